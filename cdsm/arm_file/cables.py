@@ -219,10 +219,7 @@ def setting_lines(cable: Cable) -> list[str]:
 def cable_lines(
     cables: Sequence[Cable], wires: Sequence[str], settings: Sequence[Sequence[str]]
 ) -> list[str]:
-    """Return the lines of the tables ``[[cables]]``; ``wires`` and ``settings`` are for each cable.
-
-    An empty wire is left out.
-    """
+    """Return the tables ``[[cables]]`` with a wire (left out if empty) and settings per cable."""
     lines = []
     for cable, wire, given in zip(cables, wires, settings, strict=True):
         lines += ["[[cables]]", f"name = {toml_value(cable.name)}"]

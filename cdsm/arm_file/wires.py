@@ -53,10 +53,7 @@ class Wires(NamedTuple):
 
 
 def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
-    """Read the tables ``[wires.NAME]`` and the wire of all cables from the keys of a file.
-
-    ``forced`` replaces all wires, if given. Raises GeometryError.
-    """
+    """Read the wires of a file, or raise GeometryError; ``forced`` replaces all, if given."""
     if not isinstance(keys.wires, dict):
         raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
     named, usual, faults = {}, None, []
@@ -77,10 +74,7 @@ def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
 
 
 def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire") -> Elasticity:
-    """Return the law ``given`` as a name (also one of ``named``), as EA [N], or as a table.
-
-    GeometryError names its faults, at ``key``.
-    """
+    """Return the law ``given`` by name, as EA [N] or as a table; GeometryError names ``key``."""
     try:
         if isinstance(given, dict):
             return from_table(given)

@@ -67,10 +67,7 @@ def stiffness(
 
 
 def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
-    """Compute the breakaway load along x, y and z from ``tension``.
-
-    An axis is left out if no load along it makes a cable slide, or if the arm buckles first.
-    """
+    """Compute the breakaway loads along x, y, z that exist before the arm buckles."""
     found = {}
     if tension.posture.arm.has_friction:
         for axis in ("x", "y", "z"):

@@ -93,10 +93,7 @@ def identify(
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:
-    """Return the bounds of each parameter in ``free``, texts NAME or NAME=LOW:HIGH.
-
-    Bounds are in units shown to the user; None where they are not given.
-    """
+    """Return the bounds, in shown units, of each NAME or NAME=LOW:HIGH; None if not given."""
     ranges: dict[str, Range | None] = {}
     for each in free:
         name, _, given = each.partition("=")
@@ -142,10 +139,7 @@ class _Shown:
         }
 
     def bounds(self, name: str, given: Range | None) -> Range:
-        """Return the bounds of a parameter in the units of its label.
-
-        They are ``given``, or 0 to 1 for friction, or half to twice the present value.
-        """
+        """Return ``given``; by default 0 to 1 for friction, else half to twice the value now."""
         if given is not None:
             return given
         if name.partition("@")[0] == "friction":

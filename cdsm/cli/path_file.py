@@ -48,10 +48,9 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     found = named_columns(table, refuse)
 
     def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
-        """Return the columns ``wanted`` (S, n) in SI; None if the file has none of them.
+        """Return the columns ``wanted``, with their units, (S, n) in SI; None if none is there.
 
-        ``wanted`` gives the allowed units of each name. If only a part of the columns is there,
-        the others are zero with ``some``; otherwise this is an error.
+        With ``some``, columns that are missing are zero; otherwise they are an error.
         """
         if not wanted.keys() & found.keys():
             return None
@@ -77,10 +76,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
 
 
 def one_target(given: float | None, of_file: Array | None, option: str) -> float | Array:
-    """Return the target ``given`` by an option, or the targets ``of_file`` [N/m]; one must exist.
-
-    Raises BadParameter if neither or both are given.
-    """
+    """Return the target of the option or of the file [N/m]; BadParameter unless one is given."""
     if given is not None and of_file is None:
         return given
     if given is None and of_file is not None:

@@ -225,10 +225,7 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
 def _answer(
     as_json: bool, dataset: xarray.Dataset, written: Path, conditions: Conditions | None = None
 ) -> None:
-    """Print the written file and the unstable entries of ``dataset``.
-
-    Of a new sweep also print its conditions and the count of each status.
-    """
+    """Print the written file and unstable entries; of a new sweep also conditions and counts."""
     from cdsm.support.datasets import status_names
 
     status = dataset["status"].values

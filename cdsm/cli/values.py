@@ -59,10 +59,7 @@ def gravity_of(text: str) -> list[float] | str:
 
 
 def numbers(option: str, text: str, count: int | None = None, form: str = "numbers") -> list[float]:
-    """Return the numbers in the text of ``option``, separated by commas or spaces.
-
-    Raises BadParameter unless there are ``count`` of them; ``form`` says what is expected.
-    """
+    """Return the ``count`` numbers in the text of an option; BadParameter names the ``form``."""
     from cdsm.support.format import plural
 
     try:

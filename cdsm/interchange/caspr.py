@@ -133,10 +133,7 @@ def _read_cables(
 
 
 def _unique(name: str, used: dict[str, int]) -> str:
-    """Return the name, with a number if it is already in ``used``, and add it to ``used``.
-
-    ``used`` has the highest number of each name.
-    """
+    """Return the name, numbered if it is in ``used``, which has the highest number of each."""
     label, count = name, used.get(name, 1)
     while label in used:
         count += 1

@@ -144,10 +144,7 @@ def _body(element: etree._Element, name: str) -> Body:
 
 
 def _single_joints(name: str, kind: str, joint: etree._Element) -> tuple[SingleJoint, ...]:
-    """Split a CASPR joint of type ``kind`` into single joints, in the order of its coordinates.
-
-    ``name`` is that of the link.
-    """
+    """Split a CASPR joint of the link ``name`` into single joints, in the order of coordinates."""
     if kind in _JOINTS:
         parts: list[tuple[str, str, tuple[float, ...]]] = [
             (axis, "revolute", _AXES[axis])

@@ -242,10 +242,7 @@ def _without_motors(K: Stiffness) -> Stiffness:
 def _cables(
     root: etree._Element, arm: Manipulator, K: Stiffness | None, actuators: str, damping: Array
 ) -> list[float]:
-    """Add the tendons with their damping (C,) [N s/m], and their actuators, to ``root``.
-
-    Return ``ctrl`` of the motors at the posture.
-    """
+    """Add tendons with damping (C,) [N s/m] and actuators; return ``ctrl`` at the posture."""
     tendon, motors = etree.SubElement(root, "tendon"), etree.Element("actuator")
     at_start = []
     for c, cable in enumerate(arm.cables):

@@ -33,8 +33,8 @@ _GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mas
 def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> list[Carried]:
     """Add the tree of links to ``root``, joints at ``start`` [rad, m]; return the masses.
 
-    MuJoCo's ``ref`` is the coordinate of a joint in the configuration in which the file places the
-    bodies: a joint is moved by qpos − ref. So a new ``mjData`` starts there.
+    MuJoCo moves a joint by qpos − ref from where the file places it. With ref at ``start``, a new
+    ``mjData`` starts there.
     """
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
@@ -110,10 +110,9 @@ def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[C
 
 
 def _inertia(inertia: etree._Element, R: Array) -> Array:
-    """Compute the inertia (3, 3) in the link frame, with moments that MuJoCo accepts.
+    """Compute the inertia (3, 3), turned by R, with moments that MuJoCo accepts.
 
-    MuJoCo refuses zero moments, and a largest moment near the sum of the other two. ``R`` rotates
-    from the frame of the inertia to that of the link.
+    MuJoCo refuses zero moments, and a largest moment near the sum of the other two.
     """
     xx, yy, zz, xy, xz, yz = (
         float(inertia.get(key)) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -130,10 +129,7 @@ def _inertia(inertia: etree._Element, R: Array) -> Array:
 
 
 def _shape(body: etree._Element, visual: etree._Element) -> bool:
-    """Add a ``visual`` of a URDF to a body; return False unless it is a cylinder, box or sphere.
-
-    Meshes are left out, since they are separate files.
-    """
+    """Draw a cylinder, box or sphere of a URDF; return False for meshes, which are other files."""
     shape = visual.find("geometry/*")
     if shape is None or shape.tag not in ("cylinder", "box", "sphere"):
         return False
@@ -150,10 +146,7 @@ def _shape(body: etree._Element, visual: etree._Element) -> bool:
 def _sticks(
     body: etree._Element, ends: list[Array], sites: list[tuple[float, ...]], radius: float
 ) -> None:
-    """Draw a body as sticks of a radius [m] from its frame to the next joints, at ``ends``.
-
-    Thin sticks join them to its sites.
-    """
+    """Draw a body as sticks to the next joints, at ``ends``, and thin sticks to its sites."""
     lines = [np.array([np.zeros(3), end]) for end in ends if np.linalg.norm(end) > radius]
     bones = [(line, radius) for line in lines]
     for site in map(np.asarray, dict.fromkeys(sites)):
@@ -166,10 +159,7 @@ def _sticks(
 
 
 def _placed(element: etree._Element, kind: str | None = None, start: float = 0.0) -> dict[str, str]:
-    """Return MJCF's pos and quat for the origin of a URDF element.
-
-    For a joint of type ``kind``, the body is moved to its coordinate ``start``.
-    """
+    """Return pos and quat of an origin; a joint of a ``kind`` is moved to ``start``."""
     place, turn = _origin(element)
     if kind is not None and start:
         axis = _axis(element) / np.linalg.norm(_axis(element))

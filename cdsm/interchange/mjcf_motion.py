@@ -42,11 +42,10 @@ def choose_motion(
     ratio: float | None,
     damping: float | None,
 ) -> Motion:
-    """Choose the time step for the highest natural frequency of K and ``masses``, and the damping.
+    """Choose the time step for the fastest mode of K and ``masses``, and the damping.
 
-    If ``damping`` of the joints is None, the cables damp with c = β k; β gives the least damped
-    mode the ``ratio``. Joint dampers that damp this mode as much would slow down the slow motions
-    of a long arm tenfold.
+    Without ``damping`` of the joints, the cables damp with c = β k, so that the least damped mode
+    has the ``ratio``. Joint dampers would slow down the slow motions of a long arm tenfold.
     """
     wires, joints = np.zeros(len(arm.cables)), damping or 0.0
     step, reason = _DEFAULT_STEP, "MuJoCo's own"
@@ -73,10 +72,7 @@ def choose_motion(
 
 
 def _time_step(omega: float) -> float:
-    """Choose a time step [s] for the natural frequency ``omega`` [rad/s] of the fastest mode.
-
-    It is 1, 2 or 5 times a power of ten.
-    """
+    """Choose 1, 2 or 5 times 10ⁿ s for the natural frequency [rad/s] of the fastest mode."""
     if omega * _DEFAULT_STEP <= _PHASE:
         return _DEFAULT_STEP
     power = math.floor(math.log10(_PHASE / omega))

@@ -106,10 +106,7 @@ class RoughPrototype:
         ]
 
     def tips_to_first_order(self, paths: Sequence[LoadingPath]) -> Array:
-        """Compute the tips (15, 3) [m] under the weights, to first order.
-
-        ``paths`` are the answer of :meth:`weigh` for a prototype with similar parameters.
-        """
+        """Compute the tips (15, 3) [m] to first order from the ``paths`` of a similar prototype."""
         pose = self.arm().at(POSTURE)
         tensions = np.repeat(self._tensions(pose), 3, axis=0)
         pairs = zip(paths, tensions, strict=True)

@@ -91,10 +91,7 @@ def _changes(lead: float, length: OriginalLength) -> Array:
 
 
 def _first_fall(changes: Array, length: OriginalLength, reading: int) -> tuple[float, ...]:
-    """Find the lead [mm] above which stiffness falls, for x, y and z; 0 if it always falls.
-
-    ``changes`` (N, 3) [%] at :data:`LEADS` are the row ``reading`` of :func:`_changes`.
-    """
+    """Find the lead [mm] above which stiffness falls, for x, y and z; 0 if it always falls."""
 
     def crossing(axis: int) -> float:
         if changes[0, axis] < 0.0:

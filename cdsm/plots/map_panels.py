@@ -85,10 +85,9 @@ class Case(NamedTuple):
 def cases_of(
     dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
 ) -> Iterator[Case]:
-    """Yield the values of ``quantity`` for each case: each place in the dimensions but ``poses``.
+    """Yield the values of ``quantity`` for each place in the dimensions but ``poses``.
 
-    ``words`` are the words for the values of the status. Unstable entries become NaN, except in
-    the margin.
+    ``words`` name the values of the status. Unstable entries become NaN, except in the margin.
     """
     status = dataset["status"]
     allowed = {*map(str, status.dims), "direction"}
@@ -130,10 +129,7 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
 
 
 def slices_of(points: Array, section: tuple[str, float, float] | None) -> tuple[list[Slice], bool]:
-    """Return the slabs to show of tips (N, 3) [m], and whether they are slices of a cloud.
-
-    ``section`` is one slab: axis, position and half thickness [m].
-    """
+    """Return the slabs of tips (N, 3) [m] to show, and whether they are slices of a cloud."""
     if section is not None:
         return [_slab(section)], False
     if not len(points):

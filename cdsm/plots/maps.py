@@ -239,10 +239,7 @@ def _draw(
 def _legend(
     figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
-    """Draw the legend of ``maps``: marker and word of each status, and its share of entries.
-
-    ``counted`` are the entries; ``words`` are the words for the values of the status.
-    """
+    """Draw marker and word of each status, and its share of the entries ``counted``."""
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)
     handles = []

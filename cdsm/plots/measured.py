@@ -84,10 +84,7 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Plot the stiffnesses and loops of ``fit``, predicted and measured, and residuals in σ.
-
-    ``labels`` are the names of the residuals, ``title`` is that of the figure.
-    """
+    """Plot predicted and measured values, and residuals in σ, named by ``labels``."""
     rows = fit._rows
     loops: list[Any] = [each for each in fit.measurements if hasattr(each, "forces")]
     stiff = [k for k, each in enumerate(rows) if not hasattr(each, "forces")]
@@ -132,10 +129,7 @@ def _plot_stiffnesses(axes: Any, fit: Identification, rows: Sequence[int]) -> No
 def _plot_loop(
     axes: Any, fit: Identification, loop: WeightLoop, rows: Sequence[int], colour: Any
 ) -> None:
-    """Plot the displacement along the force of ``loop``, relative to its first measured reading.
-
-    ``rows`` are the rows of the loop in ``fit``.
-    """
+    """Plot ``loop``, whose rows in ``fit`` are given, relative to its first measured reading."""
     u = np.array(loop.direction) / np.linalg.norm(loop.direction)
     along = loop.axes @ u
     read, model = (

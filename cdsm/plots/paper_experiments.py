@@ -80,7 +80,7 @@ def plot_strand(result: paper.StrandFigure) -> Figure:
 
 
 def plot_experiment(result: paper.ExperimentFigure) -> Figure:
-    """Plot each trace of ``result`` in a panel: computed values as a line, the paper's as dots."""
+    """Plot each trace in a panel: computed values as a line, the paper's as dots."""
     scale = 1.0 if result.relative else N_PER_MM
     unit = "stiffness in y\nover the first [-]" if result.relative else "stiffness [N/mm]"
     tension = result.swept == "tension"

@@ -157,10 +157,7 @@ def legend(axes: Any, **options: Any) -> Any:
 
 
 def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> None:
-    """Draw a legend below all panels, of the labels of one panel or several, in ``columns``.
-
-    A label that several panels have appears once.
-    """
+    """Draw one legend below all panels, with each label of ``axes`` (one or several) once."""
     found: dict[str, Any] = {}
     for panel in np.ravel(axes):
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
@@ -196,10 +193,7 @@ def equal_axes(axes: Any, zoom: float = 0.75) -> None:
 
 
 class _Picture(Axes3D):  # type: ignore[misc]
-    """3D axes that take the space of what they show, not of the larger square around it.
-
-    Notebooks crop figures to these boxes.
-    """
+    """3D axes as wide as what they show, without the square around it: notebooks crop to it."""
 
     def get_tightbbox(self, renderer: Any = None, **options: Any) -> Bbox:
         """Return the box around the cube of the axes, with ticks and labels [pixel]."""
@@ -230,10 +224,7 @@ def finish_picture(figure: Figure, axes: Any, title: str, right: float = 1.0) ->
 
 
 def fill_canvas(axes: Any, right: float = 1.0) -> None:
-    """Enlarge a 3D picture until it fills its figure, up to a fraction ``right`` of the width.
-
-    The figure gets the height that the picture, its title and its legend need.
-    """
+    """Enlarge a 3D picture to a fraction of the width of its figure, and fit the height."""
     figure = axes.figure
     legends, titles = figure.legends, [figure._suptitle] if figure._suptitle else []
     for _ in range(4):  # text keeps its size, so the right scale is found step by step

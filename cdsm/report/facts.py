@@ -133,10 +133,7 @@ def ranks(K: Stiffness) -> tuple[Rank, Rank, Rank]:
 
 
 def closure(K: Stiffness) -> float:
-    """Compute the largest min(n)/max(n) [-] of tensions n ≥ 0 without torque: J_Lᵀ n = 0.
-
-    Zero means that the arm cannot be pretensioned by all cables.
-    """
+    """Compute the largest min(n)/max(n) [-] of tensions n ≥ 0 with J_Lᵀ n = 0; 0 if none exist."""
     A = (K.posture.length_jacobian * joint_unit(K.posture.arm)).T
     A = A / (abs(A).max() or 1.0)
     count = A.shape[1]

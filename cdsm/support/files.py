@@ -46,10 +46,7 @@ def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> st
 
 
 def _decoded(data: bytes) -> str:
-    """Decode bytes in UTF-8, Windows-1252 or UTF-16.
-
-    UTF-16 has a byte-order mark, or zero bytes between letters.
-    """
+    """Decode UTF-8, Windows-1252, or UTF-16, which has a mark, or zero bytes between letters."""
     if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return data.decode("utf-16")
     if b"\0" in data[:2]:

@@ -27,10 +27,7 @@ def rounded(value: float, *, up: bool) -> str:
 
 
 def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
-    """Return the range of ``values`` as text, such as ``2 to 5``, or ``2`` if both ends look alike.
-
-    ``form`` writes one number.
-    """
+    """Return the range of ``values`` as text: ``2 to 5``, or ``2`` if both ends look alike."""
     low, high = form(float(values.min())), form(float(values.max()))
     return low if low == high else f"{low} to {high}"
 
@@ -66,10 +63,7 @@ def place(value: float, unit: str) -> str:
 
 
 def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
-    """Return a sentence: the coordinate of a joint is beyond its limits ``low`` and ``high``.
-
-    ``unit`` of the numbers is rad or m.
-    """
+    """Return a sentence: a joint [rad or m] is beyond its limits ``low`` and ``high``."""
     said = f"{joint} = {place(value, unit)} is outside {place(low, unit)} to {place(high, unit)}"
     return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
 
@@ -117,10 +111,7 @@ class JointUnits(NamedTuple):
         return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
-        """Return a scale of each joint coordinate (nv,): 1 rad, or ``length`` [m] if it slides.
-
-        A coordinate divided by its scale has no unit, so joints of both kinds can be compared.
-        """
+        """Return a scale of each joint (nv,): 1 rad, or ``length`` [m] if it slides."""
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:

@@ -22,8 +22,7 @@ _TIGHT: Final = 1e-10
 def least(cost: Array, **constraints: Any) -> OptimizeResult:
     """Minimise cost · x under the constraints of scipy's ``linprog``; return its result.
 
-    If the simplex method ends undecided at the tolerance :data:`_TIGHT` (e.g. in scipy 1.14), the
-    interior-point method with crossover to a vertex solves the program again.
+    If the simplex method ends undecided (as in scipy 1.14), the interior-point method follows.
     """
     from scipy.optimize import linprog  # slow to import
 

@@ -29,10 +29,7 @@ class _Items(Sized, Iterable[_Item], Protocol[_Item]):
 
 
 def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:
-    """Yield the items, and show a bar called ``what`` with the number of finished items.
-
-    The bar is not shown unless ``wanted``.
-    """
+    """Yield the items; if ``wanted``, show a bar called ``what`` with the number of items."""
     with progress_bar(what, len(items), wanted=wanted) as advance:
         for item in items:
             yield item
@@ -45,9 +42,8 @@ def progress_bar(
 ) -> Iterator[Callable[[int], None]]:
     """Show a bar called ``what``, and yield a function that advances it by a number of items.
 
-    ``total`` is the number of all items; None: unknown. ``done`` of them are finished already.
-    ``rate`` adds the number of items per second, without those that were ``done`` before. If the
-    bar is not ``wanted``, bars opened inside it are not shown either.
+    ``done`` of all ``total`` items (None: unknown) are finished already; ``rate`` shows the new
+    ones per second. If the bar is not ``wanted``, bars inside it are not shown either.
     """
     outermost = _outermost.get()
     token = _outermost.set(False)

@@ -119,10 +119,7 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
-    """Return ``validated`` such that it raises one :class:`GeometryError`, not pydantic's error.
-
-    ``kind`` is the record or function whose keywords the error names.
-    """
+    """Return ``validated`` such that it raises a GeometryError with the keywords of ``kind``."""
 
     @wraps(validated)
     def call(*args: object, **values: object) -> object:

@@ -130,10 +130,9 @@ def column_in(
     found: dict[str, tuple[int, str]],
     refuse: Callable[[str], NoReturn],
 ) -> tuple[int, float]:
-    """Return the index of the column ``name``, and the factor that converts it to SI.
+    """Return the index of the column ``name`` of ``found``, and the factor to SI of its unit.
 
-    ``found`` are the columns of the table, from :func:`named_columns`. ``known`` has the factor of
-    each allowed unit. A missing column, or one without an allowed unit, calls ``refuse``.
+    ``known`` has the factor of each allowed unit. Without such a column ``refuse`` is called.
     """
     at, unit = found.get(name, (-1, ""))
     if unit not in known:

@@ -77,10 +77,7 @@ def checked_suffix(path: str | os.PathLike[str]) -> str:
 
 
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
-    """Build a pandas table of a sweep's Dataset, with units in the names of the columns.
-
-    It has a row per entry of ``status``, and a column per component.
-    """
+    """Build a table of a sweep: a row per entry, a column with units per component."""
     import pandas
 
     status = dataset["status"]

@@ -107,8 +107,7 @@ _MANY = 5000
 def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
     """Return a new native float64 array of finite numbers, or raise :class:`InvalidInput`.
 
-    ``kind`` is a key of :data:`RANGES`; only its upper end is checked, since small magnitudes may
-    be rounding.
+    Of the range ``kind`` only the upper end is checked: small magnitudes may be rounding.
     """
     array = _native(name, value)
     unit, _, largest = ("", 0.0, LARGEST) if kind is None else RANGES[kind]

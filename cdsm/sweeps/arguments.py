@@ -23,10 +23,7 @@ Label = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 def label(dims: tuple[str, ...], values: object, long_name: str, units: str = "") -> Label:
-    """Build a coordinate of a Dataset along ``dims``; ``long_name`` and ``units`` describe it.
-
-    Units are SI in UDUNITS notation.
-    """
+    """Build a coordinate along ``dims``, with units in UDUNITS notation."""
     return dims, values, {"long_name": long_name} | ({"units": units} if units else {})
 
 
@@ -54,10 +51,7 @@ class Choice(ReadOnlyState, Generic[_Values]):
         return {self.name: label((self.name,), self.names, f"{kind} of the {self.name}", units)}
 
     def label(self, values: Array, dims: tuple[str, ...], long_name: str, units: str) -> Label:
-        """Build a coordinate with one entry for each value, such as the force of each wrench.
-
-        ``dims`` are its further dimensions; ``long_name`` and ``units`` as for :func:`label`.
-        """
+        """Build a coordinate with an entry for each value; ``dims`` are its further dimensions."""
         if self.names is None:
             return label(dims, values[0], long_name, units)
         return label((self.name, *dims), values, long_name, units)
@@ -66,10 +60,7 @@ class Choice(ReadOnlyState, Generic[_Values]):
 def laws_of(
     elasticity: Elasticity | Mapping[str, Elasticity] | None,
 ) -> Choice[tuple[Elasticity | None, ...]]:
-    """Return one elasticity, or several by name, checked; None keeps the arm's own laws.
-
-    Each elasticity is used for all cables.
-    """
+    """Check one elasticity of all cables, or several by name; None keeps those of the arm."""
     if elasticity is None or isinstance(elasticity, Elasticity):
         return Choice("elasticity", (elasticity,), None)
     if not isinstance(elasticity, Mapping) or not all(

@@ -11,12 +11,10 @@ Block = Mapping[str, slice]
 
 
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the size of a block along each dimension; a block has at most ``most`` postures.
+    """Return the size of a block of up to ``most`` postures along each dimension of ``poses``.
 
-    ``poses`` are the dimensions of a pose set with their lengths.
-
-    A block takes the last dimensions completely, a part of the dimension in front of them, and one
-    entry of all others. So the blocks cover all postures in order without gaps.
+    A block takes the last dimensions completely, a part of the one before, and one entry of the
+    others. So the blocks cover all postures in order without gaps.
     """
     room, extent = most, {}
     for dim, size in reversed(list(poses.items())):

@@ -37,13 +37,10 @@ def checked_client(client: object) -> None:
 def on_cluster(
     client: Client, specification: Specification, blocks: Iterable[Block]
 ) -> Iterator[tuple[Block, BlockResult | None]]:
-    """Compute ``blocks`` on a dask cluster; yield each with its result as soon as it is computed.
-
-    The result is None if the workers of the block died.
+    """Yield each block with its result as soon as a cluster has computed it; None if lost.
 
     If a worker dies, dask gives its blocks to other workers, at most ``allowed-failures`` times.
-    Then dask gives up, also for blocks that only waited on the worker. So each of these blocks is
-    tried once more, alone.
+    Then it gives up, also for blocks that only waited: each of these is tried once more, alone.
     """
     from distributed import as_completed
     from distributed.protocol.pickle import dumps  # pickles classes of a notebook by value

@@ -45,8 +45,7 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
 def law_text(law: Elasticity) -> str:
     """Return an elasticity as text; equal laws have equal texts, also in another process.
 
-    A user-defined law depends on its state and its code. The text identifies the code by the
-    domain, and by EA and strain at up to 185 tensions.
+    Of a user-defined law: its class, its state, domain, and EA and strain at up to 185 tensions.
     """
     text = repr(law)
     if type(law).__module__.startswith("cdsm.") and "..." not in text:  # numpy shortens arrays
@@ -61,10 +60,7 @@ def law_text(law: Elasticity) -> str:
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Return the classes of the laws whose digests differ between two texts of an arm.
-
-    The tuple is empty if anything else differs too.
-    """
+    """Return the classes of the laws if only their digests differ between two texts of an arm."""
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()
     pairs = zip(_SAMPLED.findall(one), _SAMPLED.findall(other), strict=True)

@@ -186,10 +186,9 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 def _bounds(
     task: SweepTask, q: Array, threads: int | None
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Return bounds of tension (R, C) [N], factors of friction (R, C), and which rows have bounds.
+    """Return bounds of tension (R, C) [N], friction (R, C), and which of R rows have bounds.
 
-    The R rows have the joint angles q (R, nv). The factor is the largest ratio of two tensions
-    along a cable; 1 without ``worst_friction``.
+    Friction is the largest ratio of two tensions along a cable; 1 without ``worst_friction``.
     """
     lows = task.minima.values
     minima = np.tile(lows, len(q) // len(lows))
@@ -222,10 +221,7 @@ def _finish(
     loss: Array,
     names: list[str],
 ) -> None:
-    """Add to ``rows`` of one law the quantities that a batch does not compute; complete ``status``.
-
-    ``tension`` is (R, C) [N]; ``loss`` (R, C) is the largest ratio of two tensions along a cable.
-    """
+    """Add the quantities of a law that a batch does not compute, and complete ``status``."""
     if "wire_strain" in names:
         # friction may take a tension along a cable out of the domain of its law
         held = _exists("tension", status)
@@ -257,10 +253,7 @@ def _rows(
     bounded: NDArray[np.bool_] | None = None,
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """Compute the quantities ``names`` for a batch of rows; NaN where the status forbids them.
-
-    Rows that are not ``bounded`` are infeasible.
-    """
+    """Compute quantities for rows; NaN where the status forbids. Unbounded rows are infeasible."""
     outputs = [_BATCH_NAMES.get(name, name) for name in names]
     found = batch.evaluate(
         arm,

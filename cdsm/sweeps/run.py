@@ -162,10 +162,9 @@ def _run(
     progress: bool,
     path: Path | None = None,
 ) -> None:
-    """Compute all pending blocks, and write the results into ``arrays``, in place.
+    """Compute all pending blocks, of the size ``extent``, and write the results into ``arrays``.
 
-    ``arrays`` has a numpy array, or a zarr array of the store at ``path``, for each output and for
-    ``status``. ``extent`` is the size of a block along each dimension.
+    These are numpy arrays, or zarr arrays of the store at ``path``.
     """
     task, poses = specification.task, specification.poses
     every = blocks(poses.sizes, extent)
@@ -189,10 +188,9 @@ def _run(
 def _side_by_side(
     specification: Specification, blocks: Sequence[Block]
 ) -> Iterator[tuple[Block, BlockResult]]:
-    """Yield each block and its result in order; others are computed meanwhile.
+    """Yield each block and its result in order; others are computed meanwhile, in threads.
 
-    Each block has one thread, so that also what numpy does runs side by side, and the writing of
-    results. The threads of the machine are divided among blocks if there are fewer of these.
+    If there are fewer blocks than threads of the machine, each block has several.
     """
     task, poses, cores = specification.task, specification.poses, checked_threads(None)
     workers = max(1, min(cores, len(blocks)))

@@ -34,10 +34,9 @@ _ORDER = "order"
 def opened(
     path: Path, specification: Specification, extent: Mapping[str, int]
 ) -> Iterator[Mapping[str, Any]]:
-    """Open the store at ``path``, or create it; yield an array for each output and ``status``.
+    """Open or create the store at ``path``; yield an array for each output and ``status``.
 
-    A new store has chunks of the block size ``extent``. The store is locked against other runs. The
-    system removes the lock when the process ends or crashes.
+    It is locked against other runs; the system removes the lock when the process ends.
     """
     import zarr
 
@@ -82,10 +81,9 @@ def read(path: Path) -> xarray.Dataset:
 
 
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> bool:
-    """Write an empty store to a temporary folder, then rename this folder to ``path``.
+    """Write an empty store aside, with chunks of the size ``extent``, and rename it to ``path``.
 
-    Its chunks have the block size ``extent``. Returns False if another run has made a store there
-    in the meantime.
+    Returns False if another run has made a store there in the meantime.
     """
     import zarr
 

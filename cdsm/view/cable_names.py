@@ -19,11 +19,7 @@ _NEAR: Final = 0.012
 
 
 def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> int | None:
-    """Return the index of the cable nearest to a ray from a camera; None if no cable is near.
-
-    ``paths`` are the ``cable_paths`` of a posture. The ray has an origin (3,) [m] and a direction
-    (3,).
-    """
+    """Return the index of the cable nearest to a ray from a camera; None if none is near."""
     u = direction / np.linalg.norm(direction)
     angles = [
         min(_angle(start - origin, end - start, u) for start, end in pairwise(path))
@@ -34,10 +30,7 @@ def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> in
 
 
 def _angle(start: Array, span: Array, u: Array) -> float:
-    """Return the smallest angle [rad] between the ray u from 0 and points of a line segment.
-
-    The segment begins at ``start`` (3,) and has the vector ``span`` (3,) [m].
-    """
+    """Return the smallest angle [rad] between the ray u from 0 and the segment start + span."""
     across, off = span - (span @ u) * u, start - (start @ u) * u
     part = float(np.clip(-(off @ across) / max(float(across @ across), 1e-300), 0.0, 1.0))
     point = start + part * span
@@ -54,10 +47,7 @@ class CableNames:
         self.chosen: int | None = None
 
     def choose(self, shown: Shown, origin: Array, direction: Array) -> None:
-        """Choose the cable of ``shown`` nearest to the ray of a click (origin and direction (3,)).
-
-        No cable is chosen if none is near.
-        """
+        """Choose the cable of ``shown`` that the ray of a click hits; None if it hits none."""
         if shown.posture is not None:
             self.chosen = clicked_cable(shown.posture.cable_paths, origin, direction)
 

@@ -85,10 +85,7 @@ class _Browser:
 
 
 class Cameras:
-    """Cameras of all browsers of a viser server, fitted to a ball.
-
-    The camera of a browser is fitted again if its size changes, unless its user has moved it.
-    """
+    """Cameras of all browsers, fitted to a ball again when their size changes, unless moved."""
 
     def __init__(self, server: viser.ViserServer, ball: Ball) -> None:
         self._server, self._ball = server, ball

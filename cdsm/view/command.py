@@ -34,10 +34,7 @@ _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin
 
 
 def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str]) -> str:
-    """Write the command, ``cdsm stiffness`` or ``cdsm weigh``, that prints numbers of a setting.
-
-    ``arm_arguments`` describe the arm: its file, and options such as ``--rigidity``.
-    """
+    """Write the command that prints the numbers of a setting: ``cdsm stiffness`` or ``weigh``."""
     weighs, units = setting.sag and bool(setting.force.any()), JointUnits(arm.slides).shown
     options = {
         "angles": _joined(x / unit for x, (_, unit) in zip(setting.q.tolist(), units, strict=True)),
@@ -74,11 +71,7 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
 
 
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
-    """Return the HTML at the end of the page: how to compute the same results without the page.
-
-    It shows :func:`command_line`, or :func:`python_lines` if ``arm_arguments`` is None, and the
-    buttons to copy it and to save the picture.
-    """
+    """Return the HTML with the command, or Python without ``arm_arguments``, and two buttons."""
     if arm_arguments is None:
         where, command = "in Python", python_lines(arm, setting)
     else:

@@ -151,10 +151,7 @@ class Guard:
         return response
 
     def _fault(self, hosts: list[str], origins: list[str], first: str) -> str:
-        """Return the reason to refuse a request, empty if there is none.
-
-        ``hosts`` and ``origins`` are its headers, ``first`` is the first part of its path.
-        """
+        """Return the reason to refuse a request, or an empty text; ``first`` begins its path."""
         if len(hosts) != 1:
             return f"a request for {len(hosts)} hosts"
         host = hosts[0]

@@ -36,10 +36,7 @@ _ARROW = 0.5
 
 @final
 class View:
-    """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``.
-
-    ``limits`` are as in :class:`Controls`.
-    """
+    """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``."""
 
     def __init__(
         self,
@@ -116,7 +113,7 @@ class View:
     def _add_path(self, path: Array, tips: Array) -> None:
         """Draw the tips (S, 3) [m] of a path, and add controls that play it.
 
-        ``path`` holds joint angles (S, nv), or is the array ``tips`` itself if only tips are given.
+        ``path`` has joint angles (S, nv), or is ``tips`` itself.
         """
         self._scene.draw_path(tips)
         go = self._handle.aim if path is tips else self._controls.move

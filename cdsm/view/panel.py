@@ -47,10 +47,9 @@ class _Row(NamedTuple):
 
 
 def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
-    """Write the panel of results. Each number is in an element with ``data-cdsm="name"``.
+    """Write the panel of results; each number is in an element with ``data-cdsm="name"``.
 
-    ``force_scale`` [m/N] is the length of the force arrow per newton. ``remark`` is shown above
-    the numbers.
+    ``force_scale`` [m/N] is the length of the force arrow per newton.
     """
     color = _COLORS.get(shown.condition, _GREY)
     badge = f"background:{color};color:white;font-weight:bold;text-align:center;padding:0.2em"

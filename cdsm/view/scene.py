@@ -102,10 +102,7 @@ class Scene:
         self.cameras = Cameras(server, self._ball(_straight(arm)))
 
     def update(self, shown: Shown, follow: bool) -> None:
-        """Draw the results ``shown``, and hide the objects without a result.
-
-        ``follow`` allows the cameras to be fitted again.
-        """
+        """Draw the results ``shown``; ``follow`` allows the cameras to be fitted again."""
         pose, force, ellipsoid = shown.posture, shown.setting.force, shown.ellipsoid
         for part in self._parts:
             part.visible = pose is not None

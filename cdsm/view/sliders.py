@@ -32,10 +32,7 @@ _ROUND = 1e-9
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, step and first position of a slider, in a unit of the SI value ``unit`` (° = π/180).
-
-    The page shows ``digits`` digits after the point.
-    """
+    """Ends, step, first position and digits of a slider, in a unit of the SI value ``unit``."""
 
     label: str
     low: float
@@ -47,10 +44,10 @@ class Range:
 
 
 def slider_range(label: str, low: float, high: float, initial: float, unit: float = 1.0) -> Range:
-    """Return the range of a slider from ``low`` to ``high`` [SI], with round ends and round steps.
+    """Return the range of a slider with round ends and round steps, in a unit shown to the user.
 
-    The ends are rounded inwards. The range always contains the first position ``initial`` [SI],
-    which is not rounded. ``unit`` is the unit shown to the user, in SI.
+    ``low``, ``high`` and ``initial`` are in SI. The ends are rounded inwards, but never beyond the
+    first position ``initial``, which is not rounded.
     """
     low, high, initial = (value / unit for value in (low, high, initial))
     if not high > low:
@@ -68,10 +65,7 @@ def slider_range(label: str, low: float, high: float, initial: float, unit: floa
 
 
 def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
-    """Return the slider range of each joint within its limits [degrees, or mm if it slides].
-
-    ``q`` (nv,) are the first positions.
-    """
+    """Return the slider range of each joint [degrees or mm], first at ``q`` (nv,) [rad or m]."""
     most = np.where(arm.slides, _LENGTHS * arm.length, _TURN)
     low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
     units = JointUnits(arm.slides).shown

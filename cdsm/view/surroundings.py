@@ -55,10 +55,7 @@ def draw_surroundings(server: viser.ViserServer, length: float) -> None:
 
 
 def section(length: float) -> float:
-    """Compute the distance [m] of labelled grid lines: 1, 2 or 5 times a power of ten.
-
-    It is the largest such distance up to a third of ``length`` [m], that of the arm.
-    """
+    """Compute the spacing [m] of labelled lines: 1, 2 or 5 times 10ⁿ, up to length/3."""
     power = math.log10(length / 3.0)
     decade = math.floor(power + _ROUNDING)
     part = max(part for part in (1.0, 2.0, 5.0) if math.log10(part) <= power - decade + _ROUNDING)

@@ -52,10 +52,7 @@ class TipHandle:
         self._changed()
 
     def solve(self, q: Array) -> Array | None:
-        """Return joint angles (nv,) near ``q`` that bring the tip to a new target.
-
-        None if there is no new target, or inverse kinematics fails.
-        """
+        """Return joint angles (nv,) near ``q`` for a new target of the tip; None without any."""
         target, self._target = self._target, None
         if target is None:
             return None

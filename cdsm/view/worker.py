@@ -9,11 +9,7 @@ from concurrent import futures
 
 
 class Worker:
-    """A thread that runs a job on request. All requests during a run cause one further run.
-
-    Requests come from many threads, more often than the job can run. Each run uses the newest
-    state.
-    """
+    """Thread that runs a job on request. All requests during a run cause one further run."""
 
     def __init__(self, job: Callable[[], None]) -> None:
         self._job = job
