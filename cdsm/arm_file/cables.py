@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -210,8 +210,7 @@ def build_cables(
 
 def setting_lines(cable: Cable) -> list[str]:
     """Return one line for each setting of a cable that is not the default."""
-    defaults = {"series_stiffness": math.inf, "control": "position", "minimum": 0.0}
-    defaults["maximum"] = math.inf
+    defaults = {field.name: field.default for field in fields(Cable)}
     given = {key: getattr(cable, key) for key in SETTINGS if getattr(cable, key) != defaults[key]}
     return [f"{key} = {toml_value(value)}" for key, value in given.items()]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -55,6 +54,7 @@ def design(
 
     A stopped search resumes from the files in --out.
     """
+    from cdsm.batch.inputs import checked_threads
     from cdsm.design.problem_file import read_problem
     from cdsm.design.refine import require_smooth
     from cdsm.support.files import make_folder, write_text
@@ -80,8 +80,7 @@ def design(
             highlight=False,
         )
 
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    processes = jobs or cores or 1
+    processes = checked_threads(jobs)
     found = cdsm.search_designs(
         task,
         generations=generations or file.generations,

@@ -226,7 +226,7 @@ def _answer(
     as_json: bool, dataset: xarray.Dataset, written: Path, conditions: Conditions | None = None
 ) -> None:
     """Print the written file and unstable entries; of a new sweep also conditions and counts."""
-    from cdsm.support.datasets import status_names
+    from cdsm.support.tidy import status_names
 
     status = dataset["status"].values
     words = status_names(dataset)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -23,6 +24,8 @@ from cdsm.support.validation import number_array, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
+    from multiprocessing.synchronize import Semaphore
+
     from distributed import Client
 
 
@@ -168,8 +171,9 @@ def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterato
     elif jobs == 1:
         yield lambda rows: (measure(problem, row) for row in rows)
     else:
-        # spawn: a forked process would inherit threads of BLAS
-        with ProcessPoolExecutor(jobs, get_context("spawn"), _set_problem, (problem,)) as pool:
+        context = get_context("spawn")  # a forked process would inherit threads of BLAS
+        given = problem, context.Semaphore(1)
+        with ProcessPoolExecutor(jobs, context, _set_problem, given) as pool:
             try:
                 yield lambda rows: pool.map(
                     _in_worker, rows, chunksize=max(1, min(16, len(rows) // 8))
@@ -194,8 +198,10 @@ _problem: list[DesignProblem] = []
 """The problem of a worker process."""
 
 
-def _set_problem(problem: DesignProblem) -> None:
+def _set_problem(problem: DesignProblem, first: Semaphore) -> None:
     _problem[:] = [problem]
+    if not first.acquire(block=False):  # one process says that it compiles kernels, for all
+        logging.getLogger("cdsm").setLevel(logging.ERROR)
 
 
 def _in_worker(row: Array) -> Found:

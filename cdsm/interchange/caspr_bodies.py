@@ -12,6 +12,7 @@ import numpy as np
 
 from cdsm.errors import FileError, counted
 from cdsm.support.files import read_text
+from cdsm.support.validation import AXES
 from cdsm.support.values import Array
 from cdsm.support.xml import XmlFault, numbers, parse_xml
 from cdsm.urdf import TIP
@@ -24,8 +25,6 @@ _TEMPLATE: Final = r"(\.\./)*templates/{}\.dtd"
 
 BASE: Final = "base"
 """Name of link 0."""
-
-_AXES: Final = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 _JOINTS: Final = {
     **{f"R_{axis}": axis.lower() for axis in "XYZ"},
@@ -147,9 +146,9 @@ def _single_joints(name: str, kind: str, joint: etree._Element) -> tuple[SingleJ
     """Split a CASPR joint of the link ``name`` into single joints, in the order of coordinates."""
     if kind in _JOINTS:
         parts: list[tuple[str, str, tuple[float, ...]]] = [
-            (axis, "revolute", _AXES[axis])
-            if axis in _AXES
-            else (f"slide_{axis.lower()}", "prismatic", _AXES[axis.lower()])
+            (axis, "revolute", AXES[axis])
+            if axis in AXES
+            else (f"slide_{axis.lower()}", "prismatic", AXES[axis.lower()])
             for axis in _JOINTS[kind]
         ]
     else:

@@ -33,7 +33,7 @@ from cdsm.plots.style import (
     panels,
     plain_log_ticks,
 )
-from cdsm.support.datasets import check_sweep, status_names
+from cdsm.support.tidy import check_sweep, status_names
 from cdsm.support.validation import one_of, whole_number
 from cdsm.support.values import Array
 

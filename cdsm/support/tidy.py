@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
-from cdsm.support.datasets import status_names
 from cdsm.support.extras import need
 from cdsm.support.files import as_path, write_file
 
@@ -76,10 +75,35 @@ def checked_suffix(path: str | os.PathLike[str]) -> str:
     return suffix
 
 
+def check_sweep(dataset: object) -> None:
+    """Raise :class:`~cdsm.InvalidInput` if an object is not the Dataset of a sweep."""
+    need("sweep", "xarray")
+    import xarray
+
+    if not isinstance(dataset, xarray.Dataset):
+        raise InvalidInput("dataset", f"{dataset!r} given; the Dataset of a sweep is needed.")
+    if "flag_meanings" not in dataset.get("status", xarray.DataArray()).attrs:
+        raise InvalidInput("dataset", "has no status; the Dataset of a sweep is needed.")
+
+
+def status_names(dataset: xarray.Dataset) -> dict[int, str]:
+    """Return the word for each value of a sweep's ``status``; InvalidInput if there are none."""
+    flags = dataset["status"].attrs
+    try:
+        values = np.atleast_1d(flags["flag_values"]).tolist()
+        return dict(zip(values, flags["flag_meanings"].split(), strict=True))
+    except (KeyError, AttributeError, TypeError, ValueError):
+        raise InvalidInput(
+            "dataset", "its status has no word for each number; the Dataset of a sweep is needed."
+        ) from None
+
+
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
     """Build a table of a sweep: a row per entry, a column with units per component."""
     import pandas
 
+    if not dataset["status"].ndim:
+        dataset = dataset.expand_dims("entry")
     status = dataset["status"]
     columns: dict[str, NDArray[Any]] = {}
     for name in (*dataset.coords, *dataset.data_vars):

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdsm.errors import FileError, InvalidInput
-from cdsm.support.datasets import check_sweep
 from cdsm.support.extras import need
 from cdsm.support.files import as_path, write_file
-from cdsm.support.tidy import checked_suffix, tidy
+from cdsm.support.tidy import check_sweep, checked_suffix, tidy
 
 if TYPE_CHECKING:
     import pandas
@@ -57,7 +56,7 @@ def sweep_to_pandas(dataset: xarray.Dataset) -> pandas.DataFrame:
         MissingExtra: xarray is not installed.
     """
     check_sweep(dataset)
-    return tidy(dataset if dataset["status"].ndim else dataset.expand_dims("entry"))
+    return tidy(dataset)
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
@@ -127,11 +126,10 @@ def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
 
 
 def _write_table(dataset: xarray.Dataset, path: Path) -> None:
-    if not dataset["status"].ndim:
-        dataset = dataset.expand_dims("entry")
     status = dataset["status"]
-    step = max(1, _ROWS * len(status) // max(1, status.size))
+    dim, size = next(iter(status.sizes.items()), (None, 1))
+    step = max(1, _ROWS * size // max(1, status.size))
     with path.open("w", encoding="utf-8", newline="") as file:
-        for start in range(0, len(status), step):
-            part = dataset.isel({status.dims[0]: slice(start, start + step)})
+        for start in range(0, size, step):
+            part = dataset if dim is None else dataset.isel({dim: slice(start, start + step)})
             tidy(part).to_csv(file, index=False, header=start == 0, lineterminator="\n")

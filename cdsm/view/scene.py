@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -52,29 +53,17 @@ class Scene:
             _LOG.warning("%s Sticks are drawn instead.", error)
             self._shapes = None
         draw_surroundings(server, length)
-        self._sticks = scene.add_line_segments(
-            "/sticks", _NOTHING, _STICK, thickness=0.012 * length, visible=False
-        )
-        self._brackets = scene.add_line_segments(
-            "/brackets", _NOTHING, GREY, thickness=1.5, thickness_units="screen", visible=False
-        )
-        self._reference = scene.add_line_segments(
-            "/reference", _NOTHING, GREY, thickness=2.5, thickness_units="screen", visible=False
-        )
+        thick = partial(scene.add_line_segments, points=_NOTHING, visible=False)
+        thin = partial(scene.add_line_segments, points=_NOTHING, thickness_units="screen")
+        self._sticks = thick("/sticks", colors=_STICK, thickness=0.012 * length)
+        self._brackets = thin("/brackets", colors=GREY, thickness=1.5, visible=False)
+        self._reference = thin("/reference", colors=GREY, thickness=2.5, visible=False)
         # one node per cable: viser treats colours of single points as linear light, so they
         # would differ from the colours of the bar
-        self._cables = [
-            scene.add_line_segments(
-                f"/cables/{i}", _NOTHING, GREY, thickness=2.5, thickness_units="screen"
-            )
-            for i in range(len(arm.cables))
-        ]
-        self._holes = [
-            scene.add_line_segments(
-                f"/holes/{name}", _NOTHING, color, thickness=thick * length, visible=False
-            )
-            for name, color, thick in (("stick", STICKS, 0.012), ("slide", SLIDES, 0.018))
-        ]
+        numbers = range(len(arm.cables))
+        self._cables = [thin(f"/cables/{i}", colors=GREY, thickness=2.5) for i in numbers]
+        self._sticking = thick("/holes/stick", colors=STICKS, thickness=0.012 * length)
+        self._sliding = thick("/holes/slide", colors=SLIDES, thickness=0.018 * length)
         # hidden if there is no posture
         self._parts = (cables,) if self._shapes is None else (body, cables)
         self._ellipsoid = scene.add_mesh_simple(
@@ -152,8 +141,8 @@ class Scene:
             (self._sticks, bones),
             (self._brackets, brackets),
             (self._reference, before),
-            (self._holes[0], sticking),
-            (self._holes[1], sliding),
+            (self._sticking, sticking),
+            (self._sliding, sliding),
         ):
             node.visible = len(lines) > 0
             if node.visible:

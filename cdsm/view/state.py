@@ -214,21 +214,18 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
         force, none = np.concatenate([setting.force, np.zeros(3)]), np.zeros(6)
         wrench = none if setting.sag else force
         tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench, setting.solver)
-        K = stiffness(pose, tension)
         if setting.sag:
-            if arm.has_friction:
-                K = stuck_stiffness(pose, tension)
-            stable, K = K.is_stable, None
+            locked = stuck_stiffness if arm.has_friction else stiffness
+            stable = locked(pose, tension).is_stable
             if arm.has_friction:
                 history = load_cycle(pose, tension, force[None])
-                rest = _rest(history)
-            else:
-                rest = equilibrium(pose, tension, force)
+            rest = equilibrium(pose, tension, force) if history is None else _rest(history)
             K = rest.stiffness
             _ = rest.compliance
             condition = Condition.STABLE if stable else Condition.LEFT_REFERENCE
             condition = condition if rest.stable else Condition.NEUTRAL
         else:
+            K = stiffness(pose, tension)
             _ = K.compliance  # raises if K_θ is singular: its margin is only rounding error
             condition = Condition.STABLE if K.is_stable else Condition.UNSTABLE
         problem = _PROBLEMS.get(condition, "\n".join(K.posture.remarks))
