@@ -12,17 +12,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conditions:
-    """First lines of an answer: the assumptions of its results, and the arm.
-
-    Attributes:
-        arm: The arm.
-        minimum: Given lower bounds of all tensions [N], one per case.
-        friction: Whether the results include the friction of the arm.
-    """
+    """First lines of an answer: the assumptions of its results, and the arm."""
 
     arm: cdsm.Manipulator
-    minimum: tuple[float, ...] = ()
-    friction: bool = False
+    minimum: tuple[float, ...] = ()  # given lower bounds of all tensions [N], one per case
+    friction: bool = False  # whether the results include the friction of the arm
 
     def __str__(self) -> str:
         x, y, z = self.arm.gravity.tolist()

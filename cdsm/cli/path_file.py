@@ -18,17 +18,11 @@ _STIFFNESS: Final = {"N/mm": 1e3, "N/m": 1.0}
 
 
 class PathFile(NamedTuple):
-    """A path of S samples, in SI.
+    """A path of S samples, in SI."""
 
-    Attributes:
-        angles: Joint angles (S, nv) [rad] ([m] where a joint slides); None if tips are given.
-        tips: Tip positions (S, 3) [m]; None if angles are given.
-        target: Wanted stiffness (S,) [N/m]; None if the file has no such column.
-    """
-
-    angles: Array | None
-    tips: Array | None
-    target: Array | None
+    angles: Array | None  # (S, nv) [rad], [m] where a joint slides; None if tips are given
+    tips: Array | None  # (S, 3) [m]; None if angles are given
+    target: Array | None  # wanted stiffness (S,) [N/m]; None without such a column
 
 
 def read_path(path: Path, arm: Manipulator) -> PathFile:

@@ -56,31 +56,18 @@ class SingleJoint(NamedTuple):
 
 @dataclass(frozen=True)
 class Body:
-    """Link of CASPR with the joint that carries it.
+    """Link of CASPR with the joint that carries it."""
 
-    Attributes:
-        number: Number from 1. The base has number 0.
-        name: Unique name of the link.
-        joints: The single joints, in order from the parent.
-        joint_names: Names of the single joints, in the order of CASPR's coordinates.
-        parent: Number of the parent link.
-        place: Position of the joint in the frame of the parent (3,) [m].
-        mass: Mass [kg].
-        centre: Centre of mass in the frame of the link (3,) [m].
-        inertia: Inertia about the centre of mass (3, 3) [kg m²].
-        end: End of the link in its frame (3,) [m].
-    """
-
-    number: int
-    name: str
-    joints: tuple[SingleJoint, ...]
-    joint_names: tuple[str, ...]
-    parent: int
-    place: Array
-    mass: float
-    centre: Array
-    inertia: Array
-    end: Array
+    number: int  # from 1; the base has 0
+    name: str  # unique
+    joints: tuple[SingleJoint, ...]  # in order from the parent
+    joint_names: tuple[str, ...]  # in the order of CASPR's coordinates
+    parent: int  # number of the parent link
+    place: Array  # of the joint in the frame of the parent (3,) [m]
+    mass: float  # [kg]
+    centre: Array  # of mass in the frame of the link (3,) [m]
+    inertia: Array  # about the centre of mass (3, 3) [kg m²]
+    end: Array  # of the link in its frame (3,) [m]
 
 
 def read_bodies(path: Path) -> tuple[Body, ...]:

@@ -18,8 +18,7 @@ from cdsm.support.xml import parse_xml
 _MASS, _INERTIA = 1e-6, 1e-9
 """Least mass [kg] and moment of inertia [kg m²] of a moving body in MuJoCo."""
 
-_SMALLEST = 1e-12
-"""A smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero."""
+_SMALLEST = 1e-12  # a smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero
 
 _ROUNDING = 1e-9
 """Relative margin: MuJoCo refuses a moment of inertia above the sum of the other two."""

@@ -16,9 +16,7 @@ from cdsm.support.values import Array
 DAMPING_RATIO = 0.05
 """Default damping ratio of the least damped mode [-]."""
 
-_SHARE = 0.5
-"""Least share of ω² from the cables, for modes that count for the damping."""
-
+_SHARE = 0.5  # least share of ω² from the cables, for modes that count for the damping
 _DEFAULT_STEP = 2e-3  # MuJoCo's own time step [s]
 
 _PHASE = 0.2

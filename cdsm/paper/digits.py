@@ -31,8 +31,7 @@ HALF_UNITS: Final = (
 )
 """Half a unit of the last printed digit of each coefficient, lowest power first."""
 
-_SAMPLES = 200
-"""Number of tensions at which the lower branch is sampled."""
+_SAMPLES = 200  # number of tensions at which the lower branch is sampled
 
 _FORCE = 1e4
 """Unit of rigidity [N] inside the linear programs; it scales them for the solver's tolerances."""

@@ -150,8 +150,7 @@ class PrototypeFit:
         return np.asarray(np.sqrt(np.mean(table**2, axis=0)))
 
 
-_NEAR = 0.02
-"""A parameter is at a bound if it is this near, as a fraction of its range."""
+_NEAR = 0.02  # a parameter is at a bound if it is this near, as a fraction of its range
 
 
 def identify_prototype(step: Step) -> PrototypeFit:

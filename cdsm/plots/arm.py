@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 BESIDE_BAR = 0.82
 """Fraction of the width of a figure to the left of the tension scale."""
 
-_FLATTEST = 0.35
-"""Smallest range of an axis, as a fraction of the largest."""
+_FLATTEST = 0.35  # smallest range of an axis, as a fraction of the largest
 
 
 def plot_arm(
@@ -94,22 +93,15 @@ def tension_bar(figure: Figure, colors: ScalarMappable) -> None:
 ELLIPSOID_GRID = 13, 25
 """Number of points of an ellipsoid from pole to pole, and around."""
 
-_LARGEST = 0.3
-"""Largest half axis of a drawn ellipsoid, as a fraction of the arm's length."""
+_LARGEST = 0.3  # largest half axis of a drawn ellipsoid, as a fraction of the arm's length
 
 
 class Ellipsoid(NamedTuple):
-    """Surface of the tip displacements C_vv f, |f| = 1 N, drawn at the tip to a scale.
+    """Surface of the tip displacements C_vv f, |f| = 1 N, drawn at the tip to a scale."""
 
-    Attributes:
-        surface: Points of the drawn surface (3, 13, 25) [m].
-        scale: Drawn displacement divided by true displacement [-], a power of ten.
-        longest: Largest true displacement per force [m/N].
-    """
-
-    surface: Array
-    scale: float
-    longest: float
+    surface: Array  # points of the drawn surface (3, 13, 25) [m]
+    scale: float  # drawn over true displacement [-], a power of ten
+    longest: float  # largest true displacement per force [m/N]
 
     def __str__(self) -> str:
         large, small = max(self.scale, 1.0), max(1.0 / self.scale, 1.0)

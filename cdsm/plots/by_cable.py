@@ -33,11 +33,8 @@ if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Shares
     from cdsm.tension import Tension
 
-_SAME = 1e-9
-"""Largest difference between the entries of two equal unit directions."""
-
-_WIDE = 12
-"""Above this number of cables a figure that names them is two columns wide."""
+_SAME = 1e-9  # largest difference between the entries of two equal unit directions
+_WIDE = 12  # above this number of cables a figure that names them is two columns wide
 
 
 def plot_shares(shares: Shares) -> Figure:

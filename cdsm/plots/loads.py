@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from cdsm.statics.load_history import LoadHistory
     from cdsm.statics.weight_test import WeightTest
 
-_ROOM = 0.08
-"""Margin above and below all values, as a fraction of their range."""
+_ROOM = 0.08  # margin above and below all values, as a fraction of their range
 
 
 def plot_weight_test(test: WeightTest) -> Figure:

@@ -21,32 +21,19 @@ _MOST_PANELS = 9
 _FLAT = 1e-9
 """The tips are in a plane if their extent along an axis is below this fraction of the largest."""
 
-_SLICE = 0.04
-"""Half thickness of the slices of a cloud of tips, divided by its extent."""
-
-_THIN = 0.15
-"""Least ratio of the sides of a map."""
-
-_ROOM = 0.05
-"""Margin around the tips, divided by their largest extent."""
+_SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
+_THIN = 0.15  # least ratio of the sides of a map
+_ROOM = 0.05  # margin around the tips, divided by their largest extent
 
 
 class Slice(NamedTuple):
-    """A slab of tips, seen along its normal.
+    """A slab of tips, seen along its normal."""
 
-    Attributes:
-        title: Title of the panel.
-        normal: Index of the axis normal to the slab.
-        place: Position of the middle of the slab on this axis [mm].
-        half: Half the thickness of the slab [mm].
-        plane: Indices of the two other axes, which the panel shows.
-    """
-
-    title: str
-    normal: int
-    place: float
-    half: float
-    plane: tuple[int, int]
+    title: str  # title of the panel
+    normal: int  # index of the axis normal to the slab
+    place: float  # position of the middle of the slab on this axis [mm]
+    half: float  # half the thickness of the slab [mm]
+    plane: tuple[int, int]  # indices of the two other axes, which the panel shows
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Return which points (N, 3) [mm] are in the slab."""

@@ -48,14 +48,12 @@ _UNITS: Final = {
 }
 """Factor and label of the colour bar for each unit of a Dataset."""
 
-_WIDE = 30.0
-"""The colours are logarithmic if the ratio of largest to smallest value exceeds this."""
+_WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
 
 _MIDDLE = (0.05, 0.95)
 """A value is an outlier if it is further outside these quantiles than they are apart."""
 
-_TALLEST = 4.0
-"""Largest height of a panel [inch]."""
+_TALLEST = 4.0  # largest height of a panel [inch]
 
 Statistic = Literal["median", "min", "max"]
 

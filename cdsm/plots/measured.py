@@ -30,11 +30,8 @@ if TYPE_CHECKING:
     from cdsm.identification.result import Identification
     from cdsm.wires.tensile.fit import TensileFit
 
-_BROAD = 0.25
-"""Stages wider than this fraction of the whole range have horizontal names."""
-
-_MOST_LABELS = 30
-"""Above this number of measurements the axis shows numbers, not names."""
+_BROAD = 0.25  # stages wider than this fraction of the whole range have horizontal names
+_MOST_LABELS = 30  # above this number of measurements the axis shows numbers, not names
 
 
 def plot_tensile_fit(fit: TensileFit) -> Figure:

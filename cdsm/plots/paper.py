@@ -46,11 +46,8 @@ _NOTE: Final = (
     "hung weight: $1/(u^T C\\,u)$, what a small weight at the tip measures"
 )
 _SWEPT: Final = {"young_modulus": "Young's modulus [GPa]", "tension": "cable tension, mean [N]"}
-_BARS: Final = 5
-"""Number of bars on a curve that show the range of tension over the cables."""
-
-_WIDE: Final = {"linewidth": 4.0, "alpha": 0.4}
-"""A line under another one, both visible."""
+_BARS: Final = 5  # number of bars on a curve that show the range of tension over the cables
+_WIDE: Final = {"linewidth": 4.0, "alpha": 0.4}  # a line under another one, both visible
 
 
 def plot_paper(result: paper.Figure) -> Figure:

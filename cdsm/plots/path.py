@@ -34,17 +34,10 @@ if TYPE_CHECKING:
     from cdsm.posture import Posture
     from cdsm.statics.natural_modes import Modes
 
-_GHOSTS: Final = 5
-"""Number of postures that are drawn over each other."""
-
-_FRAMES: Final = 150
-"""Largest number of frames of an animation; a longer path is thinned out."""
-
-_RATE: Final = 15
-"""Frames per second."""
-
-_SHAPES: Final = 3
-"""Number of modes that are drawn."""
+_GHOSTS: Final = 5  # number of postures that are drawn over each other
+_FRAMES: Final = 150  # largest number of frames of an animation; a longer path is thinned out
+_RATE: Final = 15  # frames per second
+_SHAPES: Final = 3  # number of modes that are drawn
 
 _DEFLECTED: Final = 0.25
 """Largest displacement of the tip in the picture of a mode, divided by the arm length."""

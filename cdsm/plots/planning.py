@@ -40,8 +40,7 @@ if TYPE_CHECKING:
     from cdsm.planning.range import StiffnessRange
     from cdsm.planning.saturation_curve import Saturation
 
-_SAME = 1e-9
-"""Largest entry of a unit direction outside a plane in which it lies."""
+_SAME = 1e-9  # largest entry of a unit direction outside a plane in which it lies
 
 _JUMP = 3.0
 """A change of the target is drawn as a step if it exceeds neighbouring changes of equal sign by

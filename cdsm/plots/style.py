@@ -60,8 +60,7 @@ ROOM: Final = 1.15
 NAMED: Final = 24
 """Above this number of cables, lines are not distinct, so cables are not named."""
 
-_GAP: Final = 0.06
-"""Free space around a picture [inch]."""
+_GAP: Final = 0.06  # free space around a picture [inch]
 
 BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
 """Place of a legend: at the right of its panel."""

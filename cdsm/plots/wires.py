@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 
 _POINTS: Final = 400
 
-_ENDLESS: Final = 1000.0
-"""Tension [N] to which a law without an end is drawn."""
+_ENDLESS: Final = 1000.0  # tension [N] to which a law without an end is drawn
 
 
 def plot_elasticity(law: Elasticity) -> Figure:

@@ -24,11 +24,8 @@ Sampled = Callable[[Array], Array]
 Noise = Callable[[float], Array]
 """Function from the step h to the rounding error of each function (T,)."""
 
-_LEVELS = 16
-"""Maximum number of step sizes; each is half the previous one."""
-
-_CONVERGING = 0.05
-"""Two extrapolations have not converged if their relative difference is larger."""
+_LEVELS = 16  # maximum number of step sizes; each is half the previous one
+_CONVERGING = 0.05  # two extrapolations have not converged if their relative difference is larger
 
 _AMPLIFIED = np.array([6.7, 99.0])
 """Error of extrapolated first and second differences, over noise/h and noise/h².

@@ -38,19 +38,12 @@ _BESIDE = 1e-6
 
 
 class LockedCable(NamedTuple):
-    """A cable with locked motor, computed from strain and energy of its law.
+    """A cable with locked motor, computed from strain and energy of its law."""
 
-    Attributes:
-        number: Index among the cables of the arm.
-        cable: The cable.
-        tension: F at the posture [N].
-        free_length: Original length l_0, which the motor keeps [m].
-    """
-
-    number: int
+    number: int  # index among the cables of the arm
     cable: Cable
-    tension: float
-    free_length: float
+    tension: float  # F at the posture [N]
+    free_length: float  # original length l_0, which the motor keeps [m]
 
     def tensions(self, longer: Array) -> Array:
         """Compute the tensions (P,) [N] for P changes of length of all cables, (P, C) [m]."""
@@ -114,14 +107,12 @@ def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
     return values
 
 
-_FIRST = 2.0**-4
-"""Largest step [rad], or in arm lengths for joints that slide."""
+_FIRST = 2.0**-4  # largest step [rad], or in arm lengths for joints that slide
 
 _ULPS = 2.0 * float(np.finfo(np.float64).eps)
 """Relative rounding error of a position or a length, which is a sum over the links."""
 
-_ROOT = 2e-13
-"""Relative error of a tension that is computed from the elongation."""
+_ROOT = 2e-13  # relative error of a tension that is computed from the elongation
 
 
 class Neighbourhood:

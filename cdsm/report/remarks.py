@@ -22,11 +22,8 @@ APART = 0.1
 CLOSE = 0.05
 """A note is given if a tension is nearer than this part of itself to a bound of its law."""
 
-_SINGULAR = 1e-12
-"""An eigenvalue of at most this part of the norm of K_θ is rounding."""
-
-_DIGITS = 1e10
-"""Condition number of K_θ above which K_θ⁻¹ has less than six digits."""
+_SINGULAR = 1e-12  # an eigenvalue of at most this part of the norm of K_θ is rounding
+_DIGITS = 1e10  # condition number of K_θ above which K_θ⁻¹ has less than six digits
 
 _NAMED = 4
 

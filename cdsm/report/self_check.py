@@ -40,8 +40,7 @@ _UNSETTLED = (
     "too short, or cables so stiff that they leave their law within the rounding of their length."
 )
 
-_NAMED = 3
-"""Maximum number of cables listed in a reason."""
+_NAMED = 3  # maximum number of cables listed in a reason
 
 _SUM = 16.0 * float(np.finfo(np.float64).eps)
 """Rounding error of a sum, relative to the sum of the magnitudes of its terms."""

@@ -84,13 +84,9 @@ def key(name: str, unit: str) -> str:
 
 
 class JointUnits(NamedTuple):
-    """Units of the joints of an arm; joints turn or slide.
+    """Units of the joints of an arm; joints turn or slide."""
 
-    Attributes:
-        slides: Whether each joint slides (nv,).
-    """
-
-    slides: NDArray[np.bool_]
+    slides: NDArray[np.bool_]  # whether each joint slides (nv,)
 
     @property
     def coordinates(self) -> tuple[str, ...]:

@@ -87,14 +87,12 @@ PerJoint = Annotated[
 """A value for all joints, or one for each joint, base to tip."""
 
 
-_DEEPEST = 64
-"""Maximum number of parts of a dotted key; a description of an arm needs two."""
+_DEEPEST = 64  # maximum number of parts of a dotted key; a description of an arm needs two
 
 _PART = r"""[ \t]*+(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[^\s.=\[\]{},#"']++)[ \t]*+"""
 _DEEP_KEY = re.compile(rf"(?:\.{_PART}){{{_DEEPEST}}}")
 
-_HINTED = 20
-"""Maximum number of unknown keys for which a similar known key is suggested."""
+_HINTED = 20  # maximum number of unknown keys for which a similar known key is suggested
 
 
 class CrossFaults(ValueError):

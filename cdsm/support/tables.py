@@ -16,8 +16,7 @@ from cdsm.errors import FileError
 from cdsm.support.files import read_text
 from cdsm.support.values import Array
 
-_LONGEST_CELL = 1000
-"""Maximum number of characters of a cell; numbers and names are shorter."""
+_LONGEST_CELL = 1000  # maximum number of characters of a cell; numbers and names are shorter
 
 ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
@@ -33,17 +32,11 @@ def csv_text(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
 
 
 class Table(NamedTuple):
-    """Cells of a table, without white space around them.
+    """Cells of a table, without white space around them."""
 
-    Attributes:
-        rows: Line number and cells of every line that is not a comment; the first is the header.
-        comments: Lines that begin with #.
-        delimiter: Character between cells; if it is not a comma, decimal commas are read.
-    """
-
-    rows: list[tuple[int, list[str]]]
-    comments: list[str]
-    delimiter: str
+    rows: list[tuple[int, list[str]]]  # line number and cells; the first row is the header
+    comments: list[str]  # lines that begin with #
+    delimiter: str  # between cells; unless it is a comma, decimal commas are read
 
     @property
     def header(self) -> list[str]:

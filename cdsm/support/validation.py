@@ -100,8 +100,7 @@ def quantity(
     return number
 
 
-_MANY = 5000
-"""Numbers from which BLAS may use threads of its own, which compete with ours."""
+_MANY = 5000  # numbers from which BLAS may use threads of its own, which compete with ours
 
 
 def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:

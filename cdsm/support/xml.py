@@ -13,15 +13,13 @@ from cdsm.support.validation import LARGEST
 DEEPEST = 100
 """Maximum depth of nested elements; descriptions of robots are less deep."""
 
-_LONGEST = 10_000
-"""Maximum number of characters of an attribute or of the text of an element."""
+_LONGEST = 10_000  # maximum number of characters of an attribute or of the text of an element
 
 _WIDEST = 100_000
 """Maximum number of characters of a tag with the text behind it, or of a comment; libxml2 compares
 the attributes of an element in pairs."""
 
-_SHOWN = 160
-"""Maximum number of characters of a text that a fault shows."""
+_SHOWN = 160  # maximum number of characters of a text that a fault shows
 
 
 class XmlFault(ValueError):

@@ -30,17 +30,11 @@ def label(dims: tuple[str, ...], values: object, long_name: str, units: str = ""
 @final
 @dataclass(frozen=True, eq=False)
 class Choice(ReadOnlyState, Generic[_Values]):
-    """Value or values of an argument. Several values become a dimension named after the argument.
+    """Value or values of an argument. Several become a dimension named after the argument."""
 
-    Attributes:
-        name: Name of the argument.
-        values: The values, one entry each; also one entry for a single value.
-        names: Labels or numbers of the values along the dimension; None for a single value.
-    """
-
-    name: str
-    values: _Values
-    names: NDArray[np.str_] | NDArray[np.int64] | None
+    name: str  # of the argument
+    values: _Values  # one entry each, also for a single value
+    names: NDArray[np.str_] | NDArray[np.int64] | None  # None for a single value
 
     @property
     def labels(self) -> dict[str, Label]:

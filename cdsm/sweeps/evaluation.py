@@ -54,34 +54,20 @@ _BATCH_NAMES = {
 class SweepTask(ReadOnlyState):
     """Quantities and cases to compute at each posture; with the postures, all a worker needs.
 
-    Attributes:
-        arm: The given arm.
-        laws: Elasticities to compare, each for all cables; None keeps those of the arm.
-        wrenches: Wrenches (W, 6): force [N], then moment [N m].
-        minima: Lower bounds of tension (M,) [N].
-        maximum: Upper bound [N].
-        directions: Unit directions (D, 3).
-        outputs: Names from :data:`~cdsm.sweeps.quantities.QUANTITIES`.
-        worst_friction: Whether all segments of the cables stay within the bounds.
-        diameter: Diameter of the cables [m].
-        breaking_load: Breaking load of the wire [N], or None.
-        bend_diameter: Diameter of the bend in the holes [m], or None.
-
-    Raises:
-        InvalidInput: An output needs an argument that is missing, or an argument is invalid.
+    InvalidInput if an output needs an argument that is missing, or an argument is invalid.
     """
 
     arm: Manipulator
-    laws: Choice[tuple[Elasticity | None, ...]]
-    wrenches: Choice[Array]
-    minima: Choice[Array]
-    maximum: float
-    directions: Choice[Array]
-    outputs: tuple[str, ...]
-    worst_friction: bool
-    diameter: float
-    breaking_load: float | None
-    bend_diameter: float | None
+    laws: Choice[tuple[Elasticity | None, ...]]  # each for all cables; None keeps those of the arm
+    wrenches: Choice[Array]  # (W, 6): force [N], then moment [N m]
+    minima: Choice[Array]  # lower bounds of tension (M,) [N]
+    maximum: float  # upper bound [N]
+    directions: Choice[Array]  # unit directions (D, 3)
+    outputs: tuple[str, ...]  # names from QUANTITIES
+    worst_friction: bool  # whether all segments of the cables stay within the bounds
+    diameter: float  # of the cables [m]
+    breaking_load: float | None  # of the wire [N]
+    bend_diameter: float | None  # of the bend in the holes [m]
 
     def __post_init__(self) -> None:
         require(

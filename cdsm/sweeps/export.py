@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_ROWS = 2**16
-"""Number of rows of a CSV table built at once."""
+_ROWS = 2**16  # number of rows of a CSV table built at once
 
 
 def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:

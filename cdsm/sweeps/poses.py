@@ -25,24 +25,16 @@ from cdsm.sweeps.blocks import Block
 MAXIMUM_POSES = 2**30
 """Maximum number of postures of a path or a random set; scipy's Sobol sequence has 30 bits."""
 
-_DRAWN = 2**16
-"""Number of Sobol points drawn at once."""
+_DRAWN = 2**16  # number of Sobol points drawn at once
 
 
 class Poses(NamedTuple):
-    """Postures of an arm.
+    """Postures of an arm."""
 
-    Attributes:
-        sizes: Length of each dimension.
-        angles: Function of a block that returns its joint angles (n, nv) [rad], in C order.
-        labels: Coordinates by name, those of the dimensions first.
-        description: Description in words.
-    """
-
-    sizes: dict[str, int]
-    angles: Callable[[Block], Array]
-    labels: dict[str, Label]
-    description: str
+    sizes: dict[str, int]  # length of each dimension
+    angles: Callable[[Block], Array]  # joint angles of a block (n, nv) [rad], in C order
+    labels: dict[str, Label]  # coordinates by name, those of the dimensions first
+    description: str  # in words
 
 
 class PoseSet(ABC):

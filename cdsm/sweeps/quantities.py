@@ -15,19 +15,12 @@ STAGES: Final = ("pose", "tension", "joint", "tip", "matrix", "principal")
 @final
 @dataclass(frozen=True)
 class Quantity:
-    """Output of a sweep: a variable of the Dataset.
+    """Output of a sweep: a variable of the Dataset."""
 
-    Attributes:
-        long_name: Name in words.
-        units: SI units in the notation of UDUNITS.
-        stage: What must exist for the quantity to exist: one of :data:`STAGES`.
-        dims: Its own dimensions, which follow those of poses and cases.
-    """
-
-    long_name: str
-    units: str
-    stage: str
-    dims: tuple[str, ...] = ()
+    long_name: str  # in words
+    units: str  # SI, in the notation of UDUNITS
+    stage: str  # what must exist for the quantity to exist: one of STAGES
+    dims: tuple[str, ...] = ()  # its own dimensions, after those of poses and cases
 
     @property
     def cases(self) -> tuple[str, ...]:

@@ -44,8 +44,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger("cdsm")
 
-_NUMBERS = 2**18
-"""Default number of joint angles in a block: some tenths of a second of work."""
+_NUMBERS = 2**18  # default number of joint angles in a block: some tenths of a second of work
 
 _NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -50,14 +50,9 @@ EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 @final
 @dataclass(frozen=True, eq=False)
 class Specification:
-    """Specification of a sweep.
+    """Specification of a sweep."""
 
-    Attributes:
-        task: Quantities and cases to compute at each posture.
-        poses: The postures.
-    """
-
-    task: SweepTask
+    task: SweepTask  # quantities and cases to compute at each posture
     poses: Poses
 
     @cached_property

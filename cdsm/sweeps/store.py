@@ -26,8 +26,7 @@ from cdsm.sweeps.specification import EMPTY, Specification
 if TYPE_CHECKING:
     import xarray
 
-_ORDER = "order"
-"""Attribute with the names of all variables in order, since a folder has no order."""
+_ORDER = "order"  # attribute with the names of all variables in order, since a folder has no order
 
 
 @contextmanager

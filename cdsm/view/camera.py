@@ -13,26 +13,22 @@ from cdsm.support.values import Array
 if TYPE_CHECKING:
     import viser
 
-_FOV: Final = math.radians(45.0)
-"""Vertical field of view."""
+_FOV: Final = math.radians(45.0)  # vertical field of view
 
 _FIRST: Final = np.array([0.2, -1.5, 0.75])
 """First direction from the arm to the camera: at its side, a little above it."""
 
-_MARGIN = 1.3
-"""Radius of the visible ball, over the radius of the arm."""
+_MARGIN = 1.3  # radius of the visible ball, over the radius of the arm
 
 _OUTSIDE, _SMALL = 1.3, 0.5
 """The cameras are fitted again if the arm's extent/fitted radius is above or below these."""
 
-_USUAL = 4.0 / 3.0
-"""Width over height of the picture for which the first camera is placed."""
+_USUAL = 4.0 / 3.0  # width over height of the picture for which the first camera is placed
 
 _PHONE = 576
 """Width in pixels up to which viser shows the panel as a sheet over the lower part of the page."""
 
-_FREE = 0.4
-"""Part of the height of a phone that this sheet leaves free."""
+_FREE = 0.4  # part of the height of a phone that this sheet leaves free
 
 
 @final

@@ -27,11 +27,8 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-_SETTLED = 0.3
-"""Seconds without a new setting before the remedies are computed, which takes longer."""
-
-_ARROW = 0.5
-"""Length of the arrow of the largest force, as a fraction of the arm's length."""
+_SETTLED = 0.3  # seconds without a new setting before the remedies are computed, which takes longer
+_ARROW = 0.5  # length of the arrow of the largest force, as a fraction of the arm's length
 
 
 @final

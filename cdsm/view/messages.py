@@ -7,8 +7,7 @@ from typing import Any, Final
 HANDLE: Final = "/target"
 """Name of the scene node that clients may drag."""
 
-_FARTHEST = 1e6
-"""Largest coordinate [m]; farther away no arm is seen."""
+_FARTHEST = 1e6  # largest coordinate [m]; farther away no arm is seen
 
 
 def scene_message(message: Any) -> dict[str, Any] | None:

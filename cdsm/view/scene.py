@@ -28,8 +28,7 @@ _LOG = logging.getLogger(__name__)
 _BODY = "/arm"
 _STICK: Final = (40, 40, 45)
 _NOTHING: Final = np.zeros((1, 2, 3))
-_ABOVE = 0.1
-"""Height of the label above the tip, as a fraction of the arm's length."""
+_ABOVE = 0.1  # height of the label above the tip, as a fraction of the arm's length
 
 
 class Scene:

@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
     from cdsm.view.guard import Guard
 
-_PANEL = 390
-"""Width of the panel in pixels, so that its longest row fits on one line."""
+_PANEL = 390  # width of the panel in pixels, so that its longest row fits on one line
 
 
 def serve(

@@ -25,8 +25,7 @@ _LENGTHS = 10.0
 _DECIMALS: Final = 9
 """Decimals of a position that is not a step, in degrees, mm or N: further ones are noise."""
 
-_ROUND = 1e-9
-"""Largest difference of an end from a round number, as a fraction of a step."""
+_ROUND = 1e-9  # largest difference of an end from a round number, as a fraction of a step
 
 
 @final

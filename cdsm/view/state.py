@@ -36,8 +36,7 @@ FORCE: Final = (59, 111, 182)
 STICKS: Final = (40, 40, 45)
 SLIDES: Final = (220, 38, 127)
 
-_BEAD: Final = 0.013
-"""Half the length of the mark of a hole, as a fraction of the arm's length."""
+_BEAD: Final = 0.013  # half the length of the mark of a hole, as a fraction of the arm's length
 
 
 class Condition(Enum):

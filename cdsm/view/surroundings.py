@@ -13,11 +13,8 @@ if TYPE_CHECKING:
     import viser
 
 _LINE, _SECTION = (222, 222, 226), (180, 180, 188)
-_CELLS: Final = 5
-"""Number of grid cells between two labelled lines."""
-
-_ROUNDING = 1e-9
-"""Rounding of a logarithm."""
+_CELLS: Final = 5  # number of grid cells between two labelled lines
+_ROUNDING = 1e-9  # rounding of a logarithm
 
 
 def draw_surroundings(server: viser.ViserServer, length: float) -> None:

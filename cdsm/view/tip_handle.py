@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     import viser
 
-_SIZE = 0.2
-"""Size of the handle, as a fraction of the arm's length."""
+_SIZE = 0.2  # size of the handle, as a fraction of the arm's length
 
 
 class TipHandle:
