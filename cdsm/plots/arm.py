@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import (
-    AXES,
     MM,
     SKY,
     SMALL,
@@ -23,6 +22,7 @@ from cdsm.plots.style import (
     finish_picture,
     picture_axes,
 )
+from cdsm.support.validation import XYZ
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def frame_arms(axes: Any, limits: Array | None, label: str = "{} [mm]") -> None:
         limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     ranges = np.ptp(limits, axis=1)
     ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
-    for name, middle, size in zip(AXES, limits.mean(axis=1), ranges, strict=True):
+    for name, middle, size in zip(XYZ, limits.mean(axis=1), ranges, strict=True):
         getattr(axes, f"set_{name}label")(label.format(name), fontsize=TEXT, labelpad=2)
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     equal_axes(axes, 1.0)

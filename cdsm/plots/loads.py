@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.plots.style import (
-    AXES,
     BESIDE,
     BLUE,
     COLORS,
@@ -24,6 +23,7 @@ from cdsm.plots.style import (
     legend,
     panels,
 )
+from cdsm.support.validation import XYZ
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,7 +46,7 @@ def plot_weight_test(test: WeightTest) -> Figure:
     loads = np.concatenate([[0.0], test.loads])
     moved = np.vstack([np.zeros(3), test.displacements])
     for axis, color, marker, nonlinear, linear in zip(
-        AXES, COLORS, "os^", moved.T, test.linear.displacement, strict=True
+        XYZ, COLORS, "os^", moved.T, test.linear.displacement, strict=True
     ):
         left.plot(MM * nonlinear, loads, f"{marker}-", color=color, markersize=3, label=axis)
         left.plot([0.0, MM * linear], [0.0, loads[-1]], "--", color=color, linewidth=0.9)
@@ -171,7 +171,7 @@ def plot_load_history(history: LoadHistory) -> Figure:
         left.set(xlabel="displacement along the force [mm]", ylabel="force [N]")
     else:
         loads = np.arange(1, len(moved) + 1)
-        for axis, color, part in zip(AXES, COLORS, moved.T, strict=True):
+        for axis, color, part in zip(XYZ, COLORS, moved.T, strict=True):
             left.plot(loads, part, color=color, label=axis, **line)
         left.set(xlabel="load", ylabel="displacement of the tip [mm]")
         legend(left)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import AXES, MM
-from cdsm.support.validation import one_of, scalar
+from cdsm.plots.style import MM
+from cdsm.support.validation import XYZ, one_of, scalar
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def slices_of(points: Array, section: tuple[str, float, float] | None) -> tuple[
         return [Slice("", normal, 0.0, np.inf, _others(normal))], False
     middle = np.median(points, axis=0)
     half = _SLICE * np.ptp(points, axis=0)
-    slices = [_slab((AXES[axis], middle[axis] / MM, half[axis] / MM)) for axis in (1, 2, 0)]
+    slices = [_slab((XYZ[axis], middle[axis] / MM, half[axis] / MM)) for axis in (1, 2, 0)]
     return slices, True
 
 
@@ -136,7 +136,7 @@ def _slab(section: tuple[str, float, float]) -> Slice:
         raise InvalidInput(
             "section", f"{section!r} given; an axis, its place and the half thickness [m] needed."
         )
-    axis = AXES.index(one_of("axis", section[0], AXES))
+    axis = XYZ.index(one_of("axis", section[0], XYZ))
     place, half = MM * scalar("section", section[1]), MM * scalar("section", section[2])
     title = f"{section[0]} = {place:.3g} ± {half:.2g} mm".replace(" ", "\xa0")  # no line break
     return Slice(title, axis, place, half, _others(axis))

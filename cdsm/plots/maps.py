@@ -17,7 +17,6 @@ from matplotlib.lines import Line2D
 from cdsm.errors import InvalidInput
 from cdsm.plots.map_panels import Case, Map, cases_of, slices_of
 from cdsm.plots.style import (
-    AXES,
     BLACK,
     MM,
     N_PER_MM,
@@ -34,7 +33,7 @@ from cdsm.plots.style import (
     plain_log_ticks,
 )
 from cdsm.support.tidy import check_sweep, status_names
-from cdsm.support.validation import one_of, whole_number
+from cdsm.support.validation import XYZ, one_of, whole_number
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -229,7 +228,7 @@ def _draw(
     axes.set(xlim=limits[0], ylim=limits[1])
     axes.plot(0.0, 0.0, "s", color="0.1", markersize=4)
     for letter, axis in zip("xy", shown.plane, strict=True):
-        getattr(axes, f"set_{letter}label")(f"{AXES[axis]} [mm]")
+        getattr(axes, f"set_{letter}label")(f"{XYZ[axis]} [mm]")
     axes.locator_params(nbins=TICKS)
     axes.set_aspect("equal")
 

@@ -16,7 +16,6 @@ from cdsm.errors import InvalidInput
 from cdsm.plots.arm import draw_arm, frame_arms
 from cdsm.plots.paper_experiments import plot_experiment, plot_prototype, plot_strand
 from cdsm.plots.style import (
-    AXES,
     BLUE,
     COLORS,
     MM,
@@ -34,6 +33,7 @@ from cdsm.plots.style import (
     plain_log_ticks,
     styled,
 )
+from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _grid(
 ) -> tuple[Figure, Any]:
     """Build a figure as wide as two columns: panels for x, y and z in each row; height [inch]."""
     figure, grid = panels(TWO_COLUMNS, height, 3, rows, sharex=True, **options)
-    for axes, axis in zip(grid[0], AXES, strict=True):
+    for axes, axis in zip(grid[0], XYZ, strict=True):
         caption(axes, axis)
     for axes in grid[-1]:
         axes.set_xlabel(_SWEPT[result.swept])
@@ -181,7 +181,7 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
     """Plot the change of stiffness over the lead: a panel per reading, a colour per direction."""
     figure, (pair,) = panels(TWO_COLUMNS, 3.4, 2, sharey=True)
     for axes, (name, reading) in zip(pair, _READINGS.items(), strict=True):
-        for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
+        for i, (axis, color) in enumerate(zip(XYZ, COLORS, strict=True)):
             for changes, length, style in (
                 (getattr(result, f"stretched_{name}"), "stretched", "-"),
                 (getattr(result, name), "unstrained", "--"),
@@ -215,7 +215,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
         caption(picture, curve.label)
         for row, (name, reading) in enumerate(_READINGS.items(), start=1):
             axes: Any = styled(figure.add_subplot(grid[row, column]))
-            for i, (axis, color) in enumerate(zip(AXES, COLORS, strict=True)):
+            for i, (axis, color) in enumerate(zip(XYZ, COLORS, strict=True)):
                 for each, look in ((original, _WIDE), (curve, {"linestyle": STYLES[i]})):
                     values = N_PER_MM * getattr(each, name)[:, i]
                     label = f"{axis}, {_LENGTHS[each.original_length]}"

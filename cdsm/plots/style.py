@@ -24,6 +24,7 @@ from mpl_toolkits.mplot3d import Axes3D, proj3d  # type: ignore[import-untyped]
 from cdsm.errors import InvalidInput
 from cdsm.support.files import as_path, write_file
 from cdsm.support.format import coordinates
+from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 
 ONE_COLUMN: Final = 3.5
@@ -43,7 +44,6 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = PALETTE = (
 )
 """The eight colours of Okabe and Ito, "Color universal design", 2008."""
 
-AXES: Final = ("x", "y", "z")
 COLORS: Final = (BLUE, VERMILLION, GREEN)
 """Colours of the directions x, y and z."""
 
@@ -186,7 +186,7 @@ def equal_axes(axes: Any, zoom: float = 0.75) -> None:
     """Give 3D axes equal scales; ``zoom`` < 1 leaves space for their labels."""
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
     axes.set_box_aspect(ranges, zoom=zoom)
-    for letter, part in zip(AXES, ranges / ranges.max(), strict=True):
+    for letter, part in zip(XYZ, ranges / ranges.max(), strict=True):
         ticks = MaxNLocator(max(1, round(TICKS * part)))  # fewer ticks on a short axis
         getattr(axes, f"{letter}axis").set_major_locator(ticks)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from cdsm.manipulator import Manipulator
-from cdsm.plots.style import AXES
+from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 from cdsm.view.command import command_text
 from cdsm.view.panel import basis_text, page_text, tensions_text
@@ -68,7 +68,7 @@ class Controls:
             self._minimum = self._add(slider_range("least tension [N]", 0.0, high, start.minimum))
             self._force = [
                 self._add(slider_range(f"force {axis} [N]", -force, force, f))
-                for axis, f in zip(AXES, start.force.tolist(), strict=True)
+                for axis, f in zip(XYZ, start.force.tolist(), strict=True)
             ]
             self._sag = self.add_switch("let it sag", _SAG, start.sag)
         ranges = joint_ranges(arm, start.q)

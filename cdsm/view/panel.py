@@ -10,10 +10,11 @@ import matplotlib
 import numpy as np
 
 from cdsm.manipulator import Manipulator
-from cdsm.plots.style import AXES, MM, N_PER_MM
+from cdsm.plots.style import MM, N_PER_MM
 from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import coordinates, plural
 from cdsm.support.markup import Markup, element
+from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 from cdsm.view.state import ELLIPSOID, FORCE, SLIDES, STICKS, Condition, Shown
 from cdsm.wires.catalogue import wires_text
@@ -115,7 +116,7 @@ def _remarks(shown: Shown, remark: str) -> Iterator[tuple[str, str]]:
 def _numbers(shown: Shown) -> Iterator[_Row]:
     K, principal, tensions, pose = shown.stiffness, shown.principal, shown.tensions, shown.posture
     if shown.along is not None and principal is not None:
-        along = {f"along-{axis}": _stiffness(F) for axis, F in zip(AXES, shown.along, strict=True)}
+        along = {f"along-{axis}": _stiffness(F) for axis, F in zip(XYZ, shown.along, strict=True)}
         yield _Row("stiffness along x, y, z", along, "N/mm")
         for name in ("softest", "stiffest"):
             direction = coordinates(principal[f"{name}_direction"], "z.2f")
