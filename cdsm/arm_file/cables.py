@@ -174,13 +174,9 @@ def _sites(entry: _Entry) -> tuple[Site, ...]:
 def build_cables(
     routed: Iterable[Routed], settings: CableSettings, wires: Wires, path: str | os.PathLike[str]
 ) -> tuple[Cable, ...]:
-    """Build the routed cables. ``settings`` apply to every cable that does not have its own.
+    """Build cables with ``wires``; ``settings`` apply to every cable without its own.
 
-    ``wires`` are the laws of the file ``path``.
-
-    Raises:
-        GeometryError: Some settings are faulty; lists every fault.
-        MissingWire: All settings are right, but some cables have no wire.
+    GeometryError lists every faulty setting. MissingWire if only the wires of some cables lack.
     """
     cables: list[Cable] = []
     faults: list[str] = []

@@ -82,14 +82,10 @@ def template(
     gravity: tuple[float, ...],
     sections: Sequence[tuple[str, Mapping[str, float]]],
 ) -> str:
-    """Return the text of an ARM.toml.
+    """Return the text of an ARM.toml called ``name``.
 
-    Args:
-        name: Name of the file.
-        wire: Name of a wire, or EA [N].
-        gravity: Gravity in base axes [m/s²].
-        sections: For each section of the arm (one for a simple arm): ``"universal"`` or
-            ``"hinged"``, and the keywords of this constructor of :class:`Geometry`.
+    ``wire`` is a name or EA [N], ``gravity`` is in base axes [m/s²]. Each section of the arm has
+    ``"universal"`` or ``"hinged"``, and the keywords of this constructor of :class:`Geometry`.
     """
     lines = [
         _HEAD.format(

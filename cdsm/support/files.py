@@ -19,9 +19,7 @@ MAXIMUM_BYTES = 10_000_000
 def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> str:
     """Return the text of a file: UTF-8, or with ``any_encoding`` also UTF-16 or Windows-1252.
 
-    Raises:
-        FileError: The file is missing, not readable, not a regular file, larger than
-            :data:`MAXIMUM_BYTES`, or of another encoding.
+    FileError if it is missing, no regular file, too large, not readable, or of another encoding.
     """
     path = as_path(path)
     try:
@@ -65,10 +63,8 @@ def write_text(path: str | os.PathLike[str], text: str) -> Path:
 def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> Path:
     """Call ``fill`` with a temporary file, then rename this file to the wanted path.
 
-    On failure the wanted path stays unchanged. A link is followed; an existing file keeps its mode.
-
-    Raises:
-        FileError: The folder is missing or not writable, the disk fails, or the path is not a file.
+    A link is followed; an existing file keeps its mode. On failure the wanted path stays unchanged,
+    and a FileError says why.
     """
     path = as_path(path)
     aside: Path | None = None
@@ -107,9 +103,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 def as_path(path: str | os.PathLike[str]) -> Path:
     """Return a path that the system can use; the file may or may not exist.
 
-    Raises:
-        InvalidInput: ``path`` is not a path.
-        FileError: The path is too long, is not text, or access is forbidden.
+    InvalidInput if it is no path; FileError if it is too long, no text, or not accessible.
     """
     try:
         found = Path(path)

@@ -71,15 +71,9 @@ def read_table(
 ) -> Table:
     """Read a table. Its delimiter is the one with which most lines have two or more numbers.
 
-    Args:
-        path: The file.
-        delimiters: Delimiters to try. If several do equally well, one that occurs in the first
-            line is preferred, in this order.
-        skip: Number of lines at the top that are not read.
-        any_encoding: Read other encodings than UTF-8, see :func:`~cdsm.support.files.read_text`.
-
-    Raises:
-        FileError: The file cannot be read, or a line cannot be split into cells; the line is named.
+    If several ``delimiters`` do equally well, the first that occurs in the first line is taken. The
+    first ``skip`` lines are not read; ``any_encoding`` is that of :func:`read_text`. FileError
+    names the line that cannot be split into cells.
     """
     text = read_text(path, any_encoding=any_encoding)
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and k > skip]

@@ -147,10 +147,9 @@ def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_
 
 
 def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | None = None) -> Array:
-    """Return a new, read-only, finite vector (size,), or raise :class:`InvalidInput`.
+    """Return a new, read-only, finite vector (size,), or raise InvalidInput with its ``meaning``.
 
-    The error quotes ``meaning``, e.g. "one angle [rad] per joint". ``kind`` is the key of the
-    entries in :data:`RANGES`.
+    ``kind`` is the key of the entries in :data:`RANGES`.
     """
     array = number_array(name, value, kind)
     if array.shape != (size,):

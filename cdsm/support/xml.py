@@ -29,12 +29,9 @@ class XmlFault(ValueError):
 def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Element:
     """Parse an XML text and return its root element, which must have the name ``root``.
 
-    ``doctype`` is a pattern of the whole system identifier of an allowed DOCTYPE, which must have
-    no public identifier (or an empty one) and no other content. The DTD is not read. Any other
-    DOCTYPE is refused, since it can define entities or name files to read.
-
-    Raises:
-        XmlFault: The text is not well-formed, too large or too deep; its DOCTYPE or root is wrong.
+    ``doctype`` is a pattern of the system identifier of an allowed DOCTYPE without other content;
+    its DTD is not read. Any other DOCTYPE is refused: it can define entities or name files to read.
+    XmlFault if the text is not well-formed, too large or too deep, or has another root.
     """
     if len(text) > MAXIMUM_BYTES:
         raise XmlFault(f"is larger than the {MAXIMUM_BYTES} characters that are read")

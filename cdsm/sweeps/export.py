@@ -86,13 +86,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
 
 
 def check_target(path: str | os.PathLike[str]) -> None:
-    """Check a path for :func:`write_sweep` before the sweep runs.
-
-    Raises:
-        InvalidInput: The path ends neither in ``.nc`` nor in ``.csv``.
-        MissingExtra: netCDF4 is needed and not installed.
-        FileError: The path is a folder, or its folder does not exist.
-    """
+    """Check a path as :func:`write_sweep` does, with its errors, before the sweep runs."""
     checked_suffix(path)
     path = as_path(path)
     if path.is_dir():

@@ -54,11 +54,8 @@ class Ball:
 def placed(ball: Ball, direction: Array, aspect: float, free: float) -> tuple[Array, Array]:
     """Compute position and look-at point [m] of a camera that looks at a ball.
 
-    Args:
-        ball: What the camera shows.
-        direction: From the ball to the camera (3,), of any length.
-        aspect: Width over height of the picture.
-        free: Upper part of the picture that nothing covers, from 0 to 1.
+    ``direction`` points to the camera. ``aspect`` is width over height of the picture, whose upper
+    part ``free`` (0 to 1) nothing covers.
     """
     high = math.tan(_FOV / 2.0)
     distance = _MARGIN * ball.radius / min(high * free, high * aspect)

@@ -38,11 +38,10 @@ _SAG: Final = (
 class Controls:
     """Controls and text of an arm in the empty panel of a viser server.
 
-    ``arm_arguments`` describe the arm in a shell, see :func:`command_text`. ``limits`` [N] are the
-    ends of the sliders: of the lower bound of all tensions, and of each force component (±).
-    ``force_scale`` [m/N] is the length of the force arrow per newton. A moved control calls
-    ``changed`` from any thread. ``fit`` fits the camera of a browser. ``admit`` receives every
-    control that browsers may use.
+    ``arm_arguments`` describe the arm in a shell. ``limits`` [N] are the ends of the sliders of the
+    lower bound of all tensions, and of each force component (±). ``force_scale`` [m/N] is the
+    length of the force arrow per newton. ``changed`` is called from any thread, ``fit`` fits the
+    camera of a browser, ``admit`` receives every control that browsers may use.
     """
 
     def __init__(

@@ -20,13 +20,10 @@ _PLAY, _PAUSE = "Play", "Pause"
 
 
 class PathPlayer:
-    """Controls that play a path.
+    """Controls that play ``path``: joint angles (S, nv) or tip positions (S, 3).
 
-    Args:
-        server: Where to add the controls.
-        path: Joint angles (S, nv) or tip positions (S, 3), a row per sample.
-        go: Moves the arm to a row of ``path``, and returns when it is shown.
-        admit: Receives every control that browsers may use.
+    ``go`` moves the arm to a row of it, and returns when that is shown. ``admit`` receives every
+    control that browsers may use.
     """
 
     def __init__(

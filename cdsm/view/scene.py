@@ -32,11 +32,10 @@ _ABOVE = 0.1  # height of the label above the tip, as a fraction of the arm's le
 
 
 class Scene:
-    """An arm in a viser server.
+    """An arm in a viser server; ``force_scale`` [m/N] is the length of its force arrow.
 
     Pinocchio's visualiser draws the links from the shapes in the URDF. Sticks join the joints of
-    links without shapes, or of all links if a mesh cannot be read. ``force_scale`` [m/N] is the
-    length of the force arrow per newton.
+    links without shapes, or of all links if a mesh cannot be read.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Manipulator, force_scale: float) -> None:
