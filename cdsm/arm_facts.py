@@ -59,8 +59,8 @@ class ArmFacts(Printed):
     def length(self) -> float:
         """Length of the path from the base through the joints to the tip, all joints at zero [m].
 
-        For a robot from a URDF, the distance of a cable site from its joint counts too: tolerances
-        scale with the length, so it must not be zero.
+        For a robot from a URDF it is at least the largest distance of a cable site from its joint:
+        tolerances scale with the length, so it must not be zero.
         """
         if self.is_serpentine:
             return self.geometry.length

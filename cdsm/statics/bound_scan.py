@@ -69,7 +69,8 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
     """Return the end [N] of a scan of the lower bound from ``low``, at most ``highest``.
 
     The scan ends where no tensions balance the arm within the domains of the elasticities. If some
-    always do, it ends where the terms of K_θ that grow with the tension decide its sign.
+    always do, it ends where the terms of K_θ that grow with the tension decide whether K_θ is
+    positive definite.
     """
     if math.isinf(highest):
         # At large bounds the tensions grow in proportion to the bound. The active part of K_θ

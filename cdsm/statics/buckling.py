@@ -11,6 +11,7 @@ with locked motors moves when it buckles.
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -118,6 +119,7 @@ def critical_load(
     if not W.any():
         raise InvalidInput("wrench", "is zero, and so is any multiple of it; give a load.")
 
+    @cache
     def at(factor: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, low, high, always + factor * W, solver))
 

@@ -103,8 +103,9 @@ class WeightFriction(ReadOnlyState):
     def dithered(self) -> float:
         """Weight over displacement [N/m] after dither: the load alternates with fading amplitude.
 
-        It falls linearly from :attr:`sliding_load` to zero in :attr:`dither_cycles` cycles. NaN if
-        the arm does not slide, no equilibrium is found on the way, or 64 cycles are too few.
+        The amplitude falls linearly from :attr:`sliding_load` to zero in :attr:`dither_cycles`
+        cycles. NaN if the arm does not slide, no equilibrium is found on the way, or 64 cycles are
+        too few.
         """
         return self._dither[1]
 
