@@ -1,4 +1,4 @@
-"""Disks of a geometry, its faults, and doubts about it."""
+"""Faults of a geometry, and doubts about it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from cdsm.errors import first_of
 from cdsm.geometry.holes import sharing
-from cdsm.geometry.parts import Disk
 
 if TYPE_CHECKING:
     from cdsm.geometry.description import Description
@@ -15,22 +14,6 @@ LONGEST = 30.0
 """If an arm is longer than this [m], its lengths are probably in millimetres."""
 
 _WIDEST = 1.0  # a hole radius or disk offset larger than this [m] is probably in millimetres
-
-
-def disks_of(geometry: Description) -> tuple[Disk, ...]:
-    """Return all disks, base to tip: see :attr:`Geometry.disks`."""
-    joints, farthest = geometry.joints, farthest_holes(geometry)
-    links = ["base_disk", *(f"link{k + 1}" for k in range(len(joints)))]
-    ends = [geometry.base_length, *(link.length for link in geometry.links)]
-    disks = []
-    for k, (joint, R, end) in enumerate(zip(joints, geometry.hole_radii, ends, strict=False)):
-        for d, link, x in (
-            (2 * k, links[k], end - joint.disk_offset),
-            (2 * k + 1, links[k + 1], joint.disk_offset),
-        ):
-            radius = 1.1 * farthest[d] if joint.disk_radius is None else joint.disk_radius
-            disks.append(Disk(link, x, k + 1, R, radius))
-    return tuple(disks)
 
 
 def farthest_holes(geometry: Description) -> list[float]:

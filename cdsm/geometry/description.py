@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cdsm.geometry.checks import disks_of, doubts_about, faults_of
+from cdsm.geometry.checks import doubts_about, farthest_holes, faults_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.support.format import plural
 from cdsm.support.records import CrossFaults, Length, LengthOrZero, Name, record
@@ -77,7 +77,18 @@ class Description(Printed):
 
         A cable of joint k passes the first 2k−1 disks and ends on disk 2k.
         """
-        return disks_of(self)
+        farthest = farthest_holes(self)
+        links = ["base_disk", *(f"link{k + 1}" for k in range(len(self.joints)))]
+        ends = [self.base_length, *(link.length for link in self.links)]
+        disks = []
+        for k, (joint, R, end) in enumerate(zip(self.joints, self.hole_radii, ends, strict=False)):
+            for d, link, x in (
+                (2 * k, links[k], end - joint.disk_offset),
+                (2 * k + 1, links[k + 1], joint.disk_offset),
+            ):
+                radius = 1.1 * farthest[d] if joint.disk_radius is None else joint.disk_radius
+                disks.append(Disk(link, x, k + 1, R, radius))
+        return tuple(disks)
 
     @property
     def cable_names(self) -> tuple[str, ...]:
