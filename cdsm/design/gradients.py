@@ -12,7 +12,6 @@ of second order in the step.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -24,7 +23,6 @@ from cdsm.design.quantities import balanced, has_margin, margin, quiet_arm
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array
-from cdsm.tension import Tension
 from cdsm.tolerances.readings import Question
 
 SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "length")
@@ -68,9 +66,8 @@ def rows_and_gradients(
         links = arm.geometry.links
         value = sum(link.mass for link in links) if measure.of == "mass" else arm.geometry.length
         return np.array([value]), chain.of_links(f"link_{measure.of}")[None]
-    values, slopes, held = [], [], []
+    values, slopes = [], []
     for tension, loss in balanced(problem, design, arm):
-        held.append((tension, loss))
         posed, K = chain.at(tension, loss), stiffness(tension.posture, tension)
         if not K.is_stable:
             raise SingularStiffness("the arm is unstable here.", K.critical_direction)
@@ -86,17 +83,15 @@ def rows_and_gradients(
     if not has_margin(problem, measure):
         return np.array(values), np.array(slopes)
     return (
-        np.array(values) + _margins(problem, measure, held),
+        np.array(values) + _margins(problem, design, measure),
         np.array(slopes) + _margin_slopes(problem, design, measure),
     )
 
 
-def _margins(
-    problem: DesignProblem, measure: Measure, held: Iterable[tuple[Tension, Array]]
-) -> Array:
-    """Compute the margin for tolerances of each row (R,) of what :func:`balanced` yields."""
+def _margins(problem: DesignProblem, design: Array, measure: Measure) -> Array:
+    """Compute the margin for tolerances of each row (R,) of :func:`rows_and_gradients`."""
     found = []
-    for tension, loss in held:
+    for tension, loss in balanced(problem, design, quiet_arm(problem, design)):
         cables = range(len(tension)) if measure.of == "motor_force" else (None,)
         found += [margin(problem, measure, tension, loss, c) for c in cables]
     return np.array(found)
@@ -113,8 +108,7 @@ def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> A
         for count, weight in weights.items():
             moved = design.copy()
             moved[n] += count * step
-            held = balanced(problem, moved, quiet_arm(problem, moved))
-            slope = slope + weight / step * _margins(problem, measure, held)
+            slope = slope + weight / step * _margins(problem, moved, measure)
         found.append(slope)
     return np.array(found).T
 

@@ -49,10 +49,9 @@ def measure(problem: DesignProblem, row: Array) -> Found:
     """Compute the quantities of one design ``row`` (n,)."""
     try:
         arm = quiet_arm(problem, row)
-    except GeometryError as error:
-        return Found(np.full(len(problem.measures), math.nan), "; ".join(error.faults))
     except CdsmError as error:
-        return Found(np.full(len(problem.measures), math.nan), str(error))
+        fault = "; ".join(error.faults) if isinstance(error, GeometryError) else str(error)
+        return Found(np.full(len(problem.measures), math.nan), fault)
     return Found(_Arm(problem, row, arm).values())
 
 

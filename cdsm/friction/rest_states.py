@@ -116,16 +116,18 @@ class RestStates:
                 rows.append(row / scale)
                 slack.append(np.array([ends]) / scale)
         equations, width = np.vstack(rows), np.vstack(slack)
-        self._equations = csc_array(np.hstack([equations, np.eye(len(equations))]))
-        self._low = np.concatenate([-np.ones(nv), low, width[:, 0]])
-        self._high = np.concatenate([np.ones(nv), high, width[:, 1]])
-        self._cone, self._cone_high = _cone(K, near, far, self._low.size)
+        lowest = np.concatenate([-np.ones(nv), low, width[:, 0]])
+        highest = np.concatenate([np.ones(nv), high, width[:, 1]])
+        sparse = csc_array(np.hstack([equations, np.eye(len(equations))]))
+        none = np.zeros(len(equations))
+        # G x ≤ h, A x = 0 and the bounds of x, as proved_largest takes them
+        self._program = *_cone(K, near, far, lowest.size), sparse, none, lowest, highest
         self._pose, self._near, self._tip, self._tension = pose, near, far.tip, F
         self._bends = bends
 
     def displacement(self, u: Array) -> End:
         """Compute the largest displacement of the tip along a unit direction (3,) [m]."""
-        cost, near = np.zeros(self._low.size), self._near
+        near, cost = self._near, np.zeros(self._program[-1].size)
         cost[: near.joints.size] = (u @ self._pose.jacobian[:3]) * near.joints
         found = self._largest(cost)
         tip_joints = self._pose.arm._model.masses.tip_joints
@@ -138,7 +140,7 @@ class RestStates:
         """Compute the least and the largest tension (n, 2) [N] of each ``chosen`` segment."""
         bounds = []
         for j in chosen:
-            cost = np.zeros(self._low.size)
+            cost = np.zeros(self._program[-1].size)
             cost[self._near.joints.size + j] = 1.0
             ends = np.array([-self._largest(-cost).bound, self._largest(cost).bound])
             bounds.append(self._tension[j] + self._near.tensions[j] * ends)
@@ -151,34 +153,31 @@ class RestStates:
         """
         from scipy.sparse import csc_array, hstack
 
-        nv = self._near.joints.size
+        cone, cone_high, equations, none, low, high = self._program
         torque = (u @ self._pose.jacobian[:3]) / self._torque
         most = int(abs(torque).argmax())
         if torque[most] == 0.0:
             return math.inf
-        column = np.zeros(self._equations.shape[0])
-        column[:nv] = -torque
-        equations, cone = self._equations, self._cone
-        largest = abs(equations[[most], :]) @ np.maximum(-self._low, self._high)
+        column = np.zeros((none.size, 1))
+        column[: torque.size, 0] = -torque
+        largest = abs(equations[[most], :]) @ np.maximum(-low, high)
         bound = 1.01 * float(largest[0]) / abs(torque[most])
-        widened = object.__new__(RestStates)
-        widened.__dict__.update(
-            self.__dict__,
-            _equations=csc_array(hstack([equations, csc_array(column[:, None])])),
-            _cone=csc_array(hstack([cone, csc_array((cone.shape[0], 1))])),
-            _low=np.append(self._low, -bound),
-            _high=np.append(self._high, bound),
+        widened = (
+            csc_array(hstack([cone, csc_array((cone.shape[0], 1))])),
+            cone_high,
+            csc_array(hstack([equations, csc_array(column)])),
+            none,
+            np.append(low, -bound),
+            np.append(high, bound),
         )
-        return widened._largest(np.append(np.zeros(self._low.size), 1.0)).bound
+        return self._largest(np.append(np.zeros(low.size), 1.0), widened).bound
 
-    def _largest(self, cost: Array) -> End:
+    def _largest(self, cost: Array, program: tuple[Any, ...] | None = None) -> End:
         """Maximize cost · x over the polyhedron; the multipliers give the proved bound."""
         scale = float(abs(cost).max())
         if scale == 0.0:
             return End(0.0, 0.0, 0.0)
-        none = np.zeros(self._equations.shape[0])
-        program = self._cone, self._cone_high, self._equations, none, self._low, self._high
-        found, bound = proved_largest(cost / scale, *program)
+        found, bound = proved_largest(cost / scale, *(program or self._program))
         if found.status != OPTIMAL:
             raise SolverError("highs", f"finds no state of rest: {found.message}")
         states = self._near.joints.size + self._near.tensions.size
