@@ -212,7 +212,7 @@ class Constraint(Measure):
 
     @property
     def _scale(self) -> float:
-        """Size by which violations are divided, as the limit; negative with ``at_most``."""
+        """Size of the limit, by which violations are divided; negative for ``at_most``."""
         size = abs(self.limit) or self.unit[1]
         return size if self.at_most is None else -size
 

@@ -22,7 +22,7 @@ class _Kind(NamedTuple):
         unit: Unit shown to the user.
         size: Size of ``unit`` in SI.
         part: ``joints``, ``links`` or ``cables``: the part of the geometry that has it, if any.
-        attribute: Its name in this part.
+        attribute: Its name in this part, or in a :class:`~cdsm.Cable`.
     """
 
     unit: str
@@ -34,7 +34,7 @@ class _Kind(NamedTuple):
 KINDS: Final = {
     "friction": _Kind("", 1.0),
     "rigidity": _Kind("", 1.0),
-    "spring": _Kind("N/mm", 1e3),
+    "spring": _Kind("N/mm", 1e3, "", "series_stiffness"),
     "lead": _Kind("mm", 1e-3, "cables", "lead"),
     "hole_radius": _Kind("mm", 1e-3, "joints", "hole_radius"),
     "disk_offset": _Kind("mm", 1e-3, "joints", "disk_offset"),
@@ -114,13 +114,14 @@ class ArmParameters:
             CableError: A spring is not positive.
         """
         geometry, parts = self.geometry, dict[str, list[Any]]()
-        of_cables: dict[str, dict[int, float]] = {"friction": {}, "rigidity": {}, "spring": {}}
-        for name, given in values.items():
+        of_joint: dict[int, dict[str, float]] = {}
+        for name, number in values.items():
             one_of("parameter", name, self.names)
-            value, (kind, where) = scalar(name, given), self._place(name)
+            value, (kind, where) = scalar(name, number), self._place(name)
             part, attribute = KINDS[kind].part, KINDS[kind].attribute
             if not part:
-                of_cables[kind].update(dict.fromkeys(where, value))
+                for k in where:
+                    of_joint.setdefault(k, {})[kind] = value
                 continue
             own = parts.setdefault(part, list(getattr(geometry, part)))
             for i, k in enumerate(_joints_of(geometry, part)):
@@ -135,15 +136,13 @@ class ArmParameters:
                 replace(site, position=moved.position)
                 for site, moved in zip(old.sites, new.sites, strict=True)
             )
-            cable = replace(old, sites=sites, lead=new.lead)
-            k = route.joint
-            if k in of_cables["friction"]:
-                cable = cable.with_friction(of_cables["friction"][k])
-            if k in of_cables["rigidity"]:
-                law = cable.elasticity.scaled(of_cables["rigidity"][k])
-                cable = replace(cable, elasticity=law)
-            if k in of_cables["spring"]:
-                cable = replace(cable, series_stiffness=of_cables["spring"][k])
+            cable, given = replace(old, sites=sites, lead=new.lead), of_joint.get(route.joint, {})
+            if "friction" in given:
+                cable = cable.with_friction(given["friction"])
+            if "rigidity" in given:
+                cable = replace(cable, elasticity=cable.elasticity.scaled(given["rigidity"]))
+            if "spring" in given:
+                cable = replace(cable, series_stiffness=given["spring"])
             cables.append(cable)
         return Manipulator(
             geometry,
@@ -155,22 +154,17 @@ class ArmParameters:
     def _values(self, name: str) -> list[float]:
         """Return the values of the parameter ``name`` at its joints, in SI."""
         (kind, where), geometry = self._place(name), self.geometry
-        cables = [
-            cable
-            for cable, route in zip(self.arm.cables, geometry.cables, strict=True)
-            if route.joint in where
-        ]
         if kind == "rigidity":
             return [1.0]
-        if kind == "spring":
-            return [cable.series_stiffness for cable in cables]
-        if kind == "friction":
-            return [max(site.friction for site in cable.sites) for cable in cables]
         if kind == "hole_radius":
             return [geometry.hole_radii[k - 1] for k in where]
         part, attribute = KINDS[kind].part, KINDS[kind].attribute
-        parts = zip(_joints_of(geometry, part), getattr(geometry, part), strict=True)
-        return [getattr(each, attribute) for k, each in parts if k in where]
+        parts = getattr(geometry, part) if part else self.arm.cables
+        joints = _joints_of(geometry, part or "cables")
+        own = [each for k, each in zip(joints, parts, strict=True) if k in where]
+        if kind == "friction":
+            return [max(site.friction for site in cable.sites) for cable in own]
+        return [getattr(each, attribute) for each in own]
 
 
 def _joints_of(geometry: Geometry, part: str) -> list[int]:
