@@ -17,7 +17,7 @@ from typing import Self, final
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.kernels import chains as chain_kernels
+from cdsm.kernels.stiffness import single_length_hessian
 from cdsm.kernels.tree import Frames, Indices, Routing
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -118,7 +118,5 @@ class Segments(ReadOnlyState):
         """Compute Σ T_j ∂²l_j/∂θ² over each cable's segments j, (C, nv, nv) [N m/rad]; T (S,)."""
         cable, (_, _, segment, joint, _) = self.chains.cable, self._routing
         return frozen(
-            chain_kernels.single_tension_stiffness(
-                segment, joint, *self._frames, tension, cable, int(cable[-1]) + 1
-            )
+            single_length_hessian(segment, joint, *self._frames, tension, cable, int(cable[-1]) + 1)
         )

@@ -57,12 +57,10 @@ class CableLaws:
         for c in held:
             by_law.setdefault(_key(self._cables[c].elasticity), []).append(c)
         # usually all cables have one law, and a slice is faster than indices
+        count = len(self._cables)
         self.held = [
-            (
-                self._cables[cables[0]].elasticity,
-                slice(None) if len(cables) == len(self._cables) else np.array(cables),
-            )
-            for cables in by_law.values()
+            (cables[of[0]].elasticity, slice(None) if len(of) == count else np.array(of))
+            for of in by_law.values()
         ]
         self._least = frozen(np.array([cable.minimum for cable in self._cables]))
         self._most = frozen(np.array([cable.maximum for cable in self._cables]))
@@ -71,8 +69,7 @@ class CableLaws:
         self.series = frozen(1.0 / series)
         self.rest = frozen(np.array([cable.elasticity.rest for cable in self._cables]))
         # constant EA of linear laws; all other laws are evaluated at each tension
-        count, self.nonlinear = len(self._cables), []
-        constant, linear = np.zeros(count), np.zeros(count)
+        self.nonlinear, constant, linear = [], np.zeros(count), np.zeros(count)
         for law, of in self.held:
             if isinstance(law, LinearElasticity):
                 constant[of], linear[of] = law.rigidity(0.0), float(self._unstrained)
@@ -104,11 +101,10 @@ class CableLaws:
             pieces = _pieces(law)
             if pieces is None:
                 continue
-            first, inside = sum(each.shape[1] for each in edges), _without_slack(law)
-            kind = CURVE if isinstance(inside, TabulatedElasticity) else POLYNOMIAL
-            of_cable[held] = first, first + pieces[0].shape[1] - 1, kind
-            edges.append(pieces[0])
-            coefficients.append(pieces[1])
+            inside, kind, own = pieces
+            first = sum(each.shape[1] for each in edges)
+            of_cable[held] = first, first + own[0].shape[1] - 1, kind
+            edges, coefficients = [*edges, own[0]], [*coefficients, own[1]]
             ends[held] = (
                 law.domain.first,
                 law.domain.high,
@@ -249,21 +245,17 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
     return law.joins if isinstance(law, StrandElasticity) else ()
 
 
-def _without_slack(law: Elasticity) -> Elasticity:
-    """Return the law below which ``law`` adds a slack branch, else the law itself."""
-    return law.law if isinstance(law, SlackBelow) else law
+def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | None:
+    """Return a law without its slack branch, with the kind, edges and coefficients of its pieces.
 
-
-def _pieces(law: Elasticity) -> tuple[Array, Array] | None:
-    """Return the edges and coefficients with which kernels evaluate a law; None if they cannot.
-
-    Polynomials must be positive on the whole domain.
+    None if kernels cannot evaluate the law: polynomials must be positive on the whole domain.
     """
-    inside = _without_slack(law)
+    inside = law.law if isinstance(law, SlackBelow) else law
     if isinstance(inside, TabulatedElasticity):
-        return inside._curve.pieces
-    whole = isinstance(inside, StrandElasticity) and inside.panels.end == math.inf
-    return inside.panels.pieces if isinstance(inside, StrandElasticity) and whole else None
+        return inside, CURVE, inside._curve.pieces
+    if isinstance(inside, StrandElasticity) and inside.panels.end == math.inf:
+        return inside, POLYNOMIAL, inside.panels.pieces
+    return None
 
 
 def _joined(tables: list[Array]) -> Array:

@@ -99,9 +99,9 @@ class Posture(ReadOnlyState):
     @cached_property
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
-        routing, cables = self.arm._model.routing, len(self.cable_lengths)
+        routing, count = self.arm._model.routing, len(self.cable_lengths)
         hessian = stiffness_kernels.single_length_hessian(
-            routing.segment, routing.joint, *self._frames, cables
+            routing.segment, routing.joint, *self._frames, np.ones(count), np.arange(count), count
         )
         return frozen(hessian)
 

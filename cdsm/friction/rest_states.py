@@ -33,8 +33,7 @@ from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError, SolverError
 from cdsm.friction.neighbourhood import Neighbourhood
 from cdsm.friction.remainders import TOO_FAR, Bends, Remainders
-from cdsm.kernels.chains import single_tension_stiffness
-from cdsm.kernels.stiffness import single_load_stiffness
+from cdsm.kernels.stiffness import single_length_hessian, single_load_stiffness
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.linear_program import OPTIMAL, proved_largest
 from cdsm.support.validation import LARGEST
@@ -75,7 +74,7 @@ class RestStates:
         cable, start = chains.cable, chains.start
         F, far = K.tension[cable], Remainders(K, within)
         routing, frames, count = segments._routing, segments._frames, np.arange(length.size)
-        H = single_tension_stiffness(
+        H = single_length_hessian(
             routing.segment, routing.joint, *frames, np.ones(length.size), count, length.size
         )
         turned, straight = near.largest(H), near.largest(g)

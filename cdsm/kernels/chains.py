@@ -21,10 +21,8 @@ import math
 import numpy as np
 
 from cdsm.kernels.compiling import Width, compiled, inner, lanes, threaded, upwards
-from cdsm.kernels.records import mirror
 from cdsm.kernels.segments import (
     Segments,
-    add_length_hessian,
     segment_scratch,
     set_derivative,
     set_direction,
@@ -37,7 +35,6 @@ from cdsm.kernels.tree import (
     Tree,
     empty_frames,
     forward_kinematics,
-    one_frames,
 )
 from cdsm.support.values import Array
 
@@ -139,11 +136,8 @@ def single_chains(
     tree = Tree(parent, order, turn, translation, joint_axis, joint_slide)
     routing = Routing(row, point, segment, joint, fixed)
     nv, count, holes, rows = q.shape[0], fixed.shape[0], hole.shape[0], parent.shape[0]
-    frames, before, after = (
-        empty_frames(tree, routing, 1),
-        segment_scratch(nv, 1),
-        segment_scratch(nv, 1),
-    )
+    before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)
+    frames = empty_frames(tree, routing, 1)
     length, J, shortest = np.empty((count, 1)), np.empty((count, nv, 1)), np.empty(1)
     wrap, gradient = np.empty((holes, 1)), np.empty((holes, nv, 1))
     rotation = np.empty((rows, 3, 3, 1))
@@ -179,11 +173,8 @@ def grip_rows(
     ``hole`` and ``own`` (P,) are as for :func:`set_wraps`.
     """
     rows, nv = q.shape
-    frames, before, after = (
-        empty_frames(tree, routing, 1),
-        segment_scratch(nv, 1),
-        segment_scratch(nv, 1),
-    )
+    before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)
+    frames = empty_frames(tree, routing, 1)
     rotation, normal = np.empty((tree.parent.shape[0], 3, 3, 1)), np.empty((7, 1))
     wrap, gradient = np.empty((hole.shape[0], 1)), np.empty((hole.shape[0], 0, 1))
     span = np.zeros((routing.fixed.shape[0], 3), dtype=np.intp)  # no joints: no gradient
@@ -196,28 +187,3 @@ def grip_rows(
         grip[n] = 0.0
         for h in range(hole.shape[0]):
             grip[n, cable[h]] += friction[h] * wrap[h, 0]
-
-
-@compiled
-def single_tension_stiffness(
-    segment: Indices,
-    joint: Indices,
-    origin: Array,
-    axis: Array,
-    slide: Array,
-    site: Array,
-    tension: Array,
-    slot: Indices,
-    slots: int,
-) -> Array:
-    """Compute Σ T_j ∂²l_j/∂θ² (slots, nv, nv) [N m/rad] of one posture over the segments of a slot.
-
-    ``slot`` (S,) is the slot of each segment, such as its cable. Arrays have no axis of postures.
-    """
-    nv = origin.shape[0] - 1
-    total, weight = np.zeros((slots, nv, nv, 1)), tension.reshape(tension.shape[0], 1)
-    frames = one_frames(origin, axis, slide, site)
-    add_length_hessian(segment, joint, frames, weight, slot, segment_scratch(nv, 1), total, None)
-    for s in range(slots):
-        mirror(total[s], None)
-    return total.reshape(slots, nv, nv)

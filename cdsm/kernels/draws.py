@@ -6,27 +6,19 @@ import math
 
 import numpy as np
 
+from cdsm.kernels.bodies import Masses
 from cdsm.kernels.compiling import threaded
 from cdsm.kernels.posture import single_pose
 from cdsm.kernels.stiffness import single_cable_stiffness, single_stiffness
-from cdsm.kernels.tree import Indices
+from cdsm.kernels.tree import Indices, Routing, Tree
 from cdsm.support.values import Array
 
 
 @threaded
 def stiffness_of_draws(
-    parent: Indices,
-    order: Indices,
-    turn: Array,
-    joint_axis: Array,
-    joint_slide: Array,
-    row: Indices,
-    segment: Indices,
-    joint: Indices,
-    gravity: Array,
-    tip: int,
-    tip_joints: Indices,
-    tip_rotation: Array,
+    tree: Tree,
+    routing: Routing,
+    masses: Masses,
     first: Indices,
     series: Array,
     rest: Array,
@@ -50,11 +42,12 @@ def stiffness_of_draws(
 
     Their shapes are (N, nv, nv), (N, 3, nv), (N, 3), (N, C, nv) and (N, nv).
 
-    The first arguments are those of :func:`~cdsm.kernels.posture.single_pose` that all arms share;
-    then ``first`` (C+1,), the first site of each cable, and 1/k_series and the tension at rest of
-    the series springs (C,). Each arm has its own q (N, nv), tensions, EA (1 + ε) (N, C), leads
-    (N, C), masses (N, nv+1), and (N, …) sites, joint origins, centres of mass and tip.
+    All arms share the first arguments: ``first`` (C+1,) is the first site of each cable, then come
+    1/k_series and the tension at rest of the series springs (C,), and W. Each arm has its own q
+    (N, nv), tensions, EA (1 + ε) (N, C), leads (N, C), masses (N, nv+1), and (N, …) sites, joint
+    origins, centres of mass and tip.
     """
+    row, tip_joints = routing.row, masses.tip_joints
     cables, fixed = tension.shape[1], np.empty(tension.shape[1])
     none = np.zeros(cables)
     for n in range(q.shape[0]):
@@ -66,30 +59,30 @@ def stiffness_of_draws(
                     y, z = site[n, a + 1, 1] - site[n, a, 1], site[n, a + 1, 2] - site[n, a, 2]
                     fixed[c] += math.sqrt(x * x + y * y + z * z)
         pose, JX, L, J, g, weight, joint_origin, axis, slide, place, _ = single_pose(
-            parent,
-            order,
-            turn,
+            tree.parent,
+            tree.order,
+            tree.turn,
             origin[n],
-            joint_axis,
-            joint_slide,
+            tree.axis,
+            tree.slide,
             row,
             site[n],
-            segment,
-            joint,
+            routing.segment,
+            routing.joint,
             fixed,
             mass[n],
             centre[n],
-            gravity,
-            tip,
+            masses.gravity,
+            masses.tip,
             tip_joints,
-            tip_rotation,
+            masses.rotation,
             tip_point[n],
             q[n],
         )
         k = single_cable_stiffness(L, tension[n], rigidity[n], none, series, rest)
         _, _, _, joint_stiffness[n] = single_stiffness(
-            segment,
-            joint,
+            routing.segment,
+            routing.joint,
             joint_origin,
             axis,
             slide,

@@ -51,14 +51,8 @@ class Segments(NamedTuple):
 @inlined
 def segment_scratch(nv: int, width: int) -> Segments:
     """Allocate the scratch for a block."""
-    return Segments(
-        np.empty((3, width)),
-        np.empty(width),
-        np.empty(width),
-        np.empty((3, width)),
-        np.empty(width),
-        np.empty((nv, 3, width)),
-    )
+    a, vectors, left = np.empty((3, width)), np.empty((2, 3, width)), np.empty((nv, 3, width))
+    return Segments(vectors[0], a[0], a[1], vectors[1], a[2], left)
 
 
 @inlined

@@ -31,6 +31,7 @@ import math
 
 import numpy as np
 
+from cdsm.kernels.bodies import Masses
 from cdsm.kernels.compiling import Index, compiled, inner
 from cdsm.kernels.motion import Motion, cross, dot, move, pull_back, set_motion, to_frame
 from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
@@ -166,24 +167,9 @@ def _by_joint(
 
 @compiled
 def single_gradient(
-    parent: Indices,
-    order: Indices,
-    turn: Array,
-    translation: Array,
-    joint_axis: Array,
-    joint_slide: Array,
-    row: Indices,
-    point: Array,
-    segment: Indices,
-    joint: Indices,
-    fixed: Array,
-    mass: Array,
-    centre: Array,
-    gravity: Array,
-    tip: int,
-    tip_joints: Indices,
-    tip_rotation: Array,
-    tip_point: Array,
+    tree: Tree,
+    routing: Routing,
+    masses: Masses,
     q: Array,
     first: Indices,
     z: Array,
@@ -204,9 +190,8 @@ def single_gradient(
     With a = 1 and p = b = 0 it is zᵀ K_θ z + v·ẋ_tip. With F = k = v = a = 0, b = 1 and p the
     tensions, it is zᵀ (J_Lᵀ F + g − J_Xᵀ W), the work of the residual of Eq. 13 on the motion z.
 
-    The first arguments are those of :func:`~cdsm.kernels.posture.single_pose`. ``first`` (C+1,) is
-    the first site of each cable, ``z`` (nv,) the joint motion, ``velocity`` v (3,), ``stiffness``
-    k (C,), ``slope`` ∂k/∂L (C,), ``pull`` p (C,), ``bent`` a and ``turned`` b.
+    ``first`` (C+1,) is the first site of each cable, ``z`` (nv,) the joint motion, ``velocity`` v
+    (3,), ``stiffness`` k (C,), ``slope`` ∂k/∂L (C,), ``pull`` p (C,), ``bent`` a and ``turned`` b.
 
     Returns:
         Ψ, and its derivatives with respect to q (nv,), the sites in the frames of their joints (P,
@@ -214,14 +199,14 @@ def single_gradient(
         position of the tip (3,), the masses (nv+1,), the tensions at constant k (C,), and k (C,).
         The derivative with respect to the length of a lead is ``slope`` times the last one.
     """
-    tree = Tree(parent, order, turn, translation, joint_axis, joint_slide)
-    routing = Routing(row, point, segment, joint, fixed)
+    parent, order, row = tree.parent, tree.order, routing.row
+    mass, gravity, tip = masses.mass, masses.gravity, masses.tip
     frames = empty_frames(tree, routing, 1)
     rows, sites, nv = parent.shape[0], row.shape[0], q.shape[0]
     rotation = np.empty((rows, 3, 3, 1))
     forward_kinematics(tree, routing, q.reshape(nv, 1), np.empty((2, 1)), rotation, frames, None)
     origin, axis = frames.origin.reshape(rows, 3), frames.axis.reshape(rows, 3)
-    slide = frames.slide.reshape(joint_slide.shape[0], 3)
+    slide = frames.slide.reshape(tree.slide.shape[0], 3)
     motion = Motion(
         np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3))
     )
@@ -239,7 +224,7 @@ def single_gradient(
             if n < sites:
                 arm[r] = frames.site[n, r, 0] - origin[i, r]
             else:
-                local = centre[i] if n < sites + rows else tip_point
+                local = masses.centre[i] if n < sites + rows else masses.point
                 arm[r] = (
                     rotation[i, r, 0, 0] * local[0]
                     + rotation[i, r, 1, 0] * local[1]

@@ -10,6 +10,8 @@ from cdsm.kernels.segments import add_length_hessian, segment_scratch
 from cdsm.kernels.tree import Indices, one_frames
 from cdsm.support.values import Array
 
+_Rows = tuple[Array, Array, Array]
+
 
 @inner
 def set_cable_stiffness(
@@ -69,27 +71,19 @@ def add_passive_stiffness(
                     + scratch[2, w] * J[e, i, w]
                 )
             if i < next_row:
-                rows = passive[i], passive[next_row]
-                _add_rows(scratch, J[c], J[d], J[e], next_row, end, *rows, width)
+                rows = J[c], J[d], J[e]
+                _add_rows(scratch, rows, next_row, end, passive[i], passive[next_row], width)
 
 
 @inner
 def _add_rows(
-    products: Array,
-    x: Array,
-    y: Array,
-    z: Array,
-    first: Index,
-    end: Index,
-    upper: Array,
-    lower: Array,
-    width: Width,
+    p: Array, rows: _Rows, first: Index, end: Index, upper: Array, lower: Array, width: Width
 ) -> None:
-    """Add p·(x, y, z) and q·(x, y, z) to the entries ``first`` to ``end`` − 1 of two rows.
+    """Add p·(x, y, z) to the entries ``first`` to ``end`` − 1 of ``upper`` and ``lower`` (nv, W).
 
-    ``products`` (6, W) are p and q; x, y and z (nv, W) are rows of J_L.
+    ``rows`` x, y and z (nv, W) are of J_L; p (6, W) has three factors for each of the two.
     """
-    p = products
+    x, y, z = rows
     for j in upwards(first, end):
         for w in lanes(width):
             upper[j, w] += p[0, w] * x[j, w] + p[1, w] * y[j, w] + p[2, w] * z[j, w]
@@ -215,19 +209,21 @@ def single_length_hessian(
     axis: Array,
     slide: Array,
     site: Array,
-    cables: int,
+    weight: Array,
+    slot: Indices,
+    slots: int,
 ) -> Array:
-    """Compute ∂²L_c/∂θ_i∂θ_j (C, nv, nv) [m/rad²] of one posture.
+    """Compute Σ w_c ∂²L_c/∂θ_i∂θ_j (slots, nv, nv) of one posture over the cables of each slot.
 
-    The arrays have no axis of postures.
+    ``weight`` w and ``slot`` are (C,); for the whole tensor they are 1 and c. The cables may also
+    be segments. The arrays have no axis of postures.
     """
-    nv = origin.shape[0] - 1
-    hessian, weight, slot = np.zeros((cables, nv, nv, 1)), np.ones((cables, 1)), np.arange(cables)
-    frames = one_frames(origin, axis, slide, site)
-    add_length_hessian(segment, joint, frames, weight, slot, segment_scratch(nv, 1), hessian, None)
-    for c in range(cables):
-        mirror(hessian[c], None)
-    return hessian.reshape(cables, nv, nv)
+    nv, F = origin.shape[0] - 1, weight.reshape(weight.shape[0], 1)
+    hessian, frames = np.zeros((slots, nv, nv, 1)), one_frames(origin, axis, slide, site)
+    add_length_hessian(segment, joint, frames, F, slot, segment_scratch(nv, 1), hessian, None)
+    for s in range(slots):
+        mirror(hessian[s], None)
+    return hessian.reshape(slots, nv, nv)
 
 
 @compiled

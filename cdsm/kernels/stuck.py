@@ -65,16 +65,8 @@ class Sticking(NamedTuple):
 @inlined
 def sticking_scratch(nv: int, width: int) -> Sticking:
     """Allocate the scratch for a block of postures."""
-    return Sticking(
-        np.empty(width),
-        np.empty(width),
-        np.empty(width),
-        np.zeros((nv, width)),
-        np.empty(width),
-        np.empty(width),
-        np.empty(width),
-        np.empty((3, width)),
-    )
+    a, gradient, before = np.empty((6, width)), np.zeros((nv, width)), np.empty((3, width))
+    return Sticking(a[0], a[1], a[2], gradient, a[3], a[4], a[5], before)
 
 
 @inner
@@ -232,9 +224,7 @@ def open_next_section(section: Sticking, width: Width) -> None:
     length, soft, locked, holds = section.length, section.soft, section.locked, section.holds
     for w in lanes(width):
         length[w] = 0.0 if holds[w] > 0.0 else length[w]
-    for w in lanes(width):
         soft[w] = 0.0 if holds[w] > 0.0 else soft[w]
-    for w in lanes(width):
         locked[w] = 1.0 if holds[w] > 0.0 else locked[w]
 
 

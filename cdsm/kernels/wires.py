@@ -52,20 +52,29 @@ class Wires(NamedTuple):
 
 
 class WireScratch(NamedTuple):
-    """Scratch of one cable: piece (W,), rows of values (7, W), coefficients (rows, W)."""
+    """Scratch of one cable, (W,) each but the coefficients (rows, W).
+
+    The piece of each tension and where it begins and ends; the strain there, and from there on; a
+    node of the Gauss rule; EA.
+    """
 
     piece: Indices
-    values: Array
+    x: Array
+    begin: Array
+    end: Array
+    before: Array
+    strain: Array
+    node: Array
+    value: Array
     coefficients: Array
 
 
 @inlined
 def wire_scratch(wires: Wires, width: int) -> WireScratch:
     """Allocate the scratch for a block."""
-    rows = wires.coefficients.shape[0]
-    return WireScratch(
-        np.empty(width, dtype=np.intp), np.empty((7, width)), np.empty((rows, width))
-    )
+    piece, a = np.empty(width, dtype=np.intp), np.empty((7, width))
+    coefficients = np.empty((wires.coefficients.shape[0], width))
+    return WireScratch(piece, a[0], a[1], a[2], a[3], a[4], a[5], a[6], coefficients)
 
 
 @inner
@@ -77,9 +86,7 @@ def set_rigidity(
     It is −1 outside the domain of the law, and EA alone if the original length of a wire is the
     stretched one. Laws that are functions of Python are left out: it is 0.
     """
-    piece, values, coefficients = scratch
-    x, begin, end, before = values[0], values[1], values[2], values[3]
-    node, value, strain = values[4], values[5], values[6]
+    piece, x, begin, end, before, strain, _, value, coefficients = scratch
     for c in upwards(0, tension.shape[0]):
         for w in lanes(width):
             rigidity[c, w] = wires.constant[c] + wires.linear[c] * tension[c, w]
@@ -106,9 +113,9 @@ def set_rigidity(
             for w in lanes(width):
                 coefficients[r, w] = wires.coefficients[r, np.uint64(piece[w])]
         if kind == CURVE:
-            _set_curve(coefficients, x, begin, end, value, strain, width)
+            _set_curve(scratch, width)
         else:
-            _set_integral(wires.nodes, coefficients, x, begin, node, value, strain, width)
+            _set_integral(wires.nodes, scratch, width)
             _set_polynomial(coefficients, x, value, width)
         for w in lanes(width):
             F = tension[c, w]
@@ -118,16 +125,9 @@ def set_rigidity(
 
 
 @inner
-def _set_curve(
-    coefficients: Array,
-    x: Array,
-    begin: Array,
-    end: Array,
-    rigidity: Array,
-    strain: Array,
-    width: Width,
-) -> None:
-    """Fill EA and ε (W,) at x (W,) of curves of strain, ε from the start of the piece."""
+def _set_curve(scratch: WireScratch, width: Width) -> None:
+    """Fill EA and the strain from the start of the piece, of curves of strain."""
+    _, x, begin, end, _, strain, _, rigidity, coefficients = scratch
     chord, rise, a, b = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
     for w in lanes(width):
         wide = end[w] - begin[w]
@@ -138,17 +138,9 @@ def _set_curve(
 
 
 @inner
-def _set_integral(
-    nodes: Array,
-    coefficients: Array,
-    x: Array,
-    begin: Array,
-    node: Array,
-    value: Array,
-    integral: Array,
-    width: Width,
-) -> None:
-    """Fill ∫ dF/EA (W,) from ``begin`` to x (W,) of polynomials EA, by a Gauss rule."""
+def _set_integral(nodes: Array, scratch: WireScratch, width: Width) -> None:
+    """Fill the strain from the start of the piece, of polynomials EA: ∫ dF/EA by a Gauss rule."""
+    _, x, begin, _, _, integral, node, value, coefficients = scratch
     for w in lanes(width):
         integral[w] = 0.0
     for n in upwards(0, nodes.shape[1]):

@@ -100,8 +100,9 @@ class Balance(NamedTuple):
         power includes that of gravity and load, with 0 it does not.
         """
         pose, none = self.tension.posture, np.zeros_like(weights)
+        model = pose.arm._model
         arguments: tuple[Any, ...] = (
-            *pose.arm._model.arrays,
+            *(model.tree, model.routing, model.masses),
             *(pose.q, inputs.first, motion, _NO_VELOCITY),
             *(none, none, none, weights, self.tension.wrench, 0.0, loaded),
         )

@@ -60,11 +60,8 @@ class DrawnArms:
         if "link_mass" in errors:
             mass[:, inputs.link_rows] += errors["link_mass"]
         places: tuple[Any, ...] = inputs.places.moved(inputs.displaced(errors))
-        tree, routing, masses = model.tree, model.routing, model.masses
         self._same: tuple[Any, ...] = (
-            *(tree.parent, tree.order, tree.turn, tree.axis, tree.slide),
-            *(routing.row, routing.segment, routing.joint),
-            *(masses.gravity, masses.tip, masses.tip_joints, masses.rotation),
+            *(model.tree, model.routing, model.masses),
             *(inputs.first, model.laws.series, model.laws.rest, K.wrench, q),
         )
         self._own: tuple[Any, ...] = (

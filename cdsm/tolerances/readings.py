@@ -171,7 +171,8 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
     derivatives are those of −uᵀ C_vv u.
     """
     pose, F, k = K.posture, K.tension, K.cable_stiffness
-    laws = pose.arm._model.laws
+    model = pose.arm._model
+    laws = model.laws
     rigidity, strain = laws_at(K, F)
     stretched = rigidity * (1.0 + strain)
     wire = pose.cable_lengths - laws.series * (F - laws.rest)
@@ -180,7 +181,7 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
     by_spring = k**2 * laws.series * (1.0 - (F - laws.rest) / stretched)
     by_force = k**2 * laws.series / stretched + by_stretched * _stretched_slope(K, strain)
     arguments: tuple[Any, ...] = (
-        *pose.arm._model.arrays,
+        *(model.tree, model.routing, model.masses),
         *(pose.q, inputs.first, motion, -2.0 * direction),
         *(F, k, slope, np.zeros_like(F), K.wrench, 1.0, 0.0),
     )
