@@ -72,39 +72,36 @@ def to_mjcf(
     """Write the arm as MJCF text, which MuJoCo loads unchanged.
 
     Bodies, joints, tendons and actuators have the names of links, joints and cables. The sites of a
-    cable are ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. A lead (the straight
-    cable between its actuator and the first site) has a constant length and is left out. So is
-    friction of the cables in their holes. Links without a drawable visual are drawn as sticks. The
-    model does not contain the wrench: give it to MuJoCo at run time (``xfrc_applied`` acts at the
-    centre of mass of a link).
+    cable are ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. Links without a drawable
+    visual are sticks. Left out are leads (straight cables of constant length before the first
+    site), friction in the holes, and the wrench: give it to MuJoCo at run time (``xfrc_applied``
+    acts at the centre of mass of a link).
 
-    The model starts at the posture: a new ``mjData`` has its joint coordinates, and so has the
-    keyframe ``pose``. The joint coordinates are those of cdsm. ``actuators`` is one of
+    A new ``mjData`` and the keyframe ``pose`` have the joint coordinates of the posture, which are
+    those of cdsm. ``actuators`` is one of
 
     - ``length``: one motor per cable keeps its original length, as in :func:`~cdsm.equilibrium`.
       Its force is k (u + L_rest − L), never a push. Its ``ctrl`` u is the length of wire that it
-      pays out [m]; u = 0 keeps the posture. A force-controlled cable keeps F; there u is tension
-      added to F [N].
-    - ``tension``: one motor per cable pulls with the tension ``ctrl`` [N]. The keyframe has F; in a
-      new ``mjData``, ``ctrl`` is zero. The cables add no passive stiffness: most arms are then
-      unstable and need a controller.
-    - ``none``: each cable is a spring of stiffness k and rest length L_rest. Springs softer than
-      F/L would need a negative rest length; they are motors without ``ctrl``, and so are
-      force-controlled cables.
+      pays out [m]. The motor of a force-controlled cable keeps F + u, with u in N.
+    - ``tension``: one motor per cable pulls with the tension ``ctrl`` [N]: F in the keyframe, zero
+      in a new ``mjData``. The cables add no passive stiffness: most arms are then unstable and need
+      a controller.
+    - ``none``: each cable is a spring of stiffness k and rest length L_rest. Force-controlled
+      cables are motors without ``ctrl``; so are springs softer than F/L, whose rest length would
+      be negative.
 
     Time step: 1, 2 or 5 times a power of ten [s], at most 0.2/ω and at most MuJoCo's 2 ms. ω is the
-    highest natural frequency, K_θ φ = ω² M φ. M belongs to the exported bodies. Moving bodies
-    without mass in the URDF get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs steps of
-    microseconds.
+    highest natural frequency, K_θ φ = ω² M φ, with M of the exported bodies. Moving bodies without
+    mass get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs steps of microseconds.
 
     Damping: the cables damp with c = β k [N s/m]. A mode has the ratio ζ = β (J_L φ)ᵀ k (J_L φ)/2ω,
     about β ω/2. β gives the least damped mode the ``damping_ratio``, mostly the lowest one; all
     others settle as fast or faster. Modes with less than half of their ω² from the cables do not
-    count and are damped less. A comment in the file gives the range of the ratios.
+    count and are damped less.
 
-    A comment at the top states time step, damping and actuators. If K_θ is not positive definite,
-    the model leaves the posture by itself. Then the comment says UNSTABLE, a warning is issued, and
-    :attr:`Stiffness.is_stable <cdsm.Stiffness.is_stable>` is false.
+    A comment at the top states time step, damping with the range of ζ, and actuators. If K_θ is not
+    positive definite, the model leaves the posture by itself: the comment says UNSTABLE, and a
+    warning is issued.
 
     Args:
         arm: The arm.
