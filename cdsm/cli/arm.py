@@ -12,6 +12,7 @@ import typer
 import cdsm
 from cdsm.cli.options import Angles, ArmOptions, AsJson, LoadOptions, TensionOptions
 from cdsm.cli.output import Json, answer, by_cable, write
+from cdsm.cli.values import misuse
 
 
 def urdf(
@@ -183,7 +184,7 @@ def export(
     Exit code 0; 3 if the arm of the MuJoCo model is unstable: it is written all the same.
     """
     if out is None and cables_out is None:
-        raise typer.BadParameter("give --out, --cables-out or both.", param_hint="--out")
+        raise misuse("--out", "give --out, --cables-out or both.")
     pose = arm.at(angles)
     numbers: Json = {"name": pose.arm.name}
     conditions = tensions.conditions(pose.arm)

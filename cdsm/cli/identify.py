@@ -11,6 +11,7 @@ import typer
 import cdsm
 from cdsm.cli.options import ArmOptions, AsJson, Picture
 from cdsm.cli.output import answer, write_picture
+from cdsm.cli.values import misuse
 
 if TYPE_CHECKING:
     from cdsm.identification.arm_parameters import ArmParameters
@@ -98,16 +99,15 @@ def _ranges(free: list[str]) -> dict[str, Range | None]:
     for each in free:
         name, _, given = each.partition("=")
         if name in ranges:
-            raise typer.BadParameter(f"{name} is given twice.", param_hint="--free")
+            raise misuse("--free", f"{name} is given twice.")
         ranges[name] = None
         if given:
             low, _, high = given.partition(":")
             try:
                 ranges[name] = float(low), float(high)
             except ValueError:
-                raise typer.BadParameter(
-                    f"{each!r} given; give NAME=LOW:HIGH, such as friction=0:0.5.",
-                    param_hint="--free",
+                raise misuse(
+                    "--free", f"{each!r} given; give NAME=LOW:HIGH, such as friction=0:0.5."
                 ) from None
     return ranges
 
@@ -146,7 +146,5 @@ class _Shown:
             return 0.0, 1.0
         value = self.present[self.label(name)]
         if not 0.0 < value < math.inf:
-            raise typer.BadParameter(
-                f"the arm has {name} {value:g}; give bounds, {name}=LOW:HIGH.", param_hint="--free"
-            )
+            raise misuse("--free", f"the arm has {name} {value:g}; give bounds, {name}=LOW:HIGH.")
         return value / 2.0, 2.0 * value

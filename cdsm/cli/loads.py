@@ -21,7 +21,7 @@ from cdsm.cli.options import (
     wrench_of,
 )
 from cdsm.cli.output import answer, write, write_picture
-from cdsm.cli.values import numbers
+from cdsm.cli.values import misuse, numbers
 
 
 def weigh(
@@ -41,7 +41,7 @@ def weigh(
     which weights measure which stiffness.
     """
     if not weight.given:
-        raise typer.BadParameter("give it or --mass: the weight.", param_hint="--force")
+        raise misuse("--force", "give it or --mass: the weight.")
     pose = arm.at(angles)
     tension = tensions.distribute(pose, wrench_of(wrench))
     test = cdsm.weight_test(pose, tension, weight.vector(pose.arm), steps=steps)
@@ -83,9 +83,7 @@ def buckle(
     loaded = weight.given or load is not None
     for option, value in (("--min-tension", min_tension), ("--max-tension", max_tension)):
         if value is not None and not loaded:
-            raise typer.BadParameter(
-                "bounds the tensions under --force or --mass only.", param_hint=option
-            )
+            raise misuse(option, "bounds the tensions under --force or --mass only.")
     pose = arm.at(angles)
     carried = wrench_of(wrench)
     tension = cdsm.critical_tension(pose, carried, solver)
@@ -137,7 +135,7 @@ def cycle(
     from cdsm.sweeps.export import check_target
 
     if not weight.given:
-        raise typer.BadParameter("give it or --mass: the largest load.", param_hint="--force")
+        raise misuse("--force", "give it or --mass: the largest load.")
     if out is not None:
         check_target(out)
     pose = arm.at(angles)

@@ -11,7 +11,7 @@ import typer
 import cdsm
 from cdsm.cli.options import AsJson
 from cdsm.cli.output import Json, answer
-from cdsm.cli.values import gravity_of, numbers
+from cdsm.cli.values import gravity_of, misuse, numbers
 
 _kind = {"rich_help_panel": "The kind of arm: one of them"}
 _size = {"rich_help_panel": "Its sizes"}
@@ -78,13 +78,11 @@ def new(
     from cdsm.wires.catalogue import WIRES, as_wire
 
     if sum(kind is not None for kind in (universal, hinged, sections)) != 1:
-        raise typer.BadParameter(
-            "give one of --universal, --hinged and --sections.", param_hint="--universal"
-        )
+        raise misuse("--universal", "give one of --universal, --hinged and --sections.")
     if twist is not None and hinged is None:
-        raise typer.BadParameter("goes with --hinged only.", param_hint="--twist")
+        raise misuse("--twist", "goes with --hinged only.")
     if arm.exists() and not overwrite:
-        raise typer.BadParameter(f"{arm} exists; add --overwrite.", param_hint="ARM.toml")
+        raise misuse("ARM.toml", f"{arm} exists; add --overwrite.")
     try:
         law: str | float = float(wire)
     except ValueError:

@@ -12,7 +12,7 @@ import typer
 
 import cdsm
 from cdsm.cli.conditions import Conditions
-from cdsm.cli.values import coordinates, gravity_of, joint_scales, numbers
+from cdsm.cli.values import coordinates, gravity_of, joint_scales, misuse, numbers
 
 if TYPE_CHECKING:
     from cdsm.support.values import Array
@@ -134,7 +134,7 @@ class ArmOptions:
         try:
             arm = self._arm()
         except cdsm.MissingWire as error:
-            raise typer.BadParameter(str(error), param_hint="--wire") from None
+            raise misuse("--wire", str(error)) from None
         if self.spring is not None:
             k = 1000.0 * self.spring
             arm = arm.with_cables([replace(cable, series_stiffness=k) for cable in arm.cables])
@@ -149,23 +149,21 @@ class ArmOptions:
     def _arm(self) -> cdsm.Manipulator:
         """Read the arm, its wire included, from its files."""
         if self.arm.suffix.lower() in (".nc", ".csv", ".zarr"):
-            raise typer.BadParameter(
-                f"{self.arm} is no arm; cdsm map reads sweeps, cdsm fit tensile tests.",
-                param_hint="ARM",
+            raise misuse(
+                "ARM", f"{self.arm} is no arm; cdsm map reads sweeps, cdsm fit tensile tests."
             )
         wire = self._wire()
         robot = self.arm.suffix.lower() == ".urdf"
         if robot and (self.cables is None or self.tip is None):
             missing = "--cables" if self.cables is None else "--tip"
-            raise typer.BadParameter("a robot in a .urdf needs it.", param_hint=missing)
+            raise misuse(missing, "a robot in a .urdf needs it.")
         if not robot:
             self._refuse("the tip of a .urdf is free, that of others is not", "tip")
         if self.arm.is_dir():
             self._refuse("a CASPR model has its own cables", "cables")
             if not any(self.arm.glob("*_bodies.xml")):
-                raise typer.BadParameter(
-                    f"{self.arm} is a folder without a CASPR model; give an ARM.toml.",
-                    param_hint="ARM",
+                raise misuse(
+                    "ARM", f"{self.arm} is a folder without a CASPR model; give an ARM.toml."
                 )
             arm = cdsm.read_caspr(self.arm, elasticity=wire or cdsm.LinearElasticity(1.0))
             if wire is None:  # only now, since the folder may hold no model
@@ -188,7 +186,7 @@ class ArmOptions:
         """Raise BadParameter if one of the options ``names`` is given; ``why`` it has no effect."""
         for field in fields(self):
             if field.name in names and getattr(self, field.name) != field.default:
-                raise typer.BadParameter(f"{why}; leave it out.", param_hint=f"--{field.name}")
+                raise misuse(f"--{field.name}", f"{why}; leave it out.")
 
     def _wire(self) -> cdsm.Elasticity | None:
         """Return the wire of --wire, or of --rigidity, if one is given."""
@@ -197,7 +195,7 @@ class ArmOptions:
         if self.wire is None:
             return None if self.rigidity is None else cdsm.LinearElasticity(self.rigidity)
         if self.rigidity is not None:
-            raise typer.BadParameter("give it or --wire, not both.", param_hint="--rigidity")
+            raise misuse("--rigidity", "give it or --wire, not both.")
         try:
             rigidity = float(self.wire)
         except ValueError:
@@ -250,7 +248,7 @@ class WeightOptions:
             force += numbers("--force", self.force, 3, "FX,FY,FZ")
         if self.mass is not None:
             if not arm.gravity.any():
-                raise typer.BadParameter("has no weight without gravity.", param_hint="--mass")
+                raise misuse("--mass", "has no weight without gravity.")
             force += self.mass * arm.gravity
         return force
 

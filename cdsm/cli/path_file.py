@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
-import typer
 
+from cdsm.cli.values import misuse
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.support.tables import ANGLE, column_in, named_columns, read_table
@@ -75,8 +75,8 @@ def one_target(given: float | None, of_file: Array | None, option: str) -> float
         return given
     if given is None and of_file is not None:
         return of_file
-    raise typer.BadParameter(
+    raise misuse(
+        option,
         "give it, or a column target [N/mm] in the file of the path; "
         f"{'neither was' if given is None else 'both were'} given.",
-        param_hint=option,
     )

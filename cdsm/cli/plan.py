@@ -13,7 +13,7 @@ from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension, Picture
 from cdsm.cli.output import answer, write, write_picture
-from cdsm.cli.values import axis, numbers
+from cdsm.cli.values import axis, misuse, numbers
 
 
 def plan(
@@ -67,7 +67,7 @@ def plan(
     """
     u = axis(direction) or numbers("--direction", direction, 3, "an axis, or X,Y,Z")
     if path is not None and angles is not None:
-        raise typer.BadParameter("is of one posture; --path has its own.", param_hint="--angles")
+        raise misuse("--angles", "is of one posture; --path has its own.")
     wanted = None if target is None else 1000.0 * target
     if path is not None:
         from cdsm.cli.path_file import one_target, read_path
@@ -87,10 +87,10 @@ def plan(
         conditions = Conditions(robot, (min_tension,))
         answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
     elif wanted is None:
-        raise typer.BadParameter("give it, or --path.", param_hint="--target")
+        raise misuse("--target", "give it, or --path.")
     elif math.isfinite(rate) or animation is not None:
         option = "--rate" if math.isfinite(rate) else "--animation"
-        raise typer.BadParameter("is of a path; give --path, too.", param_hint=option)
+        raise misuse(option, "is of a path; give --path, too.")
     else:
         pose = arm.at("0" if angles is None else angles)
         bounds = min_tension, max_tension, load.at_tip(pose.arm)

@@ -14,7 +14,7 @@ from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions
 from cdsm.cli.output import Json, answer
-from cdsm.cli.values import joint_scales, numbers
+from cdsm.cli.values import joint_scales, misuse, numbers
 from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
 
 if TYPE_CHECKING:
@@ -61,13 +61,13 @@ class PoseOptions:
     def read(self, arm: cdsm.Manipulator) -> cdsm.PoseSet:
         """Build the set of postures from its options."""
         if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
-            raise typer.BadParameter("give one of --grid, --path and --random.", param_hint=_POSES)
+            raise misuse(_POSES, "give one of --grid, --path and --random.")
         for option, value, needed, of in (
             ("--count", self.count, "--path", self.path),
             ("--seed", self.seed, "--random", self.random),
         ):
             if value is not None and of is None:
-                raise typer.BadParameter(f"goes with {needed} only.", param_hint=option)
+                raise misuse(option, f"goes with {needed} only.")
         if self.grid is not None:
             return _grid(self.grid, arm)
         if self.path is not None:
@@ -210,15 +210,13 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
         name, given = name.strip(), numbers("--grid", value.replace(":", " "))
         unit = units.get(name, 1.0)  # the sweep refuses unknown names
         if name in (*angles, *rest):
-            raise typer.BadParameter(f"{name} is given twice.", param_hint="--grid")
+            raise misuse("--grid", f"{name} is given twice.")
         if len(given) == 1:
             rest[name] = unit * given[0]
         elif len(given) == 3 and given[2] >= 1.0 and given[2].is_integer():
             angles[name] = unit * np.linspace(given[0], given[1], int(given[2]))
         else:
-            raise typer.BadParameter(
-                f"{part!r} given; a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE.", param_hint="--grid"
-            )
+            raise misuse("--grid", f"{part!r} given; a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE.")
     return cdsm.GridPoses(angles, rest)
 
 

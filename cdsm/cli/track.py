@@ -14,7 +14,7 @@ from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture
 from cdsm.cli.output import answer, write, write_picture
-from cdsm.cli.values import axis, numbers
+from cdsm.cli.values import axis, misuse, numbers
 
 
 def _laws() -> list[str]:
@@ -120,9 +120,7 @@ def track(
     _require_ending("--figure", figure, ".pdf", ".svg", ".png")
     quantity("--true-friction", true_friction or 0.0, "friction", zero=True)
     if not 0.0 < true_rigidity < math.inf:
-        raise typer.BadParameter(
-            f"{true_rigidity:g} given; a positive number is needed.", param_hint="--true-rigidity"
-        )
+        raise misuse("--true-rigidity", f"{true_rigidity:g} given; a positive number is needed.")
     robot = arm.read()
     file = read_path(path, robot)
     u, wanted = _wanted(stiffness)
@@ -169,7 +167,7 @@ def track(
 def _require_ending(option: str, path: Path | None, *endings: str) -> None:
     """Check that ``path`` of ``option`` has one of ``endings``, before a simulation of minutes."""
     if path is not None and path.suffix.lower() not in endings:
-        raise typer.BadParameter(f"{path} ends in none of {', '.join(endings)}.", param_hint=option)
+        raise misuse(option, f"{path} ends in none of {', '.join(endings)}.")
 
 
 def _wanted(text: str) -> tuple[Sequence[float], float | None]:
@@ -180,7 +178,5 @@ def _wanted(text: str) -> tuple[Sequence[float], float | None]:
         return u, None
     (wanted,) = numbers("--stiffness", value, 1, "AXIS=N/mm")
     if not 0.0 < wanted < math.inf:
-        raise typer.BadParameter(
-            f"{wanted:g} N/mm given; a positive number is needed.", param_hint="--stiffness"
-        )
+        raise misuse("--stiffness", f"{wanted:g} N/mm given; a positive number is needed.")
     return u, 1000.0 * wanted

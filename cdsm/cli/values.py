@@ -12,6 +12,11 @@ if TYPE_CHECKING:
     from cdsm.support.values import Array
 
 
+def misuse(option: str, problem: str) -> typer.BadParameter:
+    """Return the error of a wrong value of ``option``."""
+    return typer.BadParameter(problem, param_hint=option)
+
+
 def joint_scales(arm: cdsm.Manipulator) -> Array:
     """Return the command-line unit of each joint (nv,) in SI: one degree [rad] or one mm [m]."""
     import numpy as np
@@ -30,17 +35,17 @@ def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
         for part in text.replace(",", " ").split():
             name, _, value = part.partition("=")
             if one_of("joint", name, arm.joint_names) in named:
-                raise typer.BadParameter(f"{name} is given twice.", param_hint="--angles")
+                raise misuse("--angles", f"{name} is given twice.")
             named[name] = numbers("--angles", value, 1, "JOINT=DEG")[0]
         return [named.get(name, 0.0) for name in arm.joint_names]
     given = numbers("--angles", text)
     given = given * arm.nv if len(given) == 1 else given
     if len(given) != arm.nv:
         names = ", ".join(arm.joint_names)
-        raise typer.BadParameter(
+        raise misuse(
+            "--angles",
             f"{len(given)} given; give one angle, one for each of {names}, or some by name, such "
             f"as {arm.joint_names[-1]}=10.",
-            param_hint="--angles",
         )
     return given
 
@@ -65,10 +70,8 @@ def numbers(option: str, text: str, count: int | None = None, form: str = "numbe
     try:
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
-        raise typer.BadParameter(
-            f"{error}; give {form}, separated by commas.", param_hint=option
-        ) from None
+        raise misuse(option, f"{error}; give {form}, separated by commas.") from None
     if count is not None and len(values) != count:
         counted = f"{plural(len(values), 'number')} given; give {count}: {form}."
-        raise typer.BadParameter(counted, param_hint=option)
+        raise misuse(option, counted)
     return values

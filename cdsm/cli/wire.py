@@ -12,6 +12,7 @@ import typer
 import cdsm
 from cdsm.cli.options import AsJson, Picture
 from cdsm.cli.output import Json, answer, write, write_picture
+from cdsm.cli.values import misuse
 
 
 def fit(
@@ -79,9 +80,7 @@ def _pair(option: str, text: str | None) -> list[str] | None:
         return None
     entries = [entry.strip() for entry in next(csv.reader([text], skipinitialspace=True), [])]
     if len(entries) != 2:
-        raise typer.BadParameter(
-            f"{text!r} given; give two, of displacement and force.", param_hint=option
-        )
+        raise misuse(option, f"{text!r} given; give two, of displacement and force.")
     return entries
 
 
