@@ -32,7 +32,7 @@ _ABOVE = 0.1  # height of the label above the tip, as a fraction of the arm's le
 
 
 class Scene:
-    """An arm in a viser server; ``force_scale`` [m/N] is the length of its force arrow.
+    """An arm in a viser server; ``force_scale`` is the length of its force arrow [m/N].
 
     Pinocchio's visualiser draws the links from the shapes in the URDF. Sticks join the joints of
     links without shapes, or of all links if a mesh cannot be read.
