@@ -17,9 +17,11 @@ _KEYS = ("standard", "within", "distribution", "correlation", "of", "tensions")
 
 
 def read_tolerances(path: str | os.PathLike[str]) -> Tolerances:
-    """Read a file of tolerances. Errors are those of :meth:`cdsm.Tolerances.read`."""
+    """Read the tolerances of a file, or of an ARM.toml; as :meth:`cdsm.Tolerances.read`."""
     try:
-        return from_table(read_toml(read_text(path)))
+        table = read_toml(read_text(path))
+        own = table.get("tolerances", table)
+        return from_table(own if isinstance(own, dict) else table)
     except GeometryError as error:
         raise FileError(path, f"does not hold tolerances, {counted(error.faults)}") from None
 

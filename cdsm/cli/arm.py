@@ -117,7 +117,8 @@ def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
             for source in ranked
         ),
     ]
-    return "\n".join(aligned(rows))
+    remarks = (f"along {axis}: {each}" for axis, b in budgets.items() for each in b.warnings)
+    return "\n".join([*aligned(rows), *remarks])
 
 
 def check(
@@ -133,7 +134,6 @@ def check(
 ) -> None:
     """Check a stiffness: compare it with finite differences, and report every problem.
 
-    The options are those of `cdsm stiffness`.
     Exit code 0: it can be trusted; 3: it cannot, and the report says why.
     """
     from cdsm.support.files import write_text

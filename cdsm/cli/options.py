@@ -231,7 +231,8 @@ class WeightOptions:
         _tension_option(help="Force at the tip, base axes: FX,FY,FZ [N].", metavar="FX,FY,FZ"),
     ] = None
     mass: Annotated[
-        float | None, _tension_option(help="Mass [kg] that hangs at the tip, along gravity.")
+        float | None,
+        _tension_option(help="Mass [kg] that hangs at the tip, along gravity.", min=0.0),
     ] = None
 
     @property

@@ -29,8 +29,8 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     """Read a path from a CSV file: a header, then one line per sample.
 
     The header names the columns and their units. Joint columns have the names of the joints of
-    the arm; joints without a column stay at 0. Other columns are ignored. Lines that begin with #
-    are comments.
+    the arm; joints without a column stay at 0. Other columns are ignored, unless their name is one
+    of these but for a letter. Lines that begin with # are comments.
     """
 
     def refuse(problem: str) -> NoReturn:
@@ -39,7 +39,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     table = read_table(path)
     if len(table.rows) < 2:
         refuse("holds no path; a header and one line per sample are needed")
-    found = named_columns(table, refuse)
+    found = named_columns(table, (*arm.joint_names, *"xyz", "target"), refuse)
 
     def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
         """Return the columns ``wanted``, with their units, (S, n) in SI; None if none is there.

@@ -66,14 +66,14 @@ def search_designs(
         InvalidInput: An argument is invalid.
         MissingExtra: pymoo is not installed.
         FileError: The store cannot be read or written.
-        StoreError: The store belongs to another problem.
+        StoreError: The store belongs to another problem, seed or population.
     """
     instance("problem", problem, DesignProblem)
     steps = whole_number("generations", generations, 1)
     size = whole_number("population", population, 4)
     whole_number("seed", seed, 0)
     need("design", "pymoo")
-    kept = Store(store, problem)
+    kept = Store(store, problem, seed=seed, population=size)
     algorithm = _algorithm(problem, size, steps, seed)
     rows: list[Array] = []
     found: list[Found] = []

@@ -32,18 +32,24 @@ class Store:
     Args:
         path: The file; None keeps them in memory.
         problem: The problem.
+        search: What else the designs of a search depend on, such as its seed.
 
     Raises:
         FileError: The file cannot be read or written.
-        StoreError: The file has designs of another problem.
+        StoreError: The file has designs of another problem or another search.
     """
 
-    def __init__(self, path: str | os.PathLike[str] | None, problem: DesignProblem) -> None:
+    def __init__(
+        self,
+        path: str | os.PathLike[str] | None,
+        problem: DesignProblem,
+        **search: int,
+    ) -> None:
         self._path: Path | None = None if path is None else as_path(path)
         self._found: dict[bytes, Found] = {}
         if self._path is None:
             return
-        head = json.dumps({"problem": digest(problem), "of": str(problem)})
+        head = json.dumps({"problem": digest(problem), "of": str(problem), **search})
         try:
             if not self._path.exists():
                 self._path.write_text(head + "\n", encoding="utf-8")
@@ -59,8 +65,8 @@ class Store:
         if first != head:
             raise StoreError(
                 self._path,
-                "contains designs of another problem, or no record of designs. Repeat that "
-                "again, or give another folder.",
+                "contains designs of another problem, of another seed or population, or no "
+                "designs. Give another place for the results, or search as that time.",
             )
         for line in lines[:-1]:  # the last one is empty, or was cut off
             entry: dict[str, Any] = json.loads(line)

@@ -68,10 +68,10 @@ class Domain:
         outside = values <= self.low if not self.low_included else values < self.low
         outside |= values > self.high
         if np.count_nonzero(outside):
+            below = "; slack_below() continues one to 0 N" if (values <= self.low).any() else ""
             raise ElasticityRangeError(
                 f"outside the domain {self} of the elasticity. Keep the tension inside it "
-                "(minimum=, maximum=), or use an elasticity that covers it; slack_below() continues"
-                " one to 0 N.",
+                f"(minimum=, maximum=), or use an elasticity that covers it{below}.",
                 np.atleast_1d(values)[np.atleast_1d(outside)].tolist(),
                 np.flatnonzero(outside).tolist(),
             )

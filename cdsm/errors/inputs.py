@@ -172,7 +172,7 @@ class JointLimitError(CdsmError, ValueError):
         ]
         self.problem = first_of(said, NAMED, "joints")
         super().__init__(
-            f"{self.problem}. Stay inside the limits, widen joint_limit in the geometry (limit "
+            f"{self.problem}. Stay inside the limits, or widen joint_limit in the geometry (limit "
             "in a full description or a URDF), or, in Python, pass check_limits=False to compute "
             "beyond them."
         )

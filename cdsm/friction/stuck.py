@@ -106,7 +106,8 @@ def _require_friction(pose: Posture, tension: Array, signs: Array) -> None:
         raise InvalidInput(
             "tension",
             f"{before[hole]:.6g} and {after[hole]:.6g} N beside site {chains.site[hole] + 1} of "
-            f"{cable.name}: the ratio is {low[hole]:.6g} to {high[hole]:.6g} there.",
+            f"{cable.name}: the ratio is {low[hole]:.6g} to {high[hole]:.6g} in this "
+            "posture. A LoadHistory has the posture of each load, pose(i), and stiffness(i).",
         )
 
 

@@ -13,7 +13,7 @@ from cdsm.errors import GeometryError
 from cdsm.geometry import tables
 from cdsm.geometry.description import Description
 from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles, spread_out
-from cdsm.geometry.parts import UNIVERSAL_AXES, CableRoute, Joint, Limit, Link
+from cdsm.geometry.parts import UNIVERSAL_AXES, CableRoute, Joint, Limit, Link, Turn
 from cdsm.geometry.uniform import CablesPerJoint, HoleAngles, JointCount, uniform
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import (
@@ -78,7 +78,7 @@ class Geometry(Description):
         cable_radius: PerJoint[Length] | None = None,
         hole_angles: HoleAngles | None = None,
         phase: PerJoint[Number] = 0.0,
-        spread: Number = 0.0,
+        spread: Turn = 0.0,
         name: Name = "arm",
     ) -> Self:
         """Build an arm of n universal joints with m cables each.
@@ -125,7 +125,7 @@ class Geometry(Description):
         cls,
         *,
         joints: JointCount,
-        twist: Number,
+        twist: Turn,
         cables_per_joint: CablesPerJoint | None = None,
         link_length: PerJoint[Length],
         base_length: LengthOrZero,
@@ -139,7 +139,7 @@ class Geometry(Description):
         cable_radius: PerJoint[Length] | None = None,
         hole_angles: HoleAngles | None = None,
         phase: PerJoint[Number] = 0.0,
-        spread: Number = 0.0,
+        spread: Turn = 0.0,
         name: Name = "arm",
     ) -> Self:
         """Build an arm of n hinges; ``twist`` [rad] turns each axis about x from the previous one.

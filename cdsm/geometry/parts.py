@@ -6,7 +6,7 @@ import math
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from cdsm.support.records import (
     CrossFaults,
@@ -25,6 +25,17 @@ MAXIMUM_JOINTS = 100
 
 UNIVERSAL_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
+
+def _in_radians(value: float) -> float:
+    if abs(value) > 2.0 * math.pi:
+        raise ValueError(
+            f"{value:g} rad given; at most one turn, 6.28 rad, is allowed; convert degrees to "
+            "radians"
+        )
+    return value
+
+
+Turn = Annotated[Number, AfterValidator(_in_radians)]
 Limit = Annotated[Number, Field(gt=0, le=math.pi)]
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from cdsm.errors import GeometryError
-from cdsm.support.records import Name, Number, did_you_mean, parse, record, toml_lines
+from cdsm.geometry.parts import Turn
+from cdsm.support.records import Name, did_you_mean, parse, record, toml_lines
 
 if TYPE_CHECKING:
     from cdsm.geometry.geometry import Geometry
@@ -67,7 +68,7 @@ def build_only(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 @record
 class _Sections:
     sections: Annotated[tuple[dict[str, Any], ...], Field(strict=False, min_length=1)]
-    spread: Number = 0.0
+    spread: Turn = 0.0
     name: Name = "arm"
 
 

@@ -18,6 +18,7 @@ from cdsm.support.validation import AXES, instance
 
 _LENGTH: Final = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _FORCE: Final = {"N": 1.0}
+_NAMES: Final = ("test", "direction", "force", "displacement", *"xyz", "minimum")
 
 
 class _Column(NamedTuple):
@@ -50,7 +51,8 @@ def read_loops(
       ``minimum [N]``, the lower bound from which they are distributed.
 
     A cell of a joint, a cable, ``direction`` or ``minimum`` may be empty after the first line of a
-    test. Other columns are ignored, as are lines that begin with #.
+    test. Other columns are ignored, unless their name is one of these but for a letter; lines
+    that begin with # are, too.
 
     Args:
         path: The file.
@@ -80,7 +82,8 @@ class _Reader:
         self._path, self._arm, self._table = path, arm, table
         if len(table.rows) < 2:
             self._refuse("holds no loops; a header and one line per reading are needed")
-        self._header = named_columns(table, self._refuse)
+        known = *_NAMES, *arm.joint_names, *arm.cables.names
+        self._header = named_columns(table, known, self._refuse)
         kinds = [_LENGTH if slides else ANGLE for slides in arm.slides]
         self._joints = [
             self._column(name, units) if name in self._header else None

@@ -16,7 +16,7 @@ from cdsm.identification.diagnosis import unfinished, warnings_of
 from cdsm.identification.intervals import LowerOptimumError, Profiler
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.loop import WeightLoop
-from cdsm.identification.measurement import Measurement, label
+from cdsm.identification.measurement import Measurement
 from cdsm.identification.problem import Model, UserFaultError
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
@@ -155,8 +155,8 @@ def _checked_measurements(
         if isinstance(each, WeightLoop) and each.displacements is None:
             raise InvalidInput(
                 f"measurements[{i}]",
-                f"{label(i, each)} has no readings yet; give its displacements [m], as with "
-                "dataclasses.replace(loop, displacements=…).",
+                f"{each.label or 'the loop'} has no readings yet; give its displacements [m], as "
+                "with dataclasses.replace(loop, displacements=…).",
             )
     return tuple(measurements)
 
@@ -175,8 +175,8 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
         if not high - low > 1e-9 * max(abs(low), abs(high)):
             raise InvalidInput(
                 f"free[{name!r}]",
-                f"low = {low:g}, high = {high:g} given; low must be below high. What is known "
-                "belongs into model_of.",
+                f"low = {low:g}, high = {high:g} given; low must be below high. A parameter whose "
+                "value is known is not free.",
             )
         bounds[name] = (low, high)
     return bounds

@@ -54,7 +54,7 @@ def plot_weight_test(test: WeightTest) -> Figure:
     legend(left, title="direction; dashed: linear")
     names = test.without.pose.arm.cables.names
     cable_lines(right, loads, np.vstack([test.without.tension, test.tensions]), names)
-    right.set(xlabel="load [N]", ylabel="tension of each cable [N]")
+    right.set(xlabel="load [N]", ylabel="tension at each motor [N]")
     right.set_ylim(bottom=0.0)
     left_it = "; left its reference before the weight" if test.settled_first else ""
     weight = f"weight of {np.linalg.norm(test.force):.4g} N"
@@ -173,19 +173,19 @@ def plot_load_history(history: LoadHistory) -> Figure:
         loads = np.arange(1, len(moved) + 1)
         for axis, color, part in zip(XYZ, COLORS, moved.T, strict=True):
             left.plot(loads, part, color=color, label=axis, **line)
-        left.set(xlabel="load", ylabel="displacement of the tip [mm]")
+        left.set(xlabel="number of the load", ylabel="displacement of the tip [mm]")
         legend(left)
     spread = [float(np.ptp(T, axis=1).max()) for T in history.tensions]
     cable = int(np.argmax(spread))
     tensions, F = history.tensions[cable], history.reference_tension[cable]
     last = tensions.shape[1] - 1
     for j, own in enumerate(np.vstack([np.full(last + 1, F), tensions]).T):
-        label = {0: "at the motor", last: "at the end"}.get(j)
+        label = {0: "at the motor", 1: "between", last: "at the end"}.get(j)
         shade = j / max(1, last)
         color = VERMILLION if j == last else BLUE
         right.plot(own, color=color, alpha=1.0 - 0.75 * shade * (j < last), label=label, lw=0.9)
-    right.set(xlabel="load", ylabel="tension of each segment [N]")
+    right.set(xlabel="number of the load", ylabel="tension of each segment [N]")
     legend(right, title=history.reference.arm.cables[cable].name, **BESIDE)
-    lost = f"{1000.0 * history.dissipated.sum():.4g} mJ lost in {len(history.holes)} holes"
+    lost = f"{1000.0 * history.dissipated.sum():.4g} mJ lost in all in {len(history.holes)} holes"
     heading(figure, f"{history.reference.arm.name}: {lost}")
     return figure

@@ -104,7 +104,7 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
     right.vlines(place, 0.0, fit.residuals, color=BLUE, linewidth=1.2)
     right.plot(place, fit.residuals, "o", color=BLUE, markersize=4 if len(rows) < 100 else 2)
     right.axhline(0.0, color="0.2", linewidth=0.8)
-    right.set_ylabel("(predicted − measured)/σ, bands at 1 and 2 σ")
+    right.set_ylabel("(predicted − measured)/σ")
     if len(rows) <= _MOST_LABELS and any(measurement.label for measurement in fit.measurements):
         right.set_xticks(place, labels, rotation=90, fontsize=SMALL)
     else:

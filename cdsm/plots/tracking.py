@@ -67,9 +67,11 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     cable_lines(tension, t, run.tension, run.plan.arm.cables.names)
     tension.set(xlabel="time [s]", ylabel="tension [N]")
     tension.set_ylim(bottom=0.0)
+    changes = t[1:][(np.diff(run.wrench, axis=0) != 0.0).any(axis=1)][:1]
     for panel in axes[:, 0]:
-        for at in t[1:][(np.diff(run.wrench, axis=0) != 0.0).any(axis=1)][:1]:
+        for at in changes:
             panel.axvline(at, color="0.3", linewidth=0.8, linestyle=":")
     danger = f"{run.warnings[0].split(':')[0]}. " if run.warnings else ""
-    heading(figure, f"{danger}{run.plan.arm.name}, law {run.law}; dotted: the load changes")
+    dotted = "; dotted: the load changes" if changes.size else ""
+    heading(figure, f"{danger}{run.plan.arm.name}, law {run.law}{dotted}")
     return figure

@@ -96,13 +96,14 @@ def _of_tensions(report: Report) -> Iterator[str]:
         if report.sticking is None or report.readings is None:
             yield f"{said}. Here no cable is known to stick."
         else:
-            below = _numbers(report.sticking.below)
+            below = ", ".join(f"{load:.2g}" for load in report.sticking.below)
             stuck, free = (
                 _numbers(each / 1000.0) for each in (report.sticking.along, report.readings.along)
             )
             yield (
-                f"{said}. Below {below} N along x, y, z (cdsm.breakaway) the cables stick, and a "
-                f"load measures {stuck} N/mm, not {free} N/mm: hang more, or shake the arm."
+                f"{said}. Below about {below} N along x, y, z (exactly: cdsm.breakaway) the cables "
+                f"stick, and a load measures {stuck} N/mm, not {free} N/mm: hang more, or shake "
+                "the arm."
             )
     if report.optimality is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"

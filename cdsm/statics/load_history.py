@@ -213,7 +213,7 @@ class LoadHistory(ReadOnlyState):
     def __str__(self) -> str:
         count = len(self.tip)
         rows = [
-            f"{'load':>5}{'force [N]':>26}{'tip moved by [mm]':>30}"
+            f"{'load':>5}{'force [N]':>35}{'tip moved by [mm]':>30}"
             f"{'sliding':>9}{'work [mJ]':>12}{'lost [mJ]':>12}"
         ]
         work = self.load_work + self.motor_work
@@ -222,7 +222,7 @@ class LoadHistory(ReadOnlyState):
                 if k == _SHOWN // 2:
                     rows.append(f"{'…':>5}")
                 continue
-            force = "".join(f"{f:>8.4g}" for f in self.wrenches[k, :3])
+            force = "".join(f"{f:>11.4g}" for f in self.wrenches[k, :3])
             moved = "".join(f"{1000.0 * x:>10.4f}" for x in self.displacement[k])
             rows.append(
                 f"{k + 1:>5}  {force}{moved}{np.count_nonzero(self.sliding[k]):>9}"

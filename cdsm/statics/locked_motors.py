@@ -122,11 +122,13 @@ def require_domains(
         F = tension[of]
         outside = (law.domain.low * (1.0 - _BEYOND) > F) | (law.domain.high * (1.0 + _BEYOND) < F)
         if np.count_nonzero(outside):
+            slack = (law.domain.low > F).any()
+            below = ", or continue it below by its slack_below()" if slack else ""
             at = np.arange(tension.size)[of][outside].tolist()
             raise ElasticityRangeError(
                 f"{where}; the elasticity is defined on {law.domain}, and says neither how a cable "
-                "goes slack below it nor how it yields above. Change the tensions or the load, use "
-                "an elasticity that covers them, or continue it below by its slack_below().",
+                "goes slack below it nor how it yields above. Change the tensions or the load, or "
+                f"use an elasticity that covers them{below}.",
                 F[outside].tolist(),
                 at,
                 [cables[c].name for c in at],

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import io
 import math
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
@@ -21,6 +22,7 @@ _LONGEST_CELL = 1000  # maximum number of characters of a cell; numbers and name
 ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
 
+_ALIKE = 0.8  # similarity of names that differ in one letter of five or more
 _TRIED = 500  # lines that tell the delimiter; titles are fewer
 
 
@@ -100,13 +102,23 @@ def name_and_unit(cell: str) -> tuple[str, str]:
     return found[1], found[2] or ""
 
 
-def named_columns(table: Table, refuse: Callable[[str], NoReturn]) -> dict[str, tuple[int, str]]:
-    """Return index and unit of each column of a table, by name; ``refuse`` reports double names."""
+def named_columns(
+    table: Table, known: Sequence[str], refuse: Callable[[str], NoReturn]
+) -> dict[str, tuple[int, str]]:
+    """Return index and unit of each column of a table, by name.
+
+    A table may have columns beside the ``known`` ones. ``refuse`` is called for a name given twice
+    and for one that is a slip of the pen from a known one.
+    """
     found: dict[str, tuple[int, str]] = {}
     for at, cell in enumerate(table.header):
         name, unit = name_and_unit(cell)
         if name in found:
             refuse(f"has two columns called {name}; give each once")
+        as_long = [each for each in known if abs(len(each) - len(name)) < 2]
+        near = difflib.get_close_matches(name, as_long, n=1, cutoff=_ALIKE)
+        if near and name not in known:
+            refuse(f"has a column {name}, which is not known; did you mean {near[0]}? Rename it")
         found[name] = at, unit
     return found
 

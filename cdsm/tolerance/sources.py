@@ -15,8 +15,10 @@ from cdsm.errors import InvalidInput
 from cdsm.support.validation import one_of, sequence_of
 from cdsm.tolerance.tolerance import Tolerance
 
-LARGEST = dict.fromkeys(("rigidity", "spring", "joint_angle", "hole_angle", "friction"), 0.5)
-"""Largest allowed standard uncertainty by source: half of EA or k_series, 0.5 rad, or μ = 0.5."""
+LARGEST = dict.fromkeys(("rigidity", "spring", "friction"), 0.5) | dict.fromkeys(
+    ("joint_angle", "hole_angle"), 0.3
+)
+"""Largest allowed standard uncertainty by source: half of EA or k_series, μ = 0.5, 0.3 rad."""
 
 COMMON = ("rigidity", "friction")
 """Sources whose inputs share one error by default: wires of one spool, holes of one material."""
@@ -49,7 +51,8 @@ class Tolerances:
         link_length: Length of each link [m].
         link_mass: Mass of each link [kg].
         friction: Coefficient μ of each hole with friction [-].
-        site: Each coordinate of each cable site [m]. Only for arms from a URDF.
+        site: Each coordinate of each cable site [m], the only tolerance of holes if the arm is
+            from a URDF.
 
     Raises:
         InvalidInput: A tolerance is negative, not a number, or larger than a plausible error.
@@ -103,7 +106,7 @@ class Tolerances:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Tolerances:
-        """Read tolerances from a TOML file; ``[tolerances]`` of an ARM.toml has the same keys.
+        """Read tolerances from a TOML file of their own, or from ``[tolerances]`` of an ARM.toml.
 
         Each key is a source. Its value is a standard uncertainty, or a table with ``standard`` or
         ``within`` (a half-width), ``distribution``, ``correlation``, ``of`` and ``tensions``, or a

@@ -73,8 +73,8 @@ class Uncertainty(ReadOnlyState):
     def nonlinearity(self) -> float:
         """RMS error of the linear approximation over 100 drawn arms, relative to u_c [-].
 
-        The standard uncertainty of Monte Carlo differs from u_c at most by this fraction. It is inf
-        if the reading does not exist for one of the arms.
+        The standard uncertainty of Monte Carlo is larger or smaller than u_c, at most by this
+        fraction. It is inf if the reading does not exist for one of the arms.
         """
         errors = self._drawn(np.random.default_rng(0), _PROBED)
         if not errors:
@@ -166,13 +166,18 @@ class Uncertainty(ReadOnlyState):
         without = [source for source, u in self.contributions.items() if u == 0.0]
         if without:
             lines.append(f"without influence on it: {', '.join(without)}")
-        if not self.is_linear:
-            part = 100.0 * self.nonlinearity
-            lines.append(
-                f"first order is not enough here: it leaves out {part:.2g} % of the uncertainty; "
-                "use Monte Carlo (cdsm.monte_carlo)"
-            )
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.warnings])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence if first order is not enough; see :attr:`is_linear`."""
+        if self.is_linear:
+            return ()
+        off = f"{100.0 * self.nonlinearity:.2g} %"
+        return (
+            f"first order is not enough here: the uncertainty may be up to {off} larger or "
+            "smaller; use Monte Carlo (cdsm.monte_carlo)",
+        )
 
     @property
     def shown(self) -> str:

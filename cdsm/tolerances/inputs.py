@@ -25,6 +25,11 @@ from cdsm.urdf import CROSS_MASS
 _NEAR = 1e-9
 """A site this near to a disk [m] is on the disk."""
 
+_LENGTHS = ("lead", "hole_radius", "disk_offset", "link_length", "site")
+
+_LARGEST = 0.1
+"""Largest standard uncertainty of a length, over the length of the arm."""
+
 _ON_DISKS = ("hole_radius", "hole_angle", "disk_offset", "link_length")
 """Sources that only an arm with disks has."""
 
@@ -156,8 +161,8 @@ class Inputs:
         return np.asarray((self.map @ every.T).T)
 
     def require(self, tolerances: Tolerances, arm: Manipulator) -> None:
-        """Raise InvalidInput if ``tolerances`` have a source that the arm does not have."""
-        for name in tolerances.given:
+        """Raise InvalidInput if the arm does not have a source, or is smaller than its errors."""
+        for name, parts in tolerances.given.items():
             if not self.labels.get(name):
                 lacks = {
                     "friction": "has no friction in its holes; see Manipulator.with_friction.",
@@ -168,6 +173,13 @@ class Inputs:
                     "of each coordinate of its cable sites."
                 )
                 raise InvalidInput(name, f"{arm.name} {lacks.get(name, otherwise)}")
+            largest = max(np.max(part.standard) for part in parts)
+            if name in _LENGTHS and largest > _LARGEST * arm.length:
+                raise InvalidInput(
+                    name,
+                    f"a standard uncertainty of {largest:g} m given; up to {_LARGEST:g} of the "
+                    f"arm's length, {_LARGEST * arm.length:.2g} m, is a tolerance. It is in m.",
+                )
 
     def _disks(self, arm: Manipulator, sites: list[str]) -> dict[str, csr_matrix]:
         """Label the inputs of holes, disks and links; return their parts of :attr:`map`.

@@ -140,6 +140,17 @@ def test_path_without_columns_is_named(files: tuple[Path, Path]) -> None:
     assert "path.csv: has columns for neither of joint angles" in shown.stderr
 
 
+def test_misspelt_columns_are_refused(files: tuple[Path, Path]) -> None:
+    path = files[1].read_text(encoding="utf-8")
+    for old, new in (("joint2", "joint9"), ("\n", ",targt [N/mm]\n")):
+        files[1].write_text(path.replace(old, new, 1), encoding="utf-8")
+        shown = call("track", *files, "--stiffness", "z=15")
+        assert shown.exit_code == 1
+        assert "did you mean" in shown.stderr
+    files[1].write_text(path.replace("\n", ",time [s]\n", 1), encoding="utf-8")
+    assert read_path(files[1], cdsm.Manipulator.read(files[0])).angles is not None
+
+
 def test_target_out_of_range_is_told_before_anything_moves(files: tuple[Path, Path]) -> None:
     shown = call("track", *files, "--stiffness", "z=900")
     assert shown.exit_code == 3

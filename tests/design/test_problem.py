@@ -209,7 +209,12 @@ def test_a_front_has_the_bits_of_its_seed_however_it_is_computed(tmp_path: Path)
     np.testing.assert_array_equal(once.evaluated.values, resumed.evaluated.values)
     assert sorted(kept.read_text().splitlines()) == sorted("".join(lines).splitlines())
     with pytest.raises(cdsm.StoreError, match="another problem"):
-        cdsm.search_designs(problem(maximum=300.0), generations=1, population=4, store=kept)
+        cdsm.search_designs(problem(maximum=300.0), generations=4, population=8, seed=3, store=kept)
+    with pytest.raises(cdsm.StoreError, match="another seed"):
+        cdsm.search_designs(problem(), generations=4, population=8, seed=4, store=kept)
+    before = kept.read_text()
+    cdsm.search_designs(problem(), generations=5, population=8, seed=3, store=kept)
+    assert kept.read_text().startswith(before)  # more generations go on from the record
 
 
 def test_no_design_of_the_front_is_beaten() -> None:

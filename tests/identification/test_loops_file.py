@@ -80,6 +80,8 @@ def test_planned_tests_have_no_readings(tmp_path: Path) -> None:
         ("remark", "force [N]", ("two columns called force",)),
         ("remark", "cable1_1 [N]", ("minimum and cable1_1",)),
         ("minimum [N]", "tension", ("no tensions", "cable1_1 [N]")),
+        ("remark", "joint9 [deg]", ("column joint9", "did you mean joint")),
+        ("minimum [N]", "minimun [N]", ("column minimun", "did you mean minimum")),
     ],
 )
 def test_faults_name_line_and_column(
