@@ -197,15 +197,14 @@ class Posture(ReadOnlyState):
     def _equals(self, other: Posture) -> bool:
         return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))
 
-    def _joint_stiffness(
-        self, tension: Array, cable_stiffness: Array, wrench: Array
-    ) -> tuple[Array, Array, Array, Array]:
-        """Compute the active, passive and load terms and K_θ (nv, nv) [N m/rad].
+    def _joint_stiffness(self, tension: Array, cable_stiffness: Array, wrench: Array) -> Array:
+        """Compute the active, passive and load terms, P and K_θ, (5, nv, nv) [N m/rad].
 
-        Tensions (C,) [N], cable stiffnesses (C,) [N/m] and wrench (6,) are checked already.
+        P is the sum of the magnitudes of the four terms. Tensions (C,) [N], cable stiffnesses (C,)
+        [N/m] and wrench (6,) are checked already.
         """
         model = self.arm._model
-        active, passive, load, joint = stiffness_kernels.single_stiffness(
+        terms = stiffness_kernels.single_stiffness(
             model.routing.segment,
             model.routing.joint,
             *self._frames,
@@ -217,7 +216,7 @@ class Posture(ReadOnlyState):
             wrench,
             model.masses.tip_joints,
         )
-        return frozen(active), frozen(passive), frozen(load), frozen(joint)
+        return frozen(terms)
 
 
 @final

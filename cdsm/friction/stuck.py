@@ -10,14 +10,12 @@ from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.posture import Posture
 from cdsm.sticking import Flags, tension_gradient
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
-from cdsm.support.validation import instance, number_array, vector, wrench_vector
+from cdsm.support.validation import NO_WRENCH, instance, number_array, vector, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
 _RATIO = 1e-9
 """Largest relative deviation of a ratio of tensions that counts as rounding."""
-
-_NO_WRENCH = frozen(np.zeros(6))
 
 
 def stuck_stiffness(
@@ -86,7 +84,7 @@ def sliding_stiffness(
     if T.min() < 0.0:
         raise InvalidInput("tension", f"{T.min():g} N given; cables only pull.")
     _require_friction(pose, T, signs)
-    W = _NO_WRENCH if wrench is None else wrench_vector("wrench", wrench)
+    W = wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
     return assemble_segments(pose, T, signs != 0.0, W, "sliding")
 
 
@@ -131,6 +129,7 @@ def assemble_segments(
     if friction == "stuck":
         passive = (passive + passive.T) / 2.0  # symmetric but for rounding
     load = single_load_stiffness(pose.jacobian, wrench, model.masses.tip_joints)
+    terms = active, passive, pose.gravity_stiffness, load
     F = tension[segments.chains.start[:-1]]
     return Stiffness(
         posture=pose,
@@ -142,6 +141,7 @@ def assemble_segments(
         gravity=pose.gravity_stiffness,
         load=frozen(load),
         joint=frozen(active + passive + pose.gravity_stiffness + load),
+        _parts=frozen(np.sum(np.abs(terms), axis=0)),
         distribution=distribution,
         friction=friction,
         segment_tension=frozen(tension),

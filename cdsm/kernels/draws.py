@@ -80,7 +80,7 @@ def stiffness_of_draws(
             q[n],
         )
         k = single_cable_stiffness(L, tension[n], rigidity[n], none, series, rest)
-        _, _, _, joint_stiffness[n] = single_stiffness(
+        terms = single_stiffness(
             routing.segment,
             routing.joint,
             joint_origin,
@@ -95,7 +95,7 @@ def stiffness_of_draws(
             wrench,
             tip_joints,
         )
-        length_jacobian[n] = J
+        joint_stiffness[n], length_jacobian[n] = terms[4], J
         for i in range(q.shape[1]):
             torque[n, i] = -g[i]
             for r in range(6):

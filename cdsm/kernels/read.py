@@ -48,8 +48,8 @@ def read(
     if "margin" in wanted:
         found["margin"] = margin = np.empty((blocks, side))
         kernels.set_margins(K, margin, width)
-    left, right = np.empty((blocks, 3, 3, side)), np.empty((blocks, 3, nv, side))
     if "cartesian" in wanted or "pseudoinverse" in wanted:
+        left, right = np.empty((blocks, 3, 3, side)), np.empty((blocks, 3, nv, side))
         tip_stiffness.decompose(JX, left, right, status, width)
     if "pseudoinverse" in wanted:
         found["pseudoinverse"] = matrix = np.empty((blocks, 3, 3, side))

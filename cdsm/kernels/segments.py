@@ -212,6 +212,7 @@ def set_lengths(
     Where two sites coincide, L and J_L of the posture are meaningless.
     """
     segment, joint, (u, length, _, _, _, _) = routing.segment, routing.joint, scratch
+    origin, axis, slide, site = frames
     for c in upwards(0, lengths.shape[0]):
         for w in lanes(width):
             lengths[c, w] = routing.fixed[c]
@@ -222,18 +223,17 @@ def set_lengths(
         shortest[w] = math.inf
     for s in range(segment.shape[0] - 1):
         cable, a, b = np.uint64(segment[s, 0]), np.uint64(segment[s, 1]), np.uint64(segment[s, 2])
-        set_direction(frames.site, a, b, scratch, width)
+        set_direction(site, a, b, scratch, width)
         for w in lanes(width):
             lengths[cable, w] += length[w]
         for w in lanes(width):
             shortest[w] = min(shortest[w], length[w])
         for t in range(segment[s, 3], segment[s + 1, 3]):
-            j = np.uint64(joint[t])
-            sign, site = (1.0, b) if t >= segment[s, 4] else (-1.0, a)
-            rate = jacobian[cable, j - np.uint64(1)]
-            _add_rate(u, frames.site[site], frames.origin[j], frames.axis[j], sign, rate, width)
-            if frames.slide.shape[0]:
-                _add_slide_rate(u, frames.slide[j], sign, rate, width)
+            j, column = np.uint64(joint[t]), np.uint64(joint[t] - 1)
+            sign, moved = (1.0, b) if t >= segment[s, 4] else (-1.0, a)
+            _add_rate(u, site[moved], origin[j], axis[j], sign, jacobian[cable, column], width)
+            if slide.shape[0]:
+                _add_slide_rate(u, slide[j], sign, jacobian[cable, column], width)
 
 
 @inner
@@ -253,11 +253,11 @@ def add_length_hessian(
     The whole tensor needs the weight 1 and slot c for cable c.
     """
     u, _, inverse, d, _, left = scratch
-    axis = frames.axis
+    origin, axis, slide, site = frames
     for s in range(segment.shape[0] - 1):
         cable, a, b = np.uint64(segment[s, 0]), np.uint64(segment[s, 1]), np.uint64(segment[s, 2])
         first, split, end = segment[s, 3], segment[s, 4], segment[s + 1, 3]
-        set_direction(frames.site, a, b, scratch, width)
+        set_direction(site, a, b, scratch, width)
         for t in range(first, end):
             j, own = np.uint64(joint[t]), np.uint64(t - first)
             if t == split:  # the joints before it are on the other side: no u × z_i
@@ -269,13 +269,12 @@ def add_length_hessian(
                             left[k, r, w] -= weight[cable, w] * (
                                 u[p, w] * axis[i, q, w] - u[q, w] * axis[i, p, w]
                             )
-            sign, site = (1.0, b) if t >= split else (-1.0, a)
-            c, z, force = left[own], axis[j], weight[cable]
-            ends = frames.site[site], frames.origin[j], z, u, inverse
-            _set_factors(*ends, sign, force, d[0], d[1], d[2], c[0], c[1], c[2], width)
-            if frames.slide.shape[0]:
-                _add_slide(frames.slide[j], sign, d, width)
-                _add_slide_factor(frames.slide[j], u, inverse, sign, force, c, width)
+            sign, moved = (1.0, b) if t >= split else (-1.0, a)
+            c, ends = left[own], (site[moved], origin[j], axis[j], u, inverse)
+            _set_factors(*ends, sign, weight[cable], d[0], d[1], d[2], c[0], c[1], c[2], width)
+            if slide.shape[0]:
+                _add_slide(slide[j], sign, d, width)
+                _add_slide_factor(slide[j], u, inverse, sign, weight[cable], left[own], width)
             # pair joint j with itself and all joints before it, also those of the other side
             for k in upwards(0, t + 1 - first):
                 i = np.uint64(joint[first + np.intp(k)])

@@ -159,11 +159,8 @@ def sum_terms(
                 K[i, j, w] = active[a, b, w] + passive[a, b, w] + gravity[a, b, w] + load[i, j, w]
             if parts.shape[0]:
                 for w in lanes(width):
-                    parts[i, j, w] = (
-                        abs(active[a, b, w])
-                        + abs(passive[a, b, w])
-                        + (abs(gravity[a, b, w]) + abs(load[i, j, w]))
-                    )
+                    own = abs(active[a, b, w]) + abs(passive[a, b, w]) + abs(gravity[a, b, w])
+                    parts[i, j, w] = own + abs(load[i, j, w])
 
 
 @compiled
@@ -181,24 +178,25 @@ def single_stiffness(
     cable_stiffness: Array,
     wrench: Array,
     tip_joints: Indices,
-) -> tuple[Array, Array, Array, Array]:
-    """Compute the active, passive and load terms of one posture and the sum of all four, (nv, nv).
+) -> Array:
+    """Compute the active, passive and load terms, P, and K_θ of one posture, (5, nv, nv).
 
-    The arguments are the fields of :class:`Routing` and :class:`Frames` that are needed, and arrays
-    without the last axis.
+    P is the sum of the magnitudes of the four terms. The arguments are the fields of
+    :class:`Routing` and :class:`Frames` that are needed, and arrays without the last axis.
     """
     count, nv = length_jacobian.shape
     J, JX = length_jacobian.reshape(count, nv, 1), jacobian.reshape(6, nv, 1)
     F, k = tension.reshape(count, 1), cable_stiffness.reshape(count, 1)
-    active, passive, load = np.zeros((1, nv, nv, 1)), np.zeros((nv, nv, 1)), np.zeros((nv, nv, 1))
+    terms = np.zeros((5, nv, nv, 1))
+    active, passive, load, G = terms[0], terms[1], terms[2], gravity.reshape(nv, nv, 1)
     frames, slot = one_frames(origin, axis, slide, site), np.zeros(count, dtype=np.intp)
-    add_length_hessian(segment, joint, frames, F, slot, segment_scratch(nv, 1), active, None)
-    mirror(active[0], None)
+    add_length_hessian(segment, joint, frames, F, slot, segment_scratch(nv, 1), terms[:1], None)
+    mirror(active, None)
     add_passive_stiffness(J, k, passive, np.empty((6, 1)), None)
     mirror(passive, None)
     set_load_stiffness(JX, wrench.reshape(6, 1), tip_joints, load, np.empty((6, 1)), None)
-    terms = active.reshape(nv, nv), passive.reshape(nv, nv), load.reshape(nv, nv)
-    return *terms, terms[0] + terms[1] + gravity + terms[2]
+    sum_terms(active, passive, G, load, terms[4], terms[3], None)
+    return terms.reshape(5, nv, nv)
 
 
 @compiled

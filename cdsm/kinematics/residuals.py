@@ -61,7 +61,9 @@ class LengthResidual(Residual):
         """Compute the Hessian (nv, nv) of weight · r: H_L·F with F = weight/arm length."""
         tension = frozen(weight / self.arm.length)
         pose = self.arm.at(q, check_limits=False)
-        return pose._joint_stiffness(tension, frozen(np.zeros(weight.size)), _NO_WRENCH)[0]
+        none = frozen(np.zeros(weight.size))
+        active: Array = pose._joint_stiffness(tension, none, _NO_WRENCH)[0]
+        return active
 
 
 @final

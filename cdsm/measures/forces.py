@@ -18,7 +18,7 @@ from cdsm.measures.hull import hull_of
 from cdsm.measures.program import Loads
 from cdsm.posture import Posture
 from cdsm.support.format import key, plain
-from cdsm.support.validation import instance, number_array, wrench_vector
+from cdsm.support.validation import NO_WRENCH, instance, number_array, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import bounds_at, distribute_tension
 
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 _NO_MOTION = 1e-9
 """Smaller singular values of J_v/(arm's length) count as zero: the tip cannot move along them."""
-
-_NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @final
@@ -129,7 +127,7 @@ def force_polytope(
     pose: Posture,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = _NO_WRENCH,
+    wrench: ArrayLike = NO_WRENCH,
     *,
     worst_friction: bool = False,
 ) -> ForcePolytope:

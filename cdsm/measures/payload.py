@@ -18,13 +18,19 @@ from cdsm.statics.buckling import critical_load
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates, plain
 from cdsm.support.status import Status
-from cdsm.support.validation import Direction, instance, quantity, unit_direction, wrench_vector
+from cdsm.support.validation import (
+    NO_WRENCH,
+    Direction,
+    instance,
+    quantity,
+    unit_direction,
+    wrench_vector,
+)
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import bounds_at, distribute_tension
 
 PayloadLimit = Literal["tension", "deflection", "stability", "elasticity", "none"]
 
-_NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 _AROUND: Final = np.array([u for u in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(u)])
 """Directions in which the worst payload is searched for loads that buckle the arm (26, 3)."""
@@ -80,7 +86,7 @@ def payload(
     direction: Direction | None = None,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = _NO_WRENCH,
+    wrench: ArrayLike = NO_WRENCH,
     *,
     deflection: float = math.inf,
     worst_friction: bool = False,

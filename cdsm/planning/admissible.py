@@ -86,17 +86,13 @@ class Admissible:
         least = self.nearest(np.zeros_like(F), low, high) if (low <= high).all() else None
         if least is None:
             return None
-        return replace(self, least=self._balanced(least), low=low, high=high)
+        return replace(self, least=replace(self.least, values=frozen(least)), low=low, high=high)
 
     def tension(self, F: Array) -> Tension:
         """Convert F (C,) [N] to a :class:`Tension`; remove the rounding from its balance."""
         exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
-        return replace(self._balanced(F if exact is None else exact), least=False)
-
-    def _balanced(self, F: Array) -> Tension:
-        J = self.least.posture.length_jacobian
-        torque = self.least.values @ J - self.least.residual
-        return replace(self.least, values=frozen(F), residual=frozen(F @ J - torque))
+        values = frozen(F if exact is None else exact)
+        return replace(self.least, values=values, least=False)
 
 
 def admissible(

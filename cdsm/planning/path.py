@@ -22,7 +22,15 @@ from cdsm.planning.stiffness_model import StiffnessModel, checked_margin
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.progress import track
-from cdsm.support.validation import Direction, bound, flag, instance, number_array, unit_directions
+from cdsm.support.validation import (
+    NO_WRENCH,
+    Direction,
+    bound,
+    flag,
+    instance,
+    number_array,
+    unit_directions,
+)
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
@@ -45,7 +53,7 @@ def plan_path(
     target: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    wrench: ArrayLike = NO_WRENCH,
     *,
     angles: ArrayLike | None = None,
     tips: ArrayLike | None = None,

@@ -23,7 +23,7 @@ from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import MODEL, coordinates, key, plain
 from cdsm.support.progress import progress_allowed
-from cdsm.support.validation import Direction, flag, unit_directions
+from cdsm.support.validation import NO_WRENCH, Direction, flag, unit_directions
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
@@ -132,7 +132,7 @@ def plan_stiffness(
     target: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = np.inf,
-    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    wrench: ArrayLike = NO_WRENCH,
     *,
     margin: float = MARGIN,
     starts: int = 3,

@@ -19,7 +19,7 @@ from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import MODEL, coordinates, plain, span
 from cdsm.support.progress import progress_allowed, track
-from cdsm.support.validation import Direction, flag, unit_direction
+from cdsm.support.validation import NO_WRENCH, Direction, flag, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -111,7 +111,7 @@ def stiffness_range(
     direction: Direction,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = np.inf,
-    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    wrench: ArrayLike = NO_WRENCH,
     *,
     margin: float = MARGIN,
     starts: int = 24,

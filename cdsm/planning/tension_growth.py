@@ -28,7 +28,7 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import Direction, bound, instance, scalar, unit_direction
+from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 
@@ -41,7 +41,7 @@ def saturation(
     direction: Direction,
     minimum: float = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    wrench: ArrayLike = NO_WRENCH,
     *,
     fraction: float = 0.1,
     solver: str = DEFAULT_SOLVER,

@@ -29,7 +29,7 @@ from cdsm.statics.bound_scan import (
 )
 from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import bound, instance, wrench_vector
+from cdsm.support.validation import NO_WRENCH, bound, instance, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
@@ -40,7 +40,7 @@ _SHOWN: Final = 10.0  # largest load factor of the curve if the critical factor 
 
 
 def critical_tension(
-    pose: Posture, wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), solver: str = DEFAULT_SOLVER
+    pose: Posture, wrench: ArrayLike = NO_WRENCH, solver: str = DEFAULT_SOLVER
 ) -> CriticalTension:
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
@@ -95,7 +95,7 @@ def critical_load(
     maximum: ArrayLike = math.inf,
     solver: str = DEFAULT_SOLVER,
     *,
-    carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    carried: ArrayLike = NO_WRENCH,
 ) -> CriticalLoad:
     """Compute the factor λ up to which an arm at a fixed posture is stable under λ W + carried.
 

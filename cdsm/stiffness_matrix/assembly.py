@@ -8,11 +8,9 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.value import Stiffness
-from cdsm.support.validation import instance, vector, wrench_vector
-from cdsm.support.values import Array, frozen
+from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
+from cdsm.support.values import Array
 from cdsm.tension import Tension
-
-_NO_WRENCH = frozen(np.zeros(6))
 
 
 def stiffness(
@@ -53,7 +51,7 @@ def checked_tension(
         F, W = tension.values, tension.wrench
     else:
         F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
-        W = _NO_WRENCH if wrench is None else wrench_vector("wrench", wrench)
+        W = wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
         if np.count_nonzero(F < 0.0):
             c = int(F.argmin())
             raise InvalidInput(
@@ -74,7 +72,7 @@ def assemble(
 
     ``distribution`` and ``free_length`` are stored in the result; see :class:`Stiffness`.
     """
-    active, passive, load, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
+    active, passive, load, parts, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
     return Stiffness(
         posture=pose,
         tension=tension,
@@ -85,6 +83,7 @@ def assemble(
         gravity=pose.gravity_stiffness,
         load=load,
         joint=joint,
+        _parts=parts,
         free_length=free_length,
         distribution=distribution,
     )

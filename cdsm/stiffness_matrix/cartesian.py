@@ -51,6 +51,7 @@ class CartesianReadings(ReadOnlyState):
     gravity: Array
     load: Array
     joint: Array
+    _parts: Array  # sum of the magnitudes of the four terms: scale of rounding errors
 
     @cached_property
     def compliance(self) -> Array:
@@ -160,12 +161,6 @@ class CartesianReadings(ReadOnlyState):
             self._refuse(status)
         return stiffness, found["motion"][0, :, 0, 0]
 
-    @cached_property
-    def _parts(self) -> Array:
-        """Sum of the magnitudes of the four terms (nv, nv) [N m/rad]: scale of rounding errors."""
-        parts = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
-        return frozen(parts)
-
     def _read(
         self, matrix: Array, name: str, directions: Array = _NO_DIRECTIONS
     ) -> tuple[int, dict[str, Array]]:
@@ -173,10 +168,8 @@ class CartesianReadings(ReadOnlyState):
 
         ``directions`` (D, 3) are unit vectors of quantities along directions.
         """
-        status = np.full((1, 1), readings.READ)
-        K, parts, JX = (
-            each[None, :, :, None] for each in (matrix, self._parts, self.posture.jacobian)
-        )
+        status, JX = np.array([[readings.READ]]), self.posture.jacobian
+        K, parts, JX = matrix[None, ..., None], self._parts[None, ..., None], JX[None, ..., None]
         found = read(K, parts, JX, directions, (name,), status, None)
         return int(status[0, 0]), found
 

@@ -53,6 +53,9 @@ No machine has a friction coefficient above 2 or a wrap of more than two turns.
 
 WRENCH: Final = "force [N], then moment [N m], base axes"
 
+NO_WRENCH: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_ZERO: Final = frozen(np.zeros(6))
+
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 Direction = Axis | ArrayLike
@@ -154,8 +157,7 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | Non
     array = number_array(name, value, kind)
     if array.shape != (size,):
         raise InvalidInput(name, f"shape {array.shape} given, ({size},) needed: {meaning}.")
-    array.setflags(write=False)
-    return array
+    return frozen(array)
 
 
 def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Array:
@@ -167,7 +169,7 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
     # one float for all cables is the usual case and must be fast
     number = value if isinstance(value, float) else math.nan
     if least <= number <= most or number in (0.0, math.inf):
-        return frozen(np.full(size, number))
+        return frozen(np.zeros(size) + number)
     array = _native(name, value)
     if array.ndim == 0:
         array = array.repeat(size)
@@ -186,7 +188,7 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
 
 def wrench_vector(name: str, value: ArrayLike) -> Array:
     """Check a wrench; return it as a read-only vector (6,)."""
-    return vector(name, value, 6, WRENCH, "wrench")
+    return _ZERO if value is NO_WRENCH else vector(name, value, 6, WRENCH, "wrench")
 
 
 def scalar(name: str, value: object) -> float:
@@ -202,7 +204,7 @@ def unit_direction(name: str, value: Direction) -> Array:
     if isinstance(value, str):
         return frozen(np.array(axis_vector(name, value)))
     array = vector(name, value, 3, "a direction in base axes")
-    largest = float(abs(array).max())
+    largest = max(map(abs, array.tolist()))
     if largest == 0.0:
         raise InvalidInput(name, "is the zero vector; give a direction, such as (0, 0, 1).")
     scaled = array / largest  # so that the norm neither overflows nor underflows

@@ -21,6 +21,7 @@ from cdsm.support.extras import need
 from cdsm.support.files import as_path
 from cdsm.support.progress import progress_bar
 from cdsm.support.validation import (
+    NO_WRENCH,
     XYZ,
     Direction,
     flag,
@@ -46,8 +47,6 @@ _log = logging.getLogger("cdsm")
 
 _NUMBERS = 2**18  # default number of joint angles in a block: some tenths of a second of work
 
-_NO_WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
 
 def sweep(
     arm: Manipulator,
@@ -56,7 +55,7 @@ def sweep(
     minimum: ArrayLike = 0.0,
     maximum: float = np.inf,
     elasticity: Elasticity | Mapping[str, Elasticity] | None = None,
-    wrench: ArrayLike | Mapping[str, ArrayLike] = _NO_WRENCH,
+    wrench: ArrayLike | Mapping[str, ArrayLike] = NO_WRENCH,
     direction: Direction | Sequence[Direction] | Mapping[str, Direction] = XYZ,
     outputs: Iterable[str] = DEFAULT,
     worst_friction: bool = False,

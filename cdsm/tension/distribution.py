@@ -24,7 +24,15 @@ from cdsm.kernels import tension as tension_kernels
 from cdsm.kernels.distribution import single_guess
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.validation import bound, flag, instance, one_of, quantity, wrench_vector
+from cdsm.support.validation import (
+    NO_WRENCH,
+    bound,
+    flag,
+    instance,
+    one_of,
+    quantity,
+    wrench_vector,
+)
 from cdsm.support.values import Array, frozen
 from cdsm.tension.infeasibility import explain
 from cdsm.tension.solvers import DEFAULT_SOLVER, solve
@@ -35,7 +43,7 @@ def distribute_tension(
     pose: Posture,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    wrench: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    wrench: ArrayLike = NO_WRENCH,
     solver: str = DEFAULT_SOLVER,
     *,
     fixed: Mapping[str, float] | None = None,
@@ -74,8 +82,6 @@ def distribute_tension(
     if fixed:
         low, high = _with_fixed(pose, low, high, fixed)
     wrench = wrench_vector("wrench", wrench)
-    torque = pose.jacobian.T @ wrench - pose.gravity_torque
-
     length, certified = pose.arm.length, False
     if solver == DEFAULT_SOLVER:
         turned = pose.jacobian, pose.length_jacobian, pose.gravity_torque
@@ -84,6 +90,7 @@ def distribute_tension(
             *pose.arm._model.blocks, *turned, wrench, low, high, smallest
         )
     if not certified:
+        torque = pose.jacobian.T @ wrench - pose.gravity_torque
         scaled = tension_kernels.scaled_balance(pose.length_jacobian, torque, low, high, length)
         problem = tension_kernels.Scaled(*scaled)
         solution = solve(problem, solver)
@@ -98,7 +105,6 @@ def distribute_tension(
         minimum=low,
         maximum=high,
         solver=solver,
-        residual=frozen(values @ pose.length_jacobian - torque),
     )
 
 
@@ -134,6 +140,9 @@ def checked_bounds(
     cables = arm.cables
     low = bound("minimum", minimum, len(cables), rows)
     high = bound("maximum", maximum, len(cables), rows)
+    least, most = arm._model.laws.narrowed(low, high)
+    if least is low and _ordered(minimum, maximum):
+        return low, high
     allowed = (low >= 0.0) & (low < math.inf)
     if np.count_nonzero(allowed) < low.size:
         *row, c = np.argwhere(~allowed)[0].tolist()
@@ -142,7 +151,6 @@ def checked_bounds(
             f"{low[(*row, c)]:g} N given for {_named(cables[c], row)}; cables only pull, so it "
             "must be finite and not negative.",
         )
-    least, most = arm._model.laws.narrowed(low, high)
     ordered = least <= most
     if np.count_nonzero(ordered) < ordered.size:
         at = tuple(np.argwhere(~ordered)[0].tolist())
@@ -156,6 +164,13 @@ def checked_bounds(
             f"{'its own' if own else 'its'} minimum of {l1:g} N; raise maximum or lower minimum.",
         )
     return least, most
+
+
+def _ordered(minimum: object, maximum: object) -> bool:
+    """Check whether both bounds are floats and allowed: the usual case, which must be fast."""
+    if not isinstance(minimum, float) or not isinstance(maximum, float):
+        return False
+    return 0.0 <= minimum <= maximum and minimum < math.inf
 
 
 def _named(cable: Cable, row: Sequence[int]) -> str:

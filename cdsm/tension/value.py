@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -14,7 +15,7 @@ from cdsm.posture import Posture
 from cdsm.support.format import aligned, key, plain, plural
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import one_of
-from cdsm.support.values import Array, ReadOnlyState
+from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     import pandas
@@ -36,7 +37,6 @@ class Tension(ReadOnlyState):
         minimum: Lower bounds (C,) [N].
         maximum: Upper bounds (C,) [N].
         solver: Name of the requested solver, even if a first guess was optimal.
-        residual: Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m].
         least: Whether the tensions are the smallest; False if they were chosen for a stiffness.
     """
 
@@ -46,8 +46,14 @@ class Tension(ReadOnlyState):
     minimum: Array
     maximum: Array
     solver: str
-    residual: Array
     least: bool = True
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m]."""
+        pose = self.posture
+        torque = pose.jacobian.T @ self.wrench - pose.gravity_torque
+        return frozen(self.values @ pose.length_jacobian - torque)
 
     def keys(self) -> tuple[str, ...]:
         """Return the names of the cables, in the order of :attr:`values`."""

@@ -129,7 +129,7 @@ def test_measured_wires_cost_little_more_than_linear_ones(
             clock.race(name, run, linear, most=1.5, fast_repeat=1, rounds=10)
 
 
-def test_batched_tension_is_fifteen_times_faster_than_one_by_one(clock: Clock | None) -> None:
+def test_batched_tension_is_six_times_faster_than_one_by_one(clock: Clock | None) -> None:
     rows = 4000
     one, q, _, _ = problem(5, rows)
     pose = one.at(q[0])
@@ -147,7 +147,7 @@ def test_batched_tension_is_fifteen_times_faster_than_one_by_one(clock: Clock | 
             "batched tension, n = 5: faster than one by one",
             lambda: cdsm.distribute_tension(pose, 5.0),
             batch,
-            least=15.0,
+            least=6.0,
             rows=rows,
             slow_repeat=50,
             fast_repeat=1,
@@ -177,7 +177,7 @@ def test_sweep_into_a_store_costs_little_more_than_its_batch(
         clock.race(what, sweep, batch, most=2.5, fast_repeat=1, rounds=5)
 
 
-@pytest.mark.parametrize(("joints", "most", "least"), [(5, 3.0, 20.0), (20, 2.2, 4.5)])
+@pytest.mark.parametrize(("joints", "most", "least"), [(5, 3.0, 18.0), (20, 2.2, 3.3)])
 def test_one_posture_to_its_reading_costs_little_more_than_its_stiffness(
     joints: int, most: float, least: float, clock: Clock | None
 ) -> None:
