@@ -270,7 +270,7 @@ def _rows(
 
 def _exists(stage: str, status: Statuses) -> NDArray[np.bool_]:
     """Return for each entry of ``status`` whether the quantities of a stage exist."""
-    return ~np.isin(status, [kind for kind in SweepStatus if stage in LOST[kind]])
+    return np.array([stage not in LOST[kind] for kind in sorted(LOST)])[status]
 
 
 def _spread(values: Array, place: NDArray[np.bool_]) -> Array:

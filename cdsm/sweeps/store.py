@@ -85,6 +85,7 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
     Returns False if another run has made a store there in the meantime.
     """
     import zarr
+    from zarr.codecs import ZstdCodec
 
     if not path.parent.is_dir():  # zarr would create the missing folder
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
@@ -106,6 +107,7 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
                 chunks=tuple(extent.get(dim, size) for dim, size in zip(dims, shape, strict=True)),
                 dtype=fill.dtype,
                 fill_value=fill,
+                compressors=ZstdCodec(level=1),  # higher levels gain nothing on numbers
                 dimension_names=dims,
                 attributes=specification.attributes(name),
             )
