@@ -165,7 +165,7 @@ def track(
 
 
 def _require_ending(option: str, path: Path | None, *endings: str) -> None:
-    """Check that ``path`` of ``option`` has one of ``endings``, before a simulation of minutes."""
+    """Check that ``path`` of ``option`` has one of ``endings``, before a long simulation."""
     if path is not None and path.suffix.lower() not in endings:
         raise misuse(option, f"{path} ends in none of {', '.join(endings)}.")
 

@@ -107,10 +107,10 @@ def feedforward(moment: Moment) -> Command:
 
 
 def tension_control(moment: Moment) -> Command:
-    """Control the tensions of all cables to those of the plan: PI, and the planned Δl_0 added.
+    """Control the tensions of all cables to those of the plan: PI, plus the planned step of l_0.
 
-    Δl_0 = Δl_0 wanted − (P Δe + I e)/k with the error e = F wanted − F measured. P and I
-    are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length, so an
+    Each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the error e = F planned − F measured. P and
+    I are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length, so an
     arm without springs in its joints drifts slowly from its posture.
     """
     return limited(moment, _regulated(moment))

@@ -61,7 +61,7 @@ class TipForce(ReadOnlyState):
 def tip_force(
     pose: Posture, tension: ArrayLike, direction: Direction, error: float = 0.0
 ) -> TipForce:
-    """Bound the force at the tip from the tensions at the motors; the load has no moment.
+    """Bound the tip force along a direction from motor tensions; the load has no moment.
 
     The bounds are proved for each state of the cables that friction admits, if posture, friction
     and masses are those of the arm. The posture must be known, from joint encoders or a camera. At

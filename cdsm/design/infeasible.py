@@ -56,7 +56,7 @@ def explain(designs: Designs) -> NoReturn:
 
 
 def _first_reason(designs: Designs, best: int) -> str:
-    """Return why the arm of design ``best`` is not balanced or stable at the first such posture."""
+    """Return the first posture where design ``best`` is not balanced or not stable, and why."""
     problem, row = designs.problem, designs.designs[best]
     held, loads = 0, len(problem.loads)
     try:

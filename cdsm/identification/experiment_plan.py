@@ -84,7 +84,7 @@ class ExperimentPlan(ReadOnlyState):
 
     @cached_property
     def even_std(self) -> Array:
-        """Standard deviations to expect from ``even_tests`` (P,) [m, kg, N/m, …]."""
+        """Standard deviations of the parameters from ``even_tests`` (P,) [m, kg, N/m, …]."""
         return self._std(self.even)
 
     @property

@@ -54,7 +54,7 @@ def identify(
     tension_of: Callable[..., Tension | ArrayLike] | None = None,
     progress: bool = True,
 ) -> Identification:
-    """Identify parameters p of an arm within bounds: min Σ ((K_i(p) − K_i)/σ_i)².
+    """Identify P parameters p of an arm within bounds: min Σ ((K_i(p) − K_i)/σ_i)².
 
     With ``arm = model_of(**p)``, the prediction K_i(p) is ``stiffness(arm.at(angles), tension,
     wrench).along(direction)``. For a measurement with a ``force`` it is ``weight_test(
@@ -63,7 +63,7 @@ def identify(
 
     A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
     its width determines the friction. Errors of its forces and tensions count as errors of its
-    readings, with their correlations. Derivatives of loops are implicit, without a search.
+    readings, with their correlations. Derivatives of loops need no search for equilibria.
 
     The search predicts all measurements some 50 P times, the profiles of
     :meth:`Identification.confidence` some 20 P² times. A measurement with a force takes ten times
@@ -84,8 +84,7 @@ def identify(
         model_of: Function that builds the arm from the free parameters (dimensions, masses,
             springs, leads, …), given by keyword.
         measurements: Stiffnesses and loops. They have at least as many numbers as there are
-            parameters; a loop has one number less than readings per axis, since its offset is
-            unknown.
+            parameters; a loop of n forces has n − 1 per axis, since its offset is unknown.
         free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
             they are positive and a factor of 100 or more apart, the logarithm is searched.
         start: First value of each parameter. If not given, several searches start from points

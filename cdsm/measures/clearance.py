@@ -32,7 +32,7 @@ _ON = 1e-9  # a site this near to a disk [m] is on the disk
 class Clearance(ReadOnlyState):
     """Smallest signed distances of the cables of an arm; made by :func:`clearance`.
 
-    A negative distance is the depth of an overlap; inf means that there is no such pair.
+    A negative distance is the depth of an overlap; inf: there are no two such bodies.
 
     Attributes:
         posture: The posture.
@@ -41,8 +41,8 @@ class Clearance(ReadOnlyState):
         links: Between a cable and the backbone of a link [m].
         disks: Between a cable and a disk through which it does not run, or the outer rim of one
             through which it runs [m].
-        nearest: Names of the two nearest bodies for each of the three distances; empty without a
-            pair.
+        nearest: Names of the two nearest bodies for each of the three distances; empty where it is
+            inf.
     """
 
     posture: Posture

@@ -66,7 +66,7 @@ def measured(
     diameter: float = 0.0,
     threads: int | None = None,
 ) -> dict[str, Array]:
-    """Compute measures of :data:`MEASURED` at postures q (B, nv); return (B,) for each name."""
+    """Compute ``names`` of :data:`MEASURED`, (B,) each, at q (B, nv); ``diameter`` of cables."""
     found: dict[str, Array] = {}
     if any(name in KINDS for name in names):
         found |= clearances(arm, q, diameter, threads=threads)

@@ -34,7 +34,7 @@ StiffnessAt = Callable[[float], Stiffness]
 
 
 def failure_at(at: StiffnessAt, place: float) -> Limit:
-    """Return why the arm fails at ``place``, a bound [N] or factor; ``"none"`` if it does not."""
+    """Return why the arm fails at a lower bound [N] or load factor ``place``; else ``"none"``."""
     try:
         return "none" if at(place).is_stable else "buckling"
     except (InfeasibleTension, SolverError):  # a solver may fail on the very edge

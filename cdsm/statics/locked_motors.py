@@ -52,10 +52,10 @@ class LoadedArm:
     """Arm under a wrench W (6,), its motors locked at a reference posture with tensions F (C,) [N].
 
     A position-controlled cable keeps its original length l_0. Its elongation is that at the
-    reference plus the change of its length. A force-controlled cable keeps its tension. Below the
-    domain of its law a cable has the stiffness of the lower bound until it is slack, above that of
-    the upper bound: only iterates may be there, see :meth:`require_domains`. ``lengths`` are L (C,)
-    [m] at which the cables have these tensions, by default those of the reference.
+    reference plus the change of its length. A force-controlled cable keeps its tension. Outside
+    the domain of its law a cable has the stiffness of the nearest bound, or is slack. Only iterates
+    may be there, see :meth:`require_domains`. ``lengths`` are L (C,) [m] at which the cables have
+    these tensions, by default those of the reference.
 
     Raises:
         ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the

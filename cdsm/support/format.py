@@ -107,7 +107,7 @@ class JointUnits(NamedTuple):
         return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
-        """Return a scale of each joint (nv,): 1 rad, or ``length`` [m] if it slides."""
+        """Return a unit for each joint (nv,): 1 rad, or ``length`` [m] if it slides."""
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:

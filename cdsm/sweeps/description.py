@@ -45,7 +45,7 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
 def law_text(law: Elasticity) -> str:
     """Return an elasticity as text; equal laws have equal texts, also in another process.
 
-    Of a user-defined law: its class, its state, domain, and EA and strain at up to 185 tensions.
+    The text of a user-defined law has its class, and digests of its state, domain, EA and strain.
     """
     text = repr(law)
     if type(law).__module__.startswith("cdsm.") and "..." not in text:  # numpy shortens arrays

@@ -8,9 +8,9 @@ columns of J_Lᵀ of free and other cables. The tensions of the free cables are 
 
     Σ y_c dF_c = r·dBᵀ λ + μ·(dτ − dJ_Lᵀ F).
 
-Both terms are derivatives of a power at constant tensions, so the kernel of the stiffness computes
-them too. The first power is Σ r_c L̇_c at the joint velocity λ. The second is that of the residual
-torque J_Lᵀ F − τ at the joint velocity −μ. The formula holds while the same cables stay at their
+Each term is the change of a mechanical power at constant tensions and joint velocity, so the kernel
+of the stiffness computes it too: the power Σ r_c L̇_c at the velocity λ, and the power of the
+residual torque J_Lᵀ F − τ at the velocity −μ. The formula holds while the same cables stay at their
 bounds.
 """
 

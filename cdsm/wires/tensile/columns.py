@@ -79,9 +79,9 @@ class Header(NamedTuple):
 def find_header(table: Table, wanted: Sequence[str | int] | None) -> tuple[Header, Column, Column]:
     """Find the header of a table, and its columns of displacement (or strain) and force.
 
-    ``wanted`` are the names or numbers of these two columns; None: by the words of the header. Of
-    the headers among the first 50 lines that name both, it is the one that most rows of numbers
-    follow: machines write tables of results before that of the points. TensileTestError if no
+    ``wanted`` are the names or numbers of these two columns; None: the words of the header
+    decide. Of the headers in the first 50 lines that name both, the one above the most rows of
+    numbers is taken: machines write a table of results above the points. TensileTestError if no
     header names both, or it names one of them twice.
     """
     if not table.rows:
