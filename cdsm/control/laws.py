@@ -110,8 +110,8 @@ def tension_control(moment: Moment) -> Command:
     """Control the tensions of all cables to those of the plan: PI, plus the planned step of l_0.
 
     Each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the error e = F planned − F measured. P and
-    I are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length, so an
-    arm without springs in its joints drifts slowly from its posture.
+    I are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length, so
+    an arm without springs in its joints drifts slowly from its posture.
     """
     return limited(moment, _regulated(moment))
 
