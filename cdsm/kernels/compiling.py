@@ -7,11 +7,13 @@ are the same.
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import logging
 import os
 import tempfile
 import time
+import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache, partial
@@ -21,6 +23,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numba import config, njit
 from numba.core import event
+from numba.core.caching import IndexDataCacheFile
 from numba.core.compiler import Compiler
 from numba.core.dispatcher import Dispatcher
 
@@ -85,11 +88,32 @@ def _compile(function: _Function, **options: Any) -> _Function:
             kernel = compiler()(function)
         finally:
             config.CACHE_DIR = chosen  # type: ignore[attr-defined]
-    # numba compares the source of a kernel with its cache, but not that of the kernels it calls
-    stored = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    if stored is not None:
-        stored._source_stamp = stored._source_stamp, _sources()
+    kept: Any = getattr(kernel, "_cache", None)
+    if hasattr(kept, "_cache_file"):
+        # numba compares the source of a kernel with its cache, but not that of the kernels it calls
+        stored = kept._cache_file
+        stamp, name = (stored._source_stamp, _sources()), stored._index_name.removesuffix(".nbi")
+        kept._cache_file = CacheFile(stored._cache_path, name, stamp)  # type: ignore[no-untyped-call]
     return cast(_Function, kernel)
+
+
+class CacheFile(IndexDataCacheFile):
+    """Cache of one kernel on disk: an index of signatures, and a file for each.
+
+    numba numbers the files. Two processes that compile a kernel at the same time then write one
+    file for two signatures, and a third one runs the wrong machine code. Here names are unique.
+    """
+
+    def _data_name(self, number: int) -> str:
+        return f"{self._index_name.removesuffix('nbi')}{uuid.uuid4().hex}.nbc"
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        """Save the index, and remove files that it does not name: those of older sources."""
+        super()._save_index(overloads)  # type: ignore[no-untyped-call]
+        names = glob.escape(self._index_name.removesuffix("nbi")) + "*.nbc"
+        for path in Path(self._cache_path).glob(names):
+            if path.name not in overloads.values():
+                path.unlink(missing_ok=True)
 
 
 @cache

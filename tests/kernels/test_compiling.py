@@ -8,11 +8,13 @@ import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 from numba.core.dispatcher import Dispatcher
 
 import cdsm
+from cdsm.kernels.compiling import CacheFile
 from tests.support.patience import HANGS
 from tests.support.processes import ROOT
 
@@ -122,6 +124,22 @@ def test_first_calls_compile_nothing_and_give_the_same_bits(tmp_path: Path) -> N
     compiled, said = run(FIRST, "0")
     assert said.split()[-2:] == ["1", "1"]
     assert first == compiled
+
+
+def test_processes_that_compile_at_once_do_not_confuse_their_kernels(tmp_path: Path) -> None:
+    one: Any = CacheFile(str(tmp_path), "kernel", "stamp")  # type: ignore[no-untyped-call]
+    other: Any = CacheFile(str(tmp_path), "kernel", "stamp")  # type: ignore[no-untyped-call]
+    late = other._load_index()
+    one.save("posture", "code for a posture")
+    with pytest.MonkeyPatch.context() as patch:  # the other has read the index before
+        patch.setattr(other, "_load_index", lambda: late)
+        other.save("block", "code for a block")
+    one._save_data(one._data_name(1), "code for a posture")  # whoever writes last
+    assert other.load("block") == "code for a block"
+    assert one.load("posture") is None  # to be compiled again
+    one.save("posture", "anew")
+    assert (one.load("block"), other.load("posture")) == ("code for a block", "anew")
+    assert len([*tmp_path.glob("*.nbc")]) == 2  # files without a signature are gone
 
 
 def test_kernels_call_kernels_by_name() -> None:
