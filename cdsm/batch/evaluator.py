@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from cdsm.batch import layout
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import checked_threads, kernel_arm, run_slices
-from cdsm.batch.layout import OK, QUANTITIES, UNDECIDED, Codes
+from cdsm.batch.layout import OK, POSTPONED, QUANTITIES, UNDECIDED, Codes
 from cdsm.batch.rigidities import rigidities
 from cdsm.batch.stuck_readings import STUCK, WITHOUT_FRICTION, Kept, read_stuck
 from cdsm.errors import InfeasibleTension, SolverError
@@ -88,7 +88,7 @@ class Evaluator:
     ) -> None:
         self._arm, nv, cables = arm, arm.nv, len(arm.cables)
         self._nothing = frozen(np.empty((0, cables)))
-        self._no_balance = Balance(np.empty((0, cables, nv)), np.empty((0, nv)))
+        self._no_balance = _empty_balance(0, cables, nv)
         low, high = bounds or (self._nothing, self._nothing)
         given = self._nothing if tension is None else tension
         self._rows = _Rows(
@@ -151,40 +151,36 @@ class Evaluator:
 
     def _distribute(self, rows: _Rows, found: Codes, out: Array) -> None:
         """Distribute the tensions of the postures ``rows``; fill their status and outputs."""
-        count, nv, cables = len(found), self._arm.nv, len(self._arm.cables)
-        balance = Balance(np.empty((count, cables, nv)), np.empty((count, nv)))
-        tension = np.empty((count, cables))
+        balance = _empty_balance(len(found), len(self._arm.cables), self._arm.nv)
         if self._asks:  # rigidities that only Python computes need the tensions first
-            self._evaluate(rows, np.array([layout.TENSION]), found, tension, balance)
+            self._evaluate(rows, np.array([layout.TENSION]), found, balance.tension, balance)
         else:
             self._evaluate(rows, self._wanted, found, out, balance)
-        left = np.flatnonzero(found == UNDECIDED)
-        if left.size:
-            kept = Balance(*(each[left] for each in balance))
-            tension[left], found[left] = self._search(rows.take(left), kept)
-        again = slice(None) if self._asks else left[found[left] == OK]
+        left, postponed = (found == kind for kind in (UNDECIDED, POSTPONED))
+        if left.any():
+            found[left] = self._search(rows, np.flatnonzero(left), balance)
+        found[postponed] = OK
+        again = slice(None) if self._asks else np.flatnonzero((left | postponed) & (found == OK))
         codes, values = found[again], out[again]
         if codes.size:
-            given = rows.take(again).under(frozen(tension[again]))
+            given = rows.take(again).under(frozen(balance.tension[again]))
             self._evaluate(given, self._wanted, codes, values)
             found[again], out[again] = codes, values
 
-    def _search(self, rows: _Rows, balance: Balance) -> tuple[Array, Codes]:
-        """Search for tensions of postures whose guess is not optimal; also return status codes."""
-        shape = balance.arms.shape[:2]
-        low, high = (np.broadcast_to(each, shape).copy() for each in (rows.low, rows.high))
-        tension, outcome = np.empty(shape), np.empty(shape[0], dtype=np.intp)
-        search_tensions(self._arm._model.blocks, *balance, low, high, tension, outcome)
+    def _search(self, rows: _Rows, left: Indices, balance: Balance) -> Codes:
+        """Search for tensions of the rows ``left`` (r,); fill them and return status codes (r,)."""
+        (arms, torque, tension), outcome = balance, np.empty(left.size, dtype=np.intp)
+        search_tensions(arms, torque, rows.low, rows.high, left, tension, outcome)
         codes = _CODES[outcome]
-        for r in np.flatnonzero(codes == UNDECIDED):
-            row = rows.take(slice(r, r + 1))
-            pose = self._arm.at(row.q[0], check_limits=False)
+        for n in np.flatnonzero(codes == UNDECIDED):
+            row = rows.take(left[n : n + 1])
+            pose, bounds = self._arm.at(row.q[0], check_limits=False), (row.low[0], row.high[0])
             try:
-                tension[r] = distribute_tension(pose, low[r], high[r], row.wrench[0]).values
-                codes[r] = OK
+                tension[left[n]] = distribute_tension(pose, *bounds, row.wrench[0]).values
+                codes[n] = OK
             except (InfeasibleTension, SolverError) as error:
-                codes[r] = Status.of(error) or Status.SOLVER_FAILED
-        return tension, codes
+                codes[n] = Status.of(error) or Status.SOLVER_FAILED
+        return codes
 
     def _evaluate(
         self,
@@ -217,8 +213,11 @@ class Evaluator:
             kept = empty.first(-(-len(states) // width))
             left = Balance(*(each[part] for each in balance))
             wire = self._run_kernel(some, wanted, slides, kept, left, states, values)
-            if read.any():
+            if read.any() and (states == OK).any():
                 self._read(kept, wire, some.q, names, states, values)
+            else:
+                for name in chain(*names):
+                    values[:, self._place[name]] = math.nan
 
     def _run_kernel(
         self,
@@ -297,3 +296,7 @@ class Evaluator:
                     out[lost, self._place[name]] = math.nan
             found[singular] = Status.SINGULAR
             found[state == IMMOBILE] = Status.IMMOBILE
+
+
+def _empty_balance(rows: int, cables: int, nv: int) -> Balance:
+    return Balance(np.empty((rows, cables, nv)), np.empty((rows, nv)), np.empty((rows, cables)))

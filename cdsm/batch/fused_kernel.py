@@ -15,6 +15,7 @@ from cdsm.batch.layout import (
     COINCIDENT_SITES,
     GRAVITY,
     GRAVITY_TORQUE,
+    INFEASIBLE,
     JACOBIAN,
     JOINT,
     LENGTH_JACOBIAN,
@@ -22,6 +23,7 @@ from cdsm.batch.layout import (
     OK,
     OUTSIDE_ELASTICITY,
     PASSIVE,
+    POSTPONED,
     RESIDUAL,
     STUCK_JOINT,
     TENSION,
@@ -31,7 +33,7 @@ from cdsm.batch.layout import (
 )
 from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
 from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
-from cdsm.kernels.distribution import distribute, keep_balance, set_arms, set_torque
+from cdsm.kernels.distribution import distribute, keep_balance, refuse, set_arms, set_torque
 from cdsm.kernels.records import clear, contains, copy, fetch, matrix, mirror, store, vector
 from cdsm.kernels.segments import (
     SHORTEST_SEGMENT,
@@ -123,11 +125,13 @@ def evaluate_rows(
         jacobian: J_X (B, 6, nv, W) for the readings, zero on entry, or no blocks.
         stuck: K_θ while the cables stick, with the shape of ``joint``.
         stuck_parts: Sum of the magnitudes of the four terms of ``stuck``, with its shape.
-        balance: Moment arms and torques of the balance, filled for UNDECIDED postures (b, …); no
-            rows if no tensions are distributed.
+        balance: Moment arms and torques of the balance (b, …), filled for UNDECIDED postures, and
+            tensions, filled for POSTPONED ones; no rows if no tensions are distributed.
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or why no tensions were found; on return the status of the posture.
-            UNDECIDED: the guess of its tensions is not the optimum.
+            UNDECIDED: the guess of its tensions is neither the optimum nor a proof. POSTPONED: it
+            is the optimum, but few postures of the block have tensions; what depends on tensions
+            is left for a block of such postures.
     """
     rows, nv, cables, bodies = q.shape[0], q.shape[1], series.shape[0], lowest.shape[0] + 1
 
@@ -157,6 +161,7 @@ def evaluate_rows(
     rotation, carried = np.empty((bodies, 3, 3, width)), np.empty((bodies, 7, width))
     guess, check = empty_guess(blocks, nv, cables, width), certificate(nv, cables, width)
     arms, torque = np.empty((cables, nv, width)), np.empty((nv, width))
+    zero = np.zeros((cables, width))
     six, shortest = np.empty((6, width)), np.empty(width)
     code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
     wiring, own_wiring = wire_scratch(laws, width), wire_scratch(wires, width)
@@ -186,25 +191,44 @@ def evaluate_rows(
                 code[w], known[w] = COINCIDENT_SITES, 0
             if _is_beyond(angles, lowest, highest, w):
                 code[w], known[w] = BEYOND_LIMITS, 0
-        if last >= GRAVITY:
-            set_gravity_stiffness(tree.parent, carried, gravity, width)
-            if contains(wanted, GRAVITY):
-                mirror(gravity, width)
 
         # quantities that need tensions
+        reached = last
         if last > GRAVITY:
             set_torque(JX, g, loads, torque, width)
             if low.shape[0]:
                 set_arms(J, smallest_arm, arms, width)
                 distribute(blocks, arms, torque, least, most, guess, check, F, width)
                 for w in lanes(width):
-                    if code[w] == OK and not (check.optimal[w] == 1.0 and guess.failed[w] < 0.0):
+                    if code[w] == OK and not (check.certified[w] == 1.0 and guess.failed[w] < 0.0):
                         code[w] = UNDECIDED
+                failing = 0
+                for w in lanes(width):
+                    failing += 1 if code[w] == UNDECIDED and guess.failed[w] >= 0.0 else 0
+                if failing and blocks.row.shape[0]:
+                    refuse(blocks, arms, torque, least, most, guess, check, zero, width)
+                    for w in lanes(width):
+                        if code[w] == UNDECIDED and check.certified[w] == 1.0:
+                            code[w] = INFEASIBLE
                 for w in lanes(width):
                     if code[w] == UNDECIDED and first + np.intp(w) < rows:
                         keep_balance(arms, torque, balance, first + np.intp(w), w)
+                held = 0
+                for w in lanes(width):
+                    held += 1 if code[w] == OK else 0
+                if last > TENSION and 3 * held < 2 * width:
+                    reached = TENSION
+                    for w in lanes(width):
+                        code[w] = POSTPONED if code[w] == OK else code[w]
+                    for c in upwards(0, cables):
+                        for w in lanes(min(width, rows - first)):
+                            balance.tension[first + np.intp(w), c] = F[c, w]
             _note(code, LOAD, known, width)
-        if last > TENSION:
+        if reached > TENSION or contains(wanted, GRAVITY):
+            set_gravity_stiffness(tree.parent, carried, gravity, width)
+            if contains(wanted, GRAVITY):
+                mirror(gravity, width)
+        if reached > TENSION:
             if contains(wanted, RESIDUAL):
                 _set_residual(F, J, torque, residual, width)
             clear(active, width)
@@ -217,7 +241,7 @@ def evaluate_rows(
             set_load_stiffness(JX, loads, masses.tip_joints, load, six, width)
 
         # quantities that need the rigidity of the cables
-        if last > LOAD:
+        if reached > LOAD:
             if not rigidity.shape[0]:
                 set_rigidity(laws, F, stretched, wiring, width)
             for w in lanes(width):

@@ -23,6 +23,8 @@ SINGULAR = int(Status.SINGULAR)
 IMMOBILE = int(Status.IMMOBILE)
 UNDECIDED = 255
 """Internal status: the guess of tensions is not optimal; a search or a solver follows."""
+POSTPONED = 254
+"""Internal status: the tensions exist; what needs them is computed beside other postures."""
 
 QUANTITIES = (
     "tip",

@@ -1,24 +1,20 @@
-"""Dual active-set method of Goldfarb and Idnani for the tension problem, as a numba kernel.
+"""Dual active-set method of Goldfarb and Idnani for the tension problem, for blocks of postures.
 
     min ½‖F‖²   subject to   J_Lᵀ F = b   and   low ≤ F ≤ high.
 
 The search runs where the guess of :mod:`cdsm.kernels.serpentine_guess` fails. It starts at the
 optimum without bounds. It adds one violated bound after the other, and drops a bound whose
 multiplier would change its sign. It ends at the optimum, or at a proof of infeasibility. A cable is
-free if it is at no bound. Each step builds and solves a new linear system, so that errors do not
-accumulate. Its matrix is
+free if it is at no bound. With multipliers z of the bounds, positive at the lower one, negative at
+the upper one,
 
-    S = Σ J_cᵀ J_c over the free cables c, with J_c row c of J_L.
+    F = F₀ + T z,    T = 1 − J_L S⁻¹ J_Lᵀ,    S = J_Lᵀ J_L.
 
-The caller verifies the optimum or the proof.
-
-The alternative is the solver DAQP, with one Python call per posture and a linear program to prove
-infeasibility. Mean time per posture of batches, with this search and with DAQP in its place:
-
-    virtual prototype up to nine tenths of its joint limits,
-    18 of 400 postures need the search                              7 µs,  75 µs
-    arms whose cables join any two links, all postures need it     16 µs, 138 µs
-    14 cables, 6 joints, all postures need it                      10 µs, 518 µs
+z is given for free cables (it is 0), F for the others (it is the bound). A step exchanges the roles
+of z and F of one cable: a principal pivot in the tableau T. So it costs C² operations and no
+solution of equations. When the search ends, tensions and multipliers are computed again from the
+bounds that it found, so errors of the steps do not accumulate. The caller verifies the optimum or
+the proof.
 """
 
 from __future__ import annotations
@@ -28,185 +24,281 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.kernels.compiling import inner
+from cdsm.kernels.compiling import Width, inner, lanes, upwards
 from cdsm.kernels.linear_algebra import eliminate
-from cdsm.kernels.tension import row_product
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
-FOUND, IMPOSSIBLE, LOST = range(3)
-"""Outcome of a search: F and y are the optimum; y proves infeasibility; no result."""
-
-_REGULAR = 1e-13
-"""Smallest accepted ratio of smallest to largest pivot of S."""
-
 _DEPENDENT = 1e-10
-"""If 1 − J_p S⁻¹ J_pᵀ is at most this, F_p cannot move while the free cables keep the balance."""
+"""If T[p, p] is at most this, F_p cannot move while the free cables keep the balance."""
 
 _ROUNDING = 1e-13
-"""Violations of a bound below this part of the largest tension are rounding, as are such slopes."""
+"""Rounding of a bound, relative to the largest tension, and of T, relative to its largest entry."""
 
 _STEPS = 20
 """Maximum number of steps per cable; one or two are usual."""
 
+_NONE, _STUCK = -1, -2
+"""In place of a cable: no cable; _STUCK − p if cable p can never reach its bound."""
+
 
 class State(NamedTuple):
-    """Iterate and working memory of the search.
+    """Iterates of a block of W postures, and working memory of the search.
 
     Attributes:
-        F: Tensions (C,).
-        y: Multipliers of balance (nv,).
-        side: Of each cable: 1 at its lower bound, −1 at its upper bound, 0 free (C,).
-        multiplier: Multipliers of the bounds (C,).
-        system: S = Σ J_cᵀ J_c over the free cables, and a right-hand side (nv, nv + 1, 1).
-        pivots: Scratch of the elimination (4, 1).
-        w: Right-hand side, then solution, of a system with S (nv,).
+        F: Tensions (C, W).
+        y: Multipliers of balance, or a proof of infeasibility (nv, W).
+        side: Of each cable: 1 at its lower bound, −1 at its upper bound, 0 free (C, W).
+        z: Multipliers of the bounds (C, W).
+        tableau: T (C, C, W).
+        system: S, b and J_Lᵀ, then S⁻¹ b and S⁻¹ J_Lᵀ (nv, nv + 1 + C, W).
+        free: Σ J_cᵀ J_c over the free cables c, and a right-hand side (nv, nv + 1, W).
+        cables: Scratch, such as a column and a row of the tableau (2, max(C, nv), W).
+        scratch: Scratch; in the steps the last row is what counts as zero in T (4, W).
+        chosen: The cable that moves to its bound, and that of the pivot (2, W).
     """
 
     F: Array
     y: Array
-    side: Indices
-    multiplier: Array
+    side: Array
+    z: Array
+    tableau: Array
     system: Array
-    pivots: Array
-    w: Array
+    free: Array
+    cables: Array
+    scratch: Array
+    chosen: Indices
 
 
 @inner
-def empty_state(nv: int, cables: int) -> State:
+def empty_state(nv: int, cables: int, width: int) -> State:
     """Allocate the working memory of :func:`search`."""
     return State(
-        np.empty(cables),
-        np.empty(nv),
-        np.empty(cables, dtype=np.intp),
-        np.empty(cables),
-        np.empty((nv, nv + 1, 1)),
-        np.empty((4, 1)),
-        np.empty(nv),
+        np.empty((cables, width)),
+        np.empty((nv, width)),
+        np.empty((cables, width)),
+        np.empty((cables, width)),
+        np.empty((cables, cables, width)),
+        np.empty((nv, nv + 1 + cables, width)),
+        np.empty((nv, nv + 1, width)),
+        np.empty((2, max(cables, nv), width)),
+        np.empty((4, width)),
+        np.empty((2, width), dtype=np.intp),
     )
 
 
 @inner
-def search(J: Array, b: Array, low: Array, high: Array, state: State) -> int:
-    """Find the least tensions within bounds that balance the arm; fill the state.
+def search(J: Array, b: Array, low: Array, high: Array, state: State, width: Width) -> None:
+    """Find the least tensions within bounds that balance the arm; fill F and y of the state.
 
-    J is J_L (C, nv), b the torque to balance (nv,), ``low`` and ``high`` are the bounds (C,).
-
-    Returns:
-        FOUND, IMPOSSIBLE, or LOST if rounding or too many steps end the search. If IMPOSSIBLE, y
-        (nv,) of the state is the proof of infeasibility.
+    J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and ``high`` are the bounds
+    (C, W). Where the search ends at a proof of infeasibility, y is that proof. F and y mean nothing
+    where rounding or too many steps end the search.
     """
-    F, y, side, multiplier, _, _, w = state
-    for c in range(F.shape[0]):
-        side[c], multiplier[c] = 0, 0.0
-    if not _solve_for_sides(J, b, low, high, state):
-        return LOST
-    for _ in range(_STEPS * F.shape[0]):
-        p, sign = _most_violated(F, low, high, side)
-        if p < 0:
-            return FOUND if _solve_for_sides(J, b, low, high, state) else LOST
-        bound = low[p] if sign > 0.0 else high[p]
-        while side[p] == 0:
-            # cable p moves towards its bound, and the free cables keep the balance
-            for i in range(y.shape[0]):
-                w[i] = J[p, i]
-            if not _solve_free(J, state):
-                return LOST
-            # per unit step F_p changes by this; 0 if no other tensions can balance the change
-            way = 1.0 - row_product(J, p, w)
-            whole = sign * (bound - F[p]) / way if way > _DEPENDENT else math.inf
-            # the largest step at which no multiplier changes its sign, and whose bound is dropped
-            part, dropped = math.inf, -1
-            for c in range(F.shape[0]):
-                slope = side[c] * sign * row_product(J, c, w)
-                if side[c] != 0 and slope < -_ROUNDING and multiplier[c] < -part * slope:
-                    part, dropped = -multiplier[c] / slope, c
-            if whole == math.inf and part == math.inf:  # p can never reach its bound
-                for i in range(y.shape[0]):
-                    y[i] = -sign * w[i]
-                return IMPOSSIBLE
-            step = min(whole, part)
-            for c in range(F.shape[0]):
-                change = sign * step * row_product(J, c, w)
-                if side[c] != 0:
-                    multiplier[c] += side[c] * change
-                elif c != p:
-                    F[c] -= change
-            F[p] += sign * step * way
-            multiplier[p] += step
-            if whole <= part:
-                side[p], F[p] = (1 if sign > 0.0 else -1), bound
+    _start(J, b, state, width)
+    entering, nothing = state.chosen[0], state.scratch[3]
+    for w in lanes(width):
+        entering[w] = _NONE
+    for w in lanes(width):
+        nothing[w] = _DEPENDENT
+    for _ in range(_STEPS * J.shape[0]):
+        _choose(state.F, low, high, state.side, entering, state.scratch[0], width)
+        busy = 0
+        for w in lanes(width):
+            busy += 1 if entering[w] > _NONE else 0
+        if busy == 0:
+            break
+        _step(low, high, state, width)
+        _exchange(state, width)
+    _finish(J, b, low, high, state, width)
+
+
+@inner
+def _start(J: Array, b: Array, state: State, width: Width) -> None:
+    """Fill the tableau T, and F with the optimum without bounds; all cables are free."""
+    F, side, z, T, system = state.F, state.side, state.z, state.tableau, state.system
+    nv = np.uint64(J.shape[1])
+    for c in upwards(0, J.shape[0]):
+        for w in lanes(width):
+            side[c, w] = 0.0
+        for w in lanes(width):
+            z[c, w] = 0.0
+        for i in upwards(0, nv):
+            for w in lanes(width):
+                system[i, nv + np.uint64(1) + c, w] = J[c, i, w]
+    for i in upwards(0, nv):
+        for w in lanes(width):
+            system[i, nv, w] = b[i, w]
+    _set_gram(J, side, system, width)
+    eliminate(system, state.scratch, width)
+    for c in upwards(0, J.shape[0]):
+        for w in lanes(width):
+            F[c, w] = 0.0
+        for i in upwards(0, nv):
+            for w in lanes(width):
+                F[c, w] += J[c, i, w] * system[i, nv, w]
+        for d in upwards(0, J.shape[0]):
+            for w in lanes(width):
+                T[c, d, w] = 1.0 if c == d else 0.0
+            for i in upwards(0, nv):
+                for w in lanes(width):
+                    T[c, d, w] -= J[c, i, w] * system[i, nv + np.uint64(1) + d, w]
+
+
+@inner
+def _set_gram(J: Array, side: Array, system: Array, width: Width) -> None:
+    """Fill the first columns of ``system`` with Σ J_cᵀ J_c over the free cables c."""
+    for i in upwards(0, J.shape[1]):
+        for j in upwards(i, J.shape[1]):
+            for w in lanes(width):
+                system[i, j, w] = 0.0
+            for c in upwards(0, J.shape[0]):
+                for w in lanes(width):
+                    system[i, j, w] += J[c, i, w] * J[c, j, w] if side[c, w] == 0.0 else 0.0
+            for w in lanes(width):
+                system[j, i, w] = system[i, j, w]
+
+
+@inner
+def _choose(
+    F: Array, low: Array, high: Array, side: Array, entering: Indices, worst: Array, width: Width
+) -> None:
+    """Choose the free cable farthest outside its bounds as ``entering``, where it is _NONE."""
+    for w in lanes(width):
+        worst[w] = 0.0 if entering[w] == _NONE else math.inf
+    for c in upwards(0, F.shape[0]):
+        for w in lanes(width):
+            worst[w] = max(worst[w], _ROUNDING * abs(F[c, w]))
+    for c in upwards(0, F.shape[0]):
+        number = np.intp(c)
+        for w in lanes(width):
+            outside = max(low[c, w] - F[c, w], F[c, w] - high[c, w])
+            chosen = side[c, w] == 0.0 and outside > worst[w]
+            entering[w] = number if chosen else entering[w]
+            worst[w] = outside if chosen else worst[w]
+
+
+@inner
+def _step(low: Array, high: Array, state: State, width: Width) -> None:
+    """Move the entering cables towards their bounds, until z of another cable would change sign.
+
+    ``chosen`` returns the cables of the pivots, _NONE where there is none.
+    """
+    F, z, side, T, rate = state.F, state.z, state.side, state.tableau, state.cables[0]
+    sign, step, limit, nothing = (
+        state.scratch[0],
+        state.scratch[1],
+        state.scratch[2],
+        state.scratch[3],
+    )
+    entering, pivot = state.chosen[0], state.chosen[1]
+    for w in lanes(width):
+        p = np.uint64(max(entering[w], 0))
+        sign[w] = 0.0 if entering[w] < 0 else (1.0 if F[p, w] < low[p, w] else -1.0)
+    for w in lanes(width):
+        p = np.uint64(max(entering[w], 0))
+        outside = max(low[p, w] - F[p, w], F[p, w] - high[p, w])
+        step[w] = outside / T[p, p, w] if T[p, p, w] > nothing[w] else math.inf
+    for w in lanes(width):
+        pivot[w] = entering[w]
+    for c in upwards(0, F.shape[0]):
+        number = np.intp(c)
+        for w in lanes(width):
+            rate[c, w] = sign[w] * T[c, np.uint64(max(entering[w], 0)), w]
+        for w in lanes(width):
+            slope = side[c, w] * rate[c, w]
+            limit[w] = -side[c, w] * z[c, w] / slope if slope < -nothing[w] else math.inf
+        for w in lanes(width):
+            pivot[w] = number if limit[w] < step[w] else pivot[w]
+        for w in lanes(width):
+            step[w] = min(step[w], limit[w])
+    for w in lanes(width):
+        pivot[w] = pivot[w] if step[w] < math.inf and pivot[w] >= 0 else _NONE
+    for c in upwards(0, F.shape[0]):
+        for w in lanes(width):
+            moves = pivot[w] >= 0 and side[c, w] == 0.0
+            F[c, w] += step[w] * rate[c, w] if moves else 0.0
+        for w in lanes(width):
+            moves = pivot[w] >= 0 and side[c, w] != 0.0
+            z[c, w] += step[w] * rate[c, w] if moves else 0.0
+    for w in lanes(width):
+        if entering[w] >= 0:
+            p, r = np.uint64(entering[w]), np.uint64(max(pivot[w], 0))
+            if pivot[w] == _NONE:
+                entering[w] = _STUCK - entering[w]
+            elif p == r:
+                z[p, w] += sign[w] * step[w]
+                F[p, w] = low[p, w] if sign[w] > 0.0 else high[p, w]
+                side[p, w], entering[w] = sign[w], _NONE
             else:
-                side[dropped], multiplier[dropped] = 0, 0.0
-    return LOST
+                z[p, w] += sign[w] * step[w]
+                side[r, w], z[r, w] = 0.0, 0.0
 
 
 @inner
-def _most_violated(F: Array, low: Array, high: Array, side: Indices) -> tuple[int, float]:
-    """Return the free cable farthest outside its bounds ``low`` and ``high``, or −1 if none is.
-
-    Also return 1 if its tension is below the lower bound, else −1. For ``side`` see :class:`State`.
-    """
-    p, sign, worst = -1, 0.0, 0.0
-    for c in range(F.shape[0]):
-        worst = max(worst, _ROUNDING * abs(F[c]))
-    for c in range(F.shape[0]):
-        if side[c] == 0 and low[c] - F[c] > worst:
-            p, sign, worst = c, 1.0, low[c] - F[c]
-        if side[c] == 0 and F[c] - high[c] > worst:
-            p, sign, worst = c, -1.0, F[c] - high[c]
-    return p, sign
+def _exchange(state: State, width: Width) -> None:
+    """Exchange z and F of the pivots in the tableau."""
+    T, pivot, inverse, nothing = state.tableau, state.chosen[1], state.scratch[0], state.scratch[3]
+    column, row = state.cables[0], state.cables[1]
+    for w in lanes(width):
+        r = np.uint64(max(pivot[w], 0))
+        inverse[w] = 1.0 / T[r, r, w] if pivot[w] >= 0 else 0.0
+    for w in lanes(width):
+        nothing[w] = max(nothing[w], _ROUNDING * inverse[w])
+    for c in upwards(0, T.shape[0]):
+        for w in lanes(width):
+            column[c, w] = T[c, np.uint64(max(pivot[w], 0)), w] * inverse[w]
+        for w in lanes(width):
+            row[c, w] = T[np.uint64(max(pivot[w], 0)), c, w]
+    for c in upwards(0, T.shape[0]):
+        for d in upwards(0, T.shape[0]):
+            for w in lanes(width):
+                T[c, d, w] -= column[c, w] * row[d, w]
+    for c in upwards(0, T.shape[0]):
+        for w in lanes(width):
+            if pivot[w] >= 0:
+                T[c, np.uint64(pivot[w]), w] = column[c, w]
+                T[np.uint64(pivot[w]), c, w] = -inverse[w] * row[c, w]
+    for w in lanes(width):
+        if pivot[w] >= 0:
+            T[np.uint64(pivot[w]), np.uint64(pivot[w]), w] = inverse[w]
 
 
 @inner
-def _solve_for_sides(J: Array, b: Array, low: Array, high: Array, state: State) -> bool:
+def _finish(J: Array, b: Array, low: Array, high: Array, state: State, width: Width) -> None:
     """Fill F and y of ``state``: cables with a side get their bound, ``low`` or ``high``.
 
-    Free cables get the least tensions that balance the torque b (nv,). The torque that rounding
-    leaves is balanced a second time: S squares the condition number of J_L. Returns False if the
-    free cables cannot balance every torque.
+    Free cables get the least tensions that balance the torque b (nv, W). If cable p is stuck, they
+    balance J_p alone, and y is the proof: J_p y < 0, and other free cables do no work. The torque
+    that rounding leaves is balanced twice more: the system squares the condition number of J_L.
     """
-    F, y, side, _, _, _, w = state
-    for c in range(F.shape[0]):
-        F[c] = 0.0 if side[c] == 0 else (low[c] if side[c] > 0 else high[c])
-    for i in range(b.shape[0]):
-        y[i] = 0.0
-    for _ in range(2):
-        for i in range(b.shape[0]):
-            w[i] = b[i]
-        for c in range(F.shape[0]):
-            for i in range(b.shape[0]):
-                w[i] -= J[c, i] * F[c]
-        if not _solve_free(J, state):
-            return False
-        for i in range(b.shape[0]):
-            y[i] += w[i]
-        for c in range(F.shape[0]):
-            if side[c] == 0:
-                F[c] = row_product(J, c, y)
-    return True
-
-
-@inner
-def _solve_free(J: Array, state: State) -> bool:
-    """Replace w (nv,) of ``state`` by S⁻¹ w; return False if S = Σ J_cᵀ J_c is singular.
-
-    The sum is over the free cables c.
-    """
-    _, _, side, _, system, pivots, w = state
-    nv = w.shape[0]
-    for i in range(nv):
-        for j in range(nv):
-            system[i, j, 0] = 0.0
-        system[i, nv, 0] = w[i]
-    for c in range(side.shape[0]):
-        if side[c] == 0:
-            for i in range(nv):
-                if J[c, i] != 0.0:
-                    for j in range(nv):
-                        system[i, j, 0] += J[c, i] * J[c, j]
-    eliminate(system, pivots, system.shape[2])
-    for i in range(nv):
-        w[i] = system[i, nv, 0]
-    regular: bool = pivots[0, 0] > _REGULAR * pivots[1, 0]
-    return regular
+    F, y, side, system, entering = state.F, state.y, state.side, state.free, state.chosen[0]
+    sign, torque, nv = state.cables[0, 0], state.cables[1], np.uint64(y.shape[0])
+    for w in lanes(width):
+        p = np.uint64(max(_STUCK - entering[w], 0))
+        sign[w] = -1.0 if F[p, w] < low[p, w] else 1.0
+    for i in upwards(0, nv):
+        for w in lanes(width):
+            p = np.uint64(max(_STUCK - entering[w], 0))
+            torque[i, w] = sign[w] * J[p, i, w] if entering[w] < _NONE else b[i, w]
+        for w in lanes(width):
+            y[i, w] = 0.0
+    for c in upwards(0, F.shape[0]):
+        for w in lanes(width):
+            bound = low[c, w] if side[c, w] > 0.0 else high[c, w]
+            F[c, w] = bound if side[c, w] != 0.0 and entering[w] >= _NONE else 0.0
+    for _ in range(3):
+        _set_gram(J, side, system, width)
+        for i in upwards(0, nv):
+            for w in lanes(width):
+                system[i, nv, w] = torque[i, w]
+            for c in upwards(0, F.shape[0]):
+                for w in lanes(width):
+                    system[i, nv, w] -= J[c, i, w] * F[c, w]
+        eliminate(system, state.scratch, width)
+        for i in upwards(0, nv):
+            for w in lanes(width):
+                y[i, w] += system[i, nv, w]
+            for c in upwards(0, F.shape[0]):
+                for w in lanes(width):
+                    F[c, w] += J[c, i, w] * system[i, nv, w] if side[c, w] == 0.0 else 0.0

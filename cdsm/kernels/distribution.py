@@ -2,30 +2,49 @@
 
     min ½‖F‖²   subject to   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high.
 
-Most guesses of a block of postures are optimal. The other postures are solved one by one, by a
-kernel that is compiled when it is first needed.
+Most guesses of a block of postures are optimal. The other postures are solved in blocks of their
+own, by a kernel that is compiled when it is first needed.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from cdsm.kernels.active_set import FOUND, IMPOSSIBLE, empty_state, search
-from cdsm.kernels.compiling import Index, Width, compiled, inlined, inner, lanes, threaded, upwards
+from cdsm.kernels.active_set import empty_state, search
+from cdsm.kernels.compiling import (
+    WIDTH,
+    Index,
+    Width,
+    compiled,
+    inlined,
+    inner,
+    lanes,
+    threaded,
+    upwards,
+)
 from cdsm.kernels.serpentine_guess import (
     Blocks,
     Guess,
     empty_guess,
     guess_tensions,
-    is_provably_infeasible,
     set_multipliers,
+    set_proof,
 )
-from cdsm.kernels.tension import Balance, Certificate, certificate, is_infeasible, set_optimal
+from cdsm.kernels.tension import (
+    Balance,
+    Certificate,
+    certificate,
+    set_infeasible,
+    set_optimal,
+)
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 OPTIMAL, INFEASIBLE, UNDECIDED = range(3)
 """Outcome: certified tensions; a proof that there are none; neither."""
+
+_NUMBERS = 2**17
+"""Count of numbers in the memory of a block that is searched, so that the cache holds it."""
 
 
 @inner
@@ -74,14 +93,34 @@ def distribute(
 ) -> None:
     """Fill the tensions (C, W) with a guess of the least ones, and verify it.
 
-    The guess is the optimum where ``certificate.optimal`` is 1 and ``guess.failed`` is −1. J is J_L
-    (C, nv, W), with moment arms of rounding set to zero; b is the torque to balance (nv, W);
+    The guess is the optimum where ``certificate.certified`` is 1 and ``guess.failed`` is −1. J is
+    J_L (C, nv, W), with moment arms of rounding set to zero; b is the torque to balance (nv, W);
     ``low`` and ``high`` are the bounds (C, W).
     """
     guess_tensions(blocks, J, b, low, high, guess, width)
-    set_multipliers(blocks, J, guess.F, guess, np.intp(0), width)
+    set_multipliers(blocks, J, guess.F, guess, guess.y, width)
     set_optimal(J, b, low, high, guess.F, guess.y, certificate, width)
     set_within(guess.F, low, high, tension, width)
+
+
+@inner
+def refuse(
+    blocks: Blocks,
+    J: Array,
+    b: Array,
+    low: Array,
+    high: Array,
+    guess: Guess,
+    certificate: Certificate,
+    zero: Array,
+    width: Width,
+) -> None:
+    """Set ``certificate.certified`` to 1 where the guess gives a proof of infeasibility, else to 0.
+
+    ``zero`` (C, W) are zeros; the other arguments are those of :func:`distribute`, after it.
+    """
+    set_proof(blocks, J, guess, certificate.y, zero, width)
+    set_infeasible(J, b, low, high, guess.y, certificate, width)
 
 
 @inner
@@ -125,57 +164,65 @@ def single_guess(
     set_torque(JX, g, W, torque, None)
     set_arms(J, smallest, arms, None)
     distribute(blocks, arms, torque, least, most, guess, check, tension, None)
-    return tension.reshape(count), check.optimal[0] == 1.0 and guess.failed[0] < 0.0
+    return tension.reshape(count), check.certified[0] == 1.0 and guess.failed[0] < 0.0
 
 
 @threaded
 def search_tensions(
-    blocks: Blocks,
+    J: Array, b: Array, low: Array, high: Array, rows: Indices, tension: Array, outcome: Indices
+) -> None:
+    """Solve for the tensions of the postures ``rows`` (r,), whose guess is wrong.
+
+    J is (B, C, nv) and b (B, nv); ``low`` and ``high`` are (B, C), or (1, C) for all postures: as
+    in :func:`distribute`. Fills the tensions (B, C) and the outcome (r,). Without an outcome
+    OPTIMAL, the tensions are meaningless.
+    """
+    count, nv = J.shape[1], J.shape[2]
+    width = max(1, min(WIDTH, rows.shape[0], _NUMBERS // (count * (count + nv))))
+    arms, torque = np.empty((count, nv, width)), np.empty((nv, width))
+    least, most = np.empty((count, width)), np.empty((count, width))
+    state, check = empty_state(nv, count, width), certificate(nv, count, width)
+    at = np.empty(width, dtype=np.intp)
+    for first in range(0, rows.shape[0], width):
+        part = rows[first : first + width]
+        _gather(J, b, low, high, part, at, arms, torque, least, most, width)
+        search(arms, torque, least, most, state, width)
+        set_infeasible(arms, torque, least, most, state.y, check, width)
+        for w in range(part.shape[0]):
+            outcome[first + w] = INFEASIBLE if check.certified[w] == 1.0 else UNDECIDED
+        set_optimal(arms, torque, least, most, state.F, state.y, check, width)
+        for w in range(part.shape[0]):
+            if check.certified[w] == 1.0:
+                outcome[first + w] = OPTIMAL
+                for c in range(count):
+                    tension[part[w], c] = min(max(state.F[c, w], least[c, w]), most[c, w])
+
+
+@inner
+def _gather(
     J: Array,
     b: Array,
     low: Array,
     high: Array,
-    tension: Array,
-    outcome: Indices,
+    rows: Indices,
+    at: Indices,
+    arms: Array,
+    torque: Array,
+    least: Array,
+    most: Array,
+    width: Width,
 ) -> None:
-    """Solve for the tensions (r, C) of postures whose guess is wrong; fill the outcome (r,).
-
-    J is (r, C, nv) and b (r, nv); ``low`` and ``high`` are (r, C): as in :func:`distribute`.
-    Without an outcome OPTIMAL, the tensions are meaningless.
-    """
-    for r in range(J.shape[0]):
-        outcome[r] = _search_one(blocks, J[r], b[r], low[r], high[r], tension[r])
-
-
-@inner
-def _search_one(
-    blocks: Blocks, rows: Array, torque: Array, lowest: Array, highest: Array, tension: Array
-) -> int:
-    """Fill the tensions (C,) of one posture and return the outcome.
-
-    ``rows`` is J_L (C, nv), ``torque`` (nv,) is to be balanced; ``lowest`` and ``highest`` are the
-    bounds (C,).
-    """
-    count, nv = rows.shape
-    J, b = rows.reshape(count, nv, 1), torque.reshape(nv, 1)
-    low, high = lowest.reshape(count, 1), highest.reshape(count, 1)
-    one = J.shape[2]  # numba would compile kernels once more for a literal 1
-    guess, state = empty_guess(blocks, nv, count, one), empty_state(nv, count)
-    guess_tensions(blocks, J, b, low, high, guess, one)
-    if (
-        blocks.row.shape[0]
-        and guess.failed[0] >= 0.0
-        and is_provably_infeasible(blocks, J, b, low, high, guess, np.zeros((count, 1)))
-    ):
-        return INFEASIBLE
-    found = search(rows, torque, lowest, highest, state)
-    if found == FOUND:
-        F, y, check = state.F.reshape(count, 1), state.y.reshape(nv, 1), certificate(nv, count, one)
-        set_optimal(J, b, low, high, F, y, check, one)
-        if check.optimal[0] == 1.0:
-            for c in range(count):
-                tension[c] = min(max(state.F[c], lowest[c]), highest[c])
-            return OPTIMAL
-    if found == IMPOSSIBLE and is_infeasible(rows, torque, lowest, highest, state.y):
-        return INFEASIBLE
-    return UNDECIDED
+    """Fill a block of postures with ``rows``, repeating the last; ``at`` (W,) is scratch."""
+    for w in lanes(width):
+        at[w] = rows[min(np.intp(w), rows.shape[0] - 1)]
+    for i in upwards(0, b.shape[1]):
+        for w in lanes(width):
+            torque[i, w] = b[at[w], i]
+    for c in upwards(0, J.shape[1]):
+        for i in upwards(0, b.shape[1]):
+            for w in lanes(width):
+                arms[c, i, w] = J[at[w], c, i]
+        for w in lanes(width):
+            least[c, w] = low[at[w] if low.shape[0] > 1 else 0, c]
+        for w in lanes(width):
+            most[c, w] = high[at[w] if high.shape[0] > 1 else 0, c]

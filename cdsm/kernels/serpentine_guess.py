@@ -5,8 +5,8 @@ J_Lᵀ is block triangular; a block is the axes of one joint (at most two) and t
 there. From the last joint to the first, one cable per axis is raised above its lower bound to
 balance the joint. From the first joint to the last, the multipliers follow from these cables.
 Mostly this guess is the optimum: with three cables for each universal joint, in all of 9000 random
-postures up to half the joint limits, and in three of four up to nine tenths. A guess takes 0.3 to
-1.5 µs, a search by :mod:`cdsm.kernels.active_set` 9 to 16 µs.
+postures up to half the joint limits, and in three of four up to nine tenths. A guess takes 0.3 µs,
+a search by :mod:`cdsm.kernels.active_set` some 4 µs.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cdsm.kernels.compiling import Index, Width, inner, lanes, upwards
-from cdsm.kernels.tension import is_infeasible
 from cdsm.kernels.tree import Indices, Routing
 from cdsm.support.values import Array
 
@@ -83,7 +82,8 @@ class Guess(NamedTuple):
         F: Tensions (C, W) [N].
         y: Multipliers with J_L y = F for the cables above their lower bounds (nv, W).
         failed: The first block that no pair of its cables balances (W,), or −1.
-        lacking: Missing torque of that block (2, W).
+        lacking: Missing torque of the block that is tried (2, W).
+        missing: Missing torque of the block that failed (2, W).
         chosen: The two cables above their lower bounds, numbered within each of the K blocks (K, 2,
             W).
         best: Cost, tensions to add and numbers of the best pair of cables (5, W).
@@ -94,6 +94,7 @@ class Guess(NamedTuple):
     y: Array
     failed: Array
     lacking: Array
+    missing: Array
     chosen: Array
     best: Array
     pair: Array
@@ -106,6 +107,7 @@ def empty_guess(blocks: Blocks, nv: int, cables: int, width: int) -> Guess:
         np.empty((cables, width)),
         np.empty((nv, width)),
         np.empty(width),
+        np.empty((2, width)),
         np.empty((2, width)),
         np.empty((blocks.row_start.shape[0] - 1, 2, width)),
         np.empty((5, width)),
@@ -124,6 +126,7 @@ def guess_tensions(
     """
     row, row_start, cable, cable_start = blocks
     F, failed, lacking, best = guess.F, guess.failed, guess.lacking, guess.best
+    missing = guess.missing
     for c in upwards(0, F.shape[0]):
         for w in lanes(width):
             F[c, w] = low[c, w]
@@ -141,6 +144,10 @@ def guess_tensions(
         own = cable[cable_start[k] : cable_start[k + 1]]
         _set_best(J, low, high, own, i, j, guess, width)
         balanced = 0.0
+        for r in range(2):
+            for w in lanes(width):
+                fails = best[0, w] == math.inf and failed[w] < 0.0
+                missing[r, w] = lacking[r, w] if fails else missing[r, w]
         for w in lanes(width):
             fails = best[0, w] == math.inf and failed[w] < 0.0
             failed[w] = float(k) if fails else failed[w]
@@ -233,13 +240,16 @@ def _keep_better(
 
 @inner
 def set_multipliers(
-    blocks: Blocks, J: Array, F: Array, guess: Guess, first: Index, width: Width
+    blocks: Blocks, J: Array, F: Array, guess: Guess, y: Array, width: Width
 ) -> None:
-    """Fill y of ``guess`` from block ``first`` on: J_L y = F (C, W) for the chosen cables there."""
+    """Fill y (nv, W) so that J_L y = F (C, W) for the chosen cables of each block of ``guess``.
+
+    The blocks up to the one that failed keep their y.
+    """
     row, row_start, cable, cable_start = blocks
-    y, chosen, p, q = guess.y, guess.chosen, guess.best, guess.pair
-    for k in range(first, row_start.shape[0] - 1):
-        i, j = np.uint64(row[row_start[k]]), np.uint64(row[row_start[k + 1] - 1])
+    failed, chosen, p, q = guess.failed, guess.chosen, guess.best, guess.pair
+    for k in range(row_start.shape[0] - 1):
+        i, j, block = np.uint64(row[row_start[k]]), np.uint64(row[row_start[k + 1] - 1]), float(k)
         # rows of p and q, the two chosen cables: J at i, J at j, and F − J y of the earlier blocks
         for r in range(3):
             for w in lanes(width):
@@ -261,47 +271,69 @@ def set_multipliers(
                     taken[2, w] = q[3, w] if chosen[k, r, w] == number else taken[2, w]
         if i == j:
             for w in lanes(width):
-                y[i, w] = p[2, w] / p[0, w]
+                y[i, w] = p[2, w] / p[0, w] if failed[w] < block else y[i, w]
             continue
         for w in lanes(width):
             q[3, w] = p[0, w] * q[1, w] - p[1, w] * q[0, w]
         for w in lanes(width):
-            y[i, w] = (p[2, w] * q[1, w] - q[2, w] * p[1, w]) / q[3, w]
+            part = (p[2, w] * q[1, w] - q[2, w] * p[1, w]) / q[3, w]
+            y[i, w] = part if failed[w] < block else y[i, w]
         for w in lanes(width):
-            y[j, w] = (p[0, w] * q[2, w] - q[0, w] * p[2, w]) / q[3, w]
+            part = (p[0, w] * q[2, w] - q[0, w] * p[2, w]) / q[3, w]
+            y[j, w] = part if failed[w] < block else y[j, w]
 
 
 @inner
-def is_provably_infeasible(
-    blocks: Blocks, J: Array, b: Array, low: Array, high: Array, guess: Guess, zero: Array
-) -> bool:
-    """Check whether a proof shows that no tensions balance the block where ``guess`` failed.
+def set_proof(
+    blocks: Blocks, J: Array, guess: Guess, normal: Array, zero: Array, width: Width
+) -> None:
+    """Fill y of ``guess`` with what mostly proves that no tensions balance the block that failed.
 
-    The proof is a vector v. In that block, v is normal to a line that separates the lacking torque
-    from the torques of the block's cables; mostly the line is along one of these torques. For the
-    joints behind it, v is such that their chosen cables do no work.
-
-    The arrays are those of one posture, with a last axis of 1; ``zero`` (C, 1) are zeros.
+    In that block y is t + s n, with the missing torque t and n normal to t. The chosen cables
+    behind it do no work, J_c y = 0. The others shall do none or less: s is the number nearest to 0
+    for which J_c y ≤ 0. ``normal`` (nv, W) is scratch, ``zero`` (C, W) are zeros.
     """
     row, row_start, cable, cable_start = blocks
-    k, v, count, nv = int(guess.failed[0]), guess.y, J.shape[0], J.shape[1]
-    rows, torque, direction = J.reshape(count, nv), b.reshape(nv), v.reshape(nv)
-    lowest, highest = low.reshape(count), high.reshape(count)
-    i, j = row[row_start[k]], row[row_start[k + 1] - 1]
-    for s in range(cable_start[k] - 1, cable_start[k + 1]):
-        x, y = guess.lacking[0, 0], guess.lacking[1, 0]
-        if s >= cable_start[k]:
-            c = cable[s]
-            x, y = -J[c, j, 0], J[c, i, 0]
-            if x * guess.lacking[0, 0] + y * guess.lacking[1, 0] < 0.0:
-                x, y = -x, -y
-        for m in range(nv):
-            direction[m] = 0.0
-        direction[j] = y
-        direction[i] = x
-        set_multipliers(blocks, J, zero, guess, k + 1, J.shape[2])
-        if is_infeasible(rows, torque, lowest, highest, direction):
-            return True
-        if i == j:
-            break
-    return False
+    y, failed, missing, chosen = guess.y, guess.failed, guess.missing, guess.chosen
+    work, turned, least, most = guess.pair[0], guess.pair[1], guess.best[0], guess.best[1]
+    for k in range(row_start.shape[0] - 1):
+        i, j, block = np.uint64(row[row_start[k]]), np.uint64(row[row_start[k + 1] - 1]), float(k)
+        for w in lanes(width):
+            y[i, w] = missing[0, w] if failed[w] == block else 0.0
+        for w in lanes(width):
+            y[j, w] = missing[1, w] if failed[w] == block else 0.0
+        for w in lanes(width):
+            normal[i, w] = -missing[1, w] if failed[w] == block else 0.0
+        for w in lanes(width):
+            normal[j, w] = missing[0, w] if failed[w] == block else 0.0
+    set_multipliers(blocks, J, zero, guess, y, width)
+    set_multipliers(blocks, J, zero, guess, normal, width)
+    for w in lanes(width):
+        least[w] = -math.inf
+    for w in lanes(width):
+        most[w] = math.inf
+    for k in range(row_start.shape[0] - 1):
+        for s in range(cable_start[k], cable_start[k + 1]):
+            c, number, block = np.uint64(cable[s]), float(s - cable_start[k]), float(k)
+            for w in lanes(width):
+                work[w] = 0.0
+            for w in lanes(width):
+                turned[w] = 0.0
+            for t in range(row_start[k + 1]):
+                i = np.uint64(row[t])
+                for w in lanes(width):
+                    work[w] += J[c, i, w] * y[i, w]
+                for w in lanes(width):
+                    turned[w] += J[c, i, w] * normal[i, w]
+            for w in lanes(width):
+                idle = chosen[k, 0, w] == number or chosen[k, 1, w] == number
+                turned[w] = 0.0 if failed[w] < block and idle else turned[w]
+            for w in lanes(width):
+                end = -work[w] / turned[w]
+                least[w] = max(least[w], end) if turned[w] < 0.0 else least[w]
+            for w in lanes(width):
+                end = -work[w] / turned[w]
+                most[w] = min(most[w], end) if turned[w] > 0.0 else most[w]
+    for m in upwards(0, y.shape[0]):
+        for w in lanes(width):
+            y[m, w] += min(max(least[w], 0.0), most[w]) * normal[m, w]

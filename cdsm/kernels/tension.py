@@ -57,23 +57,24 @@ class Scaled(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """J_L (r, C, nv) of r postures, moment arms of rounding set to zero, and τ (r, nv)."""
+    """Of r postures J_L (r, C, nv), moment arms of rounding set to zero, τ (r, nv) and F (r, C)."""
 
     arms: Array
     torque: Array
+    tension: Array
 
 
 class Certificate(NamedTuple):
-    """Scratch and result of :func:`set_optimal`.
+    """Scratch and result of :func:`set_optimal` and :func:`set_infeasible`.
 
-    Shapes: y (nv, W), z (C, W), violations (5, W), the largest force (W,), optimal (W,).
+    Shapes: y (nv, W), z (C, W), sums (6, W), the largest force (W,), certified (W,).
     """
 
     y: Array
     z: Array
-    violations: Array
+    sums: Array
     force: Array
-    optimal: Array
+    certified: Array
 
 
 @inner
@@ -82,7 +83,7 @@ def certificate(nv: int, cables: int, width: int) -> Certificate:
     return Certificate(
         np.empty((nv, width)),
         np.empty((cables, width)),
-        np.empty((5, width)),
+        np.empty((6, width)),
         np.empty(width),
         np.empty(width),
     )
@@ -157,10 +158,10 @@ def set_violations(
     multipliers of the equations. z (n, W) are the multipliers of the bounds: negative at low,
     positive at high.
 
-    The first three rows of ``violations`` (5, W) are all zero exactly at the optimum. First, the
-    largest violation of balance (divided by the largest moment arm) and of the bounds. Second, the
-    largest |x + J y + z|, or z⁺ where high is infinite. Third, the duality gap |xᵀx + bᵀy + lowᵀz⁻
-    + highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
+    The first three of the rows of ``violations`` (5, W) or more are all zero exactly at the
+    optimum. First, the largest violation of balance (divided by the largest moment arm) and of the
+    bounds. Second, the largest |x + J y + z|, or z⁺ where high is infinite. Third, the duality gap
+    |xᵀx + bᵀy + lowᵀz⁻ + highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
     """
     primal, dual, gap, arm, term = (
         violations[0],
@@ -214,12 +215,12 @@ def set_optimal(
     scratch: Certificate,
     width: Width,
 ) -> None:
-    """Set ``scratch.optimal`` (W,) to 1 where F (C, W) is the optimum within the bounds, else to 0.
+    """Set ``scratch.certified`` (W,) to 1 where F (C, W) is the optimum within the bounds, else 0.
 
     v (nv, W) satisfies J_L v = F for cables between their bounds. The multipliers are y = −v, and z
     = J_L v − F at a bound, elsewhere 0.
     """
-    y, z, violations, force, optimal = scratch
+    y, z, violations, force, certified = scratch
     for w in lanes(width):
         force[w] = 0.0
     for i in upwards(0, b.shape[0]):
@@ -241,44 +242,63 @@ def set_optimal(
     for w in lanes(width):
         violated = max(violations[0, w], violations[1, w])
         close = math.sqrt(2.0 * violations[2, w]) <= DISTANCE * force[w]
-        optimal[w] = 1.0 if violated <= OPTIMALITY * force[w] and close else 0.0
+        certified[w] = 1.0 if violated <= OPTIMALITY * force[w] and close else 0.0
 
 
 @inner
-def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool:
-    """Check whether v (nv,) proves infeasibility: vᵀb > vᵀJ_Lᵀ F for all low ≤ F ≤ high."""
-    largest = left = size = steepest = arm = torques = force = 0.0
-    for c in range(J.shape[0]):
-        largest = max(largest, abs(row_product(J, c, v)))
-        force = max(force, low[c])
-        for i in range(b.shape[0]):
-            arm = max(arm, abs(J[c, i]))
-    for i in range(b.shape[0]):
-        left += v[i] * b[i]
-        size += abs(v[i] * b[i])
-        steepest = max(steepest, abs(v[i]))
-        torques = max(torques, abs(b[i]))
-    for c in range(J.shape[0]):
-        torque = row_product(J, c, v)
-        bound = high[c] if torque > 0.0 else low[c]
-        if bound == math.inf:
-            if torque > _ROUNDING * largest:
-                return False
-            continue
-        left -= torque * bound
-        size += abs(torque * bound)
-    if not arm > 0.0:
-        arm = 1.0  # no cable turns any joint: as in scaled_balance
-    return left > max(_PROOF * size, _MISSING * steepest * max(torques, arm * force))
+def set_infeasible(
+    J: Array, b: Array, low: Array, high: Array, v: Array, scratch: Certificate, width: Width
+) -> None:
+    """Set ``scratch.certified`` (W,) to 1 where v (nv, W) proves infeasibility, else to 0.
 
-
-@inner
-def row_product(J: Array, c: int, v: Array) -> float:
-    """Compute row c of J_L (C, nv) times v (nv,)."""
-    total = 0.0
-    for i in range(v.shape[0]):
-        total += J[c, i] * v[i]
-    return total
+    It does if vᵀb > vᵀJ_Lᵀ F for all low ≤ F ≤ high.
+    """
+    _, work, sums, force, certified = scratch
+    left, size, steepest, arm, torques, largest = (
+        sums[0],
+        sums[1],
+        sums[2],
+        sums[3],
+        sums[4],
+        sums[5],
+    )
+    for w in lanes(width):
+        left[w] = size[w] = steepest[w] = arm[w] = torques[w] = largest[w] = force[w] = 0.0
+    for i in upwards(0, b.shape[0]):
+        for w in lanes(width):
+            left[w] += v[i, w] * b[i, w]
+        for w in lanes(width):
+            size[w] += abs(v[i, w] * b[i, w])
+        for w in lanes(width):
+            steepest[w] = max(steepest[w], abs(v[i, w]))
+        for w in lanes(width):
+            torques[w] = max(torques[w], abs(b[i, w]))
+    for c in upwards(0, J.shape[0]):
+        for w in lanes(width):
+            force[w] = max(force[w], low[c, w])
+        for w in lanes(width):
+            work[c, w] = 0.0
+        for i in upwards(0, b.shape[0]):
+            for w in lanes(width):
+                arm[w] = max(arm[w], abs(J[c, i, w]))
+            for w in lanes(width):
+                work[c, w] += J[c, i, w] * v[i, w]
+        for w in lanes(width):
+            largest[w] = max(largest[w], abs(work[c, w]))
+    for c in upwards(0, J.shape[0]):
+        for w in lanes(width):
+            bound = high[c, w] if work[c, w] > 0.0 else low[c, w]
+            endless = math.inf if work[c, w] > _ROUNDING * largest[w] else 0.0
+            work[c, w] = work[c, w] * bound if bound < math.inf else endless
+        for w in lanes(width):
+            left[w] -= work[c, w]
+        for w in lanes(width):
+            size[w] += abs(work[c, w])
+    for w in lanes(width):
+        # without an arm no cable turns any joint: as in scaled_balance
+        turned = max(torques[w], (arm[w] if arm[w] > 0.0 else 1.0) * force[w])
+        proved = left[w] > max(_PROOF * size[w], _MISSING * steepest[w] * turned)
+        certified[w] = 1.0 if proved else 0.0
 
 
 @compiled

@@ -12,7 +12,7 @@ from cdsm.kernels.distribution import OPTIMAL, search_tensions
 from cdsm.kernels.draws import stiffness_of_draws
 from cdsm.kernels.tension import NO_ARM
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.values import Array
+from cdsm.support.values import Array, frozen
 from cdsm.tolerances.inputs import inputs_of
 
 _CONVERGED = 1e-10
@@ -107,9 +107,8 @@ class DrawnArms:
         high = np.broadcast_to(given.maximum, low.shape).copy()
         none = abs(arms.length_jacobian) < NO_ARM * self._K.posture.arm.length
         J, tension = np.where(none, 0.0, arms.length_jacobian), np.empty_like(low)
-        outcome = np.empty(len(low), dtype=np.intp)
-        model = self._K.posture.arm._model
-        search_tensions(model.blocks, J, arms.torque, low, high, tension, outcome)
+        rows, outcome = np.arange(len(low)), np.empty(len(low), dtype=np.intp)
+        search_tensions(J, arms.torque, frozen(low), frozen(high), rows, tension, outcome)
         if (outcome != OPTIMAL).any():
             raise InvalidInput(
                 "tolerances",

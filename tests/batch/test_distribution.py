@@ -252,12 +252,19 @@ def test_ill_conditioned_rows_are_decided_without_a_solver(monkeypatch: pytest.M
     found = cdsm.distribute_tensions(arm, q, 50.0)
     optimal, infeasible, undecided = np.sum(searched, axis=0)
     assert optimal > 20
-    assert infeasible > 500
-    assert undecided <= 5  # which ones, rounding decides; without the second solution of S: 25
-    hardest = np.nanmax(found.values, axis=1, initial=0.0).argsort()[-optimal:]
+    proved = np.count_nonzero(found.status == cdsm.Status.INFEASIBLE) - infeasible
+    assert proved > 500
+    assert infeasible < 0.05 * proved  # what no guess proves
+    assert undecided <= 2  # which ones, rounding decides
+    hardest, compared = np.nanmax(found.values, axis=1, initial=0.0).argsort()[-optimal:], 0
     for r in hardest.tolist():
-        single = cdsm.distribute_tension(arm.at(q[r]), 50.0).values
+        try:
+            single = cdsm.distribute_tension(arm.at(q[r]), 50.0).values
+        except cdsm.SolverError:  # the solver balances the torque less exactly
+            continue
         np.testing.assert_allclose(found.values[r], single, rtol=0.0, atol=EXACT * single.max())
+        compared += 1
+    assert compared >= optimal - 2
 
 
 def balance(arm: cdsm.Manipulator, q: Array, wrench: Array) -> tuple[Array, Array]:
@@ -268,7 +275,7 @@ def balance(arm: cdsm.Manipulator, q: Array, wrench: Array) -> tuple[Array, Arra
 
 search = from_python(active_set.search)
 empty_state = from_python(active_set.empty_state)
-is_infeasible = from_python(tension.is_infeasible)
+set_infeasible = from_python(tension.set_infeasible)
 set_optimal = from_python(tension.set_optimal)
 certificate = from_python(tension.certificate)
 
@@ -276,7 +283,20 @@ certificate = from_python(tension.certificate)
 def is_optimal(J: Array, b: Array, low: Array, high: Array, F: Array, y: Array) -> bool:
     check = certificate(J.shape[1], J.shape[0], 1)
     set_optimal(*(each[..., None].copy() for each in (J, b, low, high, F, y)), check, 1)
-    return bool(check.optimal[0] == 1.0)
+    return bool(check.certified[0] == 1.0)
+
+
+def is_proof(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool:
+    check = certificate(J.shape[1], J.shape[0], 1)
+    set_infeasible(*(each[..., None].copy() for each in (J, b, low, high, v)), check, 1)
+    return bool(check.certified[0] == 1.0)
+
+
+def searched(J: Array, b: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Tensions and multipliers, or a proof."""
+    state = empty_state(J.shape[1], J.shape[0], 1)
+    search(*(each[..., None].copy() for each in (J, b, low, high)), state, 1)
+    return state.F[:, 0], state.y[:, 0]
 
 
 @pytest.mark.parametrize("name", ["universal, four cables", "hinged", "mixed", "custom", "shallow"])
@@ -284,29 +304,27 @@ def test_search_alone_finds_the_optimum_or_a_proof(name: str) -> None:
     arm = ARMS[name]()
     count = len(arm.cables)
     low = np.full(count, 5.0)
-    outcomes = set()
+    found = 0
     for seed, top in itertools.product(range(15), (np.inf, 60.0)):
         q, wrench = postures(arm, 1, 0.8, seed)[0], loads(1, seed)[0]
         J, b = balance(arm, q, wrench)
-        high, state = np.full(count, top), empty_state(arm.nv, count)
-        outcome = search(J, b, low, high, state)
-        outcomes.add(outcome)
+        high = np.full(count, top)
+        F, y = searched(J, b, low, high)
         try:
             single = cdsm.distribute_tension(arm.at(q), low, high, wrench).values
         except cdsm.InfeasibleTension:
-            assert outcome == active_set.IMPOSSIBLE
-            assert is_infeasible(J, b, low, high, state.y)
+            assert is_proof(J, b, low, high, y)
             continue
-        assert outcome == active_set.FOUND
-        assert is_optimal(J, b, low, high, state.F, state.y)
-        np.testing.assert_allclose(state.F, single, rtol=0.0, atol=EXACT * single.max())
-    assert active_set.FOUND in outcomes
+        assert is_optimal(J, b, low, high, F, y)
+        np.testing.assert_allclose(F, single, rtol=0.0, atol=EXACT * single.max())
+        found += 1
+    assert found
 
 
 def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
     guess_tensions = from_python(serpentine_guess.guess_tensions)
     set_multipliers = from_python(serpentine_guess.set_multipliers)
-    is_provably_infeasible = from_python(serpentine_guess.is_provably_infeasible)
+    set_proof = from_python(serpentine_guess.set_proof)
     empty_guess = from_python(serpentine_guess.empty_guess)
     arm = shallow_arm(5)
     parts = serpentine_guess.find_blocks(arm._model.routing, arm.nv)
@@ -316,27 +334,29 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
     guessed = proved = feasible = infeasible = 0
     for q in postures(arm, 150, 0.9):
         J, b = balance(arm, q, np.zeros(6))
-        state, guess = empty_state(nv, count), empty_guess(parts, nv, count, 1)
-        found = search(J, b, low, high, state) == active_set.FOUND
+        guess, best = empty_guess(parts, nv, count, 1), searched(J, b, low, high)
+        found = is_optimal(J, b, low, high, *best)
         feasible, infeasible = feasible + found, infeasible + (not found)
         arguments = [each[..., None].copy() for each in (J, b, low, high)]
         guess_tensions(parts, *arguments, guess, 1)
         if guess.failed[0] < 0.0:
-            set_multipliers(parts, arguments[0], guess.F, guess, 0, 1)
+            set_multipliers(parts, arguments[0], guess.F, guess, guess.y, 1)
             F, y = guess.F[:, 0], guess.y[:, 0]
             np.testing.assert_allclose(J.T @ F, b, rtol=0.0, atol=1e-12 * F.max())
             free = low < F
             np.testing.assert_allclose((J @ y)[free], F[free], rtol=1e-6)
             if is_optimal(J, b, low, high, F, y):
                 assert found
-                np.testing.assert_allclose(F, state.F, rtol=0.0, atol=EXACT * F.max())
+                np.testing.assert_allclose(F, best[0], rtol=0.0, atol=EXACT * F.max())
                 guessed += 1
-        elif is_provably_infeasible(parts, *arguments, guess, np.zeros((count, 1))):
+            continue
+        set_proof(parts, arguments[0], guess, np.empty((nv, 1)), np.zeros((count, 1)), 1)
+        if is_proof(J, b, low, high, guess.y[:, 0]):
             assert not found
             proved += 1
     assert infeasible > 5
     assert guessed > 0.6 * feasible
-    assert proved > 0.8 * infeasible
+    assert proved > 0.95 * infeasible
 
 
 def test_blocks_are_those_of_the_geometry() -> None:

@@ -65,22 +65,31 @@ def test_only_what_is_pressed_against_a_bound_or_outside_is_set_onto_it() -> Non
 # --- certificates ---------------------------------------------------------------------------
 
 set_optimal = from_python(tension_kernels.set_optimal)
-is_infeasible = from_python(tension_kernels.is_infeasible)
+empty_certificate = from_python(tension_kernels.certificate)
+set_infeasible = from_python(tension_kernels.set_infeasible)
 
 J2 = np.array([[0.03, 0.0], [-0.03, 0.0], [0.0, 0.02], [0.01, -0.02]])
 
 
 def certified(F: Array, y: Array, low: Array, high: Array, b: Array | None = None) -> bool:
     torque = J2.T @ F if b is None else b
-    scratch = tension_kernels.Certificate(
-        np.empty((2, 2)), np.empty((4, 2)), np.empty((5, 2)), np.empty(2), np.empty(2)
-    )
+    scratch = empty_certificate(2, 4, 2)
     # beside a posture that has no optimum
     arguments = (
         block(np.stack([each, np.ones_like(each)])) for each in (J2, torque, low, high, F, y)
     )
     set_optimal(*arguments, scratch, 2)
-    return bool(scratch.optimal[0] == 1.0)
+    return bool(scratch.certified[0] == 1.0)
+
+
+def is_infeasible(J: Array, b: Array, low: Array, high: Array, v: Array) -> bool:
+    scratch = empty_certificate(2, 4, 2)
+    # beside a posture that is feasible
+    beside = (J, 0.0 * b, 0.0 * low, high, v)
+    arguments = (block(np.stack(pair)) for pair in zip((J, b, low, high, v), beside, strict=True))
+    set_infeasible(*arguments, scratch, 2)
+    assert scratch.certified[1] == 0.0
+    return bool(scratch.certified[0] == 1.0)
 
 
 def test_an_optimum_is_accepted_and_every_fault_refused() -> None:
