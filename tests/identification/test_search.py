@@ -506,7 +506,7 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], tuple[str, ..
     "bounds equal": (
         lambda: identify(prototype, EXACT, {"lead": (0.3, 0.3)}),
         cdsm.InvalidInput,
-        ("free['lead']", "model_of"),
+        ("free['lead']", "is not free"),
     ),
     "bounds NaN": (
         lambda: identify(prototype, EXACT, {"lead": (0.1, math.nan)}),
