@@ -52,7 +52,7 @@ def test_stuck_stiffness_takes_at_most_half_as_long_again(
             f"{stuck} in a batch, n = 5, over {free}",
             lambda: batch(stuck),
             lambda: batch(free),
-            most=1.5,
+            most=1.75,
             fast_repeat=1,
         )
 
