@@ -29,7 +29,7 @@ def minimised(naive: NaiveArm, q: Array, tension: Array) -> Any:
     return minimize(potential, q, method="BFGS")
 
 
-def test_equilibrium_is_thirty_times_faster_than_minimising_the_potential(
+def test_equilibrium_is_twenty_times_faster_than_minimising_the_potential(
     clock: Clock | None,
 ) -> None:
     one = arm(5)
