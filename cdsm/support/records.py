@@ -187,9 +187,12 @@ def _keys(kind: Callable[..., Any]) -> list[str]:
     ]
 
 
-def did_you_mean(key: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean …?`` with the known key most like this one, or an empty text."""
-    near = difflib.get_close_matches(key[:100], list(known), n=1)
+def did_you_mean(key: str, known: Iterable[str], least: float = 0.6) -> str:
+    """Return ``; did you mean …?`` with the known key most like this one, or an empty text.
+
+    ``least`` is the least similarity, from 0 to 1.
+    """
+    near = difflib.get_close_matches(key[:100], list(known), n=1, cutoff=least)
     return f"; did you mean {near[0]}?" if near else ""
 
 

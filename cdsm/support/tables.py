@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import math
 import os
@@ -15,6 +14,7 @@ import numpy as np
 
 from cdsm.errors import FileError
 from cdsm.support.files import read_text
+from cdsm.support.records import did_you_mean
 from cdsm.support.values import Array
 
 _LONGEST_CELL = 1000  # maximum number of characters of a cell; numbers and names are shorter
@@ -116,9 +116,9 @@ def named_columns(
         if name in found:
             refuse(f"has two columns called {name}; give each once")
         as_long = [each for each in known if abs(len(each) - len(name)) < 2]
-        near = difflib.get_close_matches(name, as_long, n=1, cutoff=_ALIKE)
-        if near and name not in known:
-            refuse(f"has a column {name}, which is not known; did you mean {near[0]}? Rename it")
+        meant = "" if name in known else did_you_mean(name, as_long, _ALIKE)
+        if meant:
+            refuse(f"has a column {name}, which is not known{meant} Rename it")
         found[name] = at, unit
     return found
 
