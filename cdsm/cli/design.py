@@ -50,7 +50,7 @@ def design(
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.", min=1)] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find the best designs of an arm; write the front, a figure, and the chosen arm with tables.
+    """Find the best designs of an arm; write the Pareto front, figures and the chosen arm.
 
     A stopped search resumes from the files in --out.
     """

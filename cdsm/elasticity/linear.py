@@ -70,5 +70,5 @@ class LinearElasticity(Elasticity):
         return self.domain.check(tension) / self._rigidity
 
     def energy(self, tension: ArrayLike) -> Array:
-        """Compute F²/(2 EA) [N]; see :meth:`Elasticity.energy`."""
+        """Compute F²/(2 EA) per unstretched length [J/m] = [N]; see :meth:`Elasticity.energy`."""
         return np.asarray(self.domain.check(tension) ** 2 / (2.0 * self._rigidity))

@@ -38,5 +38,5 @@ class ScaledElasticity(Elasticity):
         return self.law.strain(tension) / self.factor
 
     def energy(self, tension: ArrayLike) -> Array:
-        """Compute ∫ F dε [N] at tensions F [N]."""
+        """Compute ∫ F dε at tensions F [N], the energy per unstretched length [J/m] = [N]."""
         return self.law.energy(tension) / self.factor

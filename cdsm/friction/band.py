@@ -1,4 +1,4 @@
-"""Proved bands of tip positions and tensions at which an arm with friction may rest."""
+"""Proved bounds of the tip positions and tensions at which an arm with friction can rest."""
 
 from __future__ import annotations
 

@@ -208,7 +208,7 @@ def set_along(
 def _set_compliance(
     JX: Array, u: Array, system: Array, column: Index, compliance: Array, width: Width
 ) -> None:
-    """Fill ``compliance`` (W,) with uᵀ C_vv u; ``column`` of ``system`` is K_θ⁻¹ J_vᵀ u."""
+    """Fill ``compliance`` (W,) with uᵀ C_vv u; ``system[:, column]`` (nv, W) is K_θ⁻¹ J_vᵀ u."""
     x, y, z = u[0], u[1], u[2]
     for w in lanes(width):
         compliance[w] = 0.0

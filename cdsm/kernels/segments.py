@@ -127,7 +127,7 @@ def _add_rate(
 ) -> None:
     """Add u·d to ``rate`` (W,), with d = ±z × (x − o): axis z through o, end x of a segment.
 
-    u is the direction of the segment; ``sign`` is that of :func:`set_derivative`.
+    u (3, W) is the direction of the segment; ``sign`` is 1 if x is its end b, −1 if it is a.
     """
     for w in lanes(width):
         x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])

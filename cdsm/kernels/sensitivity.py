@@ -1,28 +1,30 @@
 """Numba kernel of derivatives of a stiffness with respect to dimensions and masses of an arm.
 
-All derivatives of stiffnesses follow from those of one quantity. With a fixed joint motion z,
+All of them follow from the derivatives of one number. With a fixed joint motion z,
 
     Φ = zᵀ K_θ z = Σ_c (F_c L̈_c + k_c L̇_c²) − Σ_b m_b γ·ẍ_b − f·ẍ_tip − m·ω̇_tip,
 
 where a dot is the derivative along q̇ = z, q̈ = 0. The cables c have tensions F and stiffnesses k,
 the bodies b have masses m_b and centres x_b; γ is gravity, W = (f, m) the load at the tip. The
-smallest eigenvalue of K_θ has the gradient of Φ with z its unit eigenvector. The compliance c = uᵀ
-J_v K_θ⁻¹ J_vᵀ u has, with z = K_θ⁻¹ J_vᵀ u,
+smallest eigenvalue of K_θ has the gradient of Φ with z its unit eigenvector. The compliance κ = uᵀ
+J_v K_θ⁻¹ J_vᵀ u has, with z = K_θ⁻¹ J_vᵀ u kept constant,
 
-    dc = −dΨ,    Ψ = Φ − 2 u·ẋ_tip.
+    dκ = −dΨ,    Ψ = Φ − 2 u·ẋ_tip.
 
-Ψ depends only on positions x, velocities ẋ and accelerations ẍ of points of links: cable sites,
-centres of mass and the tip. The kernel computes X = ∂Ψ/∂x, V = ∂Ψ/∂ẋ and A = ∂Ψ/∂ẍ of each point,
-and from them the derivatives with respect to
+Masses, tensions and stiffnesses k are factors in Ψ. Dimensions change Ψ through the positions x,
+velocities ẋ and accelerations ẍ of points: cable sites, centres of mass and the tip. The kernel
+computes X = ∂Ψ/∂x, V = ∂Ψ/∂ẋ and A = ∂Ψ/∂ẍ of each point, and from them the derivatives with
+respect to
 
 - the position of a point in its link: a displacement δ changes x by δ, ẋ by ω × δ and ẍ by ω̇ × δ +
   ω × (ω × δ);
-- the origin of a joint in its parent link: the sum of these over all points beyond the joint;
+- the origin of a joint in its parent link: all points beyond the joint are displaced so, with ω
+  and ω̇ of the parent link;
 - a joint angle: the points beyond the joint turn, and their motion relative to the parent link
   turns with them.
 
-One pass over the cables and one over the points of each joint give all derivatives. Differences
-would take two evaluations of K_θ for each.
+One pass over the cables and one over the points of each joint give all derivatives. Finite
+differences would take two evaluations of K_θ for each derivative.
 """
 
 from __future__ import annotations

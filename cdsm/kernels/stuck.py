@@ -146,7 +146,10 @@ def open_first_section(
     section: Sticking,
     width: Width,
 ) -> None:
-    """Start the first section of cable c with its lead and its series spring."""
+    """Set length, spring compliance and motor mode of ``section`` to the first one of cable c.
+
+    The length (W,) [m] is the lead minus the elongation of the series spring.
+    """
     for w in lanes(width):
         section.length[w] = holes.lead[c] - series[c] * (tension[c, w] - rest[c])
     for w in lanes(width):

@@ -40,9 +40,10 @@ _PRINTED, _HALF = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
 
 
 def least_bend() -> tuple[float, float]:
-    """Return dEA/dF [-] below and above 31 N of the continuous law with the least change of slope.
+    """Return dEA/dF [-] just below and above 31 N, for the smallest kink that Eq. 19 can have.
 
-    The slopes differ even with a free coefficient of F⁶: no law of these digits is smooth at 31 N.
+    The coefficients are any that round to the printed digits and make EA continuous at 31 N; that
+    of F⁶ below 31 N is free. The two slopes still differ.
     """
     below, above = _branches(powers(JOIN, slope=True)[0])
     free: list[tuple[float | None, float | None]] = [(-1.0, 1.0)] * 14

@@ -30,14 +30,14 @@ MINIMA: Final = (100.0, 800.0)
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LeadFigure(Figure):
-    """Change of stiffness with tension, over the lead of the cables.
+    """Change of stiffness from a lower tension bound of 100 N to 800 N, over the leads.
 
     Attributes:
         leads: Leads of all cables (N,) [m].
-        pseudoinverse: Change of K_R with the original length (N, 3) [%].
-        along: Change of the stiffness for a small weight, with the original length (N, 3) [%].
-        stretched_pseudoinverse: ``pseudoinverse`` with the paper's l_0 = L (N, 3) [%].
-        stretched_along: ``along`` with the paper's l_0 = L (N, 3) [%].
+        pseudoinverse: Change of K_R, computed with the unstrained length l_0; x, y, z (N, 3) [%].
+        along: The same for the stiffness that a small weight measures (N, 3) [%].
+        stretched_pseudoinverse: ``pseudoinverse`` computed with l_0 = L as in the paper (N, 3) [%].
+        stretched_along: ``along`` computed with l_0 = L as in the paper (N, 3) [%].
     """
 
     leads: Array

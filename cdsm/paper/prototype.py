@@ -117,7 +117,7 @@ class Prototype:
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
-        """Compute secant stiffness (N, 3) [N/m] under each weight; the tangent if it is zero."""
+        """Compute stiffness (N, 3) [N/m] in x, y, z: secant under a weight, tangent without one."""
         forced = [cable.name for cable in pose.arm.cables if cable.control == "force"]
         rows = []
         for tension in np.atleast_1d(np.asarray(tensions, dtype=np.float64)).tolist():

@@ -124,10 +124,11 @@ class Follower:
 def least_change(
     model: StiffnessModel, constraints: Constraints, before: Array, rate: Array
 ) -> Array | None:
-    """Return the tensions (C,) [N] within ``rate`` of ``before`` that meet ``constraints``.
+    """Return the tensions (C,) [N] nearest to ``before`` that meet ``constraints``, by one search.
 
-    Of several, they are nearest to ``before``. If none meet the constraints, they are those of
-    least miss that one search finds. None if it finds no stable tensions to begin with.
+    No tension changes by more than ``rate`` (C,) [N]. If the search cannot meet them, return the
+    tensions of the smallest violation found. None if no tensions within ``rate`` balance the arm,
+    or if the arm is unstable at those nearest to ``before``.
     """
     found = _search(model, model.region.within(rate, before), constraints, before, before)
     return found[0] if found else None

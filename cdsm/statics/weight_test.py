@@ -222,12 +222,13 @@ def weight_test(
     steps: int = 1,
     wrench: ArrayLike | None = None,
 ) -> WeightTest:
-    """Compute the stiffness under a weight hung at the tip, with locked motors: C = ΔX/ΔF (Eq. 20).
+    """Compute the stiffness under a weight hung at the tip, with locked motors: 1/C of Eq. 20.
 
     The test is nonlinear: the tensions follow the elongations, and the posture changes. For a small
-    force the result is 1/:meth:`~cdsm.Stiffness.along`. With friction in the holes it depends on
-    the weight: a small one measures the stuck arm, and ``friction`` of the result says from which
-    weight on the cables slide. The weight is hung once and slowly, as in :func:`~cdsm.load_cycle`.
+    force the result is :meth:`~cdsm.Stiffness.along`. With friction in the holes it depends on the
+    weight: under a small one all cables stick; ``friction.sliding_load`` of the result is the
+    weight [N] from which they slide. The weight is hung once and slowly, as in
+    :func:`~cdsm.load_cycle`.
 
     Args:
         pose: The reference posture, at which the motors are locked.
@@ -244,7 +245,7 @@ def weight_test(
         ElasticityRangeError: As for :func:`~cdsm.equilibrium`, at any step.
         EquilibriumError: The arm buckles under a part of the load. The error names this part.
             :func:`~cdsm.equilibrium` finds the posture after buckling.
-        SingularStiffness: An arm with friction is about to buckle before the weight.
+        SingularStiffness: The arm has friction and is about to buckle without the weight.
     """
     force = vector("force", force, 3, "a force in base axes [N]", "force")
     if not force.any():

@@ -44,7 +44,7 @@ class Points:
         return Points(self.strain[kept], self.force[kept], self.count[kept])
 
     def means(self, group: NDArray[np.intp]) -> Points:
-        """Return the mean point of each group 0, 1, …; ``group`` (n,) has that of a point."""
+        """Return the mean point of each group; ``group`` (n,) has the group of each point."""
         count = np.asarray(np.bincount(group, self.count), np.float64)
         strain, force = (
             np.bincount(group, self.count * each) / count for each in (self.strain, self.force)

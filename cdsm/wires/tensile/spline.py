@@ -231,7 +231,7 @@ class Curve:
         return weight[:, None] * self.jacobian(points.strain), error
 
     def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
-        """Return the Cholesky factor of the penalised normal matrix, scaled, and the scale."""
+        """Return the Cholesky factor of N/(s sᵀ) and s = √diag N, N the penalised normal matrix."""
         normal = rows.T @ rows + self._penalty
         # strain and log EA are orders apart
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
