@@ -36,18 +36,12 @@ _DISPLACED: Final = 1e-3
 
 
 class Assessment(NamedTuple):
-    """True stiffness and band of one state of a plant; NaN where there is none.
+    """True stiffness and band of one state of a plant; NaN where there is none."""
 
-    Attributes:
-        tip: Tip (3,) [m] at the equilibrium without friction.
-        stiffness: Stiffness along each direction (D,) [N/m] there.
-        margin: Smallest eigenvalue of K_θ [N m/rad] there.
-        band: Least and largest proved displacement from there along the first direction [m].
-    """
-
-    tip: Array
-    stiffness: list[float]
-    margin: float
+    tip: Array  # tip (3,) [m] at the equilibrium without friction
+    stiffness: list[float]  # stiffness along each direction (D,) [N/m] there
+    margin: float  # smallest eigenvalue of K_θ [N m/rad] there
+    # least and largest proved displacement from there along the first direction [m]
     band: tuple[float, float]
 
 

@@ -47,27 +47,17 @@ _STEPS, _CONVERGED = 8, 1e-8
 
 
 class Estimate(NamedTuple):
-    """State of the arm as the controller estimates it.
+    """State of the arm as the controller estimates it."""
 
-    Attributes:
-        pose: Posture of the controller's arm, within its joint limits.
-        tension: Mean tension along each cable (C,) [N].
-        ratio: Mean tension along each cable divided by that at the motor (C,) [-].
-        force: Force at the tip (3,) [N], base axes.
-        softness: 1/s: strain divided by that of the law [-].
-        variance: Variance of ``softness`` [-].
-        natural: Natural length of wire in each segment (S,) [m]; it depends on all past sliding.
-        shares: ρ: tension of each segment divided by that at the motor (S,) [-].
-    """
-
-    pose: Posture
-    tension: Array
-    ratio: Array
-    force: Array
-    softness: float
-    variance: float
+    pose: Posture  # of the controller's arm, within its joint limits
+    tension: Array  # mean tension along each cable (C,) [N]
+    ratio: Array  # mean tension along each cable divided by that at the motor (C,) [-]
+    force: Array  # force at the tip (3,) [N], base axes
+    softness: float  # 1/s: strain divided by that of the law [-]
+    variance: float  # variance of ``softness`` [-]
+    # natural length of wire in each segment (S,) [m]; it depends on all past sliding
     natural: Array
-    shares: Array
+    shares: Array  # ρ: tension of each segment divided by that at the motor (S,) [-]
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,21 +18,13 @@ from cdsm.support.values import Array
 
 
 class Schedule(NamedTuple):
-    """References at n steps, linearly interpolated between the samples of a plan.
+    """References at n steps, linearly interpolated between the samples of a plan."""
 
-    Attributes:
-        references: Reference of each step.
-        directions: Unit directions u (D, 3), base axes.
-        targets: Wanted stiffness (n, D) [N/m].
-        tips: Tip positions (n, 3) [m].
-        wrenches: Load of the plan (n, 6): force [N], then moment [N m].
-    """
-
-    references: tuple[Reference, ...]
-    directions: Array
-    targets: Array
-    tips: Array
-    wrenches: Array
+    references: tuple[Reference, ...]  # reference of each step
+    directions: Array  # unit directions u (D, 3), base axes
+    targets: Array  # wanted stiffness (n, D) [N/m]
+    tips: Array  # tip positions (n, 3) [m]
+    wrenches: Array  # load of the plan (n, 6): force [N], then moment [N m]
 
     @classmethod
     def of(cls, plan: PathPlan, steps: int) -> Self:

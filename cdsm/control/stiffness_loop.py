@@ -22,17 +22,11 @@ _SOFTER = 5e-3
 
 
 class Replanned(NamedTuple):
-    """Tensions that the outer loop plans at one step.
+    """Tensions that the outer loop plans at one step."""
 
-    Attributes:
-        reference: Planned tensions at the motors, and the wire for them.
-        mean: Mean tensions along each cable (C,) [N], from which the stiffness follows.
-        refused: Why nothing could be planned, so that the previous tensions were kept; or empty.
-    """
-
-    reference: Reference
-    mean: Array
-    refused: str
+    reference: Reference  # planned tensions at the motors, and the wire for them
+    mean: Array  # mean tensions along each cable (C,) [N], from which the stiffness follows
+    refused: str  # why nothing could be planned, so that the previous tensions were kept; or empty
 
 
 @dataclass(eq=False)
@@ -40,20 +34,13 @@ class StiffnessLoop:
     """Planner of the next tensions: the nearest to the previous ones with the target stiffness.
 
     If the rate does not allow these tensions, the next ones lie on the way to them.
-
-    Attributes:
-        arm: The arm of the controller.
-        directions: u (3,) or (n, 3).
-        minimum: Lower bounds of the tensions at the motors (C,) [N].
-        maximum: Upper bounds (C,) [N].
-        rate: Largest change of a tension per step (C,) [N].
     """
 
-    arm: Manipulator
-    directions: Array
-    minimum: Array
-    maximum: Array
-    rate: Array
+    arm: Manipulator  # the arm of the controller
+    directions: Array  # u (3,) or (n, 3)
+    minimum: Array  # lower bounds of the tensions at the motors (C,) [N]
+    maximum: Array  # upper bounds (C,) [N]
+    rate: Array  # largest change of a tension per step (C,) [N]
     _softness: float = field(default=1.0, init=False)
     _calibrated: Manipulator = field(init=False)
 

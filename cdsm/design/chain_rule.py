@@ -77,20 +77,13 @@ class Posed(NamedTuple):
     """Chain rule at a posture under a load, where the least tensions follow the design.
 
     The derivatives are with respect to the n variables.
-
-    Attributes:
-        chain: The chain rule of the arm.
-        balance: The least tensions, and the matrices for their derivatives.
-        turned: Derivatives (nv, n) of the joint angles.
-        grip: Derivatives (C, n) of Σ μ φ [-] of the cables; 0 without ``worst_friction``.
-        bound: Derivatives (C, n) of the lower bounds at constant φ.
     """
 
-    chain: Chain
-    balance: Balance
-    turned: Array
-    grip: Array
-    bound: Array
+    chain: Chain  # of the arm
+    balance: Balance  # the least tensions, and the matrices for their derivatives
+    turned: Array  # derivatives (nv, n) of the joint angles
+    grip: Array  # derivatives (C, n) of Σ μ φ [-] of the cables; 0 without ``worst_friction``
+    bound: Array  # derivatives (C, n) of the lower bounds at constant φ
 
     def slopes(self, by_input: dict[str, Array], by_tension: Array) -> Array:
         """Return the derivatives (n,) of a quantity.

@@ -37,21 +37,13 @@ MeasureName = Literal[
 
 
 class Kind(NamedTuple):
-    """How a quantity is named, compared and shown.
+    """How a quantity is named, compared and shown."""
 
-    Attributes:
-        words: Name in words.
-        unit: SI unit.
-        shown: Unit shown to the user, and its size in SI.
-        best: Whether the largest or the smallest value is best.
-        directed: Whether it has a direction.
-    """
-
-    words: str
-    unit: str
-    shown: tuple[str, float]
-    best: Literal["most", "least"]
-    directed: bool = False
+    words: str  # its name
+    unit: str  # SI unit
+    shown: tuple[str, float]  # unit shown to the user, and its size in SI
+    best: Literal["most", "least"]  # whether the largest or the smallest value is best
+    directed: bool = False  # whether it has a direction
 
 
 _ONE = ("", 1.0)

@@ -16,19 +16,13 @@ from cdsm.support.validation import instance, one_of, scalar, text
 
 
 class _Kind(NamedTuple):
-    """Parameter of an arm.
+    """Parameter of an arm."""
 
-    Attributes:
-        unit: Unit shown to the user.
-        size: Size of ``unit`` in SI.
-        part: ``joints``, ``links`` or ``cables``: the part of the geometry that has it, if any.
-        attribute: Its name in this part, or in a :class:`~cdsm.Cable`.
-    """
-
-    unit: str
-    size: float
+    unit: str  # unit shown to the user
+    size: float  # size of ``unit`` in SI
+    # ``joints``, ``links`` or ``cables``: the part of the geometry that has it, if any
     part: str = ""
-    attribute: str = ""
+    attribute: str = ""  # its name in this part, or in a :class:`~cdsm.Cable`
 
 
 KINDS: Final = {

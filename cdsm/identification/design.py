@@ -34,21 +34,13 @@ _GAIN = 1e-9
 
 
 class Design(NamedTuple):
-    """Design of an experiment: candidates of tests, known information, wanted parameters.
+    """Design of an experiment: candidates of tests, known information, wanted parameters."""
 
-    Attributes:
-        information: M_i (n, r, r) of each of n candidates, for r parameters.
-        known: M_0 (r, r), the prior information.
-        wanted: L (s, r), which selects s of the parameters.
-        criterion: ``"D"`` or ``"A"``.
-        tests: Number N of tests.
-    """
-
-    information: Array
-    known: Array
-    wanted: Array
-    criterion: Criterion
-    tests: int
+    information: Array  # M_i (n, r, r) of each of n candidates, for r parameters
+    known: Array  # M_0 (r, r), the prior information
+    wanted: Array  # L (s, r), which selects s of the parameters
+    criterion: Criterion  # ``"D"`` or ``"A"``
+    tests: int  # number N of tests
 
     def value(self, M: Array) -> Array:
         """Compute ln f (…), with f the criterion, of information matrices (…, r, r).

@@ -16,17 +16,11 @@ from cdsm.support.values import Array, frozen
 
 @dataclass(frozen=True, eq=False)
 class Determination:
-    """Linear analysis of which parameters measurements determine.
+    """Linear analysis of which parameters measurements determine."""
 
-    Attributes:
-        names: Names of the parameters p (P,).
-        jacobian: J = ∂r/∂p (n, P) with the residuals r in standard deviations.
-        ranges: Width of the range in which each parameter is sought (P,), such as its bounds.
-    """
-
-    names: tuple[str, ...]
-    jacobian: Array
-    ranges: Array
+    names: tuple[str, ...]  # names of the parameters p (P,)
+    jacobian: Array  # J = ∂r/∂p (n, P) with the residuals r in standard deviations
+    ranges: Array  # width of the range in which each parameter is sought (P,), such as its bounds
 
     @property
     def rank(self) -> int:

@@ -108,25 +108,15 @@ class _Knot(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Profiler:
-    """Computation of the profile of parameter ``i``, from the optimum outward.
-
-    Attributes:
-        problem: The least-squares problem.
-        best: The optimum (P,), in the unit cube.
-        jacobian: ∂r/∂point (n, P) at the optimum.
-        i: Index of the fixed parameter.
-        others: Indices of the parameters that are fitted again.
-        exact: Values of Δχ² where the profile must be exact, rising.
-        far: Largest Δχ² of the profile, above all values in ``exact``.
-    """
+    """Computation of the profile of parameter ``i``, from the optimum outward."""
 
     problem: LeastSquares
-    best: Array
-    jacobian: Array
-    i: int
-    others: list[int]
-    exact: Sequence[float]
-    far: float
+    best: Array  # the optimum (P,), in the unit cube
+    jacobian: Array  # ∂r/∂point (n, P) at the optimum
+    i: int  # index of the fixed parameter
+    others: list[int]  # indices of the parameters that are fitted again
+    exact: Sequence[float]  # values of Δχ² where the profile must be exact, rising
+    far: float  # largest Δχ² of the profile, above all values in ``exact``
 
     def profile(self) -> Profile:
         """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ²."""

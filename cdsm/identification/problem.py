@@ -38,18 +38,13 @@ class UserFaultError(Exception):
 
 @dataclass(frozen=True)
 class Model:
-    """Model of all measurements, as a function of the parameters.
+    """Model of all measurements, as a function of the parameters."""
 
-    Attributes:
-        model_of: Function that builds the arm from the parameters.
-        tension_of: Function that gives the tensions, or None.
-        measurements: The measurements.
-        weights: Weights of the readings of each loop; None for a stiffness.
-    """
-
-    model_of: Callable[..., Manipulator]
+    model_of: Callable[..., Manipulator]  # function that builds the arm from the parameters
+    # function that gives the tensions, or None
     tension_of: Callable[..., Tension | ArrayLike] | None
     measurements: tuple[Measurement | WeightLoop, ...]
+    # weights of the readings of each loop; None for a stiffness
     weights: tuple[Weights | None, ...]
     _last_rest: dict[Measurement, Array] = field(default_factory=dict)
     _paths: dict[tuple[float, ...], list[LoadingPath | None]] = field(default_factory=dict)

@@ -56,19 +56,13 @@ _CONVERGED = 1e-11
 
 
 class _NewtonStep(NamedTuple):
-    """Step of Newton's method for the free joints.
+    """Step of Newton's method for the free joints."""
 
-    Attributes:
-        move: Step (free,) [rad].
-        gradient: Gradient of the objective (or Lagrangian) with respect to all joint angles (nv,).
-        error: Violation of the optimality conditions.
-        convex: Whether the Hessian is positive semidefinite: near a minimum, not at a saddle.
-    """
-
-    move: Array
+    move: Array  # step (free,) [rad]
+    # gradient of the objective (or Lagrangian) with respect to all joint angles (nv,)
     gradient: Array
-    error: float
-    convex: bool
+    error: float  # violation of the optimality conditions
+    convex: bool  # whether the Hessian is positive semidefinite: near a minimum, not at a saddle
 
 
 _Newton = Callable[[Array, NDArray[np.bool_]], _NewtonStep]

@@ -179,19 +179,12 @@ def arm_of(
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Predicted:
-    """The 20 numbers of Section V, or the 15 of Table II alone.
+    """The 20 numbers of Section V, or the 15 of Table II alone."""
 
-    Attributes:
-        table: Table II (5, 3) [N/m].
-        drops: Reductions of Fig. 12 (2,) [-], or empty.
-        rises: Increments of Fig. 13 (2,) [-], or empty.
-        check: Stiffness in z of Section V-B [N/m], or None.
-    """
-
-    table: Array
-    drops: tuple[float, ...] = ()
-    rises: tuple[float, ...] = ()
-    check: float | None = None
+    table: Array  # Table II (5, 3) [N/m]
+    drops: tuple[float, ...] = ()  # reductions of Fig. 12 (2,) [-], or empty
+    rises: tuple[float, ...] = ()  # increments of Fig. 13 (2,) [-], or empty
+    check: float | None = None  # stiffness in z of Section V-B [N/m], or None
 
     def residuals(self, table: Array) -> Array:
         """Compute residuals (20,) [-], or (15,) for Table II alone; ``table`` is (5, 3) [N/m].

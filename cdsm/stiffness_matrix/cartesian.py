@@ -34,23 +34,14 @@ _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CartesianReadings(ReadOnlyState):
-    """Stiffness and compliance at the tip; base class of :class:`~cdsm.Stiffness`.
-
-    Attributes:
-        posture: The posture.
-        active: H_L·F (nv, nv) [N m/rad].
-        passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad].
-        gravity: ∂g/∂θ (nv, nv) [N m/rad].
-        load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad].
-        joint: K_θ, the sum of the four terms (nv, nv) [N m/rad].
-    """
+    """Stiffness and compliance at the tip; base class of :class:`~cdsm.Stiffness`."""
 
     posture: Posture
-    active: Array
-    passive: Array
-    gravity: Array
-    load: Array
-    joint: Array
+    active: Array  # H_L·F (nv, nv) [N m/rad]
+    passive: Array  # J_Lᵀ K_L J_L (nv, nv) [N m/rad]
+    gravity: Array  # ∂g/∂θ (nv, nv) [N m/rad]
+    load: Array  # −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]
+    joint: Array  # K_θ, the sum of the four terms (nv, nv) [N m/rad]
     _parts: Array  # sum of the magnitudes of the four terms: scale of rounding errors
 
     @cached_property

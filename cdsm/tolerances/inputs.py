@@ -35,19 +35,12 @@ _ON_DISKS = ("hole_radius", "hole_angle", "disk_offset", "link_length")
 
 
 class Places(NamedTuple):
-    """All points that define an arm, in the frames of its joints [m].
+    """All points that define an arm, in the frames of its joints [m]."""
 
-    Attributes:
-        site: Cable sites (…, P, 3).
-        origin: Origin of each joint in its parent (…, nv+1, 3).
-        centre: Centres of mass (…, nv+1, 3).
-        tip: The tip (…, 3).
-    """
-
-    site: Array
-    origin: Array
-    centre: Array
-    tip: Array
+    site: Array  # cable sites (…, P, 3)
+    origin: Array  # origin of each joint in its parent (…, nv+1, 3)
+    centre: Array  # centres of mass (…, nv+1, 3)
+    tip: Array  # (…, 3)
 
     def stacked(self) -> Array:
         """Return all coordinates of one arm as a vector (n,), in the order of the fields."""

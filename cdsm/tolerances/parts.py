@@ -18,16 +18,10 @@ _ALL = slice(None)
 
 
 class Part(NamedTuple):
-    """Inputs of one source that share a tolerance, and their standard uncertainties.
+    """Inputs of one source that share a tolerance, and their standard uncertainties."""
 
-    Attributes:
-        inputs: Indices of the inputs; a slice if they are all inputs of the source.
-        standard: Standard uncertainty: one number for all, or (k,).
-        tolerance: The tolerance.
-    """
-
-    inputs: slice | Indices
-    standard: float | Array
+    inputs: slice | Indices  # indices of the inputs; a slice if they are all inputs of the source
+    standard: float | Array  # standard uncertainty: one number for all, or (k,)
     tolerance: Tolerance
 
     def variance(self, sensitivity: Array) -> float:

@@ -25,16 +25,11 @@ from cdsm.tolerances.inputs import inputs_of
 
 
 class Ties(NamedTuple):
-    """Correspondence between the inputs of an arm and those of its arm of blocks.
+    """Correspondence between the inputs of an arm and those of its arm of blocks."""
 
-    Attributes:
-        labels: Names of the inputs of the arm, by source.
-        tension: Tensions of the cables of the arm (C,) [N].
-        inputs: Index of the arm's input for each input of the arm of blocks; −1 if there is none.
-    """
-
-    labels: Mapping[str, Sequence[str]]
-    tension: Array
+    labels: Mapping[str, Sequence[str]]  # names of the inputs of the arm, by source
+    tension: Array  # tensions of the cables of the arm (C,) [N]
+    # index of the arm's input for each input of the arm of blocks; −1 if there is none
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:

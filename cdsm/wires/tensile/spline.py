@@ -48,24 +48,18 @@ def _least_variance(points: Points) -> float:
 
 
 class Spread(NamedTuple):
-    """Uncertainty of a fitted :class:`Curve` with k splines, g tensions on the grid, n points.
+    """Uncertainty of a fitted :class:`Curve` with k splines, g tensions on the grid, n points."""
 
-    Attributes:
-        inverse: Inverse of the normal matrix with the penalty (k + 1, k + 1).
-        noise: Standard deviation of one point [N].
-        freedom: Degrees of freedom: number of points less the sum of their leverages.
-        errors: Studentized residuals (n,) [N]: residuals over √(1 − leverage), times √(points per
-            average), so that each has the noise of a single point.
-        deviation: Standard deviation of log EA on the grid (g,), from scatter and smoothing. The
-            scatter is estimated from the neighbouring points, so it may grow with the force. The
-            smoothing causes a bias; its mean square over curves as rough as this one is added
-            (Nychka, J. Am. Stat. Assoc. 83, 1988).
-    """
-
-    inverse: Array
-    noise: float
-    freedom: float
+    inverse: Array  # inverse of the normal matrix with the penalty (k + 1, k + 1)
+    noise: float  # standard deviation of one point [N]
+    freedom: float  # degrees of freedom: number of points less the sum of their leverages
+    # studentized residuals (n,) [N]: residuals over √(1 − leverage), times √(points per
+    # average), so that each has the noise of a single point
     errors: Array
+    # standard deviation of log EA on the grid (g,), from scatter and smoothing. The scatter is
+    # estimated from the neighbouring points, so it may grow with the force. The smoothing
+    # causes a bias; its mean square over curves as rough as this one is added (Nychka, J. Am.
+    # Stat. Assoc. 83, 1988)
     deviation: Array
 
 
