@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+import cdsm
 from cdsm.cable import Cable
 from cdsm.cable_chains import Segments
 from cdsm.errors import first_of
@@ -68,9 +69,7 @@ class Posture(ReadOnlyState):
 
         Arguments and errors are those of :func:`cdsm.plots.plot_arm`.
         """
-        from cdsm.plots import plot_arm  # matplotlib imports slowly
-
-        return plot_arm(self, tension, stiffness)
+        return cdsm.plots.plot_arm(self, tension, stiffness)
 
     def to_dict(self) -> dict[str, object]:
         """Return angles, tip, cable lengths and moment arms in SI for JSON, units in the keys."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
+import cdsm
 from cdsm.control.assessment import hung_weight
 from cdsm.control.labelled import labelled, numbers, rows, table
 from cdsm.control.plant import SlowPlant
@@ -222,11 +223,9 @@ class TrackingRun(ReadOnlyState):
 
         ``animate`` is a ``.gif`` to write too; arguments and errors as for :meth:`animate`.
         """
-        from cdsm.plots import plot_tracking_run  # matplotlib imports slowly
-
         if animate is not None:
             self.animate(animate)
-        return plot_tracking_run(self)
+        return cdsm.plots.plot_tracking_run(self)
 
     def animate(self, path: str | os.PathLike[str]) -> Path:
         """Write a ``.gif`` in which the true arm follows the path; return its path.
@@ -235,9 +234,9 @@ class TrackingRun(ReadOnlyState):
             InvalidInput: The path does not end in ``.gif``, or no step was completed.
             FileError: The file cannot be written.
         """
-        from cdsm.plots import plot_path
-
-        plot_path([state.pose for state in self.states], animate=path, tensions=self.tension)
+        cdsm.plots.plot_path(
+            [state.pose for state in self.states], animate=path, tensions=self.tension
+        )
         return as_path(path)
 
     def __repr__(self) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+import cdsm
 from cdsm.design.evaluation import Designs, evaluate_designs
 from cdsm.design.problem import DesignProblem
 from cdsm.design.workshop import cable_table, hole_table
@@ -192,9 +193,7 @@ class DesignSearch(ReadOnlyState):
 
         With one objective: its best value over the number of designs.
         """
-        from cdsm.plots import plot_designs  # matplotlib imports slowly
-
-        return plot_designs(self)
+        return cdsm.plots.plot_designs(self)
 
     def to_html(self) -> Document:
         """Return a page with the front: a click on a design shows its arm and its numbers.

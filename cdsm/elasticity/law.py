@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.elasticity.domain import Domain
 from cdsm.elasticity.inverse import tension_at
 from cdsm.errors import InvalidInput
@@ -54,9 +55,7 @@ class Elasticity(ABC):
 
     def plot(self) -> Figure:
         """Plot tangent and secant rigidity [kN] over the tension [N]."""
-        from cdsm.plots import plot_elasticity  # matplotlib imports slowly
-
-        return plot_elasticity(self)
+        return cdsm.plots.plot_elasticity(self)
 
     @property
     def rest(self) -> float:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import cdsm
 from cdsm.errors import InvalidInput, SolverError
 from cdsm.measures.hull import hull_of
 from cdsm.measures.program import Loads
@@ -92,9 +93,7 @@ class ForcePolytope(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the polytope [N]."""
-        from cdsm.plots import plot_force_polytope  # matplotlib imports slowly
-
-        return plot_force_polytope(self)
+        return cdsm.plots.plot_force_polytope(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return vertices, facets and margin in SI for JSON, with units in the keys."""

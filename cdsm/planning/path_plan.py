@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 
+import cdsm
 from cdsm.cable_laws import CableLaws
 from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
@@ -152,11 +153,9 @@ class PathPlan(ReadOnlyState):
             InvalidInput: The plan is one of ``cartesian``, or nothing to animate is planned.
             FileError: The animation cannot be written.
         """
-        from cdsm.plots import plot_path, plot_path_plan  # matplotlib imports slowly
-
         if animate is not None:
-            plot_path(self, animate=animate)
-        return plot_path_plan(self)
+            cdsm.plots.plot_path(self, animate=animate)
+        return cdsm.plots.plot_path_plan(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return the plan in SI for JSON, with units in the keys: a row per planned sample."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.planning.objectives import (
     achieved,
     checked_starts,
@@ -87,9 +88,7 @@ class StiffnessPlan(ReadOnlyState):
 
         InvalidInput if ``attainable`` is the range of another posture or direction.
         """
-        from cdsm.plots import plot_stiffness_plan  # matplotlib imports slowly
-
-        return plot_stiffness_plan(self, attainable)
+        return cdsm.plots.plot_stiffness_plan(self, attainable)
 
     def to_dict(self) -> dict[str, object]:
         """Return target, stiffness and tensions in SI for JSON, with units in the keys."""

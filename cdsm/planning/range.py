@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.planning.admissible import Admissible
@@ -75,9 +76,7 @@ class StiffnessRange(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the tensions [N] of the softest and the stiffest arm."""
-        from cdsm.plots import plot_stiffness_range  # matplotlib imports slowly
-
-        return plot_stiffness_range(self)
+        return cdsm.plots.plot_stiffness_range(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return both stiffnesses and their tensions in SI for JSON, with units in the keys."""

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, final
 
+import cdsm
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import MODEL, coordinates, plain
 from cdsm.support.tidy import data_frame
@@ -71,9 +72,7 @@ class Saturation(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot stiffness [N/mm] and its gain [N/m per N] over the lower bound of tension [N]."""
-        from cdsm.plots import plot_saturation  # matplotlib imports slowly
-
-        return plot_saturation(self)
+        return cdsm.plots.plot_saturation(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return bounds, slopes and curve in SI for JSON, with units in the keys; inf as None."""

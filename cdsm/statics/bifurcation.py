@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.statics.buckling_results import CriticalTension
 from cdsm.statics.equilibrium import Equilibrium
@@ -58,9 +59,7 @@ class Bifurcation(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the displacement of the tip [mm] over the lower bound of tension [N]."""
-        from cdsm.plots import plot_bifurcation  # matplotlib imports slowly
-
-        return plot_bifurcation(self)
+        return cdsm.plots.plot_bifurcation(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return bounds and displacements in SI for JSON, with units in the keys."""

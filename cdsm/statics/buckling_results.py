@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+import cdsm
 from cdsm.posture import Posture
 from cdsm.statics.bound_scan import Limit
 from cdsm.support.format import key, plain
@@ -69,9 +70,7 @@ class CriticalTension(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the smallest joint stiffness [N m/rad] over the lower bound of tension [N]."""
-        from cdsm.plots import plot_critical_tension  # matplotlib imports slowly
-
-        return plot_critical_tension(self)
+        return cdsm.plots.plot_critical_tension(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return bounds, mode and margins in SI for JSON, with units in the keys; inf as None."""
@@ -133,9 +132,7 @@ class CriticalLoad(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the smallest joint stiffness [N m/rad] over the factor of the load."""
-        from cdsm.plots import plot_critical_load  # matplotlib imports slowly
-
-        return plot_critical_load(self)
+        return cdsm.plots.plot_critical_load(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return load, factor and mode in SI for JSON, with units in the keys; inf as None."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import cdsm
 from cdsm.cable import Cable
 from cdsm.errors import SingularStiffness
 from cdsm.posture import Posture
@@ -156,9 +157,7 @@ class Equilibrium(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the arm in mm at the reference (grey) and at the equilibrium."""
-        from cdsm.plots import plot_path  # matplotlib imports slowly
-
-        return plot_path([self.reference, self.pose])
+        return cdsm.plots.plot_path([self.reference, self.pose])
 
     def to_dict(self) -> dict[str, object]:
         """Return posture, tensions and load in SI for JSON, with units in the keys."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+import cdsm
 from cdsm.friction.stuck import assemble_segments
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Friction, Stiffness
@@ -203,9 +204,7 @@ class LoadHistory(ReadOnlyState):
 
         They are those of one cable: the cable whose segments have the largest difference.
         """
-        from cdsm.plots import plot_load_history  # matplotlib imports slowly
-
-        return plot_load_history(self)
+        return cdsm.plots.plot_load_history(self)
 
     def __repr__(self) -> str:
         return f"<LoadHistory of {self.reference.arm.name}, {len(self.tip)} loads>"

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple, final
 import numpy as np
 from scipy.linalg import eigh
 
+import cdsm
 from cdsm.arm_model import joints_to
 from cdsm.errors import InvalidInput, SingularMass
 from cdsm.posture import Posture
@@ -65,9 +66,7 @@ class Modes(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the arm in mm, deflected by its growing modes if it has any, else by its lowest."""
-        from cdsm.plots import plot_modes  # matplotlib imports slowly
-
-        return plot_modes(self)
+        return cdsm.plots.plot_modes(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return frequencies, growth rates and shapes for JSON, with units in the keys."""

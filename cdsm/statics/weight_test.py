@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.friction.breakaway import breakaway
 from cdsm.posture import Posture
@@ -152,9 +153,7 @@ class WeightTest(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot load [N] over tip displacement [mm], and the tension of each cable [N]."""
-        from cdsm.plots import plot_weight_test  # matplotlib imports slowly
-
-        return plot_weight_test(self)
+        return cdsm.plots.plot_weight_test(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return loads, displacements and tensions in SI for JSON, with units in the keys."""

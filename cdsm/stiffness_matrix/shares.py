@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
+import cdsm
 from cdsm.instability import verdict
 from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import aligned, coordinates, plain
@@ -60,9 +61,7 @@ class Shares(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot the contribution of each cable, of gravity and of the load as bars [N/mm]."""
-        from cdsm.plots import plot_shares  # matplotlib imports slowly
-
-        return plot_shares(self)
+        return cdsm.plots.plot_shares(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return the contributions in N/m by name for JSON, with units in the keys."""

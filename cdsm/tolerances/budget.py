@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.support.validation import scalar
@@ -139,9 +140,7 @@ class Uncertainty(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Draw the contributions, one bar per source."""
-        from cdsm.plots import plot_uncertainty
-
-        return plot_uncertainty(self)
+        return cdsm.plots.plot_uncertainty(self)
 
     def __repr__(self) -> str:
         return f"<Uncertainty {self._headline}>"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.arm_file.tolerances import tolerance_lines
 from cdsm.errors import FileError, InvalidInput
 from cdsm.posture import Posture
@@ -114,9 +115,7 @@ class MonteCarlo(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Draw the histogram of the values and the normal distribution of :attr:`budget`."""
-        from cdsm.plots import plot_monte_carlo
-
-        return plot_monte_carlo(self)
+        return cdsm.plots.plot_monte_carlo(self)
 
     def __repr__(self) -> str:
         return f"<MonteCarlo {self.values.size} draws, {self._headline}>"
