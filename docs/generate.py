@@ -30,7 +30,6 @@ CHAPTERS = {
     "tolerance": "Uncertainty",
     "tension": "Posture, tension, stiffness",
     "stiffness_matrix": "Posture, tension, stiffness",
-    "shares": "Posture, tension, stiffness",
     "report": "Posture, tension, stiffness",
     "instability": "Posture, tension, stiffness",
     "friction": "Friction in the holes",

@@ -14,7 +14,7 @@ from PIL import Image
 
 import cdsm
 from cdsm.plots.arm import draw_arm
-from cdsm.plots.style import MM, TEXT, equal_axes, picture_axes
+from cdsm.plots.style import COLOR_MAP, MM, TEXT, equal_axes, picture_axes
 
 FOLDER = Path(__file__).parent / "pictures"
 FRAMES = 48
@@ -54,7 +54,7 @@ def animation() -> None:
     for pose, values, along in zip(poses, plan.tensions, plan.achieved, strict=True):
         axes.clear()
         axes.set_axis_off()
-        draw_arm(axes, pose, colormaps["viridis"](scale(values)))
+        draw_arm(axes, pose, colormaps[COLOR_MAP](scale(values)))
         axes.plot(*tips.T, color="0.7", linewidth=0.8)
         axes.set(xlim=(0, 270), ylim=(-110, 110), zlim=(-110, 110))
         equal_axes(axes, 0.86)

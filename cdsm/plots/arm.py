@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import (
+    COLOR_MAP,
     MM,
     SKY,
     SMALL,
@@ -189,4 +190,4 @@ def _draw_disks(axes: Any, pose: Posture) -> None:
 def color_scale(tensions: Array) -> ScalarMappable:
     """Build the colour scale from the smallest to the largest of ``tensions`` [N]."""
     low, high = tensions.min(), tensions.max()
-    return ScalarMappable(Normalize(low, max(high, low + 1e-9)), "viridis")
+    return ScalarMappable(Normalize(low, max(high, low + 1e-9)), COLOR_MAP)

@@ -18,6 +18,7 @@ from cdsm.errors import InvalidInput
 from cdsm.plots.map_panels import Case, Map, cases_of, slices_of
 from cdsm.plots.style import (
     BLACK,
+    COLOR_MAP,
     MM,
     N_PER_MM,
     ORANGE,
@@ -180,7 +181,7 @@ def _colors(values: Array) -> tuple[ScalarMappable, str]:
     inner = finite[(measure >= 2.0 * near - far) & (measure <= 2.0 * far - near)]
     low, high = float(inner.min()), float(inner.max())
     below, above = bool((finite < low).any()), bool((values > high).any())
-    scale, name = (LogNorm, "viridis") if wide and high > _WIDE * low else (Normalize, "viridis")
+    scale, name = LogNorm if wide and high > _WIDE * low else Normalize, COLOR_MAP
     if low < 0.0 < high:  # a margin: the colour shows its sign first
         low, high, name = -max(-low, high), max(-low, high), "PuOr"
     cmap = colormaps[name].with_extremes(under=BLACK, over=VERMILLION)

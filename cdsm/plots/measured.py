@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from cdsm.plots.style import (
     BLUE,
+    COLOR_MAP,
     KN,
     MM,
     N_PER_MM,
@@ -91,7 +92,7 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
         _plot_stiffnesses(left[0], fit, stiff)
     for shade, loop in zip(np.linspace(0.0, 0.8, len(loops)), loops, strict=True):
         own = [k for k, each in enumerate(rows) if each is loop]
-        _plot_loop(left[-1], fit, loop, own, colormaps["viridis"](shade))
+        _plot_loop(left[-1], fit, loop, own, colormaps[COLOR_MAP](shade))
     if loops:
         left[-1].set(xlabel="force [N]", ylabel="displacement along force [mm]")
         line, dot = ({"color": "0.2", **style} for style in ({}, {"marker": ".", "ls": ""}))

@@ -47,6 +47,9 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = PALETTE = (
 COLORS: Final = (BLUE, VERMILLION, GREEN)
 """Colours of the directions x, y and z."""
 
+COLOR_MAP: Final = "viridis"
+"""Colour map of numbers, such as tensions and stiffnesses; it too is clear to all colour vision."""
+
 STYLES: Final = ("-", "--", "-.", ":")
 MM: Final = 1e3
 KN: Final = 1e-3

@@ -10,7 +10,7 @@ import matplotlib
 import numpy as np
 
 from cdsm.manipulator import Manipulator
-from cdsm.plots.style import MM, N_PER_MM
+from cdsm.plots.style import COLOR_MAP, MM, N_PER_MM
 from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import coordinates, plural
 from cdsm.support.markup import Markup, element
@@ -35,7 +35,7 @@ _TABLE: Final = "width:100%;border-spacing:0 0.15em"
 _NUMBER: Final = "text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"
 _GRADIENT: Final = ",".join(
     f"rgb({red},{green},{blue})"
-    for red, green, blue, _ in matplotlib.colormaps["viridis"](np.linspace(0, 1, 9), bytes=True)
+    for red, green, blue, _ in matplotlib.colormaps[COLOR_MAP](np.linspace(0, 1, 9), bytes=True)
 )
 
 
