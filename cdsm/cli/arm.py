@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 import cdsm
-from cdsm.cli.options import Angles, ArmOptions, AsJson, LoadOptions, TensionOptions
+from cdsm.cli.options import Angles, ArmOptions, AsJson, LoadOptions, TensionOptions, out_option
 from cdsm.cli.output import Json, answer, by_cable, write
 from cdsm.cli.values import misuse
 
@@ -19,9 +19,7 @@ def urdf(
     geometry: Annotated[
         Path, typer.Argument(metavar="ARM.toml", help="File with the geometry of the arm.")
     ],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="FILE.urdf", help="URDF file to write.")
-    ],
+    out: Annotated[Path, out_option(metavar="FILE.urdf", help="URDF file to write.")],
     as_json: AsJson = False,
 ) -> None:
     """Write the URDF of an arm, checked by reading it back with two parsers."""
@@ -127,8 +125,7 @@ def check(
     load: LoadOptions,
     angles: Angles = "0",
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE.html", help="Also write the report as a page."),
+        Path | None, out_option(metavar="FILE.html", help="Also write the report as a page.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -152,12 +149,7 @@ def export(
     load: LoadOptions,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE.xml",
-            help="MuJoCo model to write, its cables under tension.",
-        ),
+        out_option(metavar="FILE.xml", help="MuJoCo model to write, its cables under tension."),
     ] = None,
     cables_out: Annotated[
         Path | None, typer.Option(metavar="FILE.toml", help="File to write the cables to.")

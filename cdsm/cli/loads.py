@@ -120,8 +120,7 @@ def cycle(
         bool, typer.Option("--one-sided", help="Unload to zero; do not reverse the load.")
     ] = False,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", help="File to write: .nc (NetCDF) or .csv, SI units."),
+        Path | None, options.out_option(help="File to write: .nc (NetCDF) or .csv, SI units.")
     ] = None,
     figure: Picture = None,
     as_json: AsJson = False,

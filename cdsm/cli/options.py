@@ -22,6 +22,7 @@ DEFAULT_SOLVER: Final = "daqp"
 
 _arm_option = partial(typer.Option, rich_help_panel="The arm")
 _tension_option = partial(typer.Option, rich_help_panel="Tensions and load")
+out_option = partial(typer.Option, "--out", "-o")
 
 
 def _solvers() -> list[str]:

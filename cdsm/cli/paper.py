@@ -9,13 +9,13 @@ from typing import Annotated, Literal
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson
+from cdsm.cli.options import AsJson, out_option
 
 
 def reproduce(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder for the figures and tables.")
-    ] = Path("reproduction"),
+    out: Annotated[Path, out_option(help="Folder for the figures and tables.")] = Path(
+        "reproduction"
+    ),
     kind: Annotated[
         Literal["pdf", "svg", "png"],
         typer.Option("--format", help="Format of the figures; pdf and svg are vectors."),

@@ -46,11 +46,8 @@ def plan(
     max_tension: MaxTension = math.inf,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE.csv",
-            help="Table of tensions, lengths, stiffness to write.",
+        options.out_option(
+            metavar="FILE.csv", help="Table of tensions, lengths, stiffness to write."
         ),
     ] = None,
     figure: Picture = None,

@@ -106,9 +106,7 @@ class MeasureOptions:
 
 def sweep(
     arm: ArmOptions,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="File to write: .nc (NetCDF) or .csv, SI units.")
-    ],
+    out: Annotated[Path, options.out_option(help="File to write: .nc (NetCDF) or .csv, SI units.")],
     poses: PoseOptions,
     load: LoadOptions,
     measures: MeasureOptions,
@@ -159,9 +157,7 @@ def map_sweep(
     sweep: Annotated[
         Path, typer.Argument(metavar="SWEEP", help="Sweep to read: .nc, or a --resume folder.")
     ],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="Picture to write.", metavar="FILE.pdf|svg|png")
-    ],
+    out: Annotated[Path, options.out_option(help="Picture to write.", metavar="FILE.pdf|svg|png")],
     quantity: Annotated[
         str,
         typer.Option(

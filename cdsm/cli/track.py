@@ -90,8 +90,8 @@ def track(
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", "-o", metavar="RUN.nc|RUN.csv", help="Results over time to write; .nc has all."
+        options.out_option(
+            metavar="RUN.nc|RUN.csv", help="Results over time to write; .nc has all."
         ),
     ] = None,
     animate: Annotated[

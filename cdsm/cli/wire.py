@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson, Picture
+from cdsm.cli.options import AsJson, Picture, out_option
 from cdsm.cli.output import Json, answer, write, write_picture
 from cdsm.cli.values import misuse
 
@@ -40,9 +40,7 @@ def fit(
     method: Annotated[str, typer.Option(help="Fit: monotone, or polynomial as in the paper.")] = (
         "monotone"
     ),
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Law of rigidity to write, as TOML.")
-    ] = None,
+    out: Annotated[Path | None, out_option(help="Law of rigidity to write, as TOML.")] = None,
     tolerances: Annotated[
         Path | None,
         typer.Option(metavar="T.toml", help="Tolerances to write: the 95 % band of the rigidity."),
