@@ -121,37 +121,10 @@ def plan_tests(
     check_call("model_of", model_of, 0, tuple(values))
     one_of("criterion", criterion, ("D", "A"))
     most = whole_number("tests", tests, 1, _MOST)
-    names = tuple(values)
-    chosen = names if wanted is None else tuple(wanted)
-    for kind, given in (("wanted", chosen), ("known", tuple(known or {}))):
-        for name in given:
-            if name not in names:
-                raise UnknownName(f"parameter in {kind}", name, names, "Name one of the arm.")
-    if not chosen:
-        raise InvalidInput("wanted", "names no parameter; leave it out for all of them.")
-    sizes = np.array(list(values.values()))
-    prior = np.zeros((len(names), len(names)))
-    for name, std in (known or {}).items():
-        if not (sigma := scalar(f"known[{name!r}]", std)) > 0.0:
-            raise InvalidInput(f"known[{name!r}]", f"{sigma:g} given; it must be positive.")
-        prior[names.index(name), names.index(name)] = abs(values[name]) / sigma
-    rows, failures = list[Array](), dict[str, str]()
+    names, chosen = tuple(values), _wanted(values, wanted, known or {})
+    prior = _prior(values, known or {})
     with progress_allowed(flag("progress", progress)):
-        for loop in track(candidates, "following the candidates"):
-            try:
-                rows.append(_rows(model_of, values, loop))
-            except (CdsmError, NoModelError) as error:
-                failures[loop.label] = str(error)
-            except UserFaultError as fault:
-                raise fault.args[0] from fault.__cause__
-    usable = tuple(loop for loop in candidates if loop.label not in failures)
-    if not usable:
-        label, reason = next(iter(failures.items()))
-        raise InvalidInput(
-            "postures",
-            f"none of {len(failures)} candidates can be tested. {label}: {reason} Choose other "
-            "postures, lighter weights or higher tensions.",
-        )
+        usable, rows, failures = _followed(model_of, values, candidates)
     whole = Determination(names, np.vstack([*rows, prior]), np.ones(len(names)))
     settled = [name for name in chosen if whole.firm[names.index(name)]]
     if not settled:
@@ -177,7 +150,7 @@ def plan_tests(
     sensitivities = design.sensitivities(M)[0] if efficiency else np.zeros(len(usable))
     return ExperimentPlan(
         names=names,
-        values=frozen(sizes),
+        values=frozen(np.array(list(values.values()))),
         wanted=chosen,
         criterion=criterion,
         candidates=usable,
@@ -188,7 +161,7 @@ def plan_tests(
         efficiency=efficiency,
         sensitivities=frozen(sensitivities / max(sensitivities.max(), 1e-300)),
         open_combinations=tuple(whole.open_combinations),
-        failures=tuple(failures.items()),
+        failures=failures,
     )
 
 
@@ -205,6 +178,55 @@ def _checked_parameters(parameters: Mapping[str, float]) -> dict[str, float]:
                 "0 given; intervals are judged relative to the expected value. Give a small one.",
             )
     return values
+
+
+def _wanted(
+    values: dict[str, float], wanted: Sequence[str] | None, known: Mapping[str, float]
+) -> tuple[str, ...]:
+    """Return the names of the parameters to determine; check them and those of ``known``."""
+    chosen = tuple(values) if wanted is None else tuple(wanted)
+    for kind, given in (("wanted", chosen), ("known", tuple(known))):
+        for name in given:
+            if name not in values:
+                raise UnknownName(
+                    f"parameter in {kind}", name, tuple(values), "Name one of the arm."
+                )
+    if not chosen:
+        raise InvalidInput("wanted", "names no parameter; leave it out for all of them.")
+    return chosen
+
+
+def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
+    """Return the rows (P, P) of the prior: |p|/σ on the diagonal where p is known, else 0."""
+    weights = dict.fromkeys(values, 0.0)
+    for name, std in known.items():
+        if not (sigma := scalar(f"known[{name!r}]", std)) > 0.0:
+            raise InvalidInput(f"known[{name!r}]", f"{sigma:g} given; it must be positive.")
+        weights[name] = abs(values[name]) / sigma
+    return np.diag(list(weights.values()))
+
+
+def _followed(
+    model_of: Callable[..., Manipulator], values: dict[str, float], candidates: Sequence[WeightLoop]
+) -> tuple[tuple[WeightLoop, ...], list[Array], tuple[tuple[str, str], ...]]:
+    """Return the loops that can be tested, the rows of each, and label and reason of the others."""
+    rows, failures = list[Array](), dict[str, str]()
+    for loop in track(candidates, "following the candidates"):
+        try:
+            rows.append(_rows(model_of, values, loop))
+        except (CdsmError, NoModelError) as error:
+            failures[loop.label] = str(error)
+        except UserFaultError as fault:
+            raise fault.args[0] from fault.__cause__
+    usable = tuple(loop for loop in candidates if loop.label not in failures)
+    if not usable:
+        label, reason = next(iter(failures.items()))
+        raise InvalidInput(
+            "postures",
+            f"none of {len(failures)} candidates can be tested. {label}: {reason} Choose other "
+            "postures, lighter weights or higher tensions.",
+        )
+    return usable, rows, tuple(failures.items())
 
 
 def _candidates(

@@ -68,14 +68,12 @@ class ExperimentPlan(ReadOnlyState):
     @property
     def tests(self) -> tuple[WeightLoop, ...]:
         """The loops to make, repetitions included, without readings."""
-        pairs = zip(self.candidates, self.counts.tolist(), strict=True)
-        return tuple(loop for loop, count in pairs for _ in range(count))
+        return self._tests(self.counts)
 
     @property
     def even_tests(self) -> tuple[WeightLoop, ...]:
         """The loops of the reference plan: as many, evenly spaced over the candidates."""
-        pairs = zip(self.candidates, self.even.tolist(), strict=True)
-        return tuple(loop for loop, count in pairs for _ in range(count))
+        return self._tests(self.even)
 
     @cached_property
     def std(self) -> Array:
@@ -101,6 +99,10 @@ class ExperimentPlan(ReadOnlyState):
             for name, even, std in found
             if name in self.wanted
         }
+
+    def _tests(self, counts: NDArray[np.intp]) -> tuple[WeightLoop, ...]:
+        pairs = zip(self.candidates, counts.tolist(), strict=True)
+        return tuple(loop for loop, count in pairs for _ in range(count))
 
     def _std(self, counts: NDArray[np.intp]) -> Array:
         pairs = zip(self.jacobians, counts.tolist(), strict=True)
