@@ -90,27 +90,9 @@ class RestStates:
         self._torque = abs(balance).max(axis=1)
         self._torque = np.where(self._torque > 0.0, self._torque, 1.0)
         rows, slack = [balance / self._torque[:, None]], [np.c_[-off, off] / self._torque[:, None]]
-        # b(F) Σ g δ + Σ l b′ ΔT + slack = 0 for each locked motor
-        unstrained = pose.arm.original_length == "unstrained"
         for c, each in enumerate(cables):
             if each.control == "position":
-                of = slice(start[c], start[c + 1])
-                ends = float(near.falls[of].max()), float(apart[of].max())
-                wire = _Wire.of(each, float(K.tension[c]), *ends, unstrained)
-                spring = 1.0 / each.series_stiffness
-                row = np.zeros((1, nv + length.size))
-                row[0, :nv] = wire.share * g[of].sum(axis=0) * within
-                row[0, nv + start[c] : nv + start[c + 1]] = length[of] * wire.slope * apart[of]
-                row[0, nv + start[c]] -= spring * wire.share * apart[start[c]]
-                # l departs from its tangent by δᵀHδ/2 and a third-order part
-                longer = near.curved(H[of].sum(axis=0)) + far.length[of].sum()
-                whole, lost = float(length[of].sum()), wire.share * float(longer)
-                each_longer = straight[of] + near.curved(H[of]) + far.length[of]
-                lost += float(each_longer.sum()) * wire.change
-                lost += spring * (wire.most - each.elasticity.domain.low) * wire.change
-                # a slack cable has more wire than its segments are long
-                spare = whole * wire.change + lost if wire.least == 0.0 else 0.0
-                ends = whole * wire.below - lost, whole * wire.above + lost + spare
+                row, ends = _locked(K, c, near, far, H, straight)
                 scale = abs(row).max()
                 rows.append(row / scale)
                 slack.append(np.array([ends]) / scale)
@@ -182,6 +164,37 @@ class RestStates:
         states = self._near.joints.size + self._near.tensions.size
         reach = float(abs(found.x[:states]).max())
         return End(-scale * found.fun, scale * bound, reach)
+
+
+def _locked(
+    K: Stiffness, c: int, near: Neighbourhood, far: Remainders, H: Array, straight: Array
+) -> tuple[Array, tuple[float, float]]:
+    """Return the equation of the locked motor of cable ``c``: b(F) Σ g·δ + Σ l b′ ΔT + slack = 0.
+
+    It is a row (1, nv + S) for δ/ρ and ΔT/ρ_T, and the bounds of its slack. H (S, nv, nv) are the
+    Hessians of the lengths l, and ``straight`` (S,) the largest |g·δ|.
+    """
+    pose, cable = K.posture, K.posture.arm.cables[c]
+    segments, apart, nv = pose.segments, near.tensions, near.joints.size
+    g, length, first = segments.length_jacobian, segments.lengths, segments.chains.start[c]
+    of = slice(first, segments.chains.start[c + 1])
+    fall, rise = float(near.falls[of].max()), float(apart[of].max())
+    unstrained = pose.arm.original_length == "unstrained"
+    wire = _Wire.of(cable, float(K.tension[c]), fall, rise, unstrained)
+    spring = 1.0 / cable.series_stiffness
+    row = np.zeros((1, nv + length.size))
+    row[0, :nv] = wire.share * g[of].sum(axis=0) * near.joints
+    row[0, nv:][of] = length[of] * wire.slope * apart[of]
+    row[0, nv + first] -= spring * wire.share * apart[first]
+    # l departs from its tangent by δᵀHδ/2 and a third-order part
+    longer = near.curved(H[of].sum(axis=0)) + far.length[of].sum()
+    whole, lost = float(length[of].sum()), wire.share * float(longer)
+    each_longer = straight[of] + near.curved(H[of]) + far.length[of]
+    lost += float(each_longer.sum()) * wire.change
+    lost += spring * (wire.most - cable.elasticity.domain.low) * wire.change
+    # a slack cable has more wire than its segments are long
+    spare = whole * wire.change + lost if wire.least == 0.0 else 0.0
+    return row, (whole * wire.below - lost, whole * wire.above + lost + spare)
 
 
 def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tuple[Any, Array]:
