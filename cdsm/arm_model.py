@@ -149,6 +149,8 @@ class ArmModel:
             lead=frozen(np.array([cable.lead for cable in cables])),
             axis=frozen(np.array([self.body.locate(link)[1][:, 0] for link in links])),
             locked=frozen(np.array([float(cable.control == "position") for cable in cables])),
+            series=self.laws.series,
+            rest=self.laws.rest,
         )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:

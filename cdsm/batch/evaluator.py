@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from itertools import chain, pairwise
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from cdsm.batch import layout
+from cdsm.batch.arguments import Asked, Kept, Rows
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import checked_threads, kernel_arm, run_slices
 from cdsm.batch.layout import OK, POSTPONED, QUANTITIES, UNDECIDED, Codes
 from cdsm.batch.rigidities import rigidities
-from cdsm.batch.stuck_readings import STUCK, WITHOUT_FRICTION, Kept, read_stuck
+from cdsm.batch.stuck_readings import STUCK, WITHOUT_FRICTION, read_stuck
 from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.compiling import WIDTH, is_new
 from cdsm.kernels.distribution import search_tensions
@@ -42,25 +42,6 @@ _INVERSE = QUANTITIES[layout.PSEUDOINVERSE + 1 :]
 """Readings that need the inverse of K_θ."""
 
 
-class _Rows(NamedTuple):
-    """What is given for b postures; one row if it is the same for all, none if it is not given."""
-
-    q: Array  # joint angles (b, nv) [rad]
-    wrench: Array  # W (b, 6)
-    tension: Array  # F (b, C) [N]; none if tensions are distributed or not needed
-    low: Array  # lower bounds (b, C) [N] of distributed tensions
-    high: Array  # upper bounds (b, C) [N]
-
-    def take(self, rows: slice | Indices) -> _Rows:
-        """Return some of the rows."""
-        return _Rows(*(frozen(each[rows]) if len(each) > 1 else each for each in self))
-
-    def under(self, tension: Array) -> _Rows:
-        """Return the rows under tensions (b, C) [N], or (0, C), that are not distributed."""
-        nothing = self.tension[:0]
-        return self._replace(tension=tension, low=nothing, high=nothing)
-
-
 class Evaluator:
     """Evaluation of ranges of rows (postures); arguments as in :func:`cdsm.batch.evaluate`.
 
@@ -87,20 +68,14 @@ class Evaluator:
         check_limits: bool = True,
     ) -> None:
         self._arm, nv, cables = arm, arm.nv, len(arm.cables)
-        self._nothing = frozen(np.empty((0, cables)))
-        self._no_balance = _empty_balance(0, cables, nv)
-        low, high = bounds or (self._nothing, self._nothing)
-        given = self._nothing if tension is None else tension
-        self._rows = _Rows(
-            *(
-                frozen(np.ascontiguousarray(np.atleast_2d(each)))
-                for each in (q, wrench, given, low, high)
-            )
-        )
+        self._nothing = nothing = frozen(np.empty((0, cables)))
+        low, high = bounds or (nothing, nothing)
+        given = q, wrench, nothing if tension is None else tension, low, high, nothing, nothing
+        self._rows = Rows(*(frozen(np.ascontiguousarray(np.atleast_2d(each))) for each in given))
         self._directions = frozen(
             np.zeros((0, 3)) if direction is None else direction.reshape(-1, 3)
         )
-        self._arrays = kernel_arm(arm, check_limits)
+        self._kernel_arm = kernel_arm(arm, check_limits)
         count = len(self._directions)
         self._start = layout.starts(nv, cables, count)
         same = {} if arm.has_friction else WITHOUT_FRICTION
@@ -124,7 +99,7 @@ class Evaluator:
         if WIDTH // 2 < len(q) <= _BATCH // record and is_new(evaluate_rows):
             self._block = max(WIDTH + 1, min(_BLOCK // record, len(q)))  # numpy runs wide blocks
 
-        shapes = dict(zip(QUANTITIES, layout.shapes(nv, cables, count), strict=True))
+        shapes = layout.shapes(nv, cables, count)
         if direction is not None and direction.ndim == 1:
             shapes |= dict.fromkeys(layout.DIRECTIONAL, ())
         # one row for each posture, which the kernel fills; the outputs are views of it
@@ -149,9 +124,9 @@ class Evaluator:
         if len(rows.tension) and "tension" in self._place:
             out[:, self._place["tension"]] = rows.tension
 
-    def _distribute(self, rows: _Rows, found: Codes, out: Array) -> None:
+    def _distribute(self, rows: Rows, found: Codes, out: Array) -> None:
         """Distribute the tensions of the postures ``rows``; fill their status and outputs."""
-        balance = _empty_balance(len(found), len(self._arm.cables), self._arm.nv)
+        balance = self._empty_balance(len(found))
         if self._asks:  # rigidities that only Python computes need the tensions first
             self._evaluate(rows, np.array([layout.TENSION]), found, balance.tension, balance)
         else:
@@ -163,35 +138,38 @@ class Evaluator:
         again = slice(None) if self._asks else np.flatnonzero((left | postponed) & (found == OK))
         codes, values = found[again], out[again]
         if codes.size:
-            given = rows.take(again).under(frozen(balance.tension[again]))
+            pulled, none = frozen(balance.tension[again]), self._nothing
+            given = rows.take(again)._replace(tension=pulled, low=none, high=none)
             self._evaluate(given, self._wanted, codes, values)
             found[again], out[again] = codes, values
 
-    def _search(self, rows: _Rows, left: Indices, balance: Balance) -> Codes:
+    def _search(self, rows: Rows, left: Indices, balance: Balance) -> Codes:
         """Search for tensions of the rows ``left`` (r,); fill them and return status codes (r,)."""
-        (arms, torque, tension), outcome = balance, np.empty(left.size, dtype=np.intp)
-        search_tensions(arms, torque, rows.low, rows.high, left, tension, outcome)
+        given, outcome = rows.take(left), np.empty(left.size, dtype=np.intp)
+        arms, torque, tension = (each[left] for each in balance)
+        search_tensions(arms, torque, given.low, given.high, tension, outcome)
         codes = _CODES[outcome]
         for n in np.flatnonzero(codes == UNDECIDED):
-            row = rows.take(left[n : n + 1])
+            row = given.take(slice(n, n + 1))
             pose, bounds = self._arm.at(row.q[0], check_limits=False), (row.low[0], row.high[0])
             try:
-                tension[left[n]] = distribute_tension(pose, *bounds, row.wrench[0]).values
+                tension[n] = distribute_tension(pose, *bounds, row.wrench[0]).values
                 codes[n] = OK
             except (InfeasibleTension, SolverError) as error:
                 codes[n] = Status.of(error) or Status.SOLVER_FAILED
+        balance.tension[left] = tension
         return codes
 
     def _evaluate(
         self,
-        rows: _Rows,
+        rows: Rows,
         wanted: Indices,
         found: Codes,
         out: Array,
         balance: Balance | None = None,
     ) -> None:
         """Fill status and output of some postures; if they have bounds, guess their tensions."""
-        balance = balance or self._no_balance
+        balance = balance or self._empty_balance(0)
         read, (nv, width) = wanted > layout.STUCK_JOINT, (self._arm.nv, self._block)
         stuck = np.isin(wanted, STUCK)
         blocks = -(-len(found) // width)
@@ -207,66 +185,39 @@ class Evaluator:
         JX = np.zeros((max(free, held), 6, nv, width))
         empty = Kept(K, parts, JX, stuck_K, stuck_parts)
         names = [[QUANTITIES[number] for number in wanted[read & kind]] for kind in (~stuck, stuck)]
+        stored = np.zeros(len(QUANTITIES), dtype=np.bool_)
+        stored[wanted[~read]] = True
+        last = int(wanted[-1]) if wanted.size else 0
+        asked = Asked(self._start, stored, last, slides, self._sticks)
         for first in range(0, len(found), blocks * width):
             part = slice(first, first + blocks * width)
-            some, states, values = rows.take(part), found[part], out[part]
+            states, values = found[part], out[part]
+            some = self._with_rigidities(rows.take(part), states)
             kept = empty.first(-(-len(states) // width))
             left = Balance(*(each[part] for each in balance))
-            wire = self._run_kernel(some, wanted, slides, kept, left, states, values)
+            evaluate_rows(self._kernel_arm, some, asked, width, kept, left, values, states)
             if read.any() and (states == OK).any():
-                self._read(kept, wire, some.q, names, states, values)
+                self._read(kept, some, names, states, values)
             else:
                 for name in chain(*names):
                     values[:, self._place[name]] = math.nan
 
-    def _run_kernel(
-        self,
-        rows: _Rows,
-        wanted: Indices,
-        slides: bool,
-        kept: Kept,
-        balance: Balance,
-        found: Codes,
-        out: Array,
-    ) -> Array:
-        """Fill all quantities but the readings, and what they need; return EA (1 + ε) of wires."""
-        rigidity = wire = self._nothing
-        model = self._arm._model
-        if self._asks and len(rows.tension):
-            usable = found == OK
-            if len(rows.tension) < len(found):  # one row for all postures
-                usable = usable.any(keepdims=True)
-            rigidity = wire = rigidities(model.laws, rows.tension, usable)
-            if self._sticks and model.wire_laws is not model.laws:
-                wire = rigidities(model.wire_laws, rows.tension, usable)
-        arguments: tuple[Any, ...] = (
-            *self._arrays,
-            rows.q,
-            rows.tension,
-            rows.low,
-            rows.high,
-            rigidity,
-            wire,
-            rows.wrench,
-            self._start,
-            wanted[wanted <= layout.STUCK_JOINT],
-            wanted[-1] if wanted.size else 0,
-            slides,
-            self._sticks,
-            self._block,
-            *kept,
-            balance,
-            out,
-            found,
-        )
-        evaluate_rows(*arguments)
-        return wire
+    def _with_rigidities(self, rows: Rows, found: Codes) -> Rows:
+        """Return the rows with the rigidities that only Python computes, if they are needed."""
+        if not (self._asks and len(rows.tension)):
+            return rows
+        model, usable = self._arm._model, found == OK
+        if len(rows.tension) < len(found):  # one row for all postures
+            usable = usable.any(keepdims=True)
+        rigidity = wire = rigidities(model.laws, rows.tension, usable)
+        if self._sticks and model.wire_laws is not model.laws:
+            wire = rigidities(model.wire_laws, rows.tension, usable)
+        return rows._replace(rigidity=rigidity, wire=wire)
 
     def _read(
         self,
         kept: Kept,
-        wire: Array,
-        q: Array,
+        rows: Rows,
         names: list[list[str]],
         found: Codes,
         out: Array,
@@ -281,9 +232,8 @@ class Evaluator:
             blocks = own.reshape(-1, self._block)
             if kind:
                 F = out[:, self._place.get("tension", slice(0))]
-                values = read_stuck(
-                    self._arm, q, F, wire, kept, self._directions, quantities, blocks
-                )
+                arm, u = self._kernel_arm, self._directions
+                values = read_stuck(arm, rows, F, kept, u, quantities, blocks)
             else:
                 values = read(*kept[:3], self._directions, quantities, blocks, self._block)
             state = own[: found.size]
@@ -297,6 +247,6 @@ class Evaluator:
             found[singular] = Status.SINGULAR
             found[state == IMMOBILE] = Status.IMMOBILE
 
-
-def _empty_balance(rows: int, cables: int, nv: int) -> Balance:
-    return Balance(np.empty((rows, cables, nv)), np.empty((rows, nv)), np.empty((rows, cables)))
+    def _empty_balance(self, rows: int) -> Balance:
+        nv, cables = self._arm.nv, len(self._arm.cables)
+        return Balance(np.empty((rows, cables, nv)), np.empty((rows, nv)), np.empty((rows, cables)))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdsm.batch.arguments import Arm, Asked, Kept, Rows
 from cdsm.batch.layout import (
     ACTIVE,
     BEYOND_LIMITS,
@@ -31,62 +32,37 @@ from cdsm.batch.layout import (
     UNDECIDED,
     Codes,
 )
-from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
-from cdsm.kernels.compiling import Index, Width, inlined, inner, lanes, threaded, upwards
+from cdsm.kernels.bodies import gravity_torque, set_gravity_stiffness, tip_jacobian
+from cdsm.kernels.compiling import Index, Width, inlined, lanes, threaded, upwards
 from cdsm.kernels.distribution import distribute, keep_balance, refuse, set_arms, set_torque
-from cdsm.kernels.records import clear, contains, copy, fetch, matrix, mirror, store, vector
+from cdsm.kernels.records import clear, copy, fetch, matrix, mirror, store, vector
 from cdsm.kernels.segments import (
     SHORTEST_SEGMENT,
     add_length_hessian,
     segment_scratch,
     set_lengths,
 )
-from cdsm.kernels.serpentine_guess import Blocks, empty_guess
+from cdsm.kernels.serpentine_guess import empty_guess
 from cdsm.kernels.stiffness import (
     add_passive_stiffness,
     set_cable_stiffness,
     set_load_stiffness,
     sum_terms,
 )
-from cdsm.kernels.stuck import Holes, add_stuck_stiffness, sticking_scratch
+from cdsm.kernels.stuck import add_stuck_stiffness, sticking_scratch
 from cdsm.kernels.tension import Balance, certificate
-from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
-from cdsm.kernels.wires import Wires, set_rigidity, wire_scratch
+from cdsm.kernels.tree import Indices, empty_frames, forward_kinematics
+from cdsm.kernels.wires import set_rigidity, wire_scratch
 from cdsm.support.values import Array
 
 
 @threaded
 def evaluate_rows(
-    tree: Tree,
-    routing: Routing,
-    masses: Masses,
-    lowest: Array,
-    highest: Array,
-    blocks: Blocks,
-    smallest_arm: float,
-    series: Array,
-    rest: Array,
-    laws: Wires,
-    wires: Wires,
-    holes: Holes,
-    q: Array,
-    tension: Array,
-    low: Array,
-    high: Array,
-    rigidity: Array,
-    wire: Array,
-    wrench: Array,
-    start: Indices,
-    wanted: Indices,
-    last: int,
-    slides: bool,
-    sticks: bool,
+    arm: Arm,
+    given: Rows,
+    asked: Asked,
     width: int,
-    joint: Array,
-    parts: Array,
-    jacobian: Array,
-    stuck: Array,
-    stuck_parts: Array,
+    kept: Kept,
     balance: Balance,
     out: Array,
     status: Codes,
@@ -94,37 +70,11 @@ def evaluate_rows(
     """Fill the status (b,) and the requested quantities (b, …) of every posture, up to K_θ.
 
     Args:
-        tree: The joints.
-        routing: The cables.
-        masses: Masses on the joints, and place of the tip.
-        lowest: Lower joint limits (nv,) [rad].
-        highest: Upper joint limits (nv,) [rad].
-        blocks: Blocks of joints and cables, from which tensions are guessed.
-        smallest_arm: Moment arms below this are rounding in the balance of tensions [m].
-        series: 1/k_series of the cables (C,) [m/N].
-        rest: Tension at which the series springs are at rest (C,) [N].
-        laws: Laws of the cables; EA is 0 under force control.
-        wires: As ``laws``, for cables that stick: EA is not 0 under force control.
-        holes: Holes of the cables.
-        q: Joint angles (b, nv) [rad].
-        tension: F (b, C) [N]; (0, C) if tensions are distributed or not needed.
-        low: Lower bounds (b, C) [N] of distributed tensions; (0, C) if none are distributed.
-        high: Upper bounds, with the shape of ``low``.
-        rigidity: EA (1 + ε) (b, C) [N], negative outside the domain; (0, C) if it follows from
-            ``laws``.
-        wire: As ``rigidity``, from ``wires``.
-        wrench: W (b, 6).
-        start: Index in the record at which each quantity begins.
-        wanted: Numbers of the requested quantities, rising.
-        last: Largest number of a quantity that must be computed.
-        slides: Whether the passive stiffness of cables that slide freely is needed.
-        sticks: Whether the passive stiffness of cables that stick is needed.
-        width: Number of postures in a block.
-        joint: K_θ of B blocks (B, nv, nv, W), for the readings; (0, nv, nv, W) if there are none.
-        parts: Sum of the magnitudes of the four terms of K_θ, with the shape of ``joint``.
-        jacobian: J_X (B, 6, nv, W) for the readings, zero on entry, or no blocks.
-        stuck: K_θ while the cables stick, with the shape of ``joint``.
-        stuck_parts: Sum of the magnitudes of the four terms of ``stuck``, with its shape.
+        arm: The arm.
+        given: The postures and their loads.
+        asked: The requested quantities.
+        width: W, the number of postures in a block.
+        kept: Filled for the readings.
         balance: Moment arms and torques of the balance (b, …), filled for UNDECIDED postures, and
             tensions, filled for POSTPONED ones; no rows if no tensions are distributed.
         out: The requested quantities in one row per posture; NaN where they do not exist.
@@ -133,7 +83,14 @@ def evaluate_rows(
             is the optimum, but few postures of the block have tensions; what depends on tensions
             is left for a block of such postures.
     """
-    rows, nv, cables, bodies = q.shape[0], q.shape[1], series.shape[0], lowest.shape[0] + 1
+    tree, routing, masses, holes, blocks = arm.tree, arm.routing, arm.masses, arm.holes, arm.blocks
+    start, stored, joint, stuck = asked.start, asked.stored, kept.joint, kept.stuck
+    rows, nv, cables, bodies = (
+        given.q.shape[0],
+        given.q.shape[1],
+        routing.fixed.shape[0],
+        tree.parent.shape[0],
+    )
 
     # the quantities: views of a record, one after the other; the posture is the last axis of all
     record = np.zeros((start[start.shape[0] - 1], width))
@@ -164,24 +121,24 @@ def evaluate_rows(
     zero = np.zeros((cables, width))
     six, shortest = np.empty((6, width)), np.empty(width)
     code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
-    wiring, own_wiring = wire_scratch(laws, width), wire_scratch(wires, width)
+    wiring, own_wiring = wire_scratch(arm.laws, width), wire_scratch(arm.wires, width)
     sticking, slot = sticking_scratch(nv, width), np.zeros(cables, dtype=np.intp)
 
     for first in range(0, rows, width):
         block = first // width
-        JX = jacobian[block] if jacobian.shape[0] else own_JX
-        fetch(q, first, angles, width)
-        fetch(wrench, first, loads, width)
-        fetch(tension, first, F, width)
-        fetch(low, first, least, width)
-        fetch(high, first, most, width)
-        fetch(rigidity, first, stretched, width)
+        JX = kept.jacobian[block] if kept.jacobian.shape[0] else own_JX
+        fetch(given.q, first, angles, width)
+        fetch(given.wrench, first, loads, width)
+        fetch(given.tension, first, F, width)
+        fetch(given.low, first, least, width)
+        fetch(given.high, first, most, width)
+        fetch(given.rigidity, first, stretched, width)
 
         # quantities of the joint angles alone
         forward_kinematics(tree, routing, angles, six, rotation, frames, width)
         set_lengths(routing, frames, segments, L, J, shortest, width)
         tip_jacobian(tree.parent, masses, rotation, frames, tip, JX, width)
-        if jacobian.shape[0] and contains(wanted, JACOBIAN):
+        if kept.jacobian.shape[0] and stored[JACOBIAN]:
             copy(JX, own_JX, width)
         gravity_torque(tree, masses, rotation, frames, carried, g, width)
         for w in lanes(width):
@@ -189,15 +146,15 @@ def evaluate_rows(
             known[w] = GRAVITY + 1
             if shortest[w] < SHORTEST_SEGMENT:
                 code[w], known[w] = COINCIDENT_SITES, 0
-            if _is_beyond(angles, lowest, highest, w):
+            if _is_beyond(angles, arm.lowest, arm.highest, w):
                 code[w], known[w] = BEYOND_LIMITS, 0
 
         # quantities that need tensions
-        reached = last
-        if last > GRAVITY:
-            set_torque(JX, g, loads, torque, width)
-            if low.shape[0]:
-                set_arms(J, smallest_arm, arms, width)
+        reached = asked.last
+        if asked.last > GRAVITY:
+            set_torque(JX, loads, g, torque, width)
+            if given.low.shape[0]:
+                set_arms(J, arm.smallest_arm, arms, width)
                 distribute(blocks, arms, torque, least, most, guess, check, F, width)
                 for w in lanes(width):
                     if code[w] == OK and not (check.certified[w] == 1.0 and guess.failed[w] < 0.0):
@@ -216,7 +173,7 @@ def evaluate_rows(
                 held = 0
                 for w in lanes(width):
                     held += 1 if code[w] == OK else 0
-                if last > TENSION and 3 * held < 2 * width:
+                if asked.last > TENSION and 3 * held < 2 * width:
                     reached = TENSION
                     for w in lanes(width):
                         code[w] = POSTPONED if code[w] == OK else code[w]
@@ -224,70 +181,56 @@ def evaluate_rows(
                         for w in lanes(min(width, rows - first)):
                             balance.tension[first + np.intp(w), c] = F[c, w]
             _note(code, LOAD, known, width)
-        if reached > TENSION or contains(wanted, GRAVITY):
+        if reached > TENSION or stored[GRAVITY]:
             set_gravity_stiffness(tree.parent, carried, gravity, width)
-            if contains(wanted, GRAVITY):
+            if stored[GRAVITY]:
                 mirror(gravity, width)
         if reached > TENSION:
-            if contains(wanted, RESIDUAL):
-                _set_residual(F, J, torque, residual, width)
+            if stored[RESIDUAL]:
+                set_torque(J, F, torque, residual, width)
             clear(active, width)
             hessian = active.reshape(1, nv, nv, width)
             add_length_hessian(
                 routing.segment, routing.joint, frames, F, slot, segments, hessian, width
             )
-            if contains(wanted, ACTIVE):
+            if stored[ACTIVE]:
                 mirror(active, width)
             set_load_stiffness(JX, loads, masses.tip_joints, load, six, width)
 
         # quantities that need the rigidity of the cables
         if reached > LOAD:
-            if not rigidity.shape[0]:
-                set_rigidity(laws, F, stretched, wiring, width)
-            for w in lanes(width):
-                if code[w] == OK and _is_negative(stretched, w):
-                    code[w] = OUTSIDE_ELASTICITY
-            set_cable_stiffness(L, F, stretched, series, rest, k, width)
-            if slides:
+            if not given.rigidity.shape[0]:
+                set_rigidity(arm.laws, F, stretched, wiring, width)
+            _note_outside(code, stretched, width)
+            set_cable_stiffness(L, F, stretched, holes.series, holes.rest, k, width)
+            if asked.slides:
                 clear(passive, width)
                 add_passive_stiffness(J, k, passive, six, width)
-                if contains(wanted, PASSIVE):
+                if stored[PASSIVE]:
                     mirror(passive, width)
-                own_K, sizes = (joint[block], parts[block]) if joint.shape[0] else (K, none)
+                own_K, sizes = (joint[block], kept.parts[block]) if joint.shape[0] else (K, none)
                 sum_terms(active, passive, gravity, load, own_K, sizes, width)
-                if joint.shape[0] and contains(wanted, JOINT):
+                if joint.shape[0] and stored[JOINT]:
                     copy(own_K, K, width)
             _note(code, JOINT, known, width)
-            if sticks:
-                fetch(wire, first, stretched, width)
-                if not wire.shape[0]:
-                    set_rigidity(wires, F, stretched, own_wiring, width)
-                for w in lanes(width):
-                    if code[w] == OK and _is_negative(stretched, w):
-                        code[w] = OUTSIDE_ELASTICITY
+            if asked.sticks:
+                fetch(given.wire, first, stretched, width)
+                if not given.wire.shape[0]:
+                    set_rigidity(arm.wires, F, stretched, own_wiring, width)
+                _note_outside(code, stretched, width)
                 clear(springs, width)
                 add_stuck_stiffness(
-                    routing, holes, frames, rotation, F, stretched, series, rest, segments,
-                    sticking, springs, width,
+                    routing, holes, frames, rotation, F, stretched, segments, sticking, springs,
+                    width,
                 )  # fmt: skip
-                held = bool(stuck.shape[0])
-                own_K, sizes = (stuck[block], stuck_parts[block]) if held else (stuck_K, none)
+                own_K, sizes = (
+                    (stuck[block], kept.stuck_parts[block]) if stuck.shape[0] else (stuck_K, none)
+                )
                 sum_terms(active, springs, gravity, load, own_K, sizes, width)
-                if held and contains(wanted, STUCK_JOINT):
+                if stuck.shape[0] and stored[STUCK_JOINT]:
                     copy(own_K, stuck_K, width)
                 _note(code, STUCK_JOINT, known, width)
-        store(record, start, wanted, code, known, first, out, status)
-
-
-@inner
-def _set_residual(F: Array, J: Array, torque: Array, residual: Array, width: Width) -> None:
-    """Fill the residual (nv, W) of Eq. 13: J_Lᵀ F minus ``torque`` = J_Xᵀ W − g."""
-    for i in upwards(0, residual.shape[0]):
-        for w in lanes(width):
-            residual[i, w] = -torque[i, w]
-        for c in upwards(0, F.shape[0]):
-            for w in lanes(width):
-                residual[i, w] += F[c, w] * J[c, i, w]
+        store(record, start, stored, code, known, first, out, status)
 
 
 @inlined
@@ -296,6 +239,14 @@ def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
     for w in lanes(width):
         if code[w] == OK:
             known[w] = number + 1
+
+
+@inlined
+def _note_outside(code: Indices, rigidity: Array, width: Width) -> None:
+    """Replace the code OK where a rigidity is negative: outside the domain of its law."""
+    for w in lanes(width):
+        if code[w] == OK and _is_negative(rigidity, w):
+            code[w] = OUTSIDE_ELASTICITY
 
 
 @inlined

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.batch.arguments import Arm
 from cdsm.errors import InvalidInput
 from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
@@ -20,28 +20,21 @@ _MOST = 4096
 """Maximum number of postures in a slice; a slice allocates the kernel's scratch once."""
 
 
-def kernel_arm(arm: Manipulator, check_limits: bool) -> tuple[Any, ...]:
-    """Return the arguments of :func:`evaluate_rows` that describe an arm.
-
-    The joint limits are infinite if they are not checked.
-    """
-    model = arm._model
-    lowest, highest = model.lowest, model.highest
-    if not flag("check_limits", check_limits):
-        lowest, highest = np.full_like(lowest, -np.inf), np.full_like(highest, np.inf)
-    return (
-        model.tree,
-        model.routing,
-        model.masses,
-        frozen(lowest),
-        frozen(highest),
-        model.blocks,
-        NO_ARM * arm.length,
-        model.laws.series,
-        model.laws.rest,
-        model.laws.wires,
-        model.wire_laws.wires,
-        model.holes,
+def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
+    """Return an arm as the kernel takes it, with infinite joint limits if they are not checked."""
+    model, endless = arm._model, np.full(arm.nv, np.inf)
+    checked = flag("check_limits", check_limits)
+    return Arm(
+        tree=model.tree,
+        routing=model.routing,
+        masses=model.masses,
+        lowest=model.lowest if checked else frozen(-endless),
+        highest=model.highest if checked else frozen(endless),
+        blocks=model.blocks,
+        smallest_arm=NO_ARM * arm.length,
+        laws=model.laws.wires,
+        wires=model.wire_laws.wires,
+        holes=model.holes,
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cdsm.batch.layout import DIRECTIONAL
+from cdsm.batch.layout import AXES, DIMENSIONS, DIRECTIONAL, JOINTS, MOTIONS
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import coordinates
 from cdsm.support.status import Status
@@ -19,34 +19,8 @@ if TYPE_CHECKING:
 
     from cdsm.batch.layout import Codes
 
-_JOINTS: Final = ("joint", "joint_column")
-_MOTIONS: Final = ("motion", "motion_column")
-_AXES: Final = ("axis", "axis_column")
-
-_DIMS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
-    "tip_position": (("axis",), "m"),
-    "tip_rotation": (_AXES, "1"),
-    "jacobian": (("motion", "joint"), "1"),
-    "cable_lengths": (("cable",), "m"),
-    "length_jacobian": (("cable", "joint"), "m/rad"),
-    "gravity_torque": (("joint",), "torque"),
-    "tension": (("cable",), "N"),
-    "residual": (("joint",), "torque"),
-    **dict.fromkeys(
-        ("gravity", "active", "load", "passive", "joint", "stuck_joint"), (_JOINTS, "stiffness")
-    ),
-    "cable_stiffness": (("cable",), "N/m"),
-    "margin": ((), "stiffness"),
-    "pseudoinverse": (_AXES, "N/m"),
-    "cartesian": (_AXES, "N/m"),
-    "along": (("direction",), "N/m"),
-    "compliance": (_MOTIONS, "1"),
-    "stuck_along": (("direction",), "N/m"),
-    "stuck_compliance": (_MOTIONS, "1"),
-    "breakaway": (("direction",), "N"),
-}
-"""Dimensions of each quantity after that of the postures, and its unit; 1 for matrices of SI units
-that differ. The units of torque and joint stiffness are those of the arm."""
+_SHOWN: Final = DIMENSIONS | {"tip_position": (("axis",), "m"), "tip_rotation": (AXES, "1")}
+"""Dimensions of each variable of a Dataset after that of the postures, and its unit."""
 
 
 def to_dataset(
@@ -69,15 +43,15 @@ def to_dataset(
         tip = values.pop("tip")
         values |= {"tip_position": tip[:, :3, 3], "tip_rotation": tip[:, :3, :3]}
     for name, value in values.items():
-        dims, unit = _DIMS[name]
+        dims, unit = _SHOWN[name]
         # one direction has no axis of its own; a variable must not have the name of a dimension
         shown = (("pose", *dims), value.reshape(len(q), -1) if name in DIRECTIONAL else value)
         variables["joint_stiffness" if name == "joint" else name] = (*shown, units.get(unit, unit))
     motions = ("x", "y", "z", "rx", "ry", "rz")
     labels = {
-        **dict.fromkeys(_JOINTS, arm.joint_names),
-        **dict.fromkeys(_MOTIONS, motions),
-        **dict.fromkeys(_AXES, motions[:3]),
+        **dict.fromkeys(JOINTS, arm.joint_names),
+        **dict.fromkeys(MOTIONS, motions),
+        **dict.fromkeys(AXES, motions[:3]),
         "cable": arm.cables.names,
     }
     if directions is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,89 +27,64 @@ UNDECIDED = 255
 POSTPONED = 254
 """Internal status: the tensions exist; what needs them is computed beside other postures."""
 
-QUANTITIES = (
-    "tip",
-    "jacobian",
-    "cable_lengths",
-    "length_jacobian",
-    "gravity_torque",
-    "gravity",
-    "tension",
-    "residual",
-    "active",
-    "load",
-    "cable_stiffness",
-    "passive",
-    "joint",
-    "stuck_joint",
-    "margin",
-    "pseudoinverse",
-    "along",
-    "compliance",
-    "cartesian",
-    "stuck_along",
-    "stuck_compliance",
-    "breakaway",
-)
-"""Quantities in the order of the record: those of the joint angles alone; then those that also need
-tensions; the rigidity of the cables; a regular K_θ; a regular K_θ of the stuck arm."""
+JOINTS: Final = ("joint", "joint_column")
+MOTIONS: Final = ("motion", "motion_column")
+AXES: Final = ("axis", "axis_column")
 
-(
-    TIP,
-    JACOBIAN,
-    CABLE_LENGTHS,
-    LENGTH_JACOBIAN,
-    GRAVITY_TORQUE,
-    GRAVITY,
-    TENSION,
-    RESIDUAL,
-    ACTIVE,
-    LOAD,
-    CABLE_STIFFNESS,
-    PASSIVE,
-    JOINT,
-    STUCK_JOINT,
-    MARGIN,
-    PSEUDOINVERSE,
-    ALONG,
-    COMPLIANCE,
-    CARTESIAN,
-    STUCK_ALONG,
-    STUCK_COMPLIANCE,
-    BREAKAWAY,
-) = range(len(QUANTITIES))
+DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
+    # of the joint angles alone
+    "tip": (("row", "column"), "1"),
+    "jacobian": (("motion", "joint"), "1"),
+    "cable_lengths": (("cable",), "m"),
+    "length_jacobian": (("cable", "joint"), "m/rad"),
+    "gravity_torque": (("joint",), "torque"),
+    "gravity": (JOINTS, "stiffness"),
+    # which also need tensions
+    "tension": (("cable",), "N"),
+    "residual": (("joint",), "torque"),
+    "active": (JOINTS, "stiffness"),
+    "load": (JOINTS, "stiffness"),
+    # the rigidity of the cables
+    "cable_stiffness": (("cable",), "N/m"),
+    "passive": (JOINTS, "stiffness"),
+    "joint": (JOINTS, "stiffness"),
+    "stuck_joint": (JOINTS, "stiffness"),
+    # a regular K_θ
+    "margin": ((), "stiffness"),
+    "pseudoinverse": (AXES, "N/m"),
+    "along": (("direction",), "N/m"),
+    "compliance": (MOTIONS, "1"),
+    "cartesian": (AXES, "N/m"),
+    # a regular K_θ of the stuck arm
+    "stuck_along": (("direction",), "N/m"),
+    "stuck_compliance": (MOTIONS, "1"),
+    "breakaway": (("direction",), "N"),
+}
+"""Dimensions of each quantity, in the order of the record, and its unit.
 
-DIRECTIONAL = ("along", "stuck_along", "breakaway")
+The unit is 1 for matrices of SI units that differ; those of torque and joint stiffness are the
+arm's.
+"""
+
+QUANTITIES: Final = tuple(DIMENSIONS)
+
+TIP, JACOBIAN, CABLE_LENGTHS, LENGTH_JACOBIAN, GRAVITY_TORQUE, GRAVITY = range(6)
+TENSION, RESIDUAL, ACTIVE, LOAD, CABLE_STIFFNESS, PASSIVE, JOINT, STUCK_JOINT = range(6, 14)
+MARGIN, PSEUDOINVERSE, ALONG, COMPLIANCE, CARTESIAN = range(14, 19)
+STUCK_ALONG, STUCK_COMPLIANCE, BREAKAWAY = range(19, 22)
+
+DIRECTIONAL: Final = tuple(name for name, (dims, _) in DIMENSIONS.items() if "direction" in dims)
 """Quantities that have a value for each direction."""
 
 
-def shapes(nv: int, cables: int, directions: int) -> tuple[tuple[int, ...], ...]:
+def shapes(nv: int, cables: int, directions: int) -> dict[str, tuple[int, ...]]:
     """Return the shape of each quantity at one posture, for nv joint coordinates."""
-    matrix = (nv, nv)
-    return (
-        (4, 4),
-        (6, nv),
-        (cables,),
-        (cables, nv),
-        (nv,),
-        matrix,
-        (cables,),
-        (nv,),
-        matrix,
-        matrix,
-        (cables,),
-        matrix,
-        matrix,
-        matrix,
-        (),
-        (3, 3),
-        (directions,),
-        (6, 6),
-        (3, 3),
-        (directions,),
-        (6, 6),
-        (directions,),
-    )
+    sizes = {"joint": nv, "cable": cables, "direction": directions}
+    sizes |= {"row": 4, "column": 4, "motion": 6, "axis": 3}
+    return {
+        name: tuple(sizes[each.removesuffix("_column")] for each in dims)
+        for name, (dims, _) in DIMENSIONS.items()
+    }
 
 
 def starts(nv: int, cables: int, directions: int) -> Indices:
@@ -116,5 +92,5 @@ def starts(nv: int, cables: int, directions: int) -> Indices:
 
     A record is the row of all quantities of a posture.
     """
-    sizes = [math.prod(shape) for shape in shapes(nv, cables, directions)]
+    sizes = [math.prod(shape) for shape in shapes(nv, cables, directions).values()]
     return np.array([0, *np.cumsum(sizes)], dtype=np.intp)

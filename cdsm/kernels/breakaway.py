@@ -76,8 +76,6 @@ def set_breakaway(
     routing: Routing,
     holes: Holes,
     wires: Wires,
-    series: Array,
-    rest: Array,
     q: Array,
     tension: Array,
     wire: Array,
@@ -92,8 +90,6 @@ def set_breakaway(
         routing: Cable sites of the arm.
         holes: Holes of its cables.
         wires: Laws of its cables.
-        series: 1/k_series of the cables (C,) [m/N].
-        rest: Tension at which the series springs are at rest (C,) [N].
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N].
         wire: EA (1 + ε) (b, C) or (1, C) [N]; (0, C) if it follows from ``wires``.
@@ -101,7 +97,7 @@ def set_breakaway(
         width: W, the number of postures in a block.
         out: The loads; inf where no hole ever slides, 0 where no cable sticks.
     """
-    nv, cables = motion.shape[1], series.shape[0]
+    nv, cables = motion.shape[1], routing.fixed.shape[0]
     rows, sites = tree.parent.shape[0], routing.row.shape[0]
     angles, F, EA = np.empty((nv, width)), np.empty((cables, width)), np.empty((cables, width))
     frames, scratch = empty_frames(tree, routing, width), segment_scratch(nv, width)
@@ -122,9 +118,8 @@ def set_breakaway(
         for d in range(motion.shape[2]):
             _set_velocities(tree, routing, frames, motion[b], d, rates, width)
             _set_slip_rates(
-                routing, holes, frames, rotation, F, EA, series, rest, scratch, section, rates,
-                slips, width,
-            )  # fmt: skip
+                routing, holes, frames, rotation, F, EA, scratch, section, rates, slips, width
+            )
             _set_loads(slips, load, width)
             for w in range(min(width, q.shape[0] - first)):
                 out[first + w, d] = load[w]
@@ -182,8 +177,6 @@ def _set_slip_rates(
     rotation: Array,
     tension: Array,
     wire: Array,
-    series: Array,
-    rest: Array,
     scratch: Segments,
     section: Sticking,
     rates: Velocities,
@@ -195,7 +188,7 @@ def _set_slip_rates(
         for w in lanes(width):
             slips.jump[p, w], slips.limit[p, w] = 0.0, -1.0
     for c in upwards(0, holes.lead.shape[0]):
-        open_first_section(holes, c, tension, series, rest, section, width)
+        open_first_section(holes, c, tension, section, width)
         set_lead(routing, holes, c, rotation, section.before, width)
         # the lead turns with the link of the first site, and keeps its length
         i = np.uint64(routing.row[holes.first[c]])

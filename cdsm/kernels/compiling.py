@@ -91,9 +91,9 @@ def _compile(function: _Function, **options: Any) -> _Function:
     kept: Any = getattr(kernel, "_cache", None)
     if hasattr(kept, "_cache_file"):
         # numba compares the source of a kernel with its cache, but not that of the kernels it calls
-        stored = kept._cache_file
-        stamp, name = (stored._source_stamp, _sources()), stored._index_name.removesuffix(".nbi")
-        kept._cache_file = CacheFile(stored._cache_path, name, stamp)  # type: ignore[no-untyped-call]
+        sources = _sources(__file__), _sources(function.__code__.co_filename)
+        stamp = kept._cache_file._source_stamp, sources
+        kept._cache_file = CacheFile(kept._cache_path, kept._impl.filename_base, stamp)  # type: ignore[no-untyped-call]
     return cast(_Function, kernel)
 
 
@@ -105,22 +105,23 @@ class CacheFile(IndexDataCacheFile):
     """
 
     def _data_name(self, number: int) -> str:
-        return f"{self._index_name.removesuffix('nbi')}{uuid.uuid4().hex}.nbc"
+        return f"{Path(self._index_name).stem}.{uuid.uuid4().hex}.nbc"
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
         """Save the index, and remove files that it does not name: those of older sources."""
         super()._save_index(overloads)  # type: ignore[no-untyped-call]
-        names = glob.escape(self._index_name.removesuffix("nbi")) + "*.nbc"
-        for path in Path(self._cache_path).glob(names):
+        for path in Path(self._cache_path).glob(
+            f"{glob.escape(Path(self._index_name).stem)}.*.nbc"
+        ):
             if path.name not in overloads.values():
                 path.unlink(missing_ok=True)
 
 
 @cache
-def _sources() -> str:
-    """Return a digest of the sources of all kernels, by which the cache notices every change."""
+def _sources(file: str) -> str:
+    """Return a digest of all sources beside a file, by which the cache notices every change."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(Path(file).parent.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

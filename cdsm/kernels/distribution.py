@@ -22,6 +22,7 @@ from cdsm.kernels.compiling import (
     threaded,
     upwards,
 )
+from cdsm.kernels.records import fetch
 from cdsm.kernels.serpentine_guess import (
     Blocks,
     Guess,
@@ -48,16 +49,17 @@ _NUMBERS = 2**17
 
 
 @inner
-def set_torque(
-    jacobian: Array, gravity_torque: Array, wrench: Array, torque: Array, width: Width
-) -> None:
-    """Fill ``torque`` (nv, W) with J_Xᵀ W − g, which the cables must balance."""
+def set_torque(jacobian: Array, force: Array, opposed: Array, torque: Array, width: Width) -> None:
+    """Fill ``torque`` (nv, W) with Jᵀ f − τ, of forces f (m, W), J (m, nv, W), and τ ``opposed``.
+
+    The cables must balance J_Xᵀ W − g. The residual of Eq. 13 is J_Lᵀ F minus that.
+    """
     for i in upwards(0, torque.shape[0]):
         for w in lanes(width):
-            torque[i, w] = -gravity_torque[i, w]
-        for a in range(6):
+            torque[i, w] = -opposed[i, w]
+        for a in upwards(0, force.shape[0]):
             for w in lanes(width):
-                torque[i, w] += wrench[a, w] * jacobian[a, i, w]
+                torque[i, w] += force[a, w] * jacobian[a, i, w]
 
 
 @inner
@@ -161,7 +163,7 @@ def single_guess(
     # copies are writable like the scratch, so one compilation serves both
     least, most = low.copy().reshape(count, 1), high.copy().reshape(count, 1)
     guess, check = empty_guess(blocks, nv, count, 1), certificate(nv, count, 1)
-    set_torque(JX, g, W, torque, None)
+    set_torque(JX, W, g, torque, None)
     set_arms(J, smallest, arms, None)
     distribute(blocks, arms, torque, least, most, guess, check, tension, None)
     return tension.reshape(count), check.certified[0] == 1.0 and guess.failed[0] < 0.0
@@ -169,60 +171,33 @@ def single_guess(
 
 @threaded
 def search_tensions(
-    J: Array, b: Array, low: Array, high: Array, rows: Indices, tension: Array, outcome: Indices
+    J: Array, b: Array, low: Array, high: Array, tension: Array, outcome: Indices
 ) -> None:
-    """Solve for the tensions of the postures ``rows`` (r,), whose guess is wrong.
+    """Solve for the tensions of r postures, whose guess is wrong.
 
-    J is (B, C, nv) and b (B, nv); ``low`` and ``high`` are (B, C), or (1, C) for all postures: as
-    in :func:`distribute`. Fills the tensions (B, C) and the outcome (r,). Without an outcome
+    J is (r, C, nv) and b (r, nv); ``low`` and ``high`` are (r, C), or (1, C) for all postures: as
+    in :func:`distribute`. Fills the tensions (r, C) and the outcome (r,). Without an outcome
     OPTIMAL, the tensions are meaningless.
     """
-    count, nv = J.shape[1], J.shape[2]
-    width = max(1, min(WIDTH, rows.shape[0], _NUMBERS // (count * (count + nv))))
-    arms, torque = np.empty((count, nv, width)), np.empty((nv, width))
+    rows, count, nv = J.shape
+    width = max(1, min(WIDTH, rows, _NUMBERS // (count * (count + nv))))
+    arms, torque = np.empty((count * nv, width)), np.empty((nv, width))
     least, most = np.empty((count, width)), np.empty((count, width))
     state, check = empty_state(nv, count, width), certificate(nv, count, width)
-    at = np.empty(width, dtype=np.intp)
-    for first in range(0, rows.shape[0], width):
-        part = rows[first : first + width]
-        _gather(J, b, low, high, part, at, arms, torque, least, most, width)
-        search(arms, torque, least, most, state, width)
-        set_infeasible(arms, torque, least, most, state.y, check, width)
+    balance = arms.reshape(count, nv, width), torque, least, most
+    for first in range(0, rows, width):
+        fetch(J.reshape(rows, count * nv), first, arms, width)
+        fetch(b, first, torque, width)
+        fetch(low, first, least, width)
+        fetch(high, first, most, width)
+        search(*balance, state, width)
+        set_infeasible(*balance, state.y, check, width)
+        part = outcome[first : first + width]
         for w in range(part.shape[0]):
-            outcome[first + w] = INFEASIBLE if check.certified[w] == 1.0 else UNDECIDED
-        set_optimal(arms, torque, least, most, state.F, state.y, check, width)
+            part[w] = INFEASIBLE if check.certified[w] == 1.0 else UNDECIDED
+        set_optimal(*balance, state.F, state.y, check, width)
         for w in range(part.shape[0]):
             if check.certified[w] == 1.0:
-                outcome[first + w] = OPTIMAL
+                part[w] = OPTIMAL
                 for c in range(count):
-                    tension[part[w], c] = min(max(state.F[c, w], least[c, w]), most[c, w])
-
-
-@inner
-def _gather(
-    J: Array,
-    b: Array,
-    low: Array,
-    high: Array,
-    rows: Indices,
-    at: Indices,
-    arms: Array,
-    torque: Array,
-    least: Array,
-    most: Array,
-    width: Width,
-) -> None:
-    """Fill a block of postures with ``rows``, repeating the last; ``at`` (W,) is scratch."""
-    for w in lanes(width):
-        at[w] = rows[min(np.intp(w), rows.shape[0] - 1)]
-    for i in upwards(0, b.shape[1]):
-        for w in lanes(width):
-            torque[i, w] = b[at[w], i]
-    for c in upwards(0, J.shape[1]):
-        for i in upwards(0, b.shape[1]):
-            for w in lanes(width):
-                arms[c, i, w] = J[at[w], c, i]
-        for w in lanes(width):
-            least[c, w] = low[at[w] if low.shape[0] > 1 else 0, c]
-        for w in lanes(width):
-            most[c, w] = high[at[w] if high.shape[0] > 1 else 0, c]
+                    tension[first + w, c] = min(max(state.F[c, w], least[c, w]), most[c, w])

@@ -69,29 +69,20 @@ def matrix(record: Array, start: Indices, quantity: int, rows: int, width: int) 
 def store(
     record: Array,
     start: Indices,
-    wanted: Indices,
+    stored: NDArray[np.bool_],
     code: Indices,
     known: Indices,
     first: int,
     out: Array,
     status: NDArray[np.uint8],
 ) -> None:
-    """Copy the requested quantities of a block to its rows; NaN where they are not known."""
+    """Copy the ``stored`` quantities of a block to its rows; NaN where they are not known."""
     count = min(record.shape[1], out.shape[0] - first)
     for w in lanes(count):
         status[first + np.intp(w)] = code[w]
     at = 0
-    for number in wanted:
-        for i in upwards(start[number], start[number + 1]):
+    for number in range(stored.shape[0]):
+        for i in upwards(start[number], start[number + 1] if stored[number] else start[number]):
             for w in lanes(count):
                 out[first + np.intp(w), at] = record[i, w] if number < known[w] else math.nan
             at += 1
-
-
-@inner
-def contains(numbers: Indices, number: int) -> bool:
-    """Check whether a number is one of some."""
-    found = False
-    for each in numbers:
-        found = found or each == number
-    return found

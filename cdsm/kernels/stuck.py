@@ -34,6 +34,8 @@ class Holes(NamedTuple):
         lead: Length of each lead (C,) [m].
         axis: Direction of each lead in the frame of the joint of its first site (C, 3).
         locked: 1 for each cable with a locked motor, 0 where the motor controls the force (C,).
+        series: 1/k_series of each cable (C,) [m/N].
+        rest: Tension at which the series springs are at rest (C,) [N].
     """
 
     first: Indices
@@ -42,6 +44,8 @@ class Holes(NamedTuple):
     lead: Array
     axis: Array
     locked: Array
+    series: Array
+    rest: Array
 
 
 class Sticking(NamedTuple):
@@ -77,8 +81,6 @@ def add_stuck_stiffness(
     rotation: Array,
     tension: Array,
     wire: Array,
-    series: Array,
-    rest: Array,
     scratch: Segments,
     section: Sticking,
     passive: Array,
@@ -87,8 +89,7 @@ def add_stuck_stiffness(
     """Add Σ k g gᵀ over the sections of all cables to ``passive`` (nv, nv, W), for i ≤ j only.
 
     k is the stiffness of a section, and g the gradient of its length. ``wire`` is EA (1 + ε) (C, W)
-    [N], also of cables whose motor controls the force. ``series`` is 1/k_series (C,) [m/N], and
-    ``rest`` (C,) [N] the tension at which the springs are at rest.
+    [N], also of cables whose motor controls the force.
     """
     segment, joint, across = routing.segment, routing.joint, scratch.direction
     d, along, inverse = scratch.derivative, scratch.along, scratch.inverse
@@ -96,7 +97,7 @@ def add_stuck_stiffness(
     s = 0
     for c in upwards(0, holes.lead.shape[0]):
         low, high = nv, np.uint64(0)  # joints that change the section
-        open_first_section(holes, c, tension, series, rest, section, width)
+        open_first_section(holes, c, tension, section, width)
         set_lead(routing, holes, c, rotation, section.before, width)
         end = np.uint64(holes.first[c + np.uint64(1)]) - np.uint64(1)
         for p in upwards(np.uint64(holes.first[c]), end):
@@ -138,24 +139,16 @@ def add_stuck_stiffness(
 
 @inner
 def open_first_section(
-    holes: Holes,
-    c: Index,
-    tension: Array,
-    series: Array,
-    rest: Array,
-    section: Sticking,
-    width: Width,
+    holes: Holes, c: Index, tension: Array, section: Sticking, width: Width
 ) -> None:
     """Set length, spring compliance and motor mode of ``section`` to the first one of cable c.
 
     The length (W,) [m] is the lead minus the elongation of the series spring.
     """
     for w in lanes(width):
-        section.length[w] = holes.lead[c] - series[c] * (tension[c, w] - rest[c])
+        section.length[w] = holes.lead[c] - holes.series[c] * (tension[c, w] - holes.rest[c])
     for w in lanes(width):
-        section.soft[w] = series[c]
-    for w in lanes(width):
-        section.locked[w] = holes.locked[c]
+        section.soft[w], section.locked[w] = holes.series[c], holes.locked[c]
 
 
 @inner

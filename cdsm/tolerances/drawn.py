@@ -107,8 +107,8 @@ class DrawnArms:
         high = np.broadcast_to(given.maximum, low.shape).copy()
         none = abs(arms.length_jacobian) < NO_ARM * self._K.posture.arm.length
         J, tension = np.where(none, 0.0, arms.length_jacobian), np.empty_like(low)
-        rows, outcome = np.arange(len(low)), np.empty(len(low), dtype=np.intp)
-        search_tensions(J, arms.torque, frozen(low), frozen(high), rows, tension, outcome)
+        outcome = np.empty(len(low), dtype=np.intp)
+        search_tensions(J, arms.torque, frozen(low), frozen(high), tension, outcome)
         if (outcome != OPTIMAL).any():
             raise InvalidInput(
                 "tolerances",

@@ -213,7 +213,7 @@ def test_rows_that_nothing_can_be_shown_of_go_to_the_single_posture(
 
     def undecided(*arguments: Any) -> None:
         decided(*arguments)
-        if len(arguments[13]) == 0 and len(arguments[14]):  # tensions were distributed
+        if len(arguments[1].low):  # tensions were distributed
             arguments[-2][:], arguments[-1][:] = np.nan, 255
 
     def lost(*arguments: Any) -> None:
