@@ -1,14 +1,7 @@
 """Breakaway: the load at which the first cable of a stuck arm begins to slide in a hole.
 
-While all cables stick, a force W u at the tip moves the joints by dθ/dW = K_θ⁻¹ J_vᵀ u, and hole i
-between the segments j and j + 1 begins to slide when |ln T_{j+1} − ln T_j| = μ φ_i. To first order
-the load of hole i is therefore
-
-    W_i = μ φ_i / (|x_i| − y_i),   x_i = d(ln T_{j+1} − ln T_j)/dW,   y_i = μ dφ_i/dW,
-
-or infinite if |x_i| ≤ y_i. μ is the friction coefficient, φ_i the wrap angle and T_j the tension of
-segment j. From the smallest W_i, Newton's method finds the load at which the loaded arm, with all
-its cables stuck, reaches the bound.
+To first order it is the least of the loads W_i of :mod:`cdsm.sticking`. From there, Newton's method
+finds the load at which the loaded arm, with all its cables stuck, reaches the bound of a hole.
 """
 
 from __future__ import annotations
@@ -31,11 +24,8 @@ from cdsm.support.validation import Direction, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
-_UNREACHED = 1e300
-"""Ratio of tensions that no hole reaches: with it cables stick under every load."""
-
-_REACHED = 1e-9
-"""Relative excess over the bound of a hole that counts as rounding."""
+_UNREACHED = 1e300  # ratio of tensions that no hole reaches: with it cables stick under every load
+_REACHED = 1e-9  # relative excess over the bound of a hole that counts as rounding
 
 _ITERATIONS = 50
 """Largest number of Newton steps; usually 3 to 5, and more if another hole slides first."""

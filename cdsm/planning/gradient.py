@@ -1,10 +1,7 @@
 """Exact derivatives of a :class:`Stiffness` with respect to the cable tensions.
 
-    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ,    k = 1/(l_0/EA(F) + 1/k_series)
-
-J_c and H_c are the gradient and the Hessian of the length of cable c (Eq. 16). k is its stiffness,
-and k′_c = dk/dF_c. Let R be rows of the tip Jacobian. The tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ changes
-by Mᵀ ∂K_θ M. M = K_θ⁻¹ Rᵀ X is the joint motion per unit motion of the tip.
+With rows R of the tip Jacobian, the tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ changes by Mᵀ ∂K_θ M.
+M = K_θ⁻¹ Rᵀ X is the joint motion per unit motion of the tip.
 """
 
 from __future__ import annotations

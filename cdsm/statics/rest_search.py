@@ -1,10 +1,7 @@
-"""Find the equilibrium of a loaded arm whose motors are locked.
+"""Find the equilibrium of a loaded arm whose motors are locked: r(q) = 0, with ∂r/∂q = K_θ.
 
-    r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0,    ∂r/∂q = K_θ                       (Eqs. 13 and 16)
-
-The cables have tensions at a reference posture, where the motors are locked. Under another load
-the arm moves. The tension F(q) of every position-controlled cable follows from its elongation,
-nonlinear elasticity and series springs included.
+The tension F(q) of every position-controlled cable follows from its elongation, nonlinear
+elasticity and series springs included.
 """
 
 from __future__ import annotations
