@@ -23,8 +23,7 @@ from cdsm.wires.slack import SlackBelow
 
 OriginalLength = Literal["unstrained", "stretched"]
 
-_STEP = 1e-5
-"""Relative step of the finite difference of the slope of EA (1 + ε)."""
+_STEP = 1e-5  # relative step of the finite difference of the slope of EA (1 + ε)
 
 
 class CableLaws:

@@ -28,11 +28,8 @@ from cdsm.support.values import Array
 _CYCLES: Final = 4
 """Number of cycles in which the shaking fades, as in :class:`~cdsm.WeightTest`."""
 
-_SHAKEN: Final = 3.0
-"""Amplitude of the shaking over the breakaway load; with it all cables slide."""
-
-_DISPLACED: Final = 1e-3
-"""Displacement that the weight causes, over the length of the arm."""
+_SHAKEN: Final = 3.0  # amplitude of the shaking over the breakaway load; with it all cables slide
+_DISPLACED: Final = 1e-3  # displacement that the weight causes, over the length of the arm
 
 
 class Assessment(NamedTuple):

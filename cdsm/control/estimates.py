@@ -36,11 +36,8 @@ from cdsm.tension import grip
 UNSURE: Final = 0.3
 """Standard deviation of 1/s before the first measurement."""
 
-_FINEST: Final = 1e-9
-"""Smallest assumed error of a length [m], also with exact sensors."""
-
-_LEAST_SPREAD: Final = 1e-3
-"""Smallest assumed error of a tension [N], also with exact load cells."""
+_FINEST: Final = 1e-9  # smallest assumed error of a length [m], also with exact sensors
+_LEAST_SPREAD: Final = 1e-3  # smallest assumed error of a tension [N], also with exact load cells
 
 _STEPS, _CONVERGED = 8, 1e-8
 """Gauss–Newton steps, and the step [rad] that ends them: the next is its square."""

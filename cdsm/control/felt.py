@@ -24,14 +24,12 @@ from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.values import Array
 
-_DISPLACED: Final = 5e-3
-"""Displacement of the tip in each direction, over the length of the arm."""
+_DISPLACED: Final = 5e-3  # displacement of the tip in each direction, over the length of the arm
 
 _RESERVE: Final = 0.5
 """Largest change of a tension by the excitation, over its distance from the nearest bound."""
 
-_READINGS: Final = 64
-"""Number of load cell readings that are averaged at rest."""
+_READINGS: Final = 64  # number of load cell readings that are averaged at rest
 
 
 def virtual_force(pose: Posture, gain: Array, force: Array) -> Array:

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from cdsm.control.run import TrackingRun
 
-_LISTED = 3
-"""Largest number of motors whose names are printed."""
+_LISTED = 3  # largest number of motors whose names are printed
 
 
 def labelled(run: TrackingRun) -> xarray.Dataset:

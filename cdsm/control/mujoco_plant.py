@@ -22,8 +22,7 @@ from cdsm.support.extras import need
 from cdsm.support.validation import quantity
 from cdsm.support.values import Array, frozen
 
-_TANGENTS: Final = 10
-"""Number of updates of the motors' tangents and of the load per step."""
+_TANGENTS: Final = 10  # number of updates of the motors' tangents and of the load per step
 
 
 class MuJoCoState(NamedTuple):

@@ -247,5 +247,4 @@ class TrackingRun(ReadOnlyState):
         return "\n".join([*self.warnings, head, *aligned(rows(self))])
 
 
-_ROUNDING = 1e-9
-"""Distance beyond a band [m] that counts as rounding."""
+_ROUNDING = 1e-9  # distance beyond a band [m] that counts as rounding

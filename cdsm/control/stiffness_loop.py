@@ -17,8 +17,7 @@ from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.support.values import Array
 
-_SOFTER = 5e-3
-"""Change of the estimated softness 1/s from which the arm is built again with it."""
+_SOFTER = 5e-3  # change of the estimated softness 1/s from which the arm is built again with it
 
 
 class Replanned(NamedTuple):

@@ -26,8 +26,7 @@ from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, proved_largest
 from cdsm.support.validation import Direction, instance, quantity, unit_direction, vector
 from cdsm.support.values import Array, ReadOnlyState
 
-_WIDEST = 1e6
-"""Bound of the force in the programs, over the tensions, so that they are bounded."""
+_WIDEST = 1e6  # bound of the force in the programs, over the tensions, so that they are bounded
 
 
 @final

@@ -32,8 +32,7 @@ from cdsm.support.validation import flag, instance, one_of, quantity, scalar, wh
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
-_MOST_STEPS: Final = 1000
-"""Largest number of steps of control between two samples."""
+_MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
 
 _LOST: Final = 0.1
 """Tip error over the length of the arm [-] from which the loop counts as unstable."""

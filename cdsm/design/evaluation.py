@@ -194,8 +194,7 @@ def _on_cluster(problem: DesignProblem, client: Client) -> Compute:
     )
 
 
-_problem: list[DesignProblem] = []
-"""The problem of a worker process."""
+_problem: list[DesignProblem] = []  # the problem of a worker process
 
 
 def _set_problem(problem: DesignProblem, first: Semaphore) -> None:

@@ -28,8 +28,7 @@ from cdsm.tolerances.readings import Question
 SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "length")
 """Quantities with exact derivatives."""
 
-_ALIKE = 1e-20
-"""Two unit vectors are equal if their squared distance is below this."""
+_ALIKE = 1e-20  # two unit vectors are equal if their squared distance is below this
 
 _STEP = 1e-4
 """Step of the differences of uncertainties, over the range of a variable: the error is 1e-6."""

@@ -18,8 +18,7 @@ from cdsm.support.markup import Document, Markup, element
 if TYPE_CHECKING:
     from cdsm.design.result import DesignSearch
 
-_DPI = 110
-"""Resolution of the pictures [1/inch]: some 50 kB each."""
+_DPI = 110  # resolution of the pictures [1/inch]: some 50 kB each
 
 _SHOWN = 60
 """Number of designs of a front that a page shows, evenly spread over it; each has a picture."""

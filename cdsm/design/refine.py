@@ -24,11 +24,8 @@ _SAFE = 1e-7
 _FAR = 10.0
 """Violation of the scaled constraints that stands for a design that does not hold all postures."""
 
-_AT_END = 1e-9
-"""Distance from the end of a range, over the range, that is rounding."""
-
-_ROUNDS = 2
-"""Number of times that a design is improved and then moved inside its limits."""
+_AT_END = 1e-9  # distance from the end of a range, over the range, that is rounding
+_ROUNDS = 2  # number of times that a design is improved and then moved inside its limits
 
 
 def refine_design(

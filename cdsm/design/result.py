@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from distributed import Client
     from matplotlib.figure import Figure
 
-_PRINTED = 20
-"""Number of designs that a printed table shows."""
+_PRINTED = 20  # number of designs that a printed table shows
 
 
 class DesignProgress(NamedTuple):

@@ -13,8 +13,7 @@ from cdsm.support.roots import rising_root
 from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 
-_ROUNDING = 1e-15
-"""Relative rounding of a strain: a few units in the last place."""
+_ROUNDING = 1e-15  # relative rounding of a strain: a few units in the last place
 
 
 # denser at the low end, where most laws are soft; the first and last points are exactly 0 and 1

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_STEP = 6e-6
-"""Relative step of central differences: the cube root of the rounding of float64."""
+_STEP = 6e-6  # relative step of central differences: the cube root of the rounding of float64
 
 
 class Elasticity(ABC):

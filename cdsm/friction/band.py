@@ -25,11 +25,8 @@ from cdsm.tension import Tension
 _ROOM = 1.1
 """Size of the first neighbourhood over the first-order band; its growth if it is too small."""
 
-_WIDENINGS = 8
-"""Largest number of neighbourhoods that are tried; then the band is not proved."""
-
-_INSIDE = 0.999
-"""A band that reaches this part of its neighbourhood needs a larger neighbourhood."""
+_WIDENINGS = 8  # largest number of neighbourhoods that are tried; then the band is not proved
+_INSIDE = 0.999  # a band that reaches this part of its neighbourhood needs a larger neighbourhood
 
 
 @final

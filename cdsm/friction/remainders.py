@@ -19,14 +19,12 @@ from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
-_STEP = 1e-4
-"""Step of finite differences [rad], [m]; their truncation is added to the bound."""
+_STEP = 1e-4  # step of finite differences [rad], [m]; their truncation is added to the bound
 
 TOO_FAR = "finds no band: friction may keep the arm too far from the reference"
 """Error message if a neighbourhood is so wide that the bounds do not exist."""
 
-_ITERATIONS = 30
-"""Steps of a fixed point that converges by a factor of ten or more."""
+_ITERATIONS = 30  # steps of a fixed point that converges by a factor of ten or more
 
 
 class Remainders:

@@ -39,8 +39,7 @@ from cdsm.support.linear_program import OPTIMAL, proved_largest
 from cdsm.support.validation import LARGEST
 from cdsm.support.values import Array, frozen
 
-_CELLS = 8192
-"""Number of tension intervals; within each, the strain is only known to increase."""
+_CELLS = 8192  # number of tension intervals; within each, the strain is only known to increase
 
 
 class End(NamedTuple):

@@ -14,8 +14,7 @@ from cdsm.support.validation import NO_WRENCH, instance, number_array, vector, w
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
-_RATIO = 1e-9
-"""Largest relative deviation of a ratio of tensions that counts as rounding."""
+_RATIO = 1e-9  # largest relative deviation of a ratio of tensions that counts as rounding
 
 
 def stuck_stiffness(

@@ -25,12 +25,8 @@ from cdsm.support.values import Array
 Criterion = Literal["D", "A"]
 
 _ITERATIONS = 2000  # steps that find shares, at most
-
-_OPTIMAL = 0.999
-"""Proved efficiency at which the search for shares ends."""
-
-_GAIN = 1e-9
-"""Smallest gain of ln f that is worth an exchange."""
+_OPTIMAL = 0.999  # proved efficiency at which the search for shares ends
+_GAIN = 1e-9  # smallest gain of ln f that is worth an exchange
 
 
 class Design(NamedTuple):

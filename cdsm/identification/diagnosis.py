@@ -12,8 +12,7 @@ from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.result import Identification
 from cdsm.support.values import Array
 
-_CORRELATED = 0.95
-"""A warning names two parameters whose correlation exceeds this value."""
+_CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
 
 _UNLIKELY = 1e-3
 """Least probability of χ². Below it, the model does not explain the measurements."""

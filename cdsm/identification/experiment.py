@@ -29,11 +29,8 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array, frozen
 
-_STEP = 1e-5
-"""Relative change of a parameter for its central difference."""
-
-_MOST = 5000
-"""Largest number of candidates and of tests."""
+_STEP = 1e-5  # relative change of a parameter for its central difference
+_MOST = 5000  # largest number of candidates and of tests
 
 
 def plan_experiment(

@@ -19,8 +19,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_WIDTH = 1.959964
-"""Half a 95 % interval in standard deviations."""
+_WIDTH = 1.959964  # half a 95 % interval in standard deviations
 
 
 @final

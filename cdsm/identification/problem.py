@@ -26,9 +26,7 @@ from cdsm.tension import Tension, distribute_tension
 
 Parameters = dict[str, float]
 
-_STEP = 1e-4
-"""Step of a tension [N] for the derivative of a loop with respect to it."""
-
+_STEP = 1e-4  # step of a tension [N] for the derivative of a loop with respect to it
 _STORED = 8  # sets of parameters whose paths are stored
 
 

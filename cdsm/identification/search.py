@@ -27,8 +27,7 @@ from cdsm.tension import Tension
 
 _log = logging.getLogger("cdsm")
 
-_ON_BOUND = 1e-9
-"""A parameter this near to a bound (share of the range) counts as on the bound."""
+_ON_BOUND = 1e-9  # a parameter this near to a bound (share of the range) counts as on the bound
 
 _CANDIDATES, _STARTS = 24, 3
 """Number of points evaluated over the bounds, and number of best points that start a search."""
@@ -36,8 +35,7 @@ _CANDIDATES, _STARTS = 24, 3
 _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
 """ftol, xtol and gtol of the searches with one-sided and with central differences."""
 
-_OF_LOOPS = (1e-6, 1e-8, 1e-8)
-"""ftol, xtol and gtol of searches with loops, whose χ² is less exact."""
+_OF_LOOPS = (1e-6, 1e-8, 1e-8)  # ftol, xtol and gtol of searches with loops, whose χ² is less exact
 
 _REWEIGHINGS = 2
 """Number of times that the weights of loops are computed again from the model found so far."""

@@ -26,8 +26,7 @@ _TOLERANCE = 1e-9
 _SMALLEST_TOLERANCE = 1e-12
 """Smallest tolerance. Rounding of a chain of 40 joints is about 1e-14."""
 
-_RIGID = 1e-9
-"""Largest entry of RᵀR − 1 that counts as rounding."""
+_RIGID = 1e-9  # largest entry of RᵀR − 1 that counts as rounding
 
 
 def solve_joint_angles(

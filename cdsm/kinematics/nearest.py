@@ -36,14 +36,9 @@ Limits = NDArray[np.int_]
 """Active limit of each joint (nv,): −1 lower, 1 upper, 0 none."""
 
 # fewer stages more often end far from the guess, more stages only take longer
-_WEIGHTS = (1e-2, 1e-4, 1e-6, 1e-8)
-"""Decreasing values of ε."""
-
-_STARTS = 12
-"""Number of random start postures, if the search from the guess finds no solution."""
-
-_NEAR = 1e-6
-"""If ‖r‖ is below this, the problem with r = 0 is solved as well."""
+_WEIGHTS = (1e-2, 1e-4, 1e-6, 1e-8)  # decreasing values of ε
+_STARTS = 12  # number of random start postures, if the search from the guess finds no solution
+_NEAR = 1e-6  # if ‖r‖ is below this, the problem with r = 0 is solved as well
 
 _SINGULAR, _FLAT = 1e-9, 1e-12
 """Singular values and eigenvalues below this share of the largest count as zero."""

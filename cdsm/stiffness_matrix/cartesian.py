@@ -26,8 +26,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
 
-_ORTHOGONAL = 1e-9
-"""Largest product of two unit directions that are orthogonal."""
+_ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
 
 _NO_DIRECTIONS = frozen(np.zeros((0, 3)))
 

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from cdsm.stiffness_matrix import Stiffness
 
-_ROUNDING = 1e-15
-"""Contributions below this fraction of the total are printed as zero."""
+_ROUNDING = 1e-15  # contributions below this fraction of the total are printed as zero
 
 
 @final

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 LINEAR = 0.05
 """Largest ``nonlinearity`` with which first-order propagation counts as sufficient."""
 
-_PROBED = 100
-"""Number of drawn arms with which the error of first-order propagation is estimated."""
+_PROBED = 100  # number of drawn arms with which the error of first-order propagation is estimated
 
 _ROUNDING = 1e-9
 """A smaller relative uncertainty is rounding: critical tensions are found to 1e-10 only."""

@@ -18,11 +18,8 @@ from cdsm.tolerances.inputs import inputs_of
 _CONVERGED = 1e-10
 """Relative step at which the search for a critical tension ends; its error is the step's square."""
 
-_STEPS = 40
-"""Largest number of secant steps; 5 are usual."""
-
-_LONGEST = 0.2
-"""Longest step relative to the tension."""
+_STEPS = 40  # largest number of secant steps; 5 are usual
+_LONGEST = 0.2  # longest step relative to the tension
 
 
 class Drawn(NamedTuple):

@@ -22,13 +22,11 @@ from cdsm.support.values import Array, frozen
 from cdsm.tolerance import Tolerances
 from cdsm.urdf import CROSS_MASS
 
-_NEAR = 1e-9
-"""A site this near to a disk [m] is on the disk."""
+_NEAR = 1e-9  # a site this near to a disk [m] is on the disk
 
 _LENGTHS = ("lead", "hole_radius", "disk_offset", "link_length", "site")
 
-_LARGEST = 0.1
-"""Largest standard uncertainty of a length, over the length of the arm."""
+_LARGEST = 0.1  # largest standard uncertainty of a length, over the length of the arm
 
 _ON_DISKS = ("hole_radius", "hole_angle", "disk_offset", "link_length")
 """Sources that only an arm with disks has."""

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-_BLOCK = 1000
-"""Number of draws in a block; each block has its own random numbers."""
+_BLOCK = 1000  # number of draws in a block; each block has its own random numbers
 
 
 AGREES = 0.1

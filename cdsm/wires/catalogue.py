@@ -27,7 +27,6 @@ WIRES: Final[dict[str, Elasticity]] = {"1x19-1.2mm": STRAND, "solid-1.2mm": SOLI
 """Laws by the name of their wire."""
 
 _FILES = (".toml", ".csv", ".txt", ".tsv")  # of tables too: their reader says to fit them first
-
 _NAMED = 3  # largest number of different wires that a text names
 
 Wire = Elasticity | str | float | os.PathLike[str]
