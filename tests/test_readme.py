@@ -65,13 +65,43 @@ def test_a_result_is_shown_within_the_first_25_lines() -> None:
     assert any(line.startswith("along ") for line in head)
 
 
-def test_files_and_constants_that_contributing_names_exist() -> None:
-    text = CONTRIBUTING.read_text(encoding="utf-8")
-    named = re.findall(r"`((?:cdsm|tests)/[\w./]+)`", text)
-    assert len(set(named)) > 30
-    assert [path for path in named if not (ROOT / path).exists()] == []
-    for path, name in re.findall(r"`(cdsm/[\w/]+\.py)`: `(\w+)`", text):
-        assert re.search(rf"\b{name}\b", (ROOT / path).read_text(encoding="utf-8")), (path, name)
+def place(path: str) -> Path | None:
+    """Return the file or folder that CONTRIBUTING names; paths may leave out ``cdsm/``."""
+    return next((base / path for base in (ROOT / "cdsm", ROOT) if (base / path).exists()), None)
+
+
+def words(path: Path) -> set[str]:
+    """Return all words of a file, or of the files in a folder."""
+    files = [path] if path.is_file() else [*path.rglob("*.py"), *path.rglob("*.pyi")]
+    return {word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8"))}
+
+
+def test_files_and_names_that_contributing_mentions_exist() -> None:
+    text = re.sub(r"```.*?```", "", CONTRIBUTING.read_text(encoding="utf-8"), flags=re.DOTALL)
+    spans = {" ".join(span.split()) for span in re.findall(r"`([^`]+)`", text)}
+    paths = {span for span in spans if re.fullmatch(r"[\w.]+/[\w./]*|\w+\.(?:py|pyi|md)", span)}
+    constants = set(re.findall(r"^\| `([\w/]+)` \| `\w", text, re.MULTILINE))  # rows of tolerances
+    built = {path for path in paths if path.startswith("build/")}
+    assert len(paths) > 300
+    assert {path for path in paths - constants - built if place(path) is None} == set()
+    homes = ("cdsm", "tests", "docs", "examples", "pyproject.toml", ".ci/run")
+    known = set[str]().union(*(words(ROOT / home) for home in homes))
+    names = {name for span in spans - paths for name in re.findall(r"[A-Za-z_]\w+", span)}
+    assert len(names) > 300
+    assert names - known == set()
+
+
+def test_names_that_contributing_finds_in_a_file_are_there() -> None:
+    text = " ".join(CONTRIBUTING.read_text(encoding="utf-8").split())
+    name, path = r"`(\w+)`", r"`([\w./]+\.(?:py|pyi)|\w+/)`"
+    listed = rf"({name}(?:(?:, | and |, and ){name})*)"
+    pairs = [(file, names) for file, names, *_ in re.findall(rf"{path}: {listed}", text)]
+    pairs += [(each[-1], each[0]) for each in re.findall(rf"{listed} (?:in|of) {path}", text)]
+    assert len(pairs) > 100
+    for file, names in pairs:
+        home = place(file)
+        assert home is not None, file
+        assert set(re.findall(name, names)) <= words(home), (file, names)
 
 
 def test_tolerances_that_contributing_lists_are_those_of_the_code() -> None:
