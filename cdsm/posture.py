@@ -81,7 +81,7 @@ class Posture(ReadOnlyState):
             "cable_length_m": lengths,
             **self.moment_arms.to_dict(),
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     @property
     def _coordinates(self) -> dict[str, object]:

@@ -210,7 +210,7 @@ class TrackingRun(ReadOnlyState):
 
     def to_dict(self) -> dict[str, object]:
         """Return the numbers of the printed table in SI for JSON, with units in the keys."""
-        return dict(plain(numbers(self)))
+        return plain(numbers(self))
 
     @property
     def saturated_motors(self) -> tuple[str, ...]:

@@ -185,7 +185,7 @@ class DesignSearch(ReadOnlyState):
             "compromise": self.compromise,
             "front": self._front._columns(),
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def plot(self) -> Figure:
         """Plot two or three objectives of all designs, with the front and :attr:`compromise`.

@@ -113,28 +113,26 @@ class ExperimentPlan(ReadOnlyState):
 
     def to_dict(self) -> dict[str, object]:
         """Return the plan as plain numbers for JSON; parameters in their own units."""
-        return dict(
-            plain(
-                {
-                    "criterion": self.criterion,
-                    "efficiency_at_least": self.efficiency,
-                    "tests": [
-                        {
-                            "label": loop.label,
-                            "times": int(count),
-                            "angles": loop.angles,
-                            "direction": loop.direction,
-                            "forces_N": loop.forces,
-                        }
-                        for loop, count in zip(self.candidates, self.counts, strict=True)
-                        if count
-                    ],
-                    "parameters": dict(zip(self.names, self.values, strict=True)),
-                    "std": dict(zip(self.names, self.std, strict=True)),
-                    "even_std": dict(zip(self.names, self.even_std, strict=True)),
-                    "undetermined": self.undetermined,
-                }
-            )
+        return plain(
+            {
+                "criterion": self.criterion,
+                "efficiency_at_least": self.efficiency,
+                "tests": [
+                    {
+                        "label": loop.label,
+                        "times": int(count),
+                        "angles": loop.angles,
+                        "direction": loop.direction,
+                        "forces_N": loop.forces,
+                    }
+                    for loop, count in zip(self.candidates, self.counts, strict=True)
+                    if count
+                ],
+                "parameters": dict(zip(self.names, self.values, strict=True)),
+                "std": dict(zip(self.names, self.std, strict=True)),
+                "even_std": dict(zip(self.names, self.even_std, strict=True)),
+                "undetermined": self.undetermined,
+            }
         )
 
     def plot(self) -> Figure:

@@ -153,19 +153,17 @@ class Identification(ReadOnlyState):
     def to_dict(self) -> dict[str, object]:
         """Return the result as plain numbers for JSON; each parameter in its own unit."""
         intervals = self.confidence()
-        return dict(
-            plain(
-                {
-                    "parameters": {
-                        name: {"value": value, "std": std, "interval_95": intervals[name]}
-                        for name, value, std in zip(self.names, self.values, self.std, strict=True)
-                    },
-                    "correlation": self.correlation,
-                    "chi_square": self.chi_square,
-                    "degrees_of_freedom": self.freedom,
-                    "rank": self.rank,
-                }
-            )
+        return plain(
+            {
+                "parameters": {
+                    name: {"value": value, "std": std, "interval_95": intervals[name]}
+                    for name, value, std in zip(self.names, self.values, self.std, strict=True)
+                },
+                "correlation": self.correlation,
+                "chi_square": self.chi_square,
+                "degrees_of_freedom": self.freedom,
+                "rank": self.rank,
+            }
         )
 
     def plot(self) -> Figure:

@@ -123,7 +123,7 @@ class JointSolution(_Solution):
             "at_limit": self.at_limit,
             "iterations": self.iterations,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     @property
     def _cables(self) -> tuple[str, ...]:
@@ -187,7 +187,7 @@ class KinematicSolution(_Solution):
             "at_limit": self.at_limit,
             "iterations": self.iterations,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     @property
     def position_error(self) -> float:

@@ -57,7 +57,7 @@ class Clearance(ReadOnlyState):
         numbers: dict[str, object] = {**self.posture._coordinates, "diameter_m": self.diameter}
         for kind, value, names in self._by_kind:
             numbers |= {f"{kind}_m": value, f"{kind}_between": names}
-        return dict(plain(numbers))
+        return plain(numbers)
 
     @property
     def _by_kind(self) -> list[tuple[str, float, tuple[str, str]]]:

@@ -106,7 +106,7 @@ class ForcePolytope(ReadOnlyState):
             "offsets_N": self.offsets,
             "unbounded": self.unbounded,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def __repr__(self) -> str:
         return (

@@ -70,7 +70,7 @@ class Payload(ReadOnlyState):
             "limit": self.limit,
             "limits_N": self.limits,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def __repr__(self) -> str:
         return f"<Payload {self}>"

@@ -54,7 +54,7 @@ class WireUse(ReadOnlyState):
             "life_margin": self.life_margin,
         }
         each = {key: dict(zip(names, values, strict=True)) for key, values in columns.items()}
-        return dict(plain({**each, "bend_ratio": self.bend_ratio}))
+        return plain({**each, "bend_ratio": self.bend_ratio})
 
     def __repr__(self) -> str:
         return (

@@ -184,7 +184,7 @@ class PathPlan(ReadOnlyState):
             ],
             "iterations": self.iterations,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the table of :meth:`write`, a row per sample; MissingExtra without pandas."""

@@ -105,7 +105,7 @@ class StiffnessPlan(ReadOnlyState):
             "efforts_N": self.efforts,
             "iterations": self.iterations,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def __repr__(self) -> str:
         F = self.tension.values

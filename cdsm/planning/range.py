@@ -88,7 +88,7 @@ class StiffnessRange(ReadOnlyState):
             "low_tension_N": dict(self.low_tension),
             "high_tension_N": dict(self.high_tension),
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def __contains__(self, target: float) -> bool:
         return self.low <= target <= self.high

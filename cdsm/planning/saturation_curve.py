@@ -91,7 +91,7 @@ class Saturation(ReadOnlyState):
             "along_N_per_m": self.curve[:, 1],
             "slope_per_m": self.curve[:, 2],
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a row for each lower bound [N]; MissingExtra without pandas."""

@@ -149,7 +149,7 @@ class Report(ReadOnlyState):
             if self.sticking is None
             else {"along_N_per_m": self.sticking.along, "below_N": self.sticking.below},
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def to_html(self) -> str:
         """Return the report as a self-contained HTML file."""

@@ -69,7 +69,7 @@ class Bifurcation(ReadOnlyState):
             "minimum_tension_N": self.bounds,
             "tip_displacements_m": self.displacements,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the tip displacements [m] at each lower bound [N]; MissingExtra without pandas."""

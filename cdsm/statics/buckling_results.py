@@ -85,7 +85,7 @@ class CriticalTension(ReadOnlyState):
             "minimum_tension_N": self.bounds,
             key("margin", arm.stiffness_unit()): self.margins,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def __str__(self) -> str:
         verdict = self._verdict
@@ -148,7 +148,7 @@ class CriticalLoad(ReadOnlyState):
             "load_factors": self.factors,
             key("load_margin", arm.stiffness_unit()): self.margins,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def __repr__(self) -> str:
         return f"<CriticalLoad factor {self.factor:.4g}, {self.limit}>"

@@ -173,7 +173,7 @@ class Equilibrium(ReadOnlyState):
             "at_limit": self.at_limit,
             "stable": self.stable,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def _state(self, cable: Cable, tension: float) -> str:
         if cable.name in self.slack:

@@ -187,7 +187,7 @@ class LoadHistory(ReadOnlyState):
             "stored_J": self.stored,
             "dissipated_J": self.dissipated,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write :meth:`to_pandas` (``.csv``) or :meth:`to_xarray` (``.nc``); return the path.

@@ -79,7 +79,7 @@ class Modes(ReadOnlyState):
             "shapes": self.shapes.T,
             "growth_shapes": self.growth_shapes.T,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def __repr__(self) -> str:
         name = self.stiffness.posture.arm.name

@@ -180,7 +180,7 @@ class WeightTest(ReadOnlyState):
         }
         if self.friction is not None:
             numbers["friction"] = self.friction.to_dict()
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return displacement [m] and tensions [N] at each load; MissingExtra without pandas."""

@@ -116,4 +116,4 @@ def numbers(K: Stiffness) -> dict[str, object]:
             {"change": each.change, "factor": each.factor, "text": str(each)} for each in K.remedies
         ],
     }
-    return dict(plain(found))
+    return plain(found)

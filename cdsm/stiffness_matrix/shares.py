@@ -74,7 +74,7 @@ class Shares(ReadOnlyState):
             "total_N_per_m": self.total,
             "stable": self.stiffness.is_stable,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return both contributions of each cable [N/m] as a table; MissingExtra without pandas."""

@@ -41,14 +41,18 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     ]
 
 
-def plain(value: Any) -> Any:
+def plain(numbers: Mapping[str, Any]) -> dict[str, object]:
     """Turn arrays and tuples into lists, infinite numbers and NaN into None, as JSON needs them."""
+    return {name: _plain(each) for name, each in numbers.items()}
+
+
+def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {name: plain(each) for name, each in value.items()}
+        return plain(value)
     if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
+        return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
-        return [plain(each) for each in value]
+        return [_plain(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

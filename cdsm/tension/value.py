@@ -110,7 +110,7 @@ class Tension(ReadOnlyState):
             key("static_residual", arm.torque_unit()): self.residual,
             "solver": self.solver,
         }
-        return dict(plain(numbers))
+        return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return tension and bounds [N] of each cable as a table; MissingExtra without pandas."""
