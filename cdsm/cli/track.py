@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -23,6 +24,70 @@ def _laws() -> list[str]:
     return list(LAWS)
 
 
+@dataclass(frozen=True)
+class TrueArmOptions:
+    """Options of the true arm, by which it differs from the controller's model."""
+
+    plant: Annotated[
+        Literal["slow", "mujoco"],
+        typer.Option(
+            help="The true arm: quasi-static, with friction; or with inertia and damping (extra "
+            "mujoco), without friction."
+        ),
+    ] = "slow"
+    payload: Annotated[
+        float, typer.Option(help="Mass [kg] that the controller does not know of.")
+    ] = 0.0
+    payload_from: Annotated[
+        float, typer.Option(help="Fraction of the path [0 to 1] after which the payload hangs.")
+    ] = 0.5
+    true_rigidity: Annotated[
+        float, typer.Option(help="True rigidity of the wires, divided by that of the model.")
+    ] = 1.0
+    true_friction: Annotated[
+        float | None, typer.Option(help="True friction coefficient; default: that of the model.")
+    ] = None
+
+    def check(self) -> None:
+        """Raise an error if an option is out of range."""
+        from cdsm.support.validation import quantity
+
+        quantity("--true-friction", self.true_friction or 0.0, "friction", zero=True)
+        if not 0.0 < self.true_rigidity < math.inf:
+            raise misuse(
+                "--true-rigidity", f"{self.true_rigidity:g} given; a positive number is needed."
+            )
+
+    def made(self, model: cdsm.Manipulator, period: float) -> cdsm.SlowPlant | cdsm.MuJoCoPlant:
+        """Return the plant; ``model`` is the arm that the controller knows."""
+        from cdsm.control import with_rigidity
+
+        arm = with_rigidity(model, self.true_rigidity) if self.true_rigidity != 1.0 else model
+        arm = arm if self.true_friction is None else arm.with_friction(self.true_friction)
+        return cdsm.MuJoCoPlant(arm, period) if self.plant == "mujoco" else cdsm.SlowPlant(arm)
+
+
+@dataclass(frozen=True)
+class SensorOptions:
+    """Options of encoders and load cells."""
+
+    encoder: Annotated[float, typer.Option(help="Resolution of the encoders [mm].")] = 0.01
+    tension_noise: Annotated[
+        float, typer.Option(help="Standard deviation of load cell noise [N].")
+    ] = 0.0
+    tension_bias: Annotated[float, typer.Option(help="Constant error of all load cells [N].")] = 0.0
+    delay: Annotated[int, typer.Option(help="Delay of the sensors in steps.")] = 0
+
+    def made(self) -> cdsm.Sensors:
+        """Return the sensors."""
+        return cdsm.Sensors(
+            encoder=1e-3 * self.encoder,
+            tension_noise=self.tension_noise,
+            tension_bias=self.tension_bias,
+            delay=self.delay,
+        )
+
+
 def track(
     arm: ArmOptions,
     path: Annotated[Path, typer.Argument(metavar="PATH.csv", help=options.PATH_COLUMNS)],
@@ -34,6 +99,7 @@ def track(
             metavar="AXIS=N/mm|X,Y,Z=N/mm",
         ),
     ],
+    *,
     law: Annotated[
         str,
         typer.Option(
@@ -42,33 +108,8 @@ def track(
             autocompletion=_laws,
         ),
     ] = "stiffness",
-    plant: Annotated[
-        Literal["slow", "mujoco"],
-        typer.Option(
-            help="The true arm: quasi-static, with friction; or with inertia and damping (extra "
-            "mujoco), without friction."
-        ),
-    ] = "slow",
-    payload: Annotated[
-        float, typer.Option(help="Mass [kg] that the controller does not know of.")
-    ] = 0.0,
-    payload_from: Annotated[
-        float, typer.Option(help="Fraction of the path [0 to 1] after which the payload hangs.")
-    ] = 0.5,
-    true_rigidity: Annotated[
-        float, typer.Option(help="True rigidity of the wires, divided by that of the model.")
-    ] = 1.0,
-    true_friction: Annotated[
-        float | None, typer.Option(help="True friction coefficient; default: that of the model.")
-    ] = None,
-    encoder: Annotated[float, typer.Option(help="Resolution of the encoders [mm].")] = 0.01,
-    tension_noise: Annotated[
-        float, typer.Option(help="Standard deviation of load cell noise [N].")
-    ] = 0.0,
-    tension_bias: Annotated[
-        float, typer.Option(help="Constant error of all load cells [N].")
-    ] = 0.0,
-    delay: Annotated[int, typer.Option(help="Delay of the sensors in steps.")] = 0,
+    true: TrueArmOptions,
+    sensors: SensorOptions,
     steps: Annotated[int, typer.Option(help="Control steps from sample to sample.")] = 5,
     period: Annotated[float, typer.Option(help="Time between two control steps [s].")] = 0.05,
     rate: Annotated[
@@ -112,15 +153,11 @@ def track(
     or a sample cannot be planned.
     """
     from cdsm.cli.path_file import one_target, read_path
-    from cdsm.control import with_rigidity
-    from cdsm.support.validation import quantity
 
     _require_ending("--out", out, ".nc", ".csv")
     _require_ending("--animate", animate, ".gif", ".csv")
     _require_ending("--figure", figure, ".pdf", ".svg", ".png")
-    quantity("--true-friction", true_friction or 0.0, "friction", zero=True)
-    if not 0.0 < true_rigidity < math.inf:
-        raise misuse("--true-rigidity", f"{true_rigidity:g} given; a positive number is needed.")
+    true.check()
     robot = arm.read()
     file = read_path(path, robot)
     u, wanted = _wanted(stiffness)
@@ -133,23 +170,15 @@ def track(
     if missed:
         warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"]
         answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
-    true = with_rigidity(robot, true_rigidity) if true_rigidity != 1.0 else robot
-    true = true if true_friction is None else true.with_friction(true_friction)
-    arm_there = cdsm.MuJoCoPlant(true, period) if plant == "mujoco" else cdsm.SlowPlant(true)
     run = cdsm.track(
         plan,
         law,
-        arm_there,
-        cdsm.Sensors(
-            encoder=1e-3 * encoder,
-            tension_noise=tension_noise,
-            tension_bias=tension_bias,
-            delay=delay,
-        ),
+        true.made(robot, period),
+        sensors.made(),
         minimum=min_tension,
         maximum=max_tension,
-        payload=payload,
-        payload_from=payload_from,
+        payload=true.payload,
+        payload_from=true.payload_from,
         steps=steps,
         period=period,
         rate=rate,
