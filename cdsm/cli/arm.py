@@ -4,15 +4,39 @@ from __future__ import annotations
 
 import contextlib
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 import cdsm
-from cdsm.cli.options import Angles, ArmOptions, AsJson, LoadOptions, TensionOptions, out_option
+from cdsm.cli.options import (
+    Angles,
+    ArmOptions,
+    AsJson,
+    LoadOptions,
+    TensionOptions,
+    directions,
+    out_option,
+)
 from cdsm.cli.output import Json, answer, by_cable, write
-from cdsm.cli.values import misuse
+from cdsm.cli.values import direction_of, misuse
+
+if TYPE_CHECKING:
+    from cdsm.support.validation import Direction
+
+_Given = Annotated[
+    Path | None,
+    typer.Option(
+        "--tolerances",
+        metavar="T.toml",
+        help="Tolerances, for the uncertainty of the stiffness; default: those in ARM.toml.",
+    ),
+]
+
+_ALONG: dict[str, Direction] = {"x": "x", "y": "y", "z": "z"}
+"""Directions of every answer, by name."""
 
 
 def urdf(
@@ -34,13 +58,15 @@ def stiffness(
     tensions: TensionOptions,
     load: LoadOptions,
     angles: Angles = "0",
-    tolerances: Annotated[
-        Path | None,
+    direction: Annotated[
+        str | None,
         typer.Option(
-            metavar="T.toml",
-            help="Tolerances, for the uncertainty of the stiffness; default: those in ARM.toml.",
+            help="One more direction for the stiffness: an axis such as -y, or a vector.",
+            metavar="AXIS|X,Y,Z",
+            autocompletion=directions,
         ),
     ] = None,
+    tolerances: _Given = None,
     as_json: AsJson = False,
 ) -> None:
     """Distribute the tensions at a posture, and print them and the stiffness.
@@ -50,30 +76,33 @@ def stiffness(
     pose = arm.at(angles)
     tension = tensions.distribute(pose, load.at_tip(pose.arm))
     K = cdsm.stiffness(pose, tension)
-    given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
-    budgets = _budgets(tension, given) if given.given else {}
-    sure = {"uncertainty": {axis: budget.to_dict() for axis, budget in budgets.items()}}
-    breakaways = _breakaways(tension)
+    parts: list[object] = [tensions.conditions(pose), tension, K]
+    more: Json = {}
+    along = _ALONG
+    if direction is not None:
+        along = along | {direction: (u := direction_of(direction))}
+        more = {"direction": u, "along_direction_N_per_m": K.along(u)}
+        parts += [f"along {direction}: {K.along(u) / 1000.0:.4g} N/mm"]
+    breakaways = _breakaways(tension, along)
     stuck = {
-        axis: {"stuck_N_per_m": each.stiffness.along(axis), "breakaway_N": each.load}
+        axis: {"stuck_N_per_m": each.stiffness.along(along[axis]), "breakaway_N": each.load}
         for axis, each in breakaways.items()
     }
-    parts = [tensions.conditions(pose.arm), tension, K]
     parts += [_sticking(breakaways)] if breakaways else []
-    parts += [_table(budgets)] if budgets else []
-    more = (sure if budgets else {}) | ({"sticking": stuck} if breakaways else {})
-    answer(as_json, lambda: K.to_dict() | more, *parts, warnings=K.warnings[:1])
+    more |= {"sticking": stuck} if breakaways else {}
+    tables, sure = _uncertainty(tension, tolerances, along)
+    answer(as_json, lambda: K.to_dict() | more | sure, *parts, *tables, warnings=K.warnings[:1])
 
 
-def _breakaways(tension: cdsm.Tension) -> dict[str, cdsm.Breakaway]:
-    """Compute the breakaway loads along x, y, z that exist before the arm buckles."""
+def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[str, cdsm.Breakaway]:
+    """Compute the breakaway loads ``along`` directions that exist before the arm buckles."""
     found = {}
     if tension.posture.arm.has_friction:
-        for axis in ("x", "y", "z"):
+        for name, u in along.items():
             with contextlib.suppress(cdsm.CdsmError):  # it buckles before, or leaves the law
-                first = cdsm.breakaway(tension.posture, tension, axis)
+                first = cdsm.breakaway(tension.posture, tension, u)
                 if 0.0 < first.load < math.inf:
-                    found[axis] = first
+                    found[name] = first
     return found
 
 
@@ -83,19 +112,29 @@ def _sticking(breakaways: dict[str, cdsm.Breakaway]) -> str:
 
     K = next(iter(breakaways.values())).stiffness
     lines = [
-        f"along {axis} {each.stiffness.along(axis) / 1000.0:.4g} N/mm below {each.load:.4g} N"
+        f"along {axis} {each.stiffness.along(each.direction) / 1000.0:.4g} N/mm below "
+        f"{each.load:.4g} N"
         for axis, each in breakaways.items()
     ]
     return "\n".join([f"small loads measure ({model_of(K)}):", *lines])
 
 
-def _budgets(tension: cdsm.Tension, tolerances: cdsm.Tolerances) -> dict[str, cdsm.Uncertainty]:
-    """Compute the uncertainty budget along x, y and z, except where the tip cannot move."""
-    found = {}
-    for axis in ("x", "y", "z"):
+def _uncertainty(
+    tension: cdsm.Tension, tolerances: Path | None, along: Mapping[str, Direction] = _ALONG
+) -> tuple[list[str], Json]:
+    """Compute uncertainty budgets ``along`` directions, as table and for JSON; empty if none.
+
+    Without a file of ``tolerances``, those of the arm count. A direction in which the tip cannot
+    move has no budget.
+    """
+    pose, found = tension.posture, {}
+    given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
+    for name, u in along.items() if given.given else ():
         with contextlib.suppress(cdsm.SingularStiffness):
-            found[axis] = cdsm.uncertainty(tension.posture, tension, tolerances, direction=axis)
-    return found
+            found[name] = cdsm.uncertainty(pose, tension, given, direction=u)
+    if not found:
+        return [], {}
+    return [_table(found)], {"uncertainty": {name: each.to_dict() for name, each in found.items()}}
 
 
 def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
@@ -127,6 +166,7 @@ def check(
     out: Annotated[
         Path | None, out_option(metavar="FILE.html", help="Also write the report as a page.")
     ] = None,
+    tolerances: _Given = None,
     as_json: AsJson = False,
 ) -> None:
     """Check a stiffness: compare it with finite differences, and report every problem.
@@ -140,7 +180,9 @@ def check(
     report = cdsm.stiffness(pose, tension).report()
     write(out, lambda file: write_text(file, report.to_html()))
     warnings = () if report.trustworthy else ("NOT to be trusted: the report says why.",)
-    answer(as_json, report.to_dict, tensions.conditions(pose.arm), report, warnings=warnings)
+    tables, sure = _uncertainty(tension, tolerances)
+    parts = [tensions.conditions(pose), report, *tables]
+    answer(as_json, lambda: report.to_dict() | sure, *parts, warnings=warnings)
 
 
 def export(
@@ -179,7 +221,7 @@ def export(
         raise misuse("--out", "give --out, --cables-out or both.")
     pose = arm.at(angles)
     numbers: Json = {"name": pose.arm.name}
-    conditions = tensions.conditions(pose.arm)
+    conditions = tensions.conditions(pose)
     lines, files = [str(conditions)], []
     warnings: list[str] = []
     if out is not None:

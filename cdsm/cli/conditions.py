@@ -1,24 +1,32 @@
-"""Print the assumptions of a result: wire, gravity, lower bound of the tensions, friction."""
+"""Print the assumptions of a result: wire, gravity, least tension, friction; and the posture."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import cdsm
+
 if TYPE_CHECKING:
-    import cdsm
     from cdsm.cli.output import Json
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """First lines of an answer: the assumptions of its results, and the arm."""
+    """First lines of an answer: the assumptions of its results, the arm, and its one posture."""
 
-    arm: cdsm.Manipulator
+    of: cdsm.Manipulator | cdsm.Posture
     minimum: tuple[float, ...] = ()  # given lower bounds of all tensions [N], one per case
     friction: bool = False  # whether the results include the friction of the arm
 
+    @property
+    def arm(self) -> cdsm.Manipulator:
+        """The arm."""
+        return self.of.arm if isinstance(self.of, cdsm.Posture) else self.of
+
     def __str__(self) -> str:
+        from cdsm.support.format import coordinates, place
+
         x, y, z = self.arm.gravity.tolist()
         words = [f"wire {self.wire}", f"gravity {x:g}, {y:g}, {z:g} m/s²"]
         if self.minimum:
@@ -29,7 +37,12 @@ class Conditions:
         if self.arm.original_length != "unstrained":
             words.append("stretched lengths")
         words.append(self._friction)
-        return f"with {'; '.join(words)}\n{self.arm}"
+        lines = [f"with {'; '.join(words)}", str(self.arm)]
+        if isinstance(self.of, cdsm.Posture):
+            q = zip(self.of.q.tolist(), self.arm.joint_units, strict=True)
+            joints = ", ".join(place(value, unit) for value, unit in q)
+            lines.append(f"at {joints}; tip at {coordinates(1e3 * self.of.tip[:3, 3])} mm")
+        return "\n".join(lines)
 
     @property
     def _friction(self) -> str:

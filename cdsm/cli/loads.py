@@ -49,7 +49,7 @@ def weigh(
     without = " without friction" if pose.arm.has_friction else ""
     loaded = f"at the full load{without}:\n{test.loaded[-1]}"
     warnings = (*cdsm.stiffness(pose, tension).warnings, *test.warnings)
-    conditions = tensions.conditions(pose.arm, friction=True)
+    conditions = tensions.conditions(pose, friction=True)
     answer(as_json, test.to_dict, conditions, test, loaded, warnings=warnings)
 
 
@@ -100,7 +100,7 @@ def buckle(
     answer(
         as_json,
         lambda: {name: value for each in reversed(found) for name, value in each.to_dict().items()},
-        Conditions(pose.arm, low),
+        Conditions(pose, low),
         *found,
         warnings=[warning for each in found for warning in each.warnings],
     )
@@ -158,7 +158,7 @@ def cycle(
     answer(
         as_json,
         lambda: history.to_dict() | {"lost_in_last_cycle_J": lost, "left_over_m": left},
-        tensions.conditions(pose.arm, friction=True),
+        tensions.conditions(pose, friction=True),
         history,
         note,
     )

@@ -212,9 +212,11 @@ class TensionOptions:
     max_tension: MaxTension = math.inf
     solver: Solver = DEFAULT_SOLVER
 
-    def conditions(self, arm: cdsm.Manipulator, *, friction: bool = False) -> Conditions:
-        """Return the assumptions of a result for ``arm`` with these options."""
-        return Conditions(arm, (self.min_tension,), friction)
+    def conditions(
+        self, of: cdsm.Manipulator | cdsm.Posture, *, friction: bool = False
+    ) -> Conditions:
+        """Return the assumptions of a result with these options, for an arm or a posture."""
+        return Conditions(of, (self.min_tension,), friction)
 
     def distribute(self, pose: cdsm.Posture, wrench: Array) -> cdsm.Tension:
         """Compute the tensions at a posture under a wrench (6,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -35,6 +36,9 @@ FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
 3 is that of every answer with a warning (the arm is unstable, has left its reference, some samples
 cannot be planned, the report is not trustworthy), and of errors that say what the arm cannot do.
 """
+
+_LIST = re.compile(r"(?<=\[)\n[^][{}\"]*\n\s*(?=\])")
+"""Inside of a JSON list of numbers with a line for each; such a list is printed in one line."""
 
 _UsageError = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
 """Base class of errors of usage, of which typer has no public name."""
@@ -74,7 +78,8 @@ def answer(
 def _print_json(numbers: Json) -> None:
     from cdsm.support.format import plain
 
-    typer.echo(json.dumps(plain(numbers), indent=1, allow_nan=False, default=str))
+    text = json.dumps(plain(numbers), indent=1, allow_nan=False, default=str)
+    typer.echo(_LIST.sub(lambda found: re.sub(r"\s+", " ", found[0]).strip(), text))
 
 
 def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:

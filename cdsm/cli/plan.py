@@ -13,7 +13,7 @@ from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension, Picture
 from cdsm.cli.output import answer, write, write_picture
-from cdsm.cli.values import axis, misuse, numbers
+from cdsm.cli.values import direction_of, misuse
 
 
 def plan(
@@ -62,7 +62,7 @@ def plan(
     Exit code 0; 3 if no tensions reach the target, at a posture or at some samples of the path. The
     other samples are written all the same.
     """
-    u = axis(direction) or numbers("--direction", direction, 3, "an axis, or X,Y,Z")
+    u = direction_of(direction)
     if path is not None and angles is not None:
         raise misuse("--angles", "is of one posture; --path has its own.")
     wanted = None if target is None else 1000.0 * target
@@ -96,6 +96,6 @@ def plan(
         if out is not None:  # repeats the search as a path of one sample
             write(out, cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q]).write)
         write_picture(figure, lambda: best.plot(attainable))
-        conditions = Conditions(pose.arm, (min_tension,))
+        conditions = Conditions(pose, (min_tension,))
         results = [attainable, best]
         answer(as_json, lambda: attainable.to_dict() | best.to_dict(), conditions, *results)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import typer
@@ -55,6 +56,11 @@ def axis(text: str) -> tuple[float, float, float] | None:
     from cdsm.support.validation import AXES
 
     return AXES.get(text.strip())
+
+
+def direction_of(text: str) -> Sequence[float]:
+    """Return the direction (3,) of --direction: an axis, or three numbers."""
+    return axis(text) or numbers("--direction", text, 3, "an axis, or X,Y,Z")
 
 
 def gravity_of(text: str) -> list[float] | str:

@@ -28,6 +28,7 @@ _PYTHON: Final = (
     (", or, in Python, pass check_limits=False to compute beyond them.", "."),
     ("Raise starts=, ask", "Ask"),
     ("give arm.with_friction(0.0).", "give --true-friction 0."),
+    ("by its slack_below()", "with --slack-below"),
     ("slack_below()", "--slack-below"),
     ("`cdsm fit`, or cdsm.read_tensile_csv and cdsm.fit_tensile_test.", "`cdsm fit`."),
     (", or start from a guess= nearer to it.", "."),

@@ -119,7 +119,8 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
     lines = [
         ("tip error, mean and largest", f"{1e3 * n['tip_error_mean_m']:.3g}, "
          f"{1e3 * n['tip_error_largest_m']:.3g} mm"),
-        ("stiffness error, mean and largest", f"{100.0 * n['stiffness_error_mean']:.3g}, "
+        ("frictionless stiffness error, mean and largest",
+         f"{100.0 * n['stiffness_error_mean']:.3g}, "
          f"{100.0 * n['stiffness_error_largest']:.3g} %"),
         ("tensions at the motors", f"{low:.4g} to {high:.4g} N"),
         ("least margin to buckling", f"{n['least_margin_Nm_per_rad']:.4g} "

@@ -214,7 +214,8 @@ class DesignSearch(ReadOnlyState):
             f"{counted}, {feasible} feasible, {len(self.front)} on the front{more}; * is the "
             "compromise"
         )
-        return "\n".join([head, *aligned(self._table()[: _PRINTED + 1])])
+        asked = [f"asked: {each.words} {each.asked}" for each in self.problem.constraints]
+        return "\n".join([head, *aligned(self._table()[: _PRINTED + 1]), *asked])
 
     def _table(self) -> list[list[str]]:
         """Return head and rows of the front in units shown to the user."""

@@ -101,8 +101,14 @@ class StiffnessRange(ReadOnlyState):
             f"along {coordinates(self.direction)} the stiffness can be "
             f"{self.low / 1000.0:.4g} to {self.high / 1000.0:.4g} N/mm\n"
             f"softest with {span(self.low_tension.values)} N, "
-            f"stiffest with {span(self.high_tension.values)} N\n({MODEL})"
+            f"stiffest with {span(self.high_tension.values)} N\n"
+            f"smallest joint stiffness {self._margin(self.low_tension)} when softest, "
+            f"{self._margin(self.high_tension)} when stiffest ({MODEL})"
         )
+
+    def _margin(self, tension: Tension) -> str:
+        unit = self.posture.arm.stiffness_unit()
+        return f"{stiffness(self.posture, tension).margin:.4g} {unit}"
 
 
 def stiffness_range(

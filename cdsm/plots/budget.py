@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdsm.plots.style import COLORS, expect, panels
+from cdsm.plots.style import COLORS, expect, legend_below, panels
 
 if TYPE_CHECKING:
     from cdsm.tolerances.budget import Uncertainty
@@ -60,6 +60,5 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
             axes.axvline(end / size, color=color, linestyle="--", linewidth=1.0)
     axes.set(xlabel=f"{first.question.name} [{unit}]", ylabel=f"probability density [1/({unit})]")
     axes.set_yticks([])
-    axes.set_ylim(top=1.25 * axes.get_ylim()[1])
-    axes.legend(title="dashed: 95 % intervals", loc="upper right")
+    legend_below(figure, axes, 2, title="dashed: 95 % intervals")
     return figure

@@ -54,6 +54,7 @@ _MIDDLE = (0.05, 0.95)
 """A value is an outlier if it is further outside these quantiles than they are apart."""
 
 _TALLEST = 4.0  # largest height of a panel [inch]
+_NARROWEST = 1.3  # least width of a panel with its labels [inch]
 
 Statistic = Literal["median", "min", "max"]
 
@@ -110,7 +111,7 @@ def plot_map(
         MissingExtra: xarray is not installed.
     """
     check_sweep(dataset)
-    remedy = "tip_position and the quantity must be among outputs= (--quantities) of the sweep."
+    remedy = "tip_position and the quantity must be among outputs= of the sweep."
     for name in (quantity, "tip_position"):
         one_of("quantity", name, [str(each) for each in dataset.data_vars], remedy)
     if statistic is not None:
@@ -146,17 +147,18 @@ def plot_map(
     shown = statistic or ("median" if cloud else None)
     columns = len(slices) if cloud else 2 if len(maps) == 4 else min(len(maps), 3)
     rows = -(-len(maps) // columns)
-    width = (TWO_COLUMNS - 1.3) / columns
     ratio = max(np.ptp(each.limits[1]) / np.ptp(each.limits[0]) for each in maps)
-    width = min(width, _TALLEST / ratio)
-    size = 1.3 + width * columns + 0.5, 0.9 + (0.45 + width * ratio) * rows
+    height = min((TWO_COLUMNS - 1.3) / columns * ratio, _TALLEST)
+    width = max(height / ratio, _NARROWEST)
+    size = 1.3 + width * columns + 0.5, 0.9 + (0.45 + height) * rows
     figure, grid = panels(*size, columns, rows)
     for axes, each in itertools.zip_longest(grid.flat, maps):
         if each is None:
             axes.set_axis_off()
             continue
         _draw(axes, each, colors, words, shown, bins)
-        caption(axes, each.title)
+        caption(axes, textwrap.fill(each.title, round(16 * width)))
+        axes.locator_params("x", nbins=min(TICKS, round(2.4 * height / ratio)))
     name = dataset[quantity].long_name.split(",")[0]
     bar = figure.colorbar(colors, ax=grid, extend=extend)
     sign = "; below 0: unstable" if quantity == "margin" else ""

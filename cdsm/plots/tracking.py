@@ -52,13 +52,14 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
         stiffness.plot(t, N_PER_MM * found, color=color, label=f"along {name}; dashed: wanted")
         if np.isfinite(felt).any():
             stiffness.plot(t, N_PER_MM * felt, "o", color=color, markersize=3, label="felt")
-    stiffness.set(ylabel="stiffness [N/mm]")
+    stiffness.set(ylabel="frictionless\nstiffness [N/mm]")
     ratio = np.concatenate([run.stiffness, run.felt]) / np.tile(run.target, (2, 1))
     if np.nanmin(ratio, initial=1.0) < _HALF:  # else a few percent would not be seen
         from_zero(stiffness, *(N_PER_MM * each for each in (run.target, run.stiffness, run.felt)))
     low, high = MM * run.band.T
     at = run.banded  # where none was proved the area has a gap
-    band.fill_between(t[at], low[at], high[at], color=SKY, alpha=0.4, label="proved band")
+    if at.any():
+        band.fill_between(t[at], low[at], high[at], color=SKY, alpha=0.4, label="proved band")
     moved = MM * run.displacement
     band.plot(t, moved, color=VERMILLION, label="tip")
     band.set(ylabel="off the rest\nwithout friction [mm]")

@@ -343,7 +343,7 @@ def test_export_states_time_step_damping_and_actuators(geometry: Path, tmp_path:
     asked = ("export", geometry, "--mjcf", model, "--angles", 5, "--rigidity", 48e3)
     told = call(*asked, "--min-tension", 5, "--damping-ratio", 0.1)
     assert told.exit_code == 0
-    chosen = told.stdout.splitlines()[2:6]
+    chosen = told.stdout.splitlines()[3:7]
     assert [line.split()[0] for line in chosen] == ["time", "damping", "actuators", "friction"]
     assert "ratio 0.1 to " in chosen[1]
     text = model.read_text(encoding="utf-8")

@@ -32,6 +32,7 @@ def test_the_example_writes_front_figures_and_the_files_of_an_arm(tmp_path: Path
     code, text = run(*words, "--generations", "5", "--population", "8")
     assert code == 0, text
     assert "on the front" in text
+    assert "asked: largest deflection under the load at most 1 mm\n" in text  # 0.001 m in the file
     names = (
         "designs.csv front.csv front.pdf front.html arm.pdf arm.toml arm.urdf arm.xml holes.csv "
         "cables.csv designs.jsonl"

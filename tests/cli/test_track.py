@@ -32,6 +32,7 @@ def test_track_tells_and_writes_what_the_api_does(files: tuple[Path, Path], tmp_
     shown = call("track", *files, *options, "--out", out, "--figure", png, "--animate", gif)
     assert shown.exit_code == 0, shown.output
     assert "law stiffness: 5 steps, completed" in shown.stdout
+    assert "\nfrictionless stiffness error, mean and largest  " in shown.stdout
     assert "100 % of 5 proved steps (0 not proved)" in shown.stdout
     plan = small_path(0.1)
     plan = cdsm.plan_path(plan.arm, "z", 15e3, 10.0, 250.0, angles=plan.angles, progress=False)

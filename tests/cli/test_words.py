@@ -39,6 +39,64 @@ def test_stiffness_with_tolerances_says_how_sure_it_is(geometry: Path, tmp_path:
     assert "of it joint angle" in shown
 
 
+def test_check_says_how_sure_its_stiffness_is(geometry: Path, tmp_path: Path) -> None:
+    file = tmp_path / "T.toml"
+    file.write_text("rigidity = 0.05\n", encoding="utf-8")
+    asked = (geometry, *STEEL, "--angles", 5, "--tolerances", file)
+    numbers = [json.loads(call(each, *asked, "--json").stdout) for each in ("check", "stiffness")]
+    assert numbers[0]["uncertainty"] == numbers[1]["uncertainty"]
+    table = call("stiffness", *asked).stdout.split("\n\n")[-1]
+    assert table.startswith("uncertainty [N/mm]")
+    assert call("check", *asked).stdout.endswith(f"\n\n{table}")
+
+
+def test_stiffness_in_one_more_direction(geometry: Path, tmp_path: Path) -> None:
+    file = tmp_path / "T.toml"
+    file.write_text("rigidity = 0.05\n", encoding="utf-8")
+    more = ("--friction", 0.1, "--tolerances", file, "--direction", "1,0,-2")
+    asked = ("stiffness", geometry, *STEEL, "--angles", 5, *more)
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.LinearElasticity(48e3))
+    pose = arm.with_friction(0.1).at(np.full(arm.nv, np.deg2rad(5.0)))
+    tension, u = cdsm.distribute_tension(pose, 10.0), (1.0, 0.0, -2.0)
+    along = cdsm.stiffness(pose, tension).along(u)
+    first = cdsm.breakaway(pose, tension, u)
+    told = json.loads(call(*asked, "--json").stdout)
+    assert told["along_direction_N_per_m"] == pytest.approx(along)
+    assert told["sticking"]["1,0,-2"]["breakaway_N"] == pytest.approx(first.load)
+    assert told["uncertainty"]["1,0,-2"]["value"] == pytest.approx(along)
+    text = call(*asked).stdout
+    assert f"along 1,0,-2: {along / 1e3:.4g} N/mm\n" in text
+    stuck = first.stiffness.along(u) / 1e3
+    assert f"along 1,0,-2 {stuck:.4g} N/mm below {first.load:.4g} N\n" in text
+
+
+@pytest.mark.parametrize(
+    ("command", "more"),
+    [
+        ("stiffness", ()),
+        ("check", ()),
+        ("weigh", ("--mass", 0.01)),
+        ("cycle", ("--mass", 0.01)),
+        ("buckle", ()),
+        ("plan", ("--direction", "z", "--target", 54.86, "--max-tension", 100)),
+    ],
+)
+def test_posture_and_tip_are_told(geometry: Path, command: str, more: tuple[object, ...]) -> None:
+    arm = cdsm.Manipulator(cdsm.Geometry.read(geometry), cdsm.LinearElasticity(48e3))
+    x, y, z = 1e3 * arm.at(np.full(arm.nv, np.deg2rad(0.1))).tip[:3, 3]
+    told = call(command, geometry, *STEEL, "--angles", 0.1, *more).stdout
+    degrees = ", ".join(["0.1°"] * arm.nv)
+    assert f"\nat {degrees}; tip at ({x:.4g}, {y:.4g}, {z:.4g}) mm\n" in told
+
+
+def test_json_has_numbers_of_a_list_in_one_line(geometry: Path) -> None:
+    text = call("stiffness", geometry, *STEEL, "--json").stdout
+    assert '"gravity_m_per_s2": [0.0, 0.0, -9.81],\n' in text
+    numbers = json.loads(text)
+    (row, *_) = numbers["compliance"]
+    assert f"\n  {json.dumps(row)},\n" in text
+
+
 # --- warnings first -------------------------------------------------------------------------
 
 

@@ -1,5 +1,6 @@
 """Workspace maps show every tip where it is, in mm, under its own colour or status."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,22 @@ def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Datase
     assert axes.get_aspect() == 1.0
     assert axes.get_title() == "minimum 5 N"
     assert figure.axes[-1].get_ylabel() == "stiffness in the softest direction [N/mm]"
+
+
+def test_titles_and_ticks_of_narrow_panels_stay_apart(planar: xr.Dataset) -> None:
+    figure = plots.plot_map(planar.isel(minimum=[0, 1]), "along")
+    figure.draw_without_rendering()
+    low, high = figure.axes[0].get_xlim()
+    assert len(figure.axes) == 7
+    titles = [axes.title.get_window_extent() for axes in figure.axes[:3]]
+    ticks = [
+        each.label1.get_window_extent()
+        for each in figure.axes[0].xaxis.get_major_ticks()
+        if low <= each.get_loc() <= high
+    ]
+    for boxes in (titles, ticks):
+        assert len(boxes) > 1
+        assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
 
 
 def test_unstable_entries_are_marked_and_counted(planar: xr.Dataset) -> None:
@@ -183,7 +200,7 @@ def test_what_cannot_be_shown_is_named(
 
 
 def test_a_sweep_without_tips_cannot_be_shown() -> None:
-    said = r"tip_position and the quantity must be among outputs= \(--quantities\) of the sweep"
+    said = r"tip_position and the quantity must be among outputs= of the sweep"
     with pytest.raises(cdsm.UnknownName, match=said):
         plots.plot_map(cdsm.sweep(short_arm(), PLANAR, minimum=20.0, outputs="margin"), "margin")
     with pytest.raises(cdsm.InvalidInput, match="the Dataset of a sweep is needed"):
