@@ -17,11 +17,11 @@ from cdsm.control.plant import PlantState, SlowPlant, SlowState
 from cdsm.errors import CdsmError, SingularStiffness
 from cdsm.friction.band import rest_band
 from cdsm.friction.breakaway import breakaway
-from cdsm.manipulator import Manipulator
-from cdsm.statics.locked_motors import LoadedArm
+from cdsm.statics.locked_motors import LoadedArm, lengths_with
 from cdsm.statics.rest_search import no_rest
 from cdsm.statics.slow_loading import Load
 from cdsm.statics.trust_region import find_rest
+from cdsm.statics.weight_friction import fading
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
@@ -42,13 +42,11 @@ class Assessment(NamedTuple):
     band: tuple[float, float]
 
 
-def assess(
-    arm: Manipulator, state: PlantState, wrench: Array, directions: Array, *, banded: bool
-) -> Assessment:
+def assess(state: PlantState, wrench: Array, directions: Array, *, banded: bool) -> Assessment:
     """Assess a state under ``wrench`` (6,) along ``directions`` (D, 3); the band if ``banded``."""
     nan = math.nan
     try:
-        K = frictionless_stiffness(arm, state, wrench)
+        K = frictionless_stiffness(state, wrench)
     except CdsmError:
         return Assessment(np.full(3, nan), [nan] * len(directions), nan, (nan, nan))
     ends = nan, nan
@@ -66,7 +64,7 @@ def _along(K: Stiffness, u: Array) -> float:
         return math.nan
 
 
-def frictionless_stiffness(arm: Manipulator, state: PlantState, wrench: Array) -> Stiffness:
+def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
     """Return K_θ at the equilibrium without friction, with the wire of a state and a load (6,).
 
     Raises:
@@ -74,11 +72,8 @@ def frictionless_stiffness(arm: Manipulator, state: PlantState, wrench: Array) -
         ElasticityRangeError: A tension leaves the domain of its law.
     """
     pose, (wire, F) = state.pose, state.true
-    lengths = pose.cable_lengths.copy()
-    for c, cable in enumerate(arm.cables):
-        if cable.control == "position":  # the length at which this much wire has this tension
-            lengths[c] = wire[c] + float(cable.elongation(F[c], wire[c]))
-    loaded = LoadedArm(pose, F, wrench, lengths)
+    held = pose.arm.cables.position_controlled
+    loaded = LoadedArm(pose, F, wrench, lengths_with(wire[held], pose, F))
     search = find_rest(loaded, loaded.at(pose, F))
     K = search.state.K
     if not search.converged:
@@ -98,19 +93,17 @@ def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
     """
     arm, load = plant.arm, state.state.load
     try:
-        near = frictionless_stiffness(arm, state, load.wrench)
+        near = frictionless_stiffness(state, load.wrench)
     except CdsmError:
         return math.nan
     weight = near.along(u) * _DISPLACED * arm.length
     if not math.isfinite(weight):
         return math.inf
     swing = _SHAKEN * breakaway(near.posture, near.tension, u, near.wrench).load
-    fading = swing * (1.0 - np.arange(2 * _CYCLES) / (2.0 * _CYCLES))
-    fading[1::2] *= -1.0
     carried, tips = state, []
     try:
         for hung in (0.0, weight):
-            for force in (*(hung + fading if arm.has_friction else ()), hung):
+            for force in (*(hung + fading(swing, _CYCLES) if arm.has_friction else ()), hung):
                 wrench = load.wrench + np.append(force * u, np.zeros(3))
                 carried = plant.load(carried, Load(wrench, load.holding, load.motors))
             tips.append(carried.pose.tip[:3, 3])

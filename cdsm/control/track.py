@@ -146,7 +146,7 @@ def track(
             break
         truth.append(state.true)
         banded = every > 0 and k % every == 0 and plant.arm.has_friction
-        judged = assess(plant.arm, state, wrenches[k], schedule.directions, banded=banded)
+        judged = assess(state, wrenches[k], schedule.directions, banded=banded)
         found = [
             felt_stiffness(plant, state, wrenches[k], observer, estimate, (low, high), u, apart)
             for u in (schedule.directions if feels and k % feels == 0 else ())

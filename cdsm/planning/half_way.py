@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
 from cdsm.errors import CdsmError, EquilibriumError
 from cdsm.planning.objectives import achieved, misfit
-from cdsm.statics.locked_motors import LoadedArm
+from cdsm.statics.locked_motors import LoadedArm, lengths_with
 from cdsm.statics.trust_region import find_rest
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -80,11 +78,7 @@ def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     arm = one.posture.arm
     mean = arm.at(q)
     # lock the cables at their mean tension, inside every domain; no posture has these lengths
-    lengths = mean.cable_lengths.copy()
-    locked = np.flatnonzero(arm.cables.position_controlled)
-    for c, l_0 in zip(locked, unstrained.tolist(), strict=True):
-        lengths[c] = l_0 + arm.cables[c].elongation(F[c], l_0)
-    loaded = LoadedArm(mean, F, W, lengths)
+    loaded = LoadedArm(mean, F, W, lengths_with(unstrained, mean, F))
     search = find_rest(loaded, loaded.at(mean, F))
     K = search.state.K
     if not (search.converged and search.convex):

@@ -108,6 +108,18 @@ class LoadedArm:
         require_domains(self.reference.arm.cables, groups, tension)
 
 
+def lengths_with(wire: Array, pose: Posture, tension: Array) -> Array:
+    """Return L (C,) [m] at which locked cables with so much ``wire`` l_0 have tensions (C,) [N].
+
+    ``wire`` (H,) [m] is that of the position-controlled cables; the others keep their lengths.
+    """
+    lengths, cables = pose.cable_lengths.copy(), pose.arm.cables
+    held = np.flatnonzero(cables.position_controlled)
+    for c, l_0 in zip(held, wire.tolist(), strict=True):
+        lengths[c] = l_0 + cables[c].elongation(tension[c], l_0)
+    return lengths
+
+
 def require_domains(
     cables: Sequence[Cable],
     groups: Iterable[tuple[Elasticity, slice | NDArray[np.intp]]],

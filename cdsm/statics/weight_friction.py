@@ -29,6 +29,13 @@ _GROWTH, _MOST = 1.25, 100.0
 _HALVINGS = 6  # number of bisections of the load from which the arm slides; they reach 0.4 %
 
 
+def fading(size: float, cycles: int) -> Array:
+    """Return loads (2 cycles,) [N] that alternate; the amplitude falls linearly from ``size``."""
+    loads = size * (1.0 - np.arange(2 * cycles) / (2.0 * cycles))
+    loads[1::2] *= -1.0
+    return loads
+
+
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WeightFriction(ReadOnlyState):
@@ -138,10 +145,8 @@ class WeightFriction(ReadOnlyState):
     def _dithered_stiffness(self, size: float, cycles: int) -> float:
         """Compute weight over displacement [N/m] after dither cycles that begin with ±size [N]."""
         history, u = self.history, np.append(self.breakaway.direction, np.zeros(3))
-        fading = size * (1.0 - np.arange(2 * cycles) / (2.0 * cycles))
-        fading[1::2] *= -1.0
-        last = history.wrenches[-1]
-        path = np.vstack([history.wrenches, last + fading[:, None] * u, last])
+        last, added = history.wrenches[-1], fading(size, cycles)[:, None] * u
+        path = np.vstack([history.wrenches, last + added, last])
         pose, F = history.reference, history.reference_tension
         return self._secant(load_cycle(pose, F, path, accuracy=1e-2).tip)
 
