@@ -34,7 +34,7 @@ from cdsm.batch.layout import (
 )
 from cdsm.kernels.bodies import gravity_torque, set_gravity_stiffness, tip_jacobian
 from cdsm.kernels.compiling import Index, Width, inlined, lanes, threaded, upwards
-from cdsm.kernels.distribution import distribute, keep_balance, refuse, set_arms, set_torque
+from cdsm.kernels.distribution import distribute, keep_balance, set_arms, set_torque
 from cdsm.kernels.records import clear, copy, fetch, matrix, mirror, store, vector
 from cdsm.kernels.segments import (
     SHORTEST_SEGMENT,
@@ -43,6 +43,7 @@ from cdsm.kernels.segments import (
     set_lengths,
 )
 from cdsm.kernels.serpentine_guess import empty_guess
+from cdsm.kernels.serpentine_multipliers import set_proof
 from cdsm.kernels.stiffness import (
     add_passive_stiffness,
     set_cable_stiffness,
@@ -50,7 +51,7 @@ from cdsm.kernels.stiffness import (
     sum_terms,
 )
 from cdsm.kernels.stuck import add_stuck_stiffness, sticking_scratch
-from cdsm.kernels.tension import Balance, certificate
+from cdsm.kernels.tension import Balance, certificate, set_infeasible
 from cdsm.kernels.tree import Indices, empty_frames, forward_kinematics
 from cdsm.kernels.wires import set_rigidity, wire_scratch
 from cdsm.support.values import Array
@@ -163,7 +164,8 @@ def evaluate_rows(
                 for w in lanes(width):
                     failing += 1 if code[w] == UNDECIDED and guess.failed[w] >= 0.0 else 0
                 if failing and blocks.row.shape[0]:
-                    refuse(blocks, arms, torque, least, most, guess, check, zero, width)
+                    set_proof(blocks, arms, guess, check.y, zero, width)
+                    set_infeasible(arms, torque, least, most, guess.y, check, width)
                     for w in lanes(width):
                         if code[w] == UNDECIDED and check.certified[w] == 1.0:
                             code[w] = INFEASIBLE

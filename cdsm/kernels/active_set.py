@@ -98,9 +98,7 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State, width: Wid
     _start(J, b, state, width)
     entering, nothing = state.chosen[0], state.scratch[3]
     for w in lanes(width):
-        entering[w] = _NONE
-    for w in lanes(width):
-        nothing[w] = _DEPENDENT
+        entering[w], nothing[w] = _NONE, _DEPENDENT
     for _ in range(_STEPS * J.shape[0]):
         _choose(state.F, low, high, state.side, entering, state.scratch[0], width)
         busy = 0
@@ -120,9 +118,7 @@ def _start(J: Array, b: Array, state: State, width: Width) -> None:
     nv = np.uint64(J.shape[1])
     for c in upwards(0, J.shape[0]):
         for w in lanes(width):
-            side[c, w] = 0.0
-        for w in lanes(width):
-            z[c, w] = 0.0
+            side[c, w] = z[c, w] = 0.0
         for i in upwards(0, nv):
             for w in lanes(width):
                 system[i, nv + np.uint64(1) + c, w] = J[c, i, w]
@@ -185,12 +181,8 @@ def _step(low: Array, high: Array, state: State, width: Width) -> None:
     ``chosen`` returns the cables of the pivots, _NONE where there is none.
     """
     F, z, side, T, rate = state.F, state.z, state.side, state.tableau, state.cables[0]
-    sign, step, limit, nothing = (
-        state.scratch[0],
-        state.scratch[1],
-        state.scratch[2],
-        state.scratch[3],
-    )
+    sign, step, limit = state.scratch[0], state.scratch[1], state.scratch[2]
+    nothing = state.scratch[3]
     entering, pivot = state.chosen[0], state.chosen[1]
     for w in lanes(width):
         p = np.uint64(max(entering[w], 0))

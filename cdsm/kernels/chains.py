@@ -20,7 +20,8 @@ import math
 
 import numpy as np
 
-from cdsm.kernels.compiling import Width, compiled, inner, lanes, threaded, upwards
+from cdsm.kernels.compiling import compiled, inner, threaded
+from cdsm.kernels.motion import cross, dot
 from cdsm.kernels.segments import (
     Segments,
     segment_scratch,
@@ -28,14 +29,7 @@ from cdsm.kernels.segments import (
     set_direction,
     set_lengths,
 )
-from cdsm.kernels.tree import (
-    Frames,
-    Indices,
-    Routing,
-    Tree,
-    empty_frames,
-    forward_kinematics,
-)
+from cdsm.kernels.tree import Frames, Indices, Routing, Tree, empty_frames, forward_kinematics
 from cdsm.support.values import Array
 
 STRAIGHT = 1e-9
@@ -43,7 +37,7 @@ STRAIGHT = 1e-9
 
 
 @inner
-def set_wraps(
+def _set_wraps(
     span: Indices,
     joint: Indices,
     hole: Indices,
@@ -53,57 +47,34 @@ def set_wraps(
     after: Segments,
     wrap: Array,
     gradient: Array,
-    normal: Array,
-    width: Width,
 ) -> None:
-    """Fill ``wrap`` (P, W) with φ of every hole, and ``gradient`` (P, nv, W) with ∂φ/∂θ.
+    """Fill ``wrap`` (P,) with φ of every hole of one posture; add ∂φ/∂θ to ``gradient``.
 
     Segment s is between the sites 2 s and 2 s + 1; ``hole`` (P,) is the segment before each hole.
     ``span`` (S, 3) are places in ``joint``: where the joints of a segment start, where those on the
     path to its second site start, and where they end. ``own`` (P,) is a constant angle added to φ.
-    ``normal`` (7, W) is scratch: u × v, p/ℓ_u or q/ℓ_v, and |u × v|.
+    ``gradient`` is (P, nv), zero on entry.
     """
-    u, v, sine = before.direction, after.direction, normal[6]
-    for h in upwards(0, hole.shape[0]):
-        s = np.uint64(hole[h])
-        first, second = np.uint64(2) * s, np.uint64(2) * s + np.uint64(3)
-        middle = np.uint64(2) * s + np.uint64(1)
-        set_direction(frames.site, first, middle, before, width)
-        set_direction(frames.site, middle, second, after, width)
-        for r in range(3):
-            m, n = (r + 1) % 3, (r + 2) % 3
-            for w in lanes(width):
-                normal[r, w] = u[m, w] * v[n, w] - u[n, w] * v[m, w]
-        for w in lanes(width):
-            sine[w] = math.sqrt(
-                normal[0, w] * normal[0, w]
-                + normal[1, w] * normal[1, w]
-                + normal[2, w] * normal[2, w]
-            )
-        for w in lanes(width):
-            cosine = u[0, w] * v[0, w] + u[1, w] * v[1, w] + u[2, w] * v[2, w]
-            wrap[h, w] = math.atan2(sine[w], cosine) + own[h]
-        for i in upwards(0, gradient.shape[1]):
-            for w in lanes(width):
-                gradient[h, i, w] = 0.0
+    u, v = before.direction.reshape(3), after.direction.reshape(3)
+    normal, arm = np.empty(3), np.empty(3)
+    for h in range(hole.shape[0]):
+        first, middle, second = 2 * hole[h], 2 * hole[h] + 1, 2 * hole[h] + 3
+        set_direction(frames.site, first, middle, before, None)
+        set_direction(frames.site, middle, second, after, None)
+        cross(u, v, normal)
+        sine = math.sqrt(dot(normal, normal))
+        wrap[h] = math.atan2(sine, dot(u, v)) + own[h]
         for side in range(2):  # p and d of the segment before the hole, then q and e
-            far, scratch = (first, before) if side == 0 else (second, after)
-            a, inverse, sign = scratch.direction, scratch.inverse, 1.0 if side == 0 else -1.0
+            far, scratch, sign = (first, before, 1.0) if side == 0 else (second, after, -1.0)
+            scale = scratch.inverse[0] / sine if sine > STRAIGHT else 0.0
+            cross(normal, scratch.direction.reshape(3), arm)
             for r in range(3):
-                m, n = (r + 1) % 3, (r + 2) % 3
-                for w in lanes(width):
-                    across = normal[m, w] * a[n, w] - normal[n, w] * a[m, w]
-                    scale = inverse[w] / sine[w] if sine[w] > STRAIGHT else 0.0
-                    normal[3 + r, w] = sign * scale * across
-            row = np.intp(s) + side
+                arm[r] *= sign * scale
+            row = hole[h] + side
             for t in range(span[row, 0], span[row, 2]):
-                j = np.uint64(joint[t])
-                d, i = scratch.derivative, j - np.uint64(1)
-                set_derivative(frames, 1.0 if t >= span[row, 1] else -1.0, far, j, d, width)
-                for w in lanes(width):
-                    gradient[h, i, w] -= (
-                        normal[3, w] * d[0, w] + normal[4, w] * d[1, w] + normal[5, w] * d[2, w]
-                    )
+                d, j = scratch.derivative, joint[t]
+                set_derivative(frames, 1.0 if t >= span[row, 1] else -1.0, far, j, d, None)
+                gradient[h, j - 1] -= dot(arm, d.reshape(3))
 
 
 @compiled
@@ -127,7 +98,7 @@ def single_chains(
     """Compute the segments and wrap angles of one posture at q (nv,).
 
     The arguments are the fields of :class:`Tree`, those of the :class:`Routing` of the segments,
-    and those that :func:`set_wraps` needs.
+    and those that :func:`_set_wraps` needs.
 
     Returns:
         l (S,), ∂l/∂θ (S, nv), φ (P,), ∂φ/∂θ (P, nv), and the fields of :class:`Frames`, all
@@ -139,16 +110,16 @@ def single_chains(
     before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)
     frames = empty_frames(tree, routing, 1)
     length, J, shortest = np.empty((count, 1)), np.empty((count, nv, 1)), np.empty(1)
-    wrap, gradient = np.empty((holes, 1)), np.empty((holes, nv, 1))
+    wrap, gradient = np.empty(holes), np.zeros((holes, nv))
     rotation = np.empty((rows, 3, 3, 1))
     forward_kinematics(tree, routing, q.reshape(nv, 1), np.empty((2, 1)), rotation, frames, None)
     set_lengths(routing, frames, before, length, J, shortest, None)
-    set_wraps(span, joint, hole, own, frames, before, after, wrap, gradient, np.empty((7, 1)), None)
+    _set_wraps(span, joint, hole, own, frames, before, after, wrap, gradient)
     return (
         length.reshape(count),
         J.reshape(count, nv),
-        wrap.reshape(holes),
-        gradient.reshape(holes, nv),
+        wrap,
+        gradient,
         frames.origin.reshape(rows, 3),
         frames.axis.reshape(rows, 3),
         frames.slide.reshape(joint_slide.shape[0], 3),
@@ -170,20 +141,18 @@ def grip_rows(
     """Fill ``grip`` (B, C) [-] with Σ μ φ over the holes of each cable at angles q (B, nv) [rad].
 
     ``routing`` is that of the segments; ``cable`` and ``friction`` (P,) are those of the holes;
-    ``hole`` and ``own`` (P,) are as for :func:`set_wraps`.
+    ``hole`` and ``own`` (P,) are as for :func:`_set_wraps`.
     """
     rows, nv = q.shape
     before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)
     frames = empty_frames(tree, routing, 1)
-    rotation, normal = np.empty((tree.parent.shape[0], 3, 3, 1)), np.empty((7, 1))
-    wrap, gradient = np.empty((hole.shape[0], 1)), np.empty((hole.shape[0], 0, 1))
+    rotation = np.empty((tree.parent.shape[0], 3, 3, 1))
+    wrap, gradient = np.empty(hole.shape[0]), np.empty((hole.shape[0], 0))
     span = np.zeros((routing.fixed.shape[0], 3), dtype=np.intp)  # no joints: no gradient
     for n in range(rows):
         angles = q[n].copy().reshape(nv, 1)
         forward_kinematics(tree, routing, angles, np.empty((2, 1)), rotation, frames, None)
-        set_wraps(
-            span, routing.joint, hole, own, frames, before, after, wrap, gradient, normal, None
-        )
+        _set_wraps(span, routing.joint, hole, own, frames, before, after, wrap, gradient)
         grip[n] = 0.0
         for h in range(hole.shape[0]):
-            grip[n, cable[h]] += friction[h] * wrap[h, 0]
+            grip[n, cable[h]] += friction[h] * wrap[h]

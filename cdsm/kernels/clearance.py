@@ -56,25 +56,18 @@ def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> f
         out = _radius(p, q, centre, axis, z0 / (z0 - z1))
         if out < radius:
             return out - radius
-    low, high = 0.0, 1.0
-    a, b = 1.0 - _GOLDEN, _GOLDEN
-    at_a, at_b = (
-        _off(p, q, centre, axis, radius, z0, z1, a),
-        _off(p, q, centre, axis, radius, z0, z1, b),
-    )
+    disk, low, high, a, b = (p, q, centre, axis, radius, z0, z1), 0.0, 1.0, 1.0 - _GOLDEN, _GOLDEN
+    at_a, at_b = _off(*disk, a), _off(*disk, b)
     for _ in range(_CUTS):
         if at_a < at_b:
             high, b, at_b = b, a, at_a
             a = high - _GOLDEN * (high - low)
-            at_a = _off(p, q, centre, axis, radius, z0, z1, a)
+            at_a = _off(*disk, a)
         else:
             low, a, at_a = a, b, at_b
             b = low + _GOLDEN * (high - low)
-            at_b = _off(p, q, centre, axis, radius, z0, z1, b)
-    ends = min(  # the section never evaluates the two ends
-        _off(p, q, centre, axis, radius, z0, z1, 0.0),
-        _off(p, q, centre, axis, radius, z0, z1, 1.0),
-    )
+            at_b = _off(*disk, b)
+    ends = min(_off(*disk, 0.0), _off(*disk, 1.0))  # the section never evaluates these two
     return math.sqrt(min(at_a, at_b, ends))
 
 

@@ -22,7 +22,6 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import config, njit
-from numba.core import event
 from numba.core.caching import IndexDataCacheFile
 from numba.core.compiler import Compiler
 from numba.core.dispatcher import Dispatcher
@@ -201,6 +200,8 @@ def _patient(function: _Function) -> _Function:
         patient = not known and spent < _PATIENCE if wide else few
         if patient and not _at_once:
             return partial(run, start, wide)
+        if not known:
+            _announce()
         return cast(Callable[..., Any], load_or_compile(*arguments))
 
     kernel._compile_for_args, kernel.is_new = choose, is_new
@@ -220,22 +221,11 @@ def _native(result: Any) -> Any:
     return result.item() if isinstance(result, np.generic) else result
 
 
-class _Announcement(event.Listener):
+@cache
+def _announce() -> None:
     """Log once that kernels are compiled: the first use on a machine takes a minute or two."""
+    _log.warning("compiling kernels, once on this machine: one or two minutes in all")
 
-    logged = False
-
-    def on_start(self, event: event.Event) -> None:
-        module = event.data["dispatcher"].py_func.__module__
-        if not self.logged and module.startswith("cdsm."):
-            self.logged = True
-            _log.warning("compiling kernels, once on this machine: one or two minutes in all")
-
-    def on_end(self, event: event.Event) -> None:
-        pass
-
-
-event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
 
 WIDTH = 64
 """Largest number of postures in a block of a compiled kernel: some vectors of the processor."""

@@ -23,21 +23,9 @@ from cdsm.kernels.compiling import (
     upwards,
 )
 from cdsm.kernels.records import fetch
-from cdsm.kernels.serpentine_guess import (
-    Blocks,
-    Guess,
-    empty_guess,
-    guess_tensions,
-    set_multipliers,
-    set_proof,
-)
-from cdsm.kernels.tension import (
-    Balance,
-    Certificate,
-    certificate,
-    set_infeasible,
-    set_optimal,
-)
+from cdsm.kernels.serpentine_guess import Blocks, Guess, empty_guess, guess_tensions
+from cdsm.kernels.serpentine_multipliers import set_multipliers
+from cdsm.kernels.tension import Balance, Certificate, certificate, set_infeasible, set_optimal
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
@@ -102,38 +90,9 @@ def distribute(
     guess_tensions(blocks, J, b, low, high, guess, width)
     set_multipliers(blocks, J, guess.F, guess, guess.y, width)
     set_optimal(J, b, low, high, guess.F, guess.y, certificate, width)
-    set_within(guess.F, low, high, tension, width)
-
-
-@inner
-def refuse(
-    blocks: Blocks,
-    J: Array,
-    b: Array,
-    low: Array,
-    high: Array,
-    guess: Guess,
-    certificate: Certificate,
-    zero: Array,
-    width: Width,
-) -> None:
-    """Set ``certificate.certified`` to 1 where the guess gives a proof of infeasibility, else to 0.
-
-    ``zero`` (C, W) are zeros; the other arguments are those of :func:`distribute`, after it.
-    """
-    set_proof(blocks, J, guess, certificate.y, zero, width)
-    set_infeasible(J, b, low, high, guess.y, certificate, width)
-
-
-@inner
-def set_within(F: Array, low: Array, high: Array, tension: Array, width: Width) -> None:
-    """Fill ``tension`` (C, W) with F limited to the bounds ``low`` and ``high`` (C, W).
-
-    Rounding may have moved F slightly beyond them.
-    """
-    for c in upwards(0, F.shape[0]):
+    for c in upwards(0, tension.shape[0]):  # rounding may have moved F slightly beyond the bounds
         for w in lanes(width):
-            tension[c, w] = min(max(F[c, w], low[c, w]), high[c, w])
+            tension[c, w] = min(max(guess.F[c, w], low[c, w]), high[c, w])
 
 
 @compiled

@@ -8,7 +8,7 @@ import numpy as np
 
 from cdsm.kernels.bodies import Masses
 from cdsm.kernels.compiling import threaded
-from cdsm.kernels.posture import single_pose
+from cdsm.kernels.posture import compute_pose
 from cdsm.kernels.stiffness import single_cable_stiffness, single_stiffness
 from cdsm.kernels.tree import Indices, Routing, Tree
 from cdsm.support.values import Array
@@ -47,29 +47,19 @@ def stiffness_of_draws(
     (N, nv), tensions, EA (1 + ε) (N, C), leads (N, C), masses (N, nv+1), and (N, …) sites, joint
     origins, centres of mass and tip.
     """
-    row, tip_joints = routing.row, masses.tip_joints
-    cables, fixed = tension.shape[1], np.empty(tension.shape[1])
-    none = np.zeros(cables)
+    row, tip_joints, count = routing.row, masses.tip_joints, tension.shape[1]
+    fixed, none = np.empty(count), np.zeros(count)
     for n in range(q.shape[0]):
-        for c in range(cables):  # segments within one link
+        for c in range(count):  # segments within one link
             fixed[c] = lead[n, c]
             for a in range(first[c], first[c + 1] - 1):
                 if row[a] == row[a + 1]:
                     x = site[n, a + 1, 0] - site[n, a, 0]
                     y, z = site[n, a + 1, 1] - site[n, a, 1], site[n, a + 1, 2] - site[n, a, 2]
                     fixed[c] += math.sqrt(x * x + y * y + z * z)
-        pose, JX, L, J, g, weight, joint_origin, axis, slide, place, _ = single_pose(
-            tree.parent,
-            tree.order,
-            tree.turn,
-            origin[n],
-            tree.axis,
-            tree.slide,
-            row,
-            site[n],
-            routing.segment,
-            routing.joint,
-            fixed,
+        joints = Tree(tree.parent, tree.order, tree.turn, origin[n], tree.axis, tree.slide)
+        cables = Routing(row, site[n], routing.segment, routing.joint, fixed)
+        bodies = Masses(
             mass[n],
             centre[n],
             masses.gravity,
@@ -77,24 +67,12 @@ def stiffness_of_draws(
             tip_joints,
             masses.rotation,
             tip_point[n],
-            q[n],
         )
+        found = compute_pose(joints, cables, bodies, q[n])
+        (pose, JX, L, J, g, weight), frames = found[:6], found[6:10]
         k = single_cable_stiffness(L, tension[n], rigidity[n], none, series, rest)
-        terms = single_stiffness(
-            routing.segment,
-            routing.joint,
-            joint_origin,
-            axis,
-            slide,
-            place,
-            JX,
-            J,
-            weight,
-            tension[n],
-            k,
-            wrench,
-            tip_joints,
-        )
+        turned = routing.segment, routing.joint, *frames, JX, J, weight
+        terms = single_stiffness(*turned, tension[n], k, wrench, tip_joints)
         joint_stiffness[n], length_jacobian[n] = terms[4], J
         for i in range(q.shape[1]):
             torque[n, i] = -g[i]

@@ -180,10 +180,8 @@ class _Operations(ast.NodeTransformer):
         return _call("_select", node.test, node.body, node.orelse) if array else node
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
-        array, way = (
-            self._is_array(node),
-            ast.BitOr() if isinstance(node.op, ast.Or) else ast.BitAnd(),
-        )
+        array = self._is_array(node)
+        way = ast.BitOr() if isinstance(node.op, ast.Or) else ast.BitAnd()
         self.generic_visit(node)
         return reduce(lambda a, b: ast.BinOp(a, way, b), node.values) if array else node
 

@@ -50,10 +50,7 @@ def add_passive_stiffness(
     count, nv, one = np.uint64(J.shape[0]), np.uint64(J.shape[1]), np.uint64(1)
     for first in range(0, J.shape[0], 3):
         c = np.uint64(first)
-        d, e = (
-            min(c + np.uint64(1), count - np.uint64(1)),
-            min(c + np.uint64(2), count - np.uint64(1)),
-        )
+        d, e = min(c + one, count - one), min(c + one + one, count - one)
         end = nv  # joints behind the end of a cable do not change its length
         while end > 0 and not _moves(J, c, d, e, end - one, width):
             end -= one

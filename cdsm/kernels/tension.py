@@ -163,13 +163,8 @@ def set_violations(
     bounds. Second, the largest |x + J y + z|, or z⁺ where high is infinite. Third, the duality gap
     |xᵀx + bᵀy + lowᵀz⁻ + highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
     """
-    primal, dual, gap, arm, term = (
-        violations[0],
-        violations[1],
-        violations[2],
-        violations[3],
-        violations[4],
-    )
+    primal, dual, gap = violations[0], violations[1], violations[2]
+    arm, term = violations[3], violations[4]
     for w in lanes(width):
         primal[w] = dual[w] = gap[w] = arm[w] = 0.0
     for i in upwards(0, b.shape[0]):
@@ -254,14 +249,8 @@ def set_infeasible(
     It does if vᵀb > vᵀJ_Lᵀ F for all low ≤ F ≤ high.
     """
     _, work, sums, force, certified = scratch
-    left, size, steepest, arm, torques, largest = (
-        sums[0],
-        sums[1],
-        sums[2],
-        sums[3],
-        sums[4],
-        sums[5],
-    )
+    left, size, steepest = sums[0], sums[1], sums[2]
+    arm, torques, largest = sums[3], sums[4], sums[5]
     for w in lanes(width):
         left[w] = size[w] = steepest[w] = arm[w] = torques[w] = largest[w] = force[w] = 0.0
     for i in upwards(0, b.shape[0]):
@@ -299,21 +288,3 @@ def set_infeasible(
         turned = max(torques[w], (arm[w] if arm[w] > 0.0 else 1.0) * force[w])
         proved = left[w] > max(_PROOF * size[w], _MISSING * steepest[w] * turned)
         certified[w] = 1.0 if proved else 0.0
-
-
-@compiled
-def onto_bounds(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
-    """Return the point x (n,) with the entries at or outside a bound set exactly to the bound.
-
-    Multipliers z (n,) mark the bounds: negative at low, positive at high. A solver misses bounds by
-    up to ``rounding``. A law whose domain starts above zero needs an exact zero.
-    """
-    point = np.empty_like(x)
-    for j in range(x.shape[0]):
-        if x[j] - low[j] <= (rounding if z[j] < 0.0 else 0.0):
-            point[j] = low[j]
-        elif high[j] - x[j] <= (rounding if z[j] > 0.0 else 0.0):
-            point[j] = high[j]
-        else:
-            point[j] = x[j]
-    return point

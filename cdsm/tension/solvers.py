@@ -13,6 +13,7 @@ import numpy as np
 
 from cdsm.errors import SolverError
 from cdsm.kernels import tension as tension_kernels
+from cdsm.kernels.compiling import compiled
 from cdsm.kernels.tension import DISTANCE, OPTIMALITY
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array
@@ -89,7 +90,25 @@ def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
             return f"calls a point optimal that is not: {shortfall}"
     # after the check: near infeasibility, large multipliers make the last bit of x matter
     x, _, z = point
-    return tension_kernels.onto_bounds(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
+    return onto_bounds(x, z, low, high, OPTIMALITY * max(1.0, float(abs(x).max())))
+
+
+@compiled
+def onto_bounds(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
+    """Return the point x (n,) with the entries at or outside a bound set exactly to the bound.
+
+    Multipliers z (n,) mark the bounds: negative at low, positive at high. A solver misses bounds by
+    up to ``rounding``. A law whose domain starts above zero needs an exact zero.
+    """
+    point = np.empty_like(x)
+    for j in range(x.shape[0]):
+        if x[j] - low[j] <= (rounding if z[j] < 0.0 else 0.0):
+            point[j] = low[j]
+        elif high[j] - x[j] <= (rounding if z[j] > 0.0 else 0.0):
+            point[j] = high[j]
+        else:
+            point[j] = x[j]
+    return point
 
 
 def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:

@@ -10,7 +10,7 @@ import pytest
 import cdsm
 from cdsm.batch import evaluator
 from cdsm.batch.fused_kernel import evaluate_rows
-from cdsm.kernels import active_set, serpentine_guess, tension
+from cdsm.kernels import active_set, serpentine_guess, serpentine_multipliers, tension
 from cdsm.kernels.distribution import UNDECIDED, search_tensions
 from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm, one_hinge
@@ -323,8 +323,8 @@ def test_search_alone_finds_the_optimum_or_a_proof(name: str) -> None:
 
 def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
     guess_tensions = from_python(serpentine_guess.guess_tensions)
-    set_multipliers = from_python(serpentine_guess.set_multipliers)
-    set_proof = from_python(serpentine_guess.set_proof)
+    set_multipliers = from_python(serpentine_multipliers.set_multipliers)
+    set_proof = from_python(serpentine_multipliers.set_proof)
     empty_guess = from_python(serpentine_guess.empty_guess)
     arm = shallow_arm(5)
     parts = serpentine_guess.find_blocks(arm._model.routing, arm.nv)

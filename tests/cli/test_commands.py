@@ -14,7 +14,10 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import cdsm
+from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.cli import app, options
+from cdsm.kernels.breakaway import set_breakaway
+from cdsm.kernels.distribution import search_tensions
 from cdsm.tension import DEFAULT_SOLVER
 from tests.interchange.test_caspr import cable, folder, link
 from tests.support.patience import HANGS
@@ -603,6 +606,8 @@ def test_warm_compiles_all_kernels_and_says_how_long_it_took() -> None:
     result = call("warm")
     assert result.exit_code == 0, result.output
     assert "kernels are compiled" in result.output
+    kernels: tuple[Any, ...] = (evaluate_rows, search_tensions, set_breakaway)
+    assert all(kernel.signatures for kernel in kernels)
 
 
 def test_first_line_says_what_was_computed_with(geometry: Path, tmp_path: Path) -> None:

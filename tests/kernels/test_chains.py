@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.kernels.chains import set_wraps
-from cdsm.kernels.segments import segment_scratch
 from cdsm.support.values import Array
 from tests.support import foreign
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.support.differences import assert_second_order
-from tests.support.kernels import block, from_python
 
 
 def weaver() -> cdsm.Manipulator:
@@ -122,20 +119,3 @@ def test_straight_cable_has_a_kink_with_gradient_zero() -> None:
         bent = arm.at([angle]).segments
         np.testing.assert_allclose(bent.wrap, abs(angle) / 2.0, rtol=1e-9)
         np.testing.assert_allclose(bent.wrap_jacobian, math.copysign(0.5, angle), rtol=1e-9)
-
-
-def test_block_of_postures_has_the_bits_of_one() -> None:
-    arm = weaver()
-    poses = [arm.at(foreign.POSTURE * factor) for factor in (1.0, 0.4, -0.6)]
-    frames = [pose.segments._frames for pose in poses]
-    stacked = type(frames[0])(*(block(np.array(part)) for part in zip(*frames, strict=True)))
-    _, _, _, joint, _, span, hole, own = arm._model.chain_arrays
-    count, nv, width = len(hole), arm.nv, len(poses)
-    wrap, gradient = np.empty((count, width)), np.empty((count, nv, width))
-    scratch = from_python(segment_scratch)
-    before, after, normal = scratch(nv, width), scratch(nv, width), np.empty((7, width))
-    kernel = from_python(set_wraps)
-    kernel(span, joint, hole, own, stacked, before, after, wrap, gradient, normal, width)
-    for w, pose in enumerate(poses):
-        np.testing.assert_array_equal(wrap[:, w], pose.segments.wrap)
-        np.testing.assert_array_equal(gradient[..., w], pose.segments.wrap_jacobian)

@@ -21,10 +21,10 @@ from tests.support.processes import ROOT
 CACHED = """
 import numpy as np
 from cdsm.kernels.compiling import at_once
-from cdsm.kernels.tension import onto_bounds
+from cdsm.kernels.tension import scaled_balance
 with at_once():
-    onto_bounds(*np.zeros((4, 2)), 0.0)
-print(sum(onto_bounds.stats.cache_hits.values()))
+    scaled_balance(np.zeros((1, 1)), *np.zeros((3, 1)), 1.0)
+print(sum(scaled_balance.stats.cache_hits.values()))
 """
 
 READ_ONLY = """

@@ -7,6 +7,7 @@ import numpy as np
 
 from cdsm.kernels import tension as tension_kernels
 from cdsm.support.values import Array, frozen
+from cdsm.tension.solvers import onto_bounds
 from tests.support.kernels import block, from_python
 
 
@@ -59,7 +60,7 @@ def test_only_what_is_pressed_against_a_bound_or_outside_is_set_onto_it() -> Non
     )
     x, z, expected = np.array(cases).T
     bounds = np.full(x.size, low), np.full(x.size, high)
-    np.testing.assert_array_equal(tension_kernels.onto_bounds(x, z, *bounds, r), expected)
+    np.testing.assert_array_equal(onto_bounds(x, z, *bounds, r), expected)
 
 
 # --- certificates ---------------------------------------------------------------------------
