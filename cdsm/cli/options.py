@@ -235,7 +235,7 @@ class WeightOptions:
     ] = None
     mass: Annotated[
         float | None,
-        _tension_option(help="Mass [kg] that hangs at the tip, along gravity.", min=0.0),
+        _tension_option(help="Mass [kg] that hangs at the tip, along gravity.", min=0.0, max=1e6),
     ] = None
 
     @property

@@ -154,9 +154,9 @@ def track(
     """
     from cdsm.cli.path_file import one_target, read_path
 
-    _require_ending("--out", out, ".nc", ".csv")
-    _require_ending("--animate", animate, ".gif", ".csv")
-    _require_ending("--figure", figure, ".pdf", ".svg", ".png")
+    _require_target("--out", out, ".nc", ".csv")
+    _require_target("--animate", animate, ".gif", ".csv")
+    _require_target("--figure", figure, ".pdf", ".svg", ".png")
     true.check()
     robot = arm.read()
     file = read_path(path, robot)
@@ -193,10 +193,14 @@ def track(
     answer(as_json, run.to_dict, conditions, run, warnings=run.warnings)
 
 
-def _require_ending(option: str, path: Path | None, *endings: str) -> None:
-    """Check that ``path`` of ``option`` has one of ``endings``, before a long simulation."""
-    if path is not None and path.suffix.lower() not in endings:
-        raise misuse(option, f"{path} ends in none of {', '.join(endings)}.")
+def _require_target(option: str, path: Path | None, *endings: str) -> None:
+    """Check ending and folder of ``path`` of ``option`` before a long simulation."""
+    from cdsm.support.files import require_folder
+
+    if path is not None:
+        if path.suffix.lower() not in endings:
+            raise misuse(option, f"{path} ends in none of {', '.join(endings)}.")
+        require_folder(path)
 
 
 def _wanted(text: str) -> tuple[Sequence[float], float | None]:

@@ -27,6 +27,7 @@ _OPTIONS: Final = {name: f"--{name.replace('_', '-')}" for name in _ALIKE} | {
 _PYTHON: Final = (
     (", or, in Python, pass check_limits=False to compute beyond them.", "."),
     ("Raise starts=, ask", "Ask"),
+    ("expected value. Give a small one.", "expected value. Give a small one: --friction 0.05."),
     ("give arm.with_friction(0.0).", "give --true-friction 0."),
     ("by its slack_below()", "with --slack-below"),
     ("slack_below()", "--slack-below"),

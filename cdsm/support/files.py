@@ -72,8 +72,7 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
         target = path.resolve()
         if target.exists() and not target.is_file():
             raise FileError(path, "is not a regular file; give the path of a file.")
-        if not target.parent.is_dir():
-            raise FileError(path, f"the folder {path.parent} does not exist; create it.")
+        require_folder(path)
         aside = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
         mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666
         os.close(os.open(aside, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
@@ -88,6 +87,12 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
             with contextlib.suppress(OSError):
                 aside.unlink()
     return path
+
+
+def require_folder(path: Path) -> None:
+    """Raise a FileError if the folder of a file to write does not exist."""
+    if not path.resolve().parent.is_dir():
+        raise FileError(path, f"the folder {path.parent} does not exist; create it.")
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from cdsm.errors import FileError, InvalidInput
 from cdsm.support.extras import need
-from cdsm.support.files import as_path, write_file
+from cdsm.support.files import as_path, require_folder, write_file
 from cdsm.support.tidy import check_sweep, checked_suffix, tidy
 
 if TYPE_CHECKING:
@@ -91,8 +91,7 @@ def check_target(path: str | os.PathLike[str]) -> None:
     path = as_path(path)
     if path.is_dir():
         raise FileError(path, "is a folder; give the path of a file.")
-    if not path.parent.is_dir():
-        raise FileError(path, f"the folder {path.parent} does not exist; create it.")
+    require_folder(path)
 
 
 def _read_netcdf(path: Path) -> xarray.Dataset:
@@ -107,7 +106,8 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
         with xarray.open_dataset(path, engine="netcdf4") as dataset:
             return dataset.load()
     except Exception as error:  # netCDF4 and xarray may raise anything
-        raise FileError(path, f"cannot be read as NetCDF: {error}.") from None
+        given = "give the .nc of a sweep, or the folder of its store"
+        raise FileError(path, f"cannot be read as NetCDF: {error}; {given}.") from None
 
 
 def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:

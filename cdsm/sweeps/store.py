@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import FileError, StoreError, listed
+from cdsm.support.files import require_folder
 from cdsm.sweeps.description import changed_laws
 from cdsm.sweeps.specification import EMPTY, Specification
 
@@ -87,8 +88,7 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
     import zarr
     from zarr.codecs import ZstdCodec
 
-    if not path.parent.is_dir():  # zarr would create the missing folder
-        raise FileError(path, f"the folder {path.parent} does not exist; create it.")
+    require_folder(path)  # zarr would create it
     aside = path.with_name(f".{path.name}-{secrets.token_hex(4)}")
     try:
         frame = specification.frame

@@ -122,6 +122,7 @@ def test_wrong_stiffness_is_refused(stiffness: str, files: tuple[Path, Path]) ->
         ("--out", "run.txt", ".nc, .csv"),
         ("--animate", "run.mp4", ".gif, .csv"),
         ("--figure", "run.bmp", ".pdf, .svg, .png"),
+        ("--figure", "absent/run.png", "the folder absent does not exist"),
     ],
 )
 def test_each_wrong_option_is_named(
