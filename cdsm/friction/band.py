@@ -23,7 +23,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 _ROOM = 1.1
-"""Size of the first neighbourhood over the first-order band; its growth if it is too small."""
+"""``room`` of the first neighbourhood; also its factor of growth, while it is too small."""
 
 _WIDENINGS = 8  # largest number of neighbourhoods that are tried; then the band is not proved
 _INSIDE = 0.999  # a band that reaches this part of its neighbourhood needs a larger neighbourhood
@@ -73,7 +73,7 @@ class RestBand(ReadOnlyState):
 
     @cached_property
     def tensions(self) -> Array:
-        """Least and largest tension (S, 2) [N] of each segment at rest; some milliseconds each."""
+        """Least and largest tension (S, 2) [N] of each segment at rest; some ms per segment."""
         return self._tensions(range(len(self.stiffness.posture.segments.lengths)))
 
     @cached_property
@@ -86,7 +86,7 @@ class RestBand(ReadOnlyState):
     def loads(self) -> Array:
         """Least and largest force along u (2,) [N] under which the reference may stay at rest.
 
-        They are added to the wrench of the reference. For each load between them, tensions that
+        These forces add to the wrench of the reference. For each force between them, tensions that
         friction allows balance the arm at exactly the angles of the reference.
         """
         if self.room == 0.0:
@@ -112,9 +112,9 @@ def rest_band(
     """Compute where along a direction the tip may rest, for any earlier loads.
 
     The reference is the posture with the given tension in all segments of each cable. The motors
-    are locked there, or control force. Any other loads may have acted before, besides ``wrench``.
-    The band is proved by linear programs with an outer correction for finite displacements and
-    nonlinear laws, unless :attr:`RestBand.proved` is false.
+    are locked there, or control force. Any other loads may have acted before ``wrench``. The band
+    is proved by linear programs with an outer correction for finite displacements and nonlinear
+    laws, unless :attr:`RestBand.proved` is false.
 
     Args:
         pose: The posture of the reference.

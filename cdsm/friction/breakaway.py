@@ -1,7 +1,8 @@
 """Breakaway: the load at which the first cable of a stuck arm begins to slide in a hole.
 
-To first order it is the least of the loads W_i of :mod:`cdsm.sticking`. From there, Newton's method
-finds the load at which the loaded arm, with all its cables stuck, reaches the bound of a hole.
+To first order it is the least of the loads W_i at which the cable begins to slide in hole i
+(:mod:`cdsm.sticking`). From there, Newton's method finds the load at which the loaded arm, with all
+its cables stuck, reaches the friction bound of a hole.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 _UNREACHED = 1e300  # ratio of tensions that no hole reaches: with it cables stick under every load
-_REACHED = 1e-9  # relative excess over the bound of a hole that counts as rounding
+_REACHED = 1e-9  # relative excess over the friction bound of a hole that counts as rounding
 
 _ITERATIONS = 50
 """Largest number of Newton steps; usually 3 to 5, and more if another hole slides first."""
@@ -34,8 +35,9 @@ _CONVERGED = 1e-10
 """Relative change of the load that ends the search: the remaining error is its square."""
 
 _ROUNDING = 1e-5
-"""Changes of the load below this part that no longer fall are rounding: an almost straight hole has
-almost no friction, and tensions are EA times a difference of lengths."""
+"""Largest relative change of the load that counts as rounding if the changes no longer fall. It is
+large because tensions are EA times a difference of lengths, and an almost straight hole has almost
+no friction."""
 
 
 @final
@@ -49,11 +51,11 @@ class Breakaway(ReadOnlyState):
         load: The breakaway load [N], in addition to the wrench of ``stiffness``; inf if no cable
             ever slides, as the force moves no joint; 0 without friction.
         first_order: The breakaway load in closed form [N], to first order in the load.
-        hole_loads: First-order load at which each hole begins to slide (P,) [N]; inf where it never
-            does, or where the hole cannot stick.
+        hole_loads: First-order load at which the cable begins to slide in each hole (P,) [N]; inf
+            for holes in which it never begins to slide, or cannot stick.
         cable: Name of the cable that slides first; None if the load is 0 or inf.
-        site: Number of the hole among the sites of ``cable``, from 1; None if ``cable`` is.
-        link: Name of the link of the hole; None if ``cable`` is.
+        site: Number of the hole among the sites of ``cable``, from 1; None if ``cable`` is None.
+        link: Name of the link of the hole; None if ``cable`` is None.
     """
 
     stiffness: Stiffness
@@ -202,7 +204,10 @@ def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float
 
 
 def segment_state(K: Stiffness) -> tuple[Array, Array]:
-    """Return T (S,) [N] and ∂T/∂θ (S, nv) [N/rad] of ``K``; InvalidInput if K is frictionless."""
+    """Return segment tensions T (S,) [N] and ∂T/∂θ (S, nv) [N/rad] of a stuck or sliding ``K``.
+
+    Raises InvalidInput if ``K`` is frictionless.
+    """
     if K.segment_tension is None or K.tension_gradient is None:
         raise InvalidInput("stiffness", "is frictionless; give one of stuck_stiffness.")
     return K.segment_tension, K.tension_gradient

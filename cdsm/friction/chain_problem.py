@@ -1,4 +1,4 @@
-"""Cables of an arm as chains of segments: their tensions, slips and energies at a fixed posture."""
+"""Compute tensions, slips and energies of cables at a posture; a cable is a chain of segments."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 _ITERATIONS = 60
-"""Newton steps on a law of rigidity. Linear laws need one, strands 3 to 6."""
+"""Largest number of Newton steps. Arms with linear laws need one, with strands 3 to 6."""
 
 _UNDAMPED = 20
 """Number of full Newton steps; later steps are halved, since kinks of a law may make them cycle."""
@@ -27,9 +27,9 @@ class Chain(NamedTuple):
     """State of all cables at a posture, after the slips; arrays are over the segments (S,)."""
 
     tension: Array  # T [N]
-    natural: Array  # a: natural length of the wire in the segment [m]
+    natural: Array  # a: natural length of the wire in the segment, its length at zero strain [m]
     slip: Array  # natural length [m] that moved to the next segment
-    slides: NDArray[np.bool_]  # whether the hole to the next segment slides
+    slides: NDArray[np.bool_]  # whether the cable slides in the hole to the next segment
     stretch: Array  # 1 + ε [-]
     compliance: Array  # −∂a/∂T at constant length [m/N]
 
@@ -45,10 +45,11 @@ class ChainProblem:
         cables: Cables of the arm.
         start: First segment of each cable; the last entry is the number of segments (C+1,).
         tension: F (C,) [N] at which the natural lengths are defined.
-        unstrained: Whether natural lengths are unstretched, or those under ``tension``.
+        unstrained: Whether ε is the strain of the law; if not, it is the strain beyond that at
+            ``tension``.
 
     Attributes:
-        laws: Each law with its cables.
+        laws: Each law with the indices of its cables.
     """
 
     def __init__(
@@ -113,7 +114,7 @@ class ChainProblem:
         supplied = ~np.isnan(forced)
         after[first[supplied]] = wire[first[supplied]]
         slack = (new == 0.0) & ~supplied[self._cable]
-        if slack.any():  # a slack cable remembers nothing: its surplus spreads evenly
+        if slack.any():  # the wire of a slack cable moves freely: it spreads evenly over segments
             surplus = np.add.reduceat(after, first) / np.add.reduceat(wire, first)
             after = np.where(slack, wire * surplus[self._cable], after)
         return Chain(new, after, slip, slides, stretch, compliance)

@@ -15,10 +15,10 @@ _NEAR = 1e-9
 
 
 class Neighbourhood:
-    """States near a reference: ``room`` times the set of those at rest to first order.
+    """States near a reference: ``room`` times the set of all states at rest to first order.
 
-    δ is the change of the joint angles, ΔT_j that of the tension of segment j, and g_j the gradient
-    of its length. In a cable of tension F, write ΔT_j = F (y_j + ȳ), with ȳ the mean of ΔT_j/F,
+    δ is the change of the joint angles, ΔT_j the change of tension of segment j, and g_j the
+    gradient of its length. In a cable of tension F, ΔT_j = F (y_j + ȳ), with ȳ the mean of ΔT_j/F,
     weighted with the compliances of the segments. If the motor is locked, F ȳ = k Σ_j g_j·δ, with k
     the stiffness of the whole cable. Equilibrium becomes K_θ δ = −Σ_j F y_j g_j with the
     frictionless K_θ. From segment to segment, y changes by any amount within ±μ φ of the hole. A
@@ -57,7 +57,10 @@ class Neighbourhood:
         self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
     def still(self, K: Stiffness) -> Self:
-        """Return the states with the joint angles of the reference, ``K``: |ln T/F| ≤ Σ μ φ."""
+        """Return the states at the joint angles of the reference ``K``; only tensions differ.
+
+        Over the holes of a cable, |ln T/F| ≤ Σ μ φ.
+        """
         segments = K.posture.segments
         chains, grip = segments.chains, np.zeros(len(segments.lengths))
         grip[chains.hole] = segments.grip
@@ -80,6 +83,6 @@ class Neighbourhood:
         return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)
 
     def cubed(self, form: Array) -> float:
-        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 for joint motions δ, A ``form`` (nv,)*3."""
+        """Bound |Σ A_ijk δ_i δ_j δ_k|/6 over the joint motions δ; ``form`` is A (nv, nv, nv)."""
         first = np.tensordot(self._steps, form, (0, 0))
         return float(abs(self._steps.T @ first @ self._steps).sum()) / 6.0

@@ -19,7 +19,7 @@ from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
-_STEP = 1e-4  # step of finite differences [rad], [m]; their truncation is added to the bound
+_STEP = 1e-4  # step of finite differences [rad] or [m]; their truncation is added to the bounds
 
 TOO_FAR = "finds no band: friction may keep the arm too far from the reference"
 """Error message if a neighbourhood is so wide that the bounds do not exist."""
@@ -30,8 +30,9 @@ _ITERATIONS = 30  # steps of a fixed point that converges by a factor of ten or 
 class Remainders:
     """Bounds of the remainders of Taylor expansions in the neighbourhood |δ| ≤ ρ.
 
-    A prismatic joint counts as a rotation by ρ/r with the lever r, which moves points as far. Each
-    bound is the largest difference between a quantity and its expansion.
+    δ is the change of the joint angles. A prismatic joint counts as a rotation by ρ/r with the
+    lever r, which moves points as far. Each attribute bounds the difference between a quantity and
+    its expansion.
 
     Attributes:
         length: Length of each segment, expanded to second order (S,) [m].
@@ -102,7 +103,7 @@ class Bends:
         self.body = np.stack(weight, axis=-1) / (2.0 * _STEP) + self.of_wrench(K.wrench)
 
     def of_wrench(self, wrench: Array) -> Array:
-        """Compute −∂²(J_Xᵀ W)/∂θ² (nv, nv, nv) of a wrench (6,)."""
+        """Compute −∂²(J_Xᵀ W)/∂θ² (nv, nv, nv) [N m/rad²] of ``wrench`` W (6,)."""
         loads = [
             [single_load_stiffness(end.jacobian, wrench, self._joints) for end in pair]
             for pair in self._ends

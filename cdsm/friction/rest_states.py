@@ -18,7 +18,7 @@ contains all states of rest in the neighbourhood (outer correction):
 - Over a range |ΔT| ≤ ρ_T of tensions, 1/(1 + ε) falls, and lies between two parallel lines.
 - Products of δ and ΔT are at most those of ρ and ρ_T.
 
-The answer of a linear program is not trusted: its multipliers give a bound by weak duality.
+The maximum that the solver returns is no proof. Its multipliers give one, by weak duality.
 """
 
 from __future__ import annotations
@@ -43,15 +43,11 @@ _CELLS = 8192  # number of tension intervals; within each, the strain is only kn
 
 
 class End(NamedTuple):
-    """Maximum of a linear program over the polyhedron.
+    """Maximum of a linear program over the polyhedron."""
 
-    ``value`` is the solver's answer, ``bound`` the proved upper bound, and ``reach`` the largest
-    |variable| of the solution, where 1 is the border of the neighbourhood.
-    """
-
-    value: float
-    bound: float
-    reach: float
+    value: float  # the solver's answer
+    bound: float  # proved upper bound
+    reach: float  # largest |variable| of the solution; 1 is the border of the neighbourhood
 
 
 class RestStates:
@@ -127,9 +123,9 @@ class RestStates:
         return frozen(np.maximum(np.array(bounds), 0.0))
 
     def load(self, u: Array) -> float:
-        """Compute the largest force [N] along u (3,) that some tensions balance.
+        """Compute the largest force [N] along u (3,) that some tensions of the polyhedron balance.
 
-        It requires ρ = 0: no joint moves.
+        The neighbourhood needs ρ = 0 (:meth:`Neighbourhood.still`): no joint moves.
         """
         from scipy.sparse import csc_array, hstack
 
@@ -153,7 +149,7 @@ class RestStates:
         return self._largest(np.append(np.zeros(low.size), 1.0), widened).bound
 
     def _largest(self, cost: Array, program: tuple[Any, ...] | None = None) -> End:
-        """Maximize cost · x over the polyhedron; the multipliers give the proved bound."""
+        """Maximize cost · x over the polyhedron, or over that of another linear ``program``."""
         scale = float(abs(cost).max())
         if scale == 0.0:
             return End(0.0, 0.0, 0.0)
@@ -234,13 +230,13 @@ def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tupl
 class _Wire(NamedTuple):
     """Bounds of b = 1/(1 + ε) of a cable over its range of tensions: two parallel lines.
 
-    b_F + slope ΔT + below ≤ b ≤ b_F + slope ΔT + above, with b_F = ``share``; |b − b_F| ≤ change.
+    b_F + slope ΔT + below ≤ b ≤ b_F + slope ΔT + above, and |b − b_F| ≤ change.
     """
 
-    least: float
-    most: float
-    share: float
-    slope: float
+    least: float  # lowest tension [N]
+    most: float  # highest tension [N]
+    share: float  # b_F, which is b at the reference
+    slope: float  # [1/N]
     below: float
     above: float
     change: float

@@ -20,7 +20,7 @@ _RATIO = 1e-9  # largest relative deviation of a ratio of tensions that counts a
 def stuck_stiffness(
     pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
 ) -> Stiffness:
-    """Compute the stiffness while all cables stick: what a load below :func:`breakaway` measures.
+    """Compute the stiffness while all cables stick: loads below :func:`breakaway` measure it.
 
     Each segment between two holes is a separate spring k_j = EA(F)/a_j with the natural length a_j:
     K_θ = Σ_j (F H_j + k_j g_j g_jᵀ) + gravity + load, with g_j = ∂l_j/∂θ and H_j = ∂²l_j/∂θ². l_j
@@ -54,9 +54,9 @@ def sliding_stiffness(
         pose: The posture.
         tension: T (S,) [N] of the segments of :attr:`Posture.segments`, not negative; or F (C,) [N]
             at the actuators: the tensions beyond each sliding hole then follow from it.
-        sliding: One sign per hole of :attr:`Posture.segments`, (P,): 0 where the cable sticks, 1
-            where the tension behind the hole is larger by the factor exp(μ φ), −1 where it is
-            smaller by this factor.
+        sliding: One sign per hole of :attr:`Posture.segments`, (P,): 0 where the cable sticks; 1
+            where the tension of the next segment, farther from the motor, is larger by the factor
+            exp(μ φ); −1 where it is smaller by this factor.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; default zero.
 
     Raises:
@@ -118,8 +118,8 @@ def assemble_segments(
 ) -> Stiffness:
     """Compute the stiffness from checked tensions T (S,) [N] of the segments.
 
-    ``sliding`` (P,) marks the holes in which cables slide. ``friction`` and ``distribution`` are
-    stored in the result.
+    ``sliding`` (P,) marks the holes in which cables slide. The result stores ``friction``
+    (``"stuck"`` or ``"sliding"``) and ``distribution``.
     """
     model, segments = pose.arm._model, pose.segments
     gradient = tension_gradient(pose, tension, sliding)

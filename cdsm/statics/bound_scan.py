@@ -44,12 +44,16 @@ def failure_at(at: StiffnessAt, place: float) -> Limit:
 
 
 def _balances(at: StiffnessAt, place: float) -> bool:
-    """Check whether some tensions within all laws balance the arm at ``place``, bound or factor."""
+    """Return whether tensions in the domains of all elasticities balance the arm at ``place``."""
     return failure_at(at, place) in ("none", "buckling")
 
 
 def tension_domain(arm: Manipulator) -> tuple[float, float]:
-    """Return the range [N] within all maxima and within the laws of position-controlled cables."""
+    """Return the range (low, high) [N] of lower bounds of tension that an arm allows.
+
+    It is below the maximum of every cable, and within the domain of every elasticity of a
+    position-controlled cable.
+    """
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
     ends = [*(each.high for each in domains), *(each.maximum for each in arm.cables)]
@@ -68,9 +72,9 @@ def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float,
 def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
     """Return the end [N] of a scan of the lower bound from ``low``, at most ``highest``.
 
-    The scan ends where no tensions balance the arm within the domains of the elasticities. If some
-    always do, it ends where the terms of K_θ that grow with the tension decide whether K_θ is
-    positive definite.
+    The scan ends where no tensions balance the arm within the domains of the elasticities. If
+    tensions balance it at every bound, the scan ends where the terms of K_θ that grow with the
+    tension decide whether K_θ is positive definite.
     """
     if math.isinf(highest):
         # At large bounds the tensions grow in proportion to the bound. The active part of K_θ

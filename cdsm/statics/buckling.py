@@ -44,8 +44,8 @@ def critical_tension(
 ) -> CriticalTension:
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
-    K_θ, of which the symmetric part counts, is that of :func:`~cdsm.stiffness` at the tensions of
-    :func:`~cdsm.distribute_tension` with the lower bound F_min on all cables.
+    :func:`~cdsm.stiffness` computes K_θ at the tensions of :func:`~cdsm.distribute_tension` with
+    the lower bound F_min on all cables. Its symmetric part decides.
 
     Args:
         pose: The posture, which stays fixed.
@@ -157,6 +157,6 @@ def critical_load(
 
 
 def _mode(K: Stiffness) -> Array:
-    """Return the unit joint motion (nv,) of the smallest eigenvalue, its largest entry positive."""
+    """Return the unit eigenvector (nv,) of K_θ of its smallest eigenvalue; largest entry > 0."""
     mode = K.critical_direction
     return frozen(mode * np.sign(mode[abs(mode).argmax()]))

@@ -26,13 +26,15 @@ if TYPE_CHECKING:
 
 
 _IMMOBILE = 1e-14
-"""Relative to the largest compliance: a smaller compliance along a direction is rounding."""
+"""A compliance along a direction below this part of the largest compliance is rounding."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Equilibrium(ReadOnlyState):
-    """Equilibrium of an arm under a load, with its arguments. All arrays are read-only.
+    """Equilibrium of an arm with locked motors under a load; made by :func:`~cdsm.equilibrium`.
+
+    All arrays are read-only.
 
     Attributes:
         reference: The posture at which the motors were locked.
@@ -82,8 +84,8 @@ class Equilibrium(ReadOnlyState):
     def stable(self) -> bool:
         """Whether K_θ (symmetric part) is positive definite for the joints without stop reaction.
 
-        It is False for a neutral state, for example if all cables are slack, and if only stops
-        without a reaction block the softest motion.
+        It is False for a neutral state, for example if all cables are slack. It is also False if
+        the softest motion is blocked only by stops that have no reaction.
         """
         values = eigenvalues(self.stiffness.joint, self._off_stops)
         return bool((values > FLAT * abs(values).max(initial=0.0)).all())
@@ -116,7 +118,9 @@ class Equilibrium(ReadOnlyState):
         return frozen(J @ np.linalg.solve(K, J.T))
 
     def along(self, direction: ArrayLike) -> float:
-        """Compute 1/(uᵀ C_vv u) [N/m] with C of :attr:`compliance`: joints at stops are fixed.
+        """Compute the tip stiffness 1/(uᵀ C_vv u) [N/m] along ``direction``; joints at stops stay.
+
+        C_vv (3, 3) is the part of :attr:`compliance` that relates displacements to forces.
 
         Args:
             direction: u (3,) in base axes, any length.

@@ -13,19 +13,19 @@ from cdsm.statics.rest_search import settled
 from cdsm.statics.trust_region import RestSearch, find_rest
 from cdsm.support.values import Array, frozen
 
-_FAR = 0.1  # largest joint motion [rad] between two equilibria that follow connects
+_FAR = 0.1  # largest joint motion [rad] from one equilibrium to the next in :func:`follow`
 
 _DENSE = 0.02
-"""Distance [rad] between postures whose stability is checked; shorter unstable parts go unseen."""
+"""Distance [rad] between postures whose stability is checked; shorter unstable parts are missed."""
 
 _FINEST = 2.0**-12  # relative precision of a buckling load
-_SLIGHT = 1e-9  # buckling loads below this part of the load are found to this absolute precision
+_SLIGHT = 1e-9  # smallest part of the load to which _FINEST is relative
 
 
 def follow_load(
     before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
 ) -> Equilibrium:
-    """Follow equilibria under wrench + λ · added from λ = ``reached`` to ``goal``.
+    """Follow equilibria under wrench + λ · added from λ = ``reached`` to ``goal``; return the last.
 
     ``before`` is the equilibrium at ``reached``. Raises EquilibriumError if the arm buckles.
     """
@@ -53,9 +53,9 @@ def follow_load(
 def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
     """Find the equilibrium that continues ``before`` under another ``wrench`` (6,), or None.
 
-    None: no path of stable postures leads there, or the step is too large to decide. The search
-    starts at the joint angles ``start`` (nv,) [rad], by default those of ``before``. Errors are
-    those of :func:`~cdsm.equilibrium`.
+    It is None if no path of stable postures was found from ``before``: a smaller change of the
+    wrench may have one. The search starts at the joint angles ``start`` (nv,) [rad], by default
+    those of ``before``. Errors are those of :func:`~cdsm.equilibrium`.
     """
     loaded = LoadedArm(before.reference, before.reference_tension, wrench)
     iterate = loaded.at(before.pose, before.tension)

@@ -3,9 +3,10 @@
     r(q) = Σ_j T_j g_j + g − J_Xᵀ W,    ∂r/∂q = Σ_j (T_j H_j + g_jᵀ ∂T_j/∂q) + ∂g/∂q − ∂(J_Xᵀ W)/∂q
 
 T_j is the tension of segment j; g_j and H_j are the gradient and the Hessian of its length. g is
-the gravity torque. At a posture the tensions follow from the natural lengths before the move
-(:mod:`cdsm.friction.chain_problem`). ∂r/∂q is not symmetric where holes slide: friction has no
-potential. Without friction this is :class:`~cdsm.statics.locked_motors.LoadedArm`.
+the gravity torque. At a posture the tensions follow from the natural lengths of the segments before
+the move, which are the lengths of their wire at zero strain (:mod:`cdsm.friction.chain_problem`).
+∂r/∂q is not symmetric where cables slide: friction has no potential. Without friction this is
+:class:`~cdsm.statics.locked_motors.LoadedArm`.
 """
 
 from __future__ import annotations
@@ -22,12 +23,15 @@ from cdsm.support.values import Array
 
 
 class Settled(NamedTuple):
-    """Arm at one posture, balanced or not; its cables have slipped until friction stops them."""
+    """Arm at one posture, balanced or not, after its cables have slipped as far as friction allows.
+
+    It is a state of :func:`~cdsm.statics.trust_region.find_rest`.
+    """
 
     pose: Posture
     chain: Chain
     residual: Array  # r (nv,) [N m]
-    torque: Array  # r minus the torque held back (nv,) [N m]
+    torque: Array  # r minus the torque of holding_back (nv,) [N m]
     rounding: Array  # rounding of r (nv,) [N m]
     stiffness: Array  # ∂r/∂q (nv, nv) [N m/rad]
     slope: Array  # ∂T/∂q (S, nv) [N/rad]
@@ -38,18 +42,18 @@ class Settled(NamedTuple):
         return self.pose.q
 
     def holding_back(self, torque: Array | float) -> Settled:
-        """Return this state with a torque (nv,) [N m] that is subtracted from its residual."""
+        """Return this state with ``torque`` (nv,) [N m] subtracted: a search solves r = torque."""
         return self._replace(torque=self.residual - torque)
 
 
 class FrictionalArm(NamedTuple):
-    """Arm under a wrench, with the natural lengths of its segments before the move."""
+    """Arm with friction under a wrench: computes its state after a move to other joint angles."""
 
     problem: ChainProblem
     limits: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]
     natural: Array  # natural length of each segment before the move (S,) [m]
     wrench: Array  # W (6,): force [N], then moment [N m]
-    forced: Array  # tension at which a motor holds the first segment (C,) [N]; NaN: its wire
+    forced: Array  # tension of force-controlled cables (C,) [N]; NaN: position-controlled
 
     def stops(self) -> tuple[Array, Array]:
         """Return the lowest and highest angles (nv,) [rad], at which joints rest on stops."""

@@ -1,4 +1,4 @@
-"""Load an arm with friction in its holes slowly, from load to load and command to command."""
+"""Load an arm with friction in its holes slowly: a series of loads and of motor commands."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_LOADS = 100_000
 """Largest number of loads of a history."""
 
 _LEAST, _MOST = 1e-12, 0.1
-"""Range of ``accuracy``: the energy error that rounding causes, and a tenth of the work."""
+"""Smallest and largest ``accuracy``: below the first, the energy error is rounding."""
 
 
 def load_cycle(
@@ -102,8 +102,8 @@ def load_cycle(
 def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:
     """Return the :class:`SlowLoading` of an arm at its reference, from checked arguments.
 
-    Its cables have tensions (C,) [N] under ``wrench`` (6,). Raises InvalidInput if ``pose`` is
-    beyond a joint limit.
+    Its cables have tensions (C,) [N] under ``wrench`` (6,). ``accuracy`` is that of
+    :func:`load_cycle`. Raises InvalidInput if ``pose`` is beyond a joint limit.
     """
     require_between_stops(pose)
     LoadedArm(pose, tension, wrench)  # refuses a spring that leaves no wire
@@ -115,7 +115,10 @@ def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) 
 
 
 def _commands(motors: ArrayLike, forced: NDArray[np.bool_], shape: tuple[int, ...]) -> Array:
-    """Check and return the commands (n, C); force-controlled cables (``forced``) only pull."""
+    """Check the motor commands (n, C) of all loads, which need this ``shape``, and return them.
+
+    ``forced`` (C,) marks the force-controlled cables: their commands are tensions, never negative.
+    """
     commands = number_array("motors", motors)
     if commands.shape != shape:
         raise InvalidInput(

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SHOWN = 24
-"""Largest number of loads that ``print`` shows; of more, it shows the first and the last."""
+"""Largest number of loads that ``print`` shows; of more loads it shows the first and last ones."""
 
 
 @final
@@ -102,16 +102,16 @@ class LoadHistory(ReadOnlyState):
         return tuple(f"{cables[c].name} site {site + 1}" for c, site in pairs)
 
     def pose(self, load: int) -> Posture:
-        """Return the posture at load number ``load``; a negative number counts from the last load.
+        """Return the posture at load number ``load``, from 0; a negative one counts from the end.
 
         Raises InvalidInput if there is no such load.
         """
         return self.reference.arm.at(self.angles[self._index(load)], check_limits=False)
 
     def stiffness(self, load: int) -> Stiffness:
-        """Compute the tangent stiffness at load number ``load``.
+        """Compute the tangent stiffness at load number ``load``, from 0, as in :meth:`pose`.
 
-        It holds as long as the sliding holes continue to slide.
+        It is valid as long as cables continue to slide in the same holes.
         """
         k = self._index(load)
         signs = self.sliding[k]
@@ -200,9 +200,9 @@ class LoadHistory(ReadOnlyState):
         return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def plot(self) -> Figure:
-        """Plot force over displacement, and the segment tensions where they differ most.
+        """Plot force over tip displacement, and the tensions of the segments of one cable.
 
-        They are those of one cable: the cable whose segments have the largest difference.
+        It is the cable whose segments differ most in tension.
         """
         return cdsm.plots.plot_load_history(self)
 

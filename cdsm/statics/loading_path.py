@@ -35,15 +35,16 @@ _SHORTEST = 2.0**-6
 
 class _Rest(NamedTuple):
     state: State
-    load: int  # the load that it is on the way to
-    part: float  # of the way
+    load: int  # index of the load to which the arm is on the way
+    part: float  # part of the way from the load before, 1 at the load itself
 
 
 @dataclass(frozen=True, eq=False)
 class LoadingPath:
     """Equilibria ("rests") of an arm with friction during a series of loads.
 
-    Their number does not depend on the arm, so a small change of it changes the tips smoothly.
+    Unless a search fails, only the loads decide where the rests are. So a small change of the arm
+    changes the tips smoothly.
     """
 
     loading: SlowLoading
@@ -64,9 +65,10 @@ class LoadingPath:
     ) -> LoadingPath:
         """Load an arm that is balanced at a posture under ``wrench`` (6,) by forces (n, 3) [N].
 
-        ``parts`` is the number of rests over the range of the forces. The searches start from the
-        motions of a ``near`` path, of a similar arm under the same loads: up to twice as fast.
-        CdsmError if the posture is beyond a joint limit, or no equilibrium was found on the way.
+        ``tension`` is F (C,) [N] before the first force, ``parts`` the number of rests over the
+        range of the forces. ``near`` is the path of a similar arm under the same loads: searches
+        that start from its motions are up to twice as fast. Raises CdsmError if the posture is
+        beyond a joint limit, or no equilibrium was found on the way.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = state = loading.begin(tension, wrench)
@@ -123,7 +125,8 @@ class LoadingPath:
     def beside(self, pose: Posture, tension: Array, wrench: Array) -> Array:
         """Compute the tips (n, 3) [m] of a slightly different arm under the same loads.
 
-        ``pose`` is its reference posture. Each cable has the same number of segments as here.
+        ``pose`` is the reference posture of that arm, where its cables have ``tension`` F (C,) [N]
+        under ``wrench`` (6,). Each cable has as many segments as in this path.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = loading.begin(tension, wrench)
@@ -141,7 +144,7 @@ class LoadingPath:
         return np.array([tips[i] for i in self.last])
 
     def by_forces(self, direction: Array) -> Array:
-        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N] for forces f_j along a unit vector (3,)."""
+        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N]: f_j is added to load j along ``direction`` (3,)."""
         count, problem, first = len(self.last), self.loading.problem, self.loading.start[:-1]
         each, none = np.eye(count), np.zeros(count)
         natural = np.zeros((len(self.start.settled.chain.natural), count))

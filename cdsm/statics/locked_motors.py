@@ -29,9 +29,9 @@ _BEYOND = 1e-9  # a tension outside the domain of a law by at most this part is 
 class Iterate(NamedTuple):
     """Arm at one posture, balanced or not: a state of the equilibrium search."""
 
-    K: Stiffness  # with the original lengths of the reference
-    torque: Array  # imbalance minus the torque held back (nv,) [N m]
-    rounding: Array  # rounding of the imbalance (nv,) [N m]
+    K: Stiffness  # with the original lengths of the reference; its residual is r(q)
+    torque: Array  # r minus the torque of holding_back (nv,) [N m]
+    rounding: Array  # rounding of r (nv,) [N m]
 
     @property
     def q(self) -> Array:
@@ -44,18 +44,18 @@ class Iterate(NamedTuple):
         return self.K.joint
 
     def holding_back(self, torque: Array | float) -> Iterate:
-        """Return this state with a torque (nv,) [N m] that is subtracted from its residual."""
+        """Return this state with ``torque`` (nv,) [N m] subtracted: a search solves r = torque."""
         return self._replace(torque=self.K.residual - torque)
 
 
 class LoadedArm:
     """Arm under a wrench W (6,), its motors locked at a reference posture with tensions F (C,) [N].
 
-    A position-controlled cable keeps its original length l_0. Its elongation is that at the
-    reference plus the change of its length. A force-controlled cable keeps its tension. Outside
-    the domain of its law a cable has the stiffness of the nearest bound, or is slack. Only iterates
-    may be there, see :meth:`require_domains`. ``lengths`` are L (C,) [m] at which the cables have
-    these tensions, by default those of the reference.
+    A position-controlled cable keeps its original length l_0. Its elongation is its elongation at
+    the reference plus the change of its length. A force-controlled cable keeps its tension. Outside
+    the domain of its law a cable has the stiffness of the nearest bound, or is slack. Only states
+    during a search may be there; :meth:`require_domains` refuses a result. ``lengths`` are L (C,)
+    [m] at which the cables have the tensions F, by default the lengths at the reference.
 
     Raises:
         ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the
@@ -109,9 +109,10 @@ class LoadedArm:
 
 
 def lengths_with(wire: Array, pose: Posture, tension: Array) -> Array:
-    """Return L (C,) [m] at which locked cables with so much ``wire`` l_0 have tensions (C,) [N].
+    """Return L (C,) [m] at which cables of original lengths ``wire`` have ``tension`` (C,) [N].
 
-    ``wire`` (H,) [m] is that of the position-controlled cables; the others keep their lengths.
+    ``wire`` is l_0 (H,) [m] of the H position-controlled cables. The other cables keep their
+    lengths in ``pose``.
     """
     lengths, cables = pose.cable_lengths.copy(), pose.arm.cables
     held = np.flatnonzero(cables.position_controlled)
@@ -148,7 +149,7 @@ def require_domains(
 
 
 def stops(reference: Posture) -> tuple[Array, Array]:
-    """Return lowest and highest angles (nv,) [rad] of the stops; ``reference`` is between them."""
+    """Return the lowest and highest angles (nv,) [rad] of the joints; ``reference`` is between."""
     arm, q = reference.arm, reference.q
     touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
     if arm.is_serpentine:
@@ -171,10 +172,10 @@ def rounding(K: Stiffness) -> Array:
 
 
 def tilt_torque(pose: Posture, tension: Array) -> Array:
-    """Compute the error of joint torques (nv,) [N m] per relative rounding error of the sites.
+    """Compute the error of joint torques (nv,) [N m] for a relative error 1 of the site positions.
 
-    Errors of the sites rotate the segments, short ones most. ``tension`` [N] has an entry for each
-    segment that joints can change.
+    Such an error rotates the segments, short ones most. ``tension`` [N] has an entry for each
+    segment whose length depends on the joints.
     """
     start, end, over, joint = pose.arm._model.moving
     site, origin = pose._frames.site, pose._frames.origin
@@ -191,9 +192,11 @@ def tilt_torque(pose: Posture, tension: Array) -> Array:
 
 
 class _LockedLaw:
-    """Position-controlled cables with one law; all arrays are over these cables.
+    """Tension as a function of length for the n position-controlled cables with one law.
 
-    Outside the domain a cable has the stiffness of the nearest bound. L and F are of the reference.
+    Outside the domain of the law a cable has the stiffness of the nearest bound. Arguments (n,):
+    ``free_length`` is l_0 [m], ``series`` 1/k_series [m/N]; ``lengths`` L [m] and ``tension`` F [N]
+    are those at the reference.
     """
 
     def __init__(
@@ -222,7 +225,8 @@ class _LockedLaw:
                 which,
             )
         self._before = 1.0 / softest  # stiffness below the law [N/m]
-        self._after, self._span = np.zeros(size), self._high  # and above; elongation of the law
+        # stiffness above the law [N/m]; elongation from its lower to its upper bound [m]
+        self._after, self._span = np.zeros(size), self._high
         if math.isfinite(domain.high):
             self._after = 1.0 / self._compliance(self._high)
             self._span = self._elongation(self._high)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _MASSLESS = 1e-12  # a motion has no mass if its eigenvalue of M is below this part of the largest
 
 _STAND_IN = 0.02
-"""Largest share of placeholder masses in the kinetic energy; it changes a frequency by 1 %."""
+"""Largest share of the kinetic energy that placeholder masses may have: a frequency errs by 1 %."""
 
 
 @final

@@ -1,7 +1,8 @@
-"""Find the equilibrium of a loaded arm whose motors are locked: r(q) = 0, with ∂r/∂q = K_θ.
+"""Find the equilibrium of a loaded arm whose motors are locked.
 
-The tension F(q) of every position-controlled cable follows from its elongation, nonlinear
-elasticity and series springs included.
+It solves r(q) = 0 for the residual torque r, with ∂r/∂q = K_θ. The tension F(q) of every
+position-controlled cable follows from its elongation, nonlinear elasticity and series springs
+included.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _SMALLEST_STEP = 2.0**-6  # smallest load step that is tried
 
 
 _CLOSE = 1e-3
-"""Two sites meet if their distance falls below this part of their distance at the reference."""
+"""Two sites of a cable meet if their distance is below this part of that at the reference."""
 
 
 def equilibrium(
@@ -93,7 +94,10 @@ def require_between_stops(pose: Posture) -> None:
 
 
 def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
-    """Return the equilibrium that ``search`` found, or raise ElasticityRangeError."""
+    """Return the equilibrium that ``search`` found.
+
+    Raises ElasticityRangeError if a tension is outside the domain of its law.
+    """
     K = search.state.K
     loaded.require_domains(K.tension)
     reaction = np.where(search.at_stop, K.residual, 0.0)

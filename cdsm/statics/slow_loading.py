@@ -72,8 +72,8 @@ class Passage(NamedTuple):
 
     load_work: float
     motor_work: float
-    stored: float  # change
-    dissipated: float
+    stored: float  # change of the energy of cables, springs and weights
+    dissipated: float  # work lost to friction in the holes
     slip: Array  # natural length that moved from each segment to the next (S,) [m]
 
     @property
@@ -82,7 +82,7 @@ class Passage(NamedTuple):
         return self.load_work + self.motor_work - self.stored - self.dissipated
 
     def joined(self, other: Passage) -> Passage:
-        """Return the sum of this passage and the next."""
+        """Return the sum of this passage and ``other``, which follows it."""
         return Passage(
             self.load_work + other.load_work,
             self.motor_work + other.motor_work,
@@ -115,8 +115,8 @@ class SlowLoading(NamedTuple):
     def carry(self, before: State, load: Load, what: str) -> tuple[State, Passage]:
         """Change the load of the equilibrium ``before`` to ``load`` in sub-steps.
 
-        Returns the new state, and the energies and slips on the way. EquilibriumError, which names
-        the load as ``what``, if no equilibrium was found on the way.
+        Returns the new state, and the energies and slips on the way. Raises EquilibriumError if no
+        equilibrium was found on the way; its text names the step as ``what``.
         """
         first, state = before.load, before
         total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
@@ -143,16 +143,17 @@ class SlowLoading(NamedTuple):
         return state, total
 
     def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
-        """Return the arm with natural lengths (S,) [m] before wire slips, under these commands."""
+        """Return the arm with ``natural`` lengths (S,) [m] before wire slips, wrench and motors."""
         forced = np.where(self.forced, motors, np.nan)
         return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
 
     def rest(
         self, before: State, load: Load, motion: Array | None = None
     ) -> tuple[State | None, RestSearch[Settled]]:
-        """Find the equilibrium after ``before`` under a new load, or None; also return the search.
+        """Find the equilibrium after ``before`` under a new load; also return the search.
 
-        The search starts at the angles of ``before``, plus ``motion`` (nv,) [rad] if it is given.
+        The equilibrium is None if the search fails. The search starts at the angles of ``before``,
+        plus ``motion`` (nv,) [rad] if it is given.
         """
         old, natural = before.settled, before.settled.chain.natural.copy()
         taken = np.where(self.forced, 0.0, load.motors - before.load.motors)
@@ -161,7 +162,7 @@ class SlowLoading(NamedTuple):
         start = None if motion is None else _guess(arm, old, motion, load.holding)
         if start is None:
             start = arm.at(old.pose, old.chain.tension).holding_back(load.holding)
-            if before.motion @ start.torque < 0.0:  # it moves on the same way: what slid slides on
+            if before.motion @ start.torque < 0.0:  # goes on the same way: sliding holes slide on
                 start = _newton_step(arm, old, start, load.holding)
         search = find_rest(arm, start, load.holding)
         if not search.converged:

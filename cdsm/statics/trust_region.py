@@ -10,8 +10,8 @@ difference of two potentials would be rounding. If r is a gradient, this is the 
 with the exact Hessian, which decreases the potential and leaves saddle points. Near the end every
 step is a full Newton step with the complete K, not only its symmetric part.
 
-scipy's trust-exact does not fit: it has no stops, and it needs a potential. A moment at the tip has
-no potential. Where there is one, BFGS takes thirty times as long to minimise it
+scipy's trust-exact does not fit: it has no stops, and it needs a potential, which a moment at the
+tip does not have. BFGS takes thirty times as long to minimise the potential of a pure force
 (tests/benchmarks/test_equilibrium_speed.py).
 """
 
@@ -30,7 +30,7 @@ _ATTEMPTS = 200
 """Largest number of iterations. Arms with an equilibrium need up to 130, mostly below 10."""
 
 _FIRST, _WIDEST = 0.2, 0.5
-"""Initial and largest trust-region radius [rad]. The limit keeps a step within its valley."""
+"""Initial and largest trust-region radius [rad]. Longer steps might skip the nearest minimum."""
 
 FLAT = 1e-12
 """Eigenvalues of K below this part of the largest are rounding: the state is neutral."""
@@ -60,14 +60,14 @@ class Iterate(Protocol):
         """Derivative ∂r/∂q of the residual torque r (nv, nv) [N m/rad]."""
 
     def holding_back(self, torque: Array | float) -> Self:
-        """Return this state with a torque (nv,) [N m] that is subtracted from its residual."""
+        """Return this state with ``torque`` (nv,) [N m] subtracted: a search solves r = torque."""
 
 
 State = TypeVar("State", bound=Iterate)
 
 
 class Loaded(Protocol[State]):
-    """Arm under a load."""
+    """What :func:`find_rest` needs of a loaded arm: its state at joint angles, and its stops."""
 
     def moved(self, q: Array, near: State) -> State:
         """Compute the arm at joint angles ``q`` (nv,) [rad], with tensions searched from ``near``.
@@ -76,17 +76,17 @@ class Loaded(Protocol[State]):
         """
 
     def stops(self) -> tuple[Array, Array]:
-        """Return the lowest and highest angles (nv,) [rad]."""
+        """Return the lowest and highest angles (nv,) [rad], at which joints rest on stops."""
 
 
 class RestSearch(NamedTuple, Generic[State]):
-    """Result of an equilibrium search."""
+    """Result of :func:`find_rest`; free joints are those not at a stop."""
 
     state: State  # the last iterate
     at_stop: NDArray[np.bool_]  # which joints rest on a stop that pushes (nv,)
-    history: tuple[float, ...]  # largest |r| of the free joints at every accepted iterate
+    history: tuple[float, ...]  # largest |torque| [N m] of free joints at every accepted iterate
     iterations: int  # number of steps tried
-    converged: bool  # whether r of the free joints is rounding and no direction leads down
+    converged: bool  # free joints are balanced, and no motion between the stops does negative work
     convex: bool  # whether K of the free joints was positive definite at every iterate
 
 
@@ -95,9 +95,9 @@ class _Free(NamedTuple):
 
     at_stop: NDArray[np.bool_]  # which joints a stop holds (nv,)
     indices: NDArray[np.intp]  # indices of the free joints
-    spectrum: tuple[Array, Array]  # eigenvalues and eigenvectors of their K (symmetric part)
-    imbalance: float  # their largest |r|
-    balanced: bool  # whether their r is rounding
+    spectrum: tuple[Array, Array]  # eigenvalues and eigenvectors of K (symmetric part), free joints
+    imbalance: float  # largest |torque| [N m] of a free joint
+    balanced: bool  # whether the torques of all free joints are rounding
     flat: float  # eigenvalues up to this size are rounding
     lowest: float  # lowest eigenvalue; inf if no joint is free
 
@@ -197,7 +197,8 @@ def _descend(
 ) -> Array:
     """Return joint angles (nv,) that decrease the quadratic model; a joint stays at its stop.
 
-    The path from ``state`` is at most ``radius`` [rad] long. ``sign`` is that of :func:`_step`.
+    The path from ``state`` is at most ``radius`` [rad] long. ``torque`` is r at ``state``; if it is
+    zero, ``sign`` (±1) chooses between the two opposite ways down.
     """
     (lower, upper), q, indices, spectrum = stops, state.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:
@@ -220,7 +221,7 @@ def _descend(
 def _step(
     torque: Array, stiffness: Array, values: Array, vectors: Array, radius: float, sign: float
 ) -> Array:
-    """Return the step p of least r·p + ½ pᵀKp with |p| ≤ ``radius``, where r is ``torque``.
+    """Return the step p that minimises r·p + ½ pᵀKp with |p| ≤ ``radius``; r is ``torque``.
 
     ``values`` and ``vectors`` are the eigenvalues and eigenvectors of K. If r = 0, ``sign`` chooses
     between the minima p and −p.

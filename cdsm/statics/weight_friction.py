@@ -30,7 +30,7 @@ _HALVINGS = 6  # number of bisections of the load from which the arm slides; the
 
 
 def fading(size: float, cycles: int) -> Array:
-    """Return loads (2 cycles,) [N] that alternate; the amplitude falls linearly from ``size``."""
+    """Return loads (2 cycles,) [N] of changing sign; the amplitude falls linearly from ``size``."""
     loads = size * (1.0 - np.arange(2 * cycles) / (2.0 * cycles))
     loads[1::2] *= -1.0
     return loads
@@ -60,7 +60,7 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def secant(self) -> float:
-        """Weight over tip displacement along it, with friction [N/m]; inf without motion."""
+        """Weight divided by tip displacement along it, with friction [N/m]; inf without motion."""
         return self._secant(self.history.tip)
 
     @cached_property
@@ -108,7 +108,7 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def dithered(self) -> float:
-        """Weight over displacement [N/m] after dither: the load alternates with fading amplitude.
+        """Weight divided by displacement [N/m] after dither: a load of changing sign that fades.
 
         The amplitude falls linearly from :attr:`sliding_load` to zero in :attr:`dither_cycles`
         cycles. NaN if the arm does not slide, no equilibrium is found on the way, or 64 cycles are
@@ -143,7 +143,7 @@ class WeightFriction(ReadOnlyState):
         return 0, math.nan
 
     def _dithered_stiffness(self, size: float, cycles: int) -> float:
-        """Compute weight over displacement [N/m] after dither cycles that begin with ±size [N]."""
+        """Compute weight/displacement [N/m] after dither ``cycles`` that begin with ±size [N]."""
         history, u = self.history, np.append(self.breakaway.direction, np.zeros(3))
         last, added = history.wrenches[-1], fading(size, cycles)[:, None] * u
         path = np.vstack([history.wrenches, last + added, last])

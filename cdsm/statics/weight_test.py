@@ -33,16 +33,16 @@ MOST_STEPS = 1000
 """Largest number of steps. A curve with more points is not smoother, but takes long."""
 
 _MEASURED = 1e-12
-"""Smallest tip displacement over the arm's length that has about three correct digits."""
+"""Smallest tip displacement, divided by the arm's length, with about three correct digits."""
 
 _DISPLACED = 1e-9
-"""Smallest tip displacement over the arm's length that is more than rounding of the balance."""
+"""Smallest tip displacement, divided by the arm's length, above the rounding of equilibrium."""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearPrediction(ReadOnlyState):
-    """Prediction of a weight test by the stiffness of the unloaded arm; joints at stops stay there.
+    """Prediction of a weight test by the stiffness without the weight; joints at stops stay there.
 
     ΔF (3,) [N] is the force of the :class:`WeightTest`, and u = ΔF/|ΔF|.
 
