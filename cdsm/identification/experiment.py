@@ -20,7 +20,6 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.validation import (
     Direction,
-    flag,
     number_array,
     one_of,
     scalar,
@@ -120,7 +119,7 @@ def plan_tests(
     most = whole_number("tests", tests, 1, _MOST)
     names, chosen = tuple(values), _wanted(values, wanted, known or {})
     prior = _prior(values, known or {})
-    with progress_allowed(flag("progress", progress)):
+    with progress_allowed(progress):
         usable, rows, failures = _followed(model_of, values, candidates)
     whole = Determination(names, np.vstack([*rows, prior]), np.ones(len(names)))
     settled = [name for name in chosen if whole.firm[names.index(name)]]

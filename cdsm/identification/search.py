@@ -21,7 +21,7 @@ from cdsm.identification.problem import Model, UserFaultError
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
 from cdsm.support.progress import progress_allowed, track
-from cdsm.support.validation import flag, scalar, vector
+from cdsm.support.validation import scalar, vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
@@ -115,7 +115,7 @@ def identify(
     model = Model.of(model_of, tension_of, measurements)
     problem = problem_of(model, bounds)
     try:
-        with progress_allowed(flag("progress", progress)):
+        with progress_allowed(progress):
             starts = _starts(problem, start)
             for _ in range(_REWEIGHINGS if model.inexact_loads else 0):
                 model = model.weighted(problem.parameters(starts[0]))

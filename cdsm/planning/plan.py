@@ -24,7 +24,7 @@ from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import MODEL, coordinates, key, plain
 from cdsm.support.progress import progress_allowed
-from cdsm.support.validation import NO_WRENCH, Direction, flag, unit_directions
+from cdsm.support.validation import NO_WRENCH, Direction, unit_directions
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
@@ -180,7 +180,7 @@ def plan_stiffness(
     directions = None if direction is None else unit_directions("direction", direction)
     targets = checked_targets(directions, target)
     planner = Planner(model, target_constraints(model, directions, targets), number, seed)
-    with progress_allowed(flag("progress", progress)):
+    with progress_allowed(progress):
         found = planner.least() or planner.nearest()
     tension = model.region.tension(found.evaluation.F)
     K = stiffness(pose, tension)

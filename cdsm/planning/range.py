@@ -20,7 +20,7 @@ from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import MODEL, coordinates, plain, span
 from cdsm.support.progress import progress_allowed, track
-from cdsm.support.validation import NO_WRENCH, Direction, flag, unit_direction
+from cdsm.support.validation import NO_WRENCH, Direction, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -160,7 +160,7 @@ def stiffness_range(
     model = StiffnessModel(pose, minimum, maximum, wrench, margin)
     u = unit_direction("direction", direction)
     stiffness(pose, model.region.least)._require_mobile(u)
-    with progress_allowed(flag("progress", progress)):
+    with progress_allowed(progress):
         low, high = range_ends(model, u, *checked_starts(starts, seed))
     if low.open or high.open:
         raise InvalidInput(

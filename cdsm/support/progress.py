@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from cdsm.support.validation import flag
+
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn, Task
     from rich.text import Text
@@ -56,9 +58,12 @@ def progress_bar(
 
 
 @contextmanager
-def progress_allowed(wanted: bool) -> Iterator[None]:
-    """Hide all bars that are opened inside this context, unless ``wanted``."""
-    token = _outermost.set(_outermost.get() and wanted)
+def progress_allowed(progress: bool) -> Iterator[None]:
+    """Hide all bars that are opened inside this context, unless ``progress``, an argument, is set.
+
+    InvalidInput if it is no bool.
+    """
+    token = _outermost.set(flag("progress", progress) and _outermost.get())
     try:
         yield
     finally:
