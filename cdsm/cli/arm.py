@@ -1,4 +1,4 @@
-"""``cdsm urdf | stiffness | check | export``: stiffness of an arm, and files of an arm."""
+"""``cdsm urdf | stiffness | check | export``: compute the stiffness of an arm; write its files."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _Given = Annotated[
 ]
 
 _ALONG: dict[str, Direction] = {"x": "x", "y": "y", "z": "z"}
-"""Directions of every answer, by name."""
+"""Directions along which every answer has the stiffness, by name."""
 
 
 def urdf(
@@ -95,11 +95,15 @@ def stiffness(
 
 
 def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[str, cdsm.Breakaway]:
-    """Compute the breakaway loads ``along`` directions that exist before the arm buckles."""
+    """Compute the breakaway load in each direction of ``along``, by name of the direction.
+
+    A direction is left out if the arm buckles before a cable slides, if one slides without a load,
+    or if none slides at any load.
+    """
     found = {}
     if tension.posture.arm.has_friction:
         for name, u in along.items():
-            with contextlib.suppress(cdsm.CdsmError):  # it buckles before, or leaves the law
+            with contextlib.suppress(cdsm.CdsmError):  # it buckles before, or leaves its law EA(F)
                 first = cdsm.breakaway(tension.posture, tension, u)
                 if 0.0 < first.load < math.inf:
                     found[name] = first
@@ -122,10 +126,10 @@ def _sticking(breakaways: dict[str, cdsm.Breakaway]) -> str:
 def _uncertainty(
     tension: cdsm.Tension, tolerances: Path | None, along: Mapping[str, Direction] = _ALONG
 ) -> tuple[list[str], Json]:
-    """Compute uncertainty budgets ``along`` directions, as table and for JSON; empty if none.
+    """Compute the uncertainty budget in each direction of ``along``, as a table and for JSON.
 
-    Without a file of ``tolerances``, those of the arm count. A direction in which the tip cannot
-    move has no budget.
+    Both are empty if neither a file of ``tolerances`` is given nor the arm has tolerances. A
+    direction in which the tip cannot move has no budget.
     """
     pose, found = tension.posture, {}
     given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
@@ -138,7 +142,7 @@ def _uncertainty(
 
 
 def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
-    """Write a table of ``budgets``: stiffness ± uncertainty, and sources [%]; a column per axis."""
+    """Write a table of ``budgets``, a column per axis: stiffness ± uncertainty, and sources [%]."""
     from cdsm.support.format import aligned
 
     def percent(source: str) -> list[float]:

@@ -1,4 +1,4 @@
-"""Adapt our commands to typer: shared options, older names, errors as messages or JSON, help."""
+"""Make typer commands of our functions: shared options, older names, errors as text or JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdsm.cli.words import newer
 
 
 class Command(typer.core.TyperCommand):
-    """Command that also takes older names of options; with --json, errors of usage are JSON."""
+    """Command of typer that also takes older option names; --json makes errors of usage JSON."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Replace older names of options in ``args``, then parse them."""
@@ -36,8 +36,8 @@ class Command(typer.core.TyperCommand):
 def as_command(function: Callable[..., None]) -> Callable[..., None]:
     """Return a function as typer needs it: one parameter per option, and errors as messages.
 
-    typer reads options only from the signature. Shared options are declared once, as fields of a
-    dataclass; here they replace the parameter of the function that is annotated with it.
+    typer reads options only from the signature. Options of several commands are the fields of a
+    dataclass; here these fields replace a parameter that is annotated with the dataclass.
     """
     groups: dict[str, Any] = {}
     options: list[inspect.Parameter] = []

@@ -1,4 +1,4 @@
-"""Print the assumptions of a result: wire, gravity, least tension, friction; and the posture."""
+"""Print the assumptions of a result (wire, gravity, least tension, friction) and its posture."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conditions:
-    """First lines of an answer: the assumptions of its results, the arm, and its one posture."""
+    """First lines of an answer: the assumptions of its results, the arm, the posture if given."""
 
-    of: cdsm.Manipulator | cdsm.Posture
+    of: cdsm.Manipulator | cdsm.Posture  # the arm, or the only posture of the results
     minimum: tuple[float, ...] = ()  # given lower bounds of all tensions [N], one per case
     friction: bool = False  # whether the results include the friction of the arm
 
@@ -56,7 +56,7 @@ class Conditions:
 
     @property
     def wire(self) -> str:
-        """The wires of the cables and their springs, as text."""
+        """Wires of the cables and springs in series with them, as text."""
         from cdsm.wires.catalogue import wires_text
 
         return wires_text(self.arm.cables)

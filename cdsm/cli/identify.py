@@ -94,7 +94,7 @@ def identify(
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:
-    """Return the bounds, in shown units, of each NAME or NAME=LOW:HIGH; None if not given."""
+    """Return the bounds of each parameter in ``--free``, in units of the command line, or None."""
     ranges: dict[str, Range | None] = {}
     for each in free:
         name, _, given = each.partition("=")
@@ -113,7 +113,7 @@ def _ranges(free: list[str]) -> dict[str, Range | None]:
 
 
 class _Shown:
-    """Parameters of an arm in units shown to the user; the label of a parameter has its unit."""
+    """Parameters of an arm in the units of the command line, which their labels name."""
 
     def __init__(self, parameters: ArmParameters) -> None:
         self._parameters = parameters
@@ -139,7 +139,7 @@ class _Shown:
         }
 
     def bounds(self, name: str, given: Range | None) -> Range:
-        """Return ``given``; by default 0 to 1 for friction, else half to twice the value now."""
+        """Return ``given``; if None, 0 to 1 for friction, else half to twice the arm's value."""
         if given is not None:
             return given
         if name.partition("@")[0] == "friction":

@@ -1,4 +1,4 @@
-"""Options of the commands, and the arm and the tensions that they describe."""
+"""Declare options that commands share; build the arm, tensions and loads that they describe."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cdsm.support.values import Array
 
 DEFAULT_SOLVER: Final = "daqp"
-"""Equal to the default of :mod:`cdsm.tension`, whose import would delay the help pages."""
+"""Copy of the default of :mod:`cdsm.tension`; an import of that would delay the help pages."""
 
 _arm_option = partial(typer.Option, rich_help_panel="The arm")
 _tension_option = partial(typer.Option, rich_help_panel="Tensions and load")
@@ -38,7 +38,7 @@ def _wires() -> list[str]:
 
 
 def directions() -> list[str]:
-    """Return the names of directions."""
+    """Return the names of directions, such as ``-z``, for completion in a shell."""
     from cdsm.support.validation import AXES
 
     return list(AXES)
@@ -167,7 +167,7 @@ class ArmOptions:
                     "ARM", f"{self.arm} is a folder without a CASPR model; give an ARM.toml."
                 )
             arm = cdsm.read_caspr(self.arm, elasticity=wire or cdsm.LinearElasticity(1.0))
-            if wire is None:  # only now, since the folder may hold no model
+            if wire is None:  # after reading, whose errors come first: the folder may hold no model
                 raise cdsm.MissingWire(self.arm)
             return arm
         if self.cables is None:
@@ -175,7 +175,7 @@ class ArmOptions:
         cables = cdsm.read_cables(self.cables, wire)
         if robot:
             return cdsm.Manipulator.from_urdf(self.arm, cables, tip=str(self.tip))
-        # the cables of the arm are not asked for a wire
+        # any law does for the arm's own cables, since they are replaced
         return cdsm.Manipulator.read(self.arm, cables[0].elasticity).with_cables(cables)
 
     def at(self, angles: str) -> cdsm.Posture:
@@ -184,7 +184,7 @@ class ArmOptions:
         return arm.at(coordinates(angles, arm) * joint_scales(arm))
 
     def _refuse(self, why: str, *names: str) -> None:
-        """Raise BadParameter if one of the options ``names`` is given; ``why`` it has no effect."""
+        """Raise BadParameter if one of the options ``names`` is given; ``why`` is the message."""
         for field in fields(self):
             if field.name in names and getattr(self, field.name) != field.default:
                 raise misuse(f"--{field.name}", f"{why}; leave it out.")
@@ -215,11 +215,11 @@ class TensionOptions:
     def conditions(
         self, of: cdsm.Manipulator | cdsm.Posture, *, friction: bool = False
     ) -> Conditions:
-        """Return the assumptions of a result with these options, for an arm or a posture."""
+        """Return the assumptions of a result with these options, of an arm or a posture."""
         return Conditions(of, (self.min_tension,), friction)
 
     def distribute(self, pose: cdsm.Posture, wrench: Array) -> cdsm.Tension:
-        """Compute the tensions at a posture under a wrench (6,)."""
+        """Compute the tensions at a posture under a wrench (6,): force [N], then moment [N m]."""
         return cdsm.distribute_tension(
             pose, self.min_tension, self.max_tension, wrench, self.solver
         )
@@ -227,7 +227,7 @@ class TensionOptions:
 
 @dataclass(frozen=True)
 class WeightOptions:
-    """Options of a force at the tip."""
+    """Options ``--force`` and ``--mass``: a force at the tip, and a mass that hangs there."""
 
     force: Annotated[
         str | None,
@@ -259,7 +259,7 @@ class WeightOptions:
 
 @dataclass(frozen=True)
 class LoadOptions(WeightOptions):
-    """Options of a load at the tip; force, mass and wrench add up."""
+    """Options ``--force``, ``--mass``, ``--wrench``: loads at the tip, which add up."""
 
     wrench: Wrench = None
 

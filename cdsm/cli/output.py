@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cdsm.support.values import Array
 
 Json = dict[str, object]
-"""Numbers of an answer in SI, with units in the keys. Arrays and infinite numbers are allowed."""
+"""Answer for JSON: numbers in SI, units in the keys. Arrays and infinite numbers are allowed."""
 
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether the running command shows tracebacks."""
@@ -33,12 +33,13 @@ debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
 """Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
 
-3 is that of every answer with a warning (the arm is unstable, has left its reference, some samples
-cannot be planned, the report is not trustworthy), and of errors that say what the arm cannot do.
+3 is the exit code of every answer with a warning (the arm is unstable, has left its reference, some
+samples cannot be planned, the report is not trustworthy), and of errors that say what the arm
+cannot do.
 """
 
 _LIST = re.compile(r"(?<=\[)\n[^][{}\"]*\n\s*(?=\])")
-"""Inside of a JSON list of numbers with a line for each; such a list is printed in one line."""
+"""Pattern of a JSON list of numbers with a line for each number; it is printed in one line."""
 
 _UsageError = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
 """Base class of errors of usage, of which typer has no public name."""
@@ -57,7 +58,7 @@ def answer(
 ) -> None:
     """Print an answer, its warnings first: ``parts`` as text, or ``as_dict()`` as strict JSON.
 
-    Warnings end the command with exit code 3. So files are written before this call.
+    If there are warnings, the command ends here with exit code 3. So write files before.
     """
     if as_json:
         numbers: Json = {"warnings": warnings}
@@ -88,7 +89,7 @@ def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
 
 
 def write(path: Path | None, fill: Callable[[Path], object]) -> None:
-    """If a path is given, write it by ``fill``, and say so on standard error."""
+    """If a path is given, write the file by ``fill(path)``, and say so on standard error."""
     if path is not None:
         fill(path)
         typer.echo(f"written: {path}", err=True)
@@ -102,7 +103,7 @@ def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
 def _show(
     usual: Callable[..., None], message: Warning, category: type[Warning], *where: Any
 ) -> None:
-    """Show a ``message`` in one line if its category is a warning of cdsm; else call ``usual``."""
+    """Print a warning of cdsm in one line; show others by ``usual``, as Python does."""
     if not issubclass(category, cdsm.CdsmWarning):
         return usual(message, category, *where)
     text = f"warning: {message}"
@@ -123,7 +124,7 @@ def misuse_reported(as_json: bool) -> Iterator[None]:
 
 @contextmanager
 def reported(as_json: bool) -> Iterator[None]:
-    """Turn an error into a message, or JSON if ``as_json``, and an exit code; --debug raises it.
+    """Turn an error into an exit code and a message, or JSON if ``as_json``; --debug raises it.
 
     A warning of cdsm is printed in one line.
     """

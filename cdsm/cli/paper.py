@@ -1,4 +1,4 @@
-"""``cdsm reproduce``: recompute the paper on the stiffness of such arms (see README)."""
+"""``cdsm reproduce``: recompute the figures of the paper, and compare their numbers with ours."""
 
 from __future__ import annotations
 

@@ -29,8 +29,8 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     """Read a path from a CSV file: a header, then one line per sample.
 
     The header names the columns and their units. Joint columns have the names of the joints of
-    the arm; joints without a column stay at 0. Other columns are ignored, unless their name is one
-    of these but for a letter. Lines that begin with # are comments.
+    the arm; joints without a column stay at 0. Other columns are ignored, but FileError if the name
+    of one looks like a typing error. Lines that begin with # are comments.
     """
 
     def refuse(problem: str) -> NoReturn:
@@ -42,9 +42,10 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     found = named_columns(table, (*arm.joint_names, *"xyz", "target"), refuse)
 
     def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
-        """Return the columns ``wanted``, with their units, (S, n) in SI; None if none is there.
+        """Return n columns (S, n) in SI; None if the table has none of them.
 
-        With ``some``, columns that are missing are zero; otherwise they are an error.
+        ``wanted`` has the names of the columns, with the units of each and their sizes in SI. With
+        ``some``, missing columns are zero; otherwise they are an error.
         """
         if not wanted.keys() & found.keys():
             return None
@@ -70,7 +71,7 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
 
 
 def one_target(given: float | None, of_file: Array | None, option: str) -> float | Array:
-    """Return the target of the option or of the file [N/m]; BadParameter unless one is given."""
+    """Return the target [N/m], ``given`` or ``of_file``; BadParameter if none is there, or both."""
     if given is not None and of_file is None:
         return given
     if given is None and of_file is not None:

@@ -82,7 +82,7 @@ class PoseOptions:
 
 @dataclass(frozen=True)
 class MeasureOptions:
-    """Options of payloads, clearances and the use of wires."""
+    """Options for the quantities payload, clearance, wire safety and wire life of a sweep."""
 
     worst_friction: Annotated[
         bool,
@@ -219,7 +219,10 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
 def _answer(
     as_json: bool, dataset: xarray.Dataset, written: Path, conditions: Conditions | None = None
 ) -> None:
-    """Print the written file and unstable entries; of a new sweep also conditions and counts."""
+    """Print which file was written, and warn of unstable entries.
+
+    ``conditions`` are given for a new sweep; then they and the counts of all statuses are printed.
+    """
     from cdsm.support.tidy import status_names
 
     status = dataset["status"].values

@@ -26,7 +26,7 @@ def _laws() -> list[str]:
 
 @dataclass(frozen=True)
 class TrueArmOptions:
-    """Options of the true arm, by which it differs from the controller's model."""
+    """Options that say how the true arm differs from the controller's model."""
 
     plant: Annotated[
         Literal["slow", "mujoco"],
@@ -59,7 +59,7 @@ class TrueArmOptions:
             )
 
     def made(self, model: cdsm.Manipulator, period: float) -> cdsm.SlowPlant | cdsm.MuJoCoPlant:
-        """Return the plant; ``model`` is the arm that the controller knows."""
+        """Build the plant; ``model`` is the controller's arm, ``period`` the time of a step [s]."""
         from cdsm.control import with_rigidity
 
         arm = with_rigidity(model, self.true_rigidity) if self.true_rigidity != 1.0 else model
@@ -69,7 +69,7 @@ class TrueArmOptions:
 
 @dataclass(frozen=True)
 class SensorOptions:
-    """Options of encoders and load cells."""
+    """Options that describe the encoders and load cells."""
 
     encoder: Annotated[float, typer.Option(help="Resolution of the encoders [mm].")] = 0.01
     tension_noise: Annotated[
@@ -79,7 +79,7 @@ class SensorOptions:
     delay: Annotated[int, typer.Option(help="Delay of the sensors in steps.")] = 0
 
     def made(self) -> cdsm.Sensors:
-        """Return the sensors."""
+        """Build the sensors."""
         return cdsm.Sensors(
             encoder=1e-3 * self.encoder,
             tension_noise=self.tension_noise,

@@ -1,4 +1,4 @@
-"""Values of options: numbers, axes, joint coordinates."""
+"""Read the values of options: numbers, axes, joint coordinates."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def misuse(option: str, problem: str) -> typer.BadParameter:
 
 
 def joint_scales(arm: cdsm.Manipulator) -> Array:
-    """Return the command-line unit of each joint (nv,) in SI: one degree [rad] or one mm [m]."""
+    """Return the factor from each joint's unit on the command line to SI (nv,): of 1° or 1 mm."""
     import numpy as np
 
     from cdsm.support.format import JointUnits
@@ -70,7 +70,10 @@ def gravity_of(text: str) -> list[float] | str:
 
 
 def numbers(option: str, text: str, count: int | None = None, form: str = "numbers") -> list[float]:
-    """Return the ``count`` numbers in the text of an option; BadParameter names the ``form``."""
+    """Return the ``count`` numbers in the text of an option; None: any count.
+
+    BadParameter otherwise; its message says that ``form`` is needed, such as ``FX,FY,FZ``.
+    """
     from cdsm.support.format import plural
 
     try:

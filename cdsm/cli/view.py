@@ -83,7 +83,7 @@ def view(
 
 
 def _arguments(arm: ArmOptions) -> list[str]:
-    """Return the arguments of the shell that describe an arm."""
+    """Return the command-line arguments that describe an arm: its file, and the options given."""
     given = [str(arm.arm)]
     for field in fields(arm)[1:]:
         value, option = getattr(arm, field.name), f"--{field.name.replace('_', '-')}"

@@ -27,7 +27,7 @@ def warm(as_json: AsJson = False) -> None:
         cdsm.plan_stiffness(pose, up, 1.01 * K.along(up), minimum=40.0)
         readings = ("margin", "along", "compliance", "cartesian", "pseudoinverse")
         cdsm.evaluate(arm, pose.q[None], minimum=40.0, direction=up, outputs=readings)
-        cdsm.distribute_tensions(arm, pose.q[None], 40.0, 60.0)  # no guess decides: a search
+        cdsm.distribute_tensions(arm, pose.q[None], 40.0, 60.0)  # runs the search for tensions
         rough = cdsm.presets.virtual_prototype(friction=0.1).at(pose.q)
         cdsm.evaluate(rough.arm, pose.q[None], tension.values, direction=up, outputs=("breakaway",))
         cdsm.load_cycle(rough, tension.values, np.zeros((1, 6)))

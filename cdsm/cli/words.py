@@ -1,4 +1,4 @@
-"""Words of the command line: options in messages of the library, older names of options."""
+"""Put names of options into messages of the library; replace older names of options."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OPTIONS: Final = {name: f"--{name.replace('_', '-')}" for name in _ALIKE} | {
     "outputs": "--quantities",
     "store": "--resume",
 }
-"""Option for each argument of the library that a message may name."""
+"""Option in place of each argument of the library that a message may name."""
 
 _PYTHON: Final = (
     (", or, in Python, pass check_limits=False to compute beyond them.", "."),

@@ -1,4 +1,4 @@
-"""Recomputed figures: claims of the paper, computed numbers, and their output as text or JSON."""
+"""Compare claims of the paper with computed numbers, and write both as text or JSON."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ EXPLANATION = (
 @final
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One number, or one for each of x, y and z, of the paper, and the computed numbers.
+    """A number of the paper, or one for each of x, y and z, beside the computed numbers.
 
     Attributes:
         figure: Name of the figure.
@@ -37,8 +37,9 @@ class Claim:
         paper: Numbers of the paper; None if the paper gives words only.
         computed: K_R with the pseudo-inverse and l_0 = L, as in the paper; for Section V the
             stiffness measured by weights; for Fig. 5 numbers of the strand.
-        original: K_R with the pseudo-inverse and the original length. Empty for Fig. 5, Section V.
-        along: Stiffness for a small weight, with the original length. Empty for Fig. 5, Section V.
+        original: As ``computed``, but with the original length l_0. Empty for Fig. 5, Section V.
+        along: Stiffness that a small weight measures, with the original length l_0. Empty for
+            Fig. 5, Section V.
         assumption: Assumptions where the paper is silent.
         searched: Assumptions that were searched to meet the paper's number; empty if none.
         at_most: Whether the paper's number is an upper bound.
@@ -57,7 +58,7 @@ class Claim:
 
     @property
     def difference(self) -> tuple[float, ...] | None:
-        """Computed minus paper, in :attr:`unit`; None without a number or for an upper bound."""
+        """``computed`` − ``paper``; None if ``paper`` is None or an upper bound."""
         if self.paper is None or self.at_most:
             return None
         return tuple(ours - theirs for ours, theirs in zip(self.computed, self.paper, strict=True))
@@ -65,12 +66,12 @@ class Claim:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Figure(ABC):
-    """One recomputed figure of the paper. Subclasses have the curves.
+    """One recomputed figure of the paper. Each subclass adds its curves.
 
     Attributes:
         name: ``"fig3"``, ``"lead"`` and so on.
         title: Title above the figure.
-        claims: Numbers of the paper and computed numbers.
+        claims: Numbers of the paper beside computed numbers.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Curves of stiffness of the virtual prototype, over Young's modulus or tension.
 
-Every number is computed in three ways ("readings"): ``pseudoinverse`` with the stretched length L
-instead of the original length l_0, as in the paper; ``pseudoinverse`` with l_0; and ``along`` with
-l_0, the stiffness that a small weight at the tip measures.
+Every number is computed in three ways ("readings"): ``pseudoinverse`` (K_R) from EA/L with the
+stretched length L, as in the paper; ``pseudoinverse`` from EA/l_0 with the original length l_0; and
+``along`` from EA/l_0, the stiffness that a small weight at the tip measures.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Part = Literal["active", "passive"]
 Swept = Literal["young_modulus", "tension"]
 
 FROM_FIG_6: Final = "prototype searched for Fig. 6"
-"""Text of ``Claim.searched`` for all figures but Fig. 6."""
+"""Text of ``Claim.searched``: the virtual prototype was chosen to meet the number of Fig. 6."""
 
 
 @final
@@ -38,13 +38,13 @@ class Curve:
 
     Attributes:
         label: Name of the curve in its figure.
-        original_length: ``original_length`` of the :class:`~cdsm.Manipulator`.
+        original_length: ``"stretched"`` for EA/L, ``"unstrained"`` for EA/l_0.
         swept: Swept quantity (N,): Young's modulus [Pa] or lower bound of tension [N].
         tension: Smallest, mean and largest cable tension (N, 3) [N].
         pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].
-        pseudoinverse_part: Diagonal of K_R of the figure's ``part`` of K_θ alone (N, 3) [N/m].
+        pseudoinverse_part: Diagonal of K_R from the figure's ``part`` of K_θ alone (N, 3) [N/m].
         along: Stiffness that a small weight measures along x, y, z (N, 3) [N/m].
-        along_part: Share of ``part`` in ``along`` (N, 3) [N/m].
+        along_part: Share of the figure's ``part`` of K_θ in ``along`` (N, 3) [N/m].
     """
 
     label: str
@@ -63,10 +63,10 @@ class StiffnessFigure(Figure):
     """A figure of stiffness over Young's modulus or tension.
 
     Attributes:
-        swept: Name of the swept quantity.
-        part: Name of the term of K_θ shown beside the total.
-        curves: Curves with the stretched length as original length, as in the paper.
-        original: Curves of the same cases with the original length.
+        swept: ``"young_modulus"`` or ``"tension"``: the quantity on the horizontal axis.
+        part: ``"active"`` or ``"passive"``: the term of K_θ that is shown beside the total.
+        curves: Curves from EA/L with the stretched length L, as in the paper.
+        original: The same curves from EA/l_0.
         postures: Posture of each curve.
     """
 
@@ -100,7 +100,7 @@ class StiffnessFigure(Figure):
 
 
 class Pair(NamedTuple):
-    """Curves of one case: with the stretched length (as in the paper) and the original length."""
+    """The same curve from EA/L, with the stretched length (as in the paper), and from EA/l_0."""
 
     stretched: Curve
     original: Curve
@@ -111,7 +111,7 @@ class Pair(NamedTuple):
     ) -> Claim:
         """Build a claim; ``measure`` computes its numbers, once for each of the three readings.
 
-        ``measure`` takes the stiffness (N, 3) and the share of the figure's part in it (N, 3).
+        ``measure`` takes a stiffness (N, 3) and its active or passive part (N, 3), both [N/m].
         ``searched`` and ``texts`` are fields of the claim.
         """
         paper, original = self.stretched, self.original
@@ -127,9 +127,10 @@ class Pair(NamedTuple):
 def over_cases(
     label: str, q: Array, cases: Sequence[tuple[Elasticity, float]], swept: Array, part: Part
 ) -> Pair:
-    """Compute curves over N cases (law, lower bound [N]) at a posture q (nv,) [rad].
+    """Compute the stiffness at a posture q (nv,) [rad] for N cases: laws with lower bounds [N].
 
-    ``swept`` (N,) is their abscissa, ``part`` a term of K_θ.
+    ``swept`` (N,) is the abscissa of the curves. Its unit is that of ``Curve.swept``. ``part`` is
+    the term of K_θ that is computed beside the total.
     """
 
     def curve(length: OriginalLength) -> Curve:
@@ -153,7 +154,7 @@ def over_cases(
 
 
 def over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> Pair:
-    """Compute curves over lower bounds of tension ``minima`` (N,) [N], with the active part."""
+    """Compute stiffness and its active part over lower bounds of tension ``minima`` (N,) [N]."""
     return over_cases(label, q, [(law, minimum) for minimum in minima], minima, "active")
 
 
@@ -164,5 +165,5 @@ def at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
 
 
 def readings(K: Stiffness) -> Array:
-    """Compute diagonal of K_R (row 0) and stiffness for a small weight (row 1), (2, 3) [N/m]."""
+    """Return the diagonal of K_R (row 0) and stiffness for a small weight (row 1), (2, 3) [N/m]."""
     return np.array([np.diag(K.pseudoinverse()), [K.along(axis) for axis in np.eye(3)]])

@@ -1,8 +1,8 @@
-"""Laws that round to the printed digits of Eq. 19, and their bounds.
+"""Bounds of all laws EA(F) whose coefficients round to the printed digits of Eq. 19.
 
-A printed coefficient stands for all numbers that round to it: c = c_printed + h ∘ d with |d| ≤ 1,
-where h is half a unit of the last digit. The rigidity EA(F) = Σ c_i Fⁱ is linear in d. Therefore
-linear programs find the bounds of EA.
+A printed coefficient stands for all numbers that round to it: c_i = p_i + h_i d_i with |d_i| ≤ 1,
+where p_i is printed and h_i is half a unit of its last digit. The rigidity EA(F) = Σ c_i Fⁱ is
+linear in d. Therefore linear programs find the bounds of EA.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ HALF_UNITS: Final = (
     frozen(np.array([5e-3, 5e-3, 5e-3, 5e-3, 5e-3, 5e-5, 5e-5])),
     frozen(np.array([5e-2, 5e-3, 5e-3, 5e-5, 5e-9, 5e-12, 5e-15])),
 )
-"""Half a unit of the last printed digit of each coefficient, lowest power first."""
+"""Half a unit of the last printed digit of each coefficient, lowest power first: of the lower and
+the upper branch."""
 
 _SAMPLES = 200  # number of tensions at which the lower branch is sampled
 
@@ -42,8 +43,8 @@ _PRINTED, _HALF = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
 def least_bend() -> tuple[float, float]:
     """Return dEA/dF [-] just below and above 31 N, for the smallest kink that Eq. 19 can have.
 
-    The coefficients are any that round to the printed digits and make EA continuous at 31 N; that
-    of F⁶ below 31 N is free. The two slopes still differ.
+    EA is continuous at 31 N. Each coefficient rounds to its printed digits, except that of F⁶ below
+    31 N, which may be any number. Even then the two slopes differ.
     """
     below, above = _branches(powers(JOIN, slope=True)[0])
     free: list[tuple[float | None, float | None]] = [(-1.0, 1.0)] * 14
@@ -53,9 +54,9 @@ def least_bend() -> tuple[float, float]:
 
 
 def band(tension: ArrayLike) -> tuple[Array, Array]:
-    """Find least and largest EA [N] of all laws of the printed digits, shape of ``tension`` [N].
+    """Find least and largest EA [N] of all laws of the printed digits, for each ``tension`` [N].
 
-    The laws are continuous at 31 N and positive over the domain.
+    Both have the shape of ``tension``. The laws are continuous at 31 N, and positive below it.
 
     Raises:
         InvalidInput: ``tension`` is not finite numbers.
@@ -71,13 +72,16 @@ def band(tension: ArrayLike) -> tuple[Array, Array]:
 
 
 def powers(tension: ArrayLike, slope: bool = False) -> Array:
-    """Return powers Fⁱ (N, 7), i = 0 to 6, of N tensions F; with ``slope`` derivatives i Fⁱ⁻¹."""
+    """Return the powers Fⁱ (N, 7), i = 0 to 6, of N tensions; with ``slope`` instead i Fⁱ⁻¹."""
     F, i = np.atleast_1d(np.asarray(tension, dtype=np.float64))[:, None], np.arange(7)
     return np.asarray(i * F ** np.maximum(i - 1, 0) if slope else F**i)
 
 
 def _branches(rows: Array) -> tuple[Array, Array]:
-    """Extend rows (..., 7) for one branch to rows (..., 14) for the lower and the upper branch."""
+    """Pad rows (..., 7) with zeros to (..., 14): once for the lower branch, once for the upper one.
+
+    The first 7 columns are those of the lower branch.
+    """
     none = np.zeros_like(rows)
     return np.hstack([rows, none]), np.hstack([none, rows])
 
@@ -85,7 +89,10 @@ def _branches(rows: Array) -> tuple[Array, Array]:
 def _least(
     cost: Array, positive: Array, bounds: Sequence[tuple[float | None, float | None]]
 ) -> Array:
-    """Find the coefficients c (14,) of a continuous law that minimise cost·c, positive·c ≥ 0."""
+    """Find the coefficients c (14,) of a continuous law with least cost·c, so that positive·c ≥ 0.
+
+    ``bounds`` are those of d; None: no bound.
+    """
     lower, upper = _branches(powers(JOIN)[0])
     join = lower - upper
     solution = linprog(

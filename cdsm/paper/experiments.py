@@ -1,4 +1,4 @@
-"""Figs. 10, 12 and 13 and Table II of Section V, as virtual experiments.
+"""Recompute Figs. 10, 12 and 13 and Table II of Section V by virtual experiments.
 
 :mod:`cdsm.paper.prototype_fit` identifies a prototype from the numbers of these experiments.
 Agreement only shows that such a prototype is possible. Disagreement contradicts the model, an
@@ -100,7 +100,7 @@ def figure_10() -> ExperimentFigure:
 
 
 def figure_12() -> ExperimentFigure:
-    """Compute stiffness in y over tension with cables of constant stiffness, 2 configurations."""
+    """Compute stiffness in y over tension, cables of constant stiffness, for 2 configurations."""
     fit = identified(STEPS[1])
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], prototype.highest_hybrid_tension, _POINTS)
@@ -160,7 +160,7 @@ def figure_13() -> ExperimentFigure:
 
 
 def _over_tension(fit: PrototypeFit) -> list[Trace]:
-    """Compute stiffness in x, y and z over tension, beside the table of the fit."""
+    """Compute stiffness in x, y and z over tension, beside the Table II of the fit."""
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS)
     curves = prototype.weigh(prototype.arm().at(prototype.configurations[0]), tensions)
@@ -179,7 +179,10 @@ def _over_tension(fit: PrototypeFit) -> list[Trace]:
 def _configurations(
     fit: PrototypeFit, swept: Array, curves: Sequence[Array], paper: Sequence[float]
 ) -> tuple[Trace, ...]:
-    """Build a trace per configuration: a curve over ``swept``, relative to its first value."""
+    """Build a trace per configuration: a curve over ``swept``, divided by its first value.
+
+    ``paper`` has the paper's ratio of the last to the first value of each curve.
+    """
     configurations = np.rad2deg(fit.prototype.configurations)
     return tuple(
         Trace(
@@ -196,7 +199,7 @@ def _configurations(
 
 
 def _table_claims(fit: PrototypeFit) -> list[Claim]:
-    """Compare the columns of Table II, and their increments, with the fitted prototype."""
+    """Compare the columns of Table II, and their increments, with those of the fitted prototype."""
     table, computed = fit.step.table, fit.predicted.table
     assumption = f"{fit.step.label}; {fit.step.count}"
     claims = [

@@ -1,8 +1,9 @@
-"""Fit of Table II with effects that Section V leaves out: friction, bearings, a softer strand.
+"""Fit Table II with effects that Section V leaves out: friction, bearings, another strand.
 
-The tests hang a weight slowly on the shaken arm, so cables stick in the holes at first. A bearing
-is a spring parallel to its joint: a pair of springs between the disks beside the joint. The
-rigidity of all cables is Eq. 19 times one factor, since they come from one spool.
+Each test begins on a shaken arm, whose cables have one tension along their length. Then a weight is
+applied slowly, so cables stick in the holes at first. A bearing acts as a spring about its joint:
+the model has a pair of springs between the disks beside the joint. The rigidity of all cables is
+Eq. 19 times one factor, since they come from one spool.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ ADDED: Final = {"friction": (0.0, 0.5), "bearing": (0.0, 500.0), "rigidity": (0.
 """Bounds of μ [-], of the stiffness of a bearing [N m/rad], and of the factor on Eq. 19 [-]."""
 
 _SEARCHED: Final = {
-    # start without and with the added parameters: near the best of searches from several starts
+    # starts without and with the added parameters: near the best of searches from several starts
     "link_length": (0.0304, 0.03097),
     "tool_length": (0.2547, 0.2781),
     "hole_radius": (0.02432, 0.02479),
@@ -52,8 +53,8 @@ _SEARCHED: Final = {
     "rigidity": (1.0, 1.06),
 }
 
-_LEAST_WEIGHT = 0.2  # [N]: no weight moves nothing
-_PARTS = 2  # rests on the way to a weight
+_LEAST_WEIGHT = 0.2  # lower bound of the weights [N], since without a weight the tip does not move
+_PARTS = 2  # number of equilibria from zero load to the whole weight
 _STRETCHED = 1e-3  # elongation of the springs of a bearing [m]
 
 
@@ -63,7 +64,7 @@ class RoughPrototype:
     """A prototype of Section V with friction, bearings and another rigidity of the strand.
 
     Attributes:
-        prototype: The other parameters.
+        prototype: All other parameters.
         friction: μ [-] in all holes.
         bearing: Stiffness of each bearing [N m/rad].
         rigidity: Factor [-] on the rigidity of Eq. 19, common to all cables.
@@ -76,7 +77,7 @@ class RoughPrototype:
 
     @property
     def spring(self) -> float:
-        """Stiffness k [N/m] of each of the two springs of a bearing, whose stiffness is 2 k R²."""
+        """Stiffness k [N/m] of each of the two springs of a bearing; the bearing has 2 k R²."""
         return self.bearing / (2.0 * self.prototype.hole_radius**2)
 
     def arm(self) -> Manipulator:
@@ -97,7 +98,10 @@ class RoughPrototype:
         return arm.with_cables([*arm.cables, *springs])
 
     def weigh(self) -> list[LoadingPath]:
-        """Load the arm slowly with the weight of each entry of Table II; CdsmError on failure."""
+        """Load the arm slowly with the weight of each entry of Table II, row by row (15 paths).
+
+        CdsmError if an equilibrium is not found.
+        """
         pose = self.arm().at(POSTURE)
         return [
             LoadingPath.of(pose, F, np.zeros(6), weight[None], _PARTS)
@@ -123,7 +127,7 @@ class RoughPrototype:
         return np.asarray(((weights**2).sum(axis=1) / work).reshape(5, 3))
 
     def _tensions(self, pose: Posture) -> Array:
-        """Distribute the tensions (5, C) [N] of each row; springs of a bearing cause no torque."""
+        """Return the tensions (5, C) [N] of each row; the springs of a bearing cause no torque."""
         names = pose.arm.cables.names
         springs = [c for c, name in enumerate(names) if name.startswith("bearing")]
         fixed = dict[str, float]()
@@ -144,7 +148,7 @@ class RoughPrototype:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RoughFit:
-    """The prototype with added parameters that explains Table II best.
+    """The prototype that explains Table II best, with added parameters.
 
     Attributes:
         prototype: Identified parameters.

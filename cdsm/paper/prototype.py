@@ -1,4 +1,4 @@
-"""The prototype of Section V: its unknown parameters, and the experiments made with it."""
+"""Compute the experiments of Section V on a prototype with given parameters."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ _RIGID = LinearElasticity(1e12)  # the series stiffness is the whole stiffness o
 @final
 @dataclass(frozen=True, kw_only=True)
 class Prototype:
-    """Unknown parameters of Section V. The first cable of each pair is position-controlled.
+    """Parameters of the prototype of Section V that the paper does not state.
+
+    The first cable of each pair is position-controlled, the second one force-controlled.
 
     Attributes:
         link_length: Length of the links between the joints [m].
@@ -117,7 +119,7 @@ class Prototype:
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
-        """Compute stiffness (N, 3) [N/m] in x, y, z: secant under a weight, tangent without one."""
+        """Compute stiffness (N, 3) [N/m] in x, y, z: secant for a weight, tangent if that is 0."""
         forced = [cable.name for cable in pose.arm.cables if cable.control == "force"]
         rows = []
         for tension in np.atleast_1d(np.asarray(tensions, dtype=np.float64)).tolist():
@@ -162,7 +164,7 @@ class Prototype:
 def arm_of(
     one: Prototype, law: Elasticity, series_stiffness: float, friction: float = 0.0
 ) -> Manipulator:
-    """Build the arm with the dimensions of a prototype, cables of a law with springs in series."""
+    """Build the arm of a prototype: cables of a law, each with a spring [N/m] in series."""
     return presets.experimental_prototype(
         law,
         series_stiffness=series_stiffness,
@@ -179,7 +181,7 @@ def arm_of(
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Predicted:
-    """The 20 numbers of Section V, or the 15 of Table II alone."""
+    """Predictions of the 20 numbers of Section V, or of the 15 of Table II alone."""
 
     table: Array  # Table II (5, 3) [N/m]
     drops: tuple[float, ...] = ()  # reductions of Fig. 12 (2,) [-], or empty

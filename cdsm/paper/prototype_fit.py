@@ -1,4 +1,4 @@
-"""One prototype that explains all measurements of Section V, if the model holds.
+"""Identify one prototype from all measurements of Section V.
 
 The paper prints 20 numbers of its prototype and none of its dimensions. Every unknown is a
 parameter within :data:`BOUNDS`. A search finds the parameters that explain the numbers best, in
@@ -28,7 +28,7 @@ _EVEN = TENSIONS.tolist()
 _TOUCH = math.tan(_LIMIT / 2.0)  # with a smaller disk ratio, disks touch before ±30°
 
 _PARAMETERS: Final[dict[str, tuple[float, ...]]] = {
-    # bounds, then starts: even tensions, uneven tensions, Table II alone
+    # lower and upper bound, then the three starts: START, UNEVEN_START, TABLE_START
     "link_length": (0.03, 0.15, 0.031, 0.0305, 0.0305),
     "tool_length": (0.03, 0.3, 0.295, 0.295, 0.266),
     "hole_radius": (0.015, 0.05, 0.0495, 0.0495, 0.0268),
@@ -57,13 +57,16 @@ BOUNDS: Final = {name: (low, high) for name, (low, high, *_) in _PARAMETERS.item
 START, UNEVEN_START, TABLE_START = (
     Prototype(**{name: row[column] for name, row in _PARAMETERS.items()}) for column in (2, 3, 4)
 )
-"""Starts near the results of searches over all of :data:`BOUNDS`. They keep the search short."""
+"""Starts for evenly and for unevenly spaced tensions, and for Table II alone.
+
+They are near the results of searches over all of :data:`BOUNDS`, so the search is short.
+"""
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Step:
-    """One interpretation of Section V: its numbers and the free parameters.
+    """One interpretation of Section V: the numbers to explain, and the parameters to search.
 
     Attributes:
         label: Name in tables and figures.
@@ -128,7 +131,7 @@ class PrototypeFit:
         step: Interpretation of Section V.
         prototype: Identified parameters.
         predicted: Numbers of Section V for the identified prototype.
-        residuals: Residuals of :meth:`Predicted.residuals`, in the order of ``step.numbers``.
+        residuals: Residual [-] of each of ``step.numbers``: see :meth:`Predicted.residuals`.
         at_bound: Names of searched parameters at a bound; the best value may lie beyond it.
     """
 
@@ -154,7 +157,7 @@ _NEAR = 0.02  # a parameter is at a bound if it is this near, as a fraction of i
 
 
 def identify_prototype(step: Step) -> PrototypeFit:
-    """Find the free parameters of a step within :data:`BOUNDS` that minimise Σ r².
+    """Find the free parameters of a step within :data:`BOUNDS` that minimise the squared residuals.
 
     Raises:
         InvalidInput: The start is out of bounds, or its arm has no stable equilibrium.
@@ -195,10 +198,10 @@ def identify_prototype(step: Step) -> PrototypeFit:
 
 
 identified = cache(identify_prototype)
-"""Function :func:`identify_prototype` that keeps its results."""
+"""As :func:`identify_prototype`; a repeated call returns the stored result."""
 
 section_v_claim = partial(Claim, searched="all parameters of the prototype")
-"""Make a :class:`Claim` of Section V. It is measured with weights, so it has one number only."""
+"""Build a :class:`Claim` of Section V, measured with weights; ``original``, ``along`` are empty."""
 
 
 @final

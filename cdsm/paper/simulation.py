@@ -1,7 +1,7 @@
-"""Figs. 3, 4, 6, 7 and 8 of the paper, recomputed.
+"""Recompute Figs. 3, 4, 6, 7 and 8 of the paper.
 
-:mod:`cdsm.presets` and the assumptions of each claim fill in what the paper leaves open. A claim
-also says which assumptions were searched to meet the paper's number.
+Where the paper is silent, :mod:`cdsm.presets` and this module assume values: see
+``Claim.assumption``. ``Claim.searched`` names those that were chosen to meet the paper's number.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _POINTS = 25
 
 
 def figure_3() -> StiffnessFigure:
-    """Compute passive and total stiffness over Young's modulus, 160 to 320 GPa, fixed tension."""
+    """Compute stiffness and its passive part over Young's modulus, 160 to 320 GPa, for 2 bounds."""
     moduli = np.linspace(160e9, 320e9, _POINTS)
     laws = [LinearElasticity.of_wire(modulus, presets.STRAND_DIAMETER) for modulus in moduli]
     pairs = [
@@ -80,7 +80,7 @@ def figure_3() -> StiffnessFigure:
 
 
 def figure_4() -> StiffnessFigure:
-    """Compute active and total stiffness over tension, with constant EA."""
+    """Compute stiffness and its active part over tension, with constant EA."""
     minima = np.linspace(100.0, 800.0, _POINTS)
     strand, wire = (
         over_minimum(label, law, _TEN, minima)
@@ -198,7 +198,7 @@ def _figure(
 
 
 def _highest_minimum(pose: Posture) -> float:
-    """Find the lower bound [N] at which the largest tension reaches :data:`STRAND_END`."""
+    """Find the lower bound [N] of all tensions at which the largest is just :data:`STRAND_END`."""
 
     def excess(minimum: float) -> float:
         return float(distribute_tension(pose, minimum).values.max()) - STRAND_END

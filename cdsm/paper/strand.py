@@ -31,9 +31,9 @@ class StrandFigure(Figure):
         displacement: Stretch of the wire above 2.2 N, ∫ l_0 dF/EA (N,) [m].
         tangent: Tangent rigidity EA of the repaired Eq. 19 (N,) [N].
         secant: Secant rigidity of the repaired Eq. 19, Eq. 18 (N,) [N].
-        low: Least EA of all continuous laws of the printed digits (N,) [N].
-        high: Largest EA of all continuous laws of the printed digits (N,) [N].
-        printed: Eq. 19 as printed (N,) [N].
+        low: Least EA of all continuous laws that round to the printed digits (N,) [N].
+        high: Largest EA of all continuous laws that round to the printed digits (N,) [N].
+        printed: EA by Eq. 19 as printed (N,) [N].
         join: Tension at which the branches of Eq. 19 meet [N].
     """
 
@@ -62,7 +62,7 @@ class StrandFigure(Figure):
 
 
 def eq19_as_printed(tension: ArrayLike) -> Array:
-    """Compute Eq. 19 [N] as misprinted, same shape as ``tension`` [N]: negative from 11 to 31 N."""
+    """Compute EA [N] at each ``tension`` [N] by the misprinted Eq. 19: negative from 11 to 31 N."""
     F = np.asarray(tension, dtype=np.float64)
     lower, upper = EQ19_PRINTED
     return np.where(F <= JOIN, polyval(F, (*lower[:-1], -1e-3)), polyval(F, upper))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cdsm.tension import Tension
 
 BESIDE_BAR = 0.82
-"""Fraction of the width of a figure to the left of the tension scale."""
+"""Fraction of the width of a figure that is left of the colour bar of tensions."""
 
 _FLATTEST = 0.35  # smallest range of an axis, as a fraction of the largest
 
@@ -42,15 +42,15 @@ def plot_arm(
 ) -> Figure:
     """Plot an arm in 3D: backbone, disks and cables, with equal axes in mm.
 
-    For a robot from a URDF the joints are drawn: circles turn, squares slide. A thin line joins
-    each cable site to its link.
+    For a robot from a URDF the joints are drawn: circles are revolute, squares prismatic. A thin
+    line joins each cable site to its link.
 
     Args:
         pose: Posture to draw.
         tension: Tensions that colour the cables, if given.
         stiffness: If given and stable, the ellipsoid C_vv f, |f| = 1, is drawn at the tip. It
-            shows the displacement under a force of any direction, to the scale in the legend. The
-            title says if the arm is unstable.
+            shows the displacement under a force of 1 N in any direction, enlarged as the legend
+            says. The title says if the arm is unstable.
 
     Raises:
         InvalidInput: An argument has the wrong type, or belongs to another arm or posture.
@@ -92,16 +92,16 @@ def tension_bar(figure: Figure, colors: ScalarMappable) -> None:
 
 
 ELLIPSOID_GRID = 13, 25
-"""Number of points of an ellipsoid from pole to pole, and around."""
+"""Number of points of a drawn ellipsoid: from pole to pole, and around its axis."""
 
 _LARGEST = 0.3  # largest half axis of a drawn ellipsoid, as a fraction of the arm's length
 
 
 class Ellipsoid(NamedTuple):
-    """Surface of the tip displacements C_vv f, |f| = 1 N, drawn at the tip to a scale."""
+    """Surface of the tip displacements C_vv f, |f| = 1 N, to be drawn at the tip."""
 
     surface: Array  # points of the drawn surface (3, 13, 25) [m]
-    scale: float  # drawn over true displacement [-], a power of ten
+    scale: float  # drawn displacement over true displacement [-], a power of ten
     longest: float  # largest true displacement per force [m/N]
 
     def __str__(self) -> str:
@@ -110,10 +110,10 @@ class Ellipsoid(NamedTuple):
 
 
 def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
-    """Compute the ellipsoid of C_vv (3, 3) [m/N] at a tip (3,) [m] of an arm of a length [m].
+    """Compute the ellipsoid of a compliance C_vv (3, 3) [m/N] at the tip (3,) [m] of an arm.
 
-    The scale is the power of ten that draws the longest half axis with 3 to 30 % of the length. The
-    size of the ellipsoid thus shows the magnitude. None if no force moves the tip.
+    It is enlarged by a power of ten, so that its longest half axis is 3 to 30 % of the ``length``
+    of the arm [m]. None if no force moves the tip.
     """
     longest = float(np.linalg.norm(compliance, 2))
     if longest == 0.0:
@@ -150,9 +150,10 @@ def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
 
 
 def frame_arms(axes: Any, limits: Array | None, label: str = "{} [mm]") -> None:
-    """Set the limits (3, 2) of 3D axes with equal scales, and ``label`` with the name of each axis.
+    """Set the limits (3, 2) of 3D axes with equal scales, and their labels.
 
-    Without limits, the axes contain all that is drawn.
+    In ``label``, {} stands for the name of the axis. Without limits, the axes contain all that is
+    drawn.
     """
     axes.tick_params(labelsize=SMALL, pad=-3)
     if limits is None:

@@ -39,7 +39,7 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
     """Plot the values of a Monte Carlo run as a histogram, beside the normal distribution.
 
-    The normal distribution is that of first-order error propagation. Dashed: 95 % intervals.
+    The normal distribution results from first-order error propagation. Dashed: 95 % intervals.
 
     InvalidInput if ``run`` is no result of :func:`~cdsm.monte_carlo`.
     """

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from cdsm.tension import Tension
 
 _SAME = 1e-9  # largest difference between the entries of two equal unit directions
-_WIDE = 12  # above this number of cables a figure that names them is two columns wide
+_WIDE = 12  # above this number of cables, a figure with their names is two columns wide
 
 
 def plot_shares(shares: Shares) -> Figure:

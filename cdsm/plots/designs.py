@@ -1,4 +1,4 @@
-"""Figure of a search for designs: the Pareto front, or the progress for a single objective."""
+"""Plot a search for designs: the Pareto front, or the progress for a single objective."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
 
     Args:
         found: The result of :func:`cdsm.search_designs` or :func:`cdsm.refine_design`.
-        named: Numbers of designs on the front whose points get a name in an SVG,
-            ``design-NUMBER-OBJECTIVE``.
+        named: Indices into the front. The points of these designs get an id in an SVG,
+            ``design-NUMBER-OBJECTIVE``, so that a page can find them.
 
     Raises:
         InvalidInput: ``found`` is not such a result.
@@ -62,7 +62,7 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
         x, y = (every[objectives[n].key] / scales[n][1] for n in (0, k))
         panel.plot(x[feasible], y[feasible], ".", color="0.7", markersize=3, label="feasible")
         panel.plot(x[found.front], y[found.front], ".-", color=BLUE, linewidth=0.8, label="front")
-        for number in named:  # a page finds them by these names
+        for number in named:
             n = found.front[number]
             panel.plot(x[n], y[n], "o", color=BLUE, markersize=4, gid=f"design-{number}-{k}")
         chosen = found.front[found.compromise]

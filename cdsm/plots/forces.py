@@ -1,4 +1,4 @@
-"""Figure of the tip forces that the cables can balance."""
+"""Plot the tip forces that the cables can balance."""
 
 from __future__ import annotations
 

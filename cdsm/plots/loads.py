@@ -156,8 +156,9 @@ def plot_load_history(history: LoadHistory) -> Figure:
     """Plot the force over the displacement of the tip, and the tensions of one cable's segments.
 
     Force and displacement are components along the largest force of the history. If no load has a
-    force, the displacement is plotted load by load. The cable is the one whose segments differ most
-    in tension. InvalidInput if ``history`` is no result of :func:`~cdsm.load_cycle`.
+    force, the displacement is plotted over the number of the load. The cable is the one whose
+    segments differ most in tension. InvalidInput if ``history`` is no result of
+    :func:`~cdsm.load_cycle`.
     """
     expect("history", history, "LoadHistory")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)

@@ -1,4 +1,4 @@
-"""Panels of workspace maps: which tips, values and statuses each one shows."""
+"""Choose the tips, values and statuses that each panel of a workspace map shows."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class Slice(NamedTuple):
 
 
 class Map(NamedTuple):
-    """A panel: tips (N, 2) [mm] in its ``plane`` of two axes, with quantity and status of each."""
+    """What one panel of a workspace map shows."""
 
     title: str
-    points: Array
-    values: Array
-    status: NDArray[np.int8]
-    plane: tuple[int, int]
+    points: Array  # tips (N, 2) [mm]
+    values: Array  # plotted quantity at each tip (N,), NaN if missing
+    status: NDArray[np.int8]  # status code of each tip (N,)
+    plane: tuple[int, int]  # indices of the two base axes that the panel shows
 
     @property
     def limits(self) -> Array:
@@ -62,19 +62,20 @@ class Map(NamedTuple):
 
 
 class Case(NamedTuple):
-    """The plotted quantity at all tips (NaN if missing), and their status, for one case."""
+    """The plotted quantity for one case of a sweep, such as one bound of tension."""
 
     title: str
-    values: Array
-    status: NDArray[np.int8]
+    values: Array  # at each of N postures (N,), NaN if missing
+    status: NDArray[np.int8]  # status code of each posture (N,)
 
 
 def cases_of(
     dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
 ) -> Iterator[Case]:
-    """Yield the values of ``quantity`` for each place in the dimensions but ``poses``.
+    """Yield the values of ``quantity`` for each case: each index of all dimensions but ``poses``.
 
-    ``words`` name the values of the status. Unstable entries become NaN, except in the margin.
+    ``poses`` are the dimensions of the postures; ``words`` has the word of each status code.
+    Unstable entries become NaN, except in the margin.
     """
     status = dataset["status"]
     allowed = {*map(str, status.dims), "direction"}
@@ -116,7 +117,10 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
 
 
 def slices_of(points: Array, section: tuple[str, float, float] | None) -> tuple[list[Slice], bool]:
-    """Return the slabs of tips (N, 3) [m] to show, and whether they are slices of a cloud."""
+    """Return the slabs of tips (N, 3) [mm] to show, and whether they are slices of a cloud.
+
+    ``section`` has the lengths in [m].
+    """
     if section is not None:
         return [_slab(section)], False
     if not len(points):

@@ -70,7 +70,7 @@ _MARKS: Final[dict[str, tuple[str, str, float]]] = {
     "worker_lost": ("1", BLACK, 20.0),
     "pending": ("2", "0.5", 20.0),
 }
-"""Marker, colour and size of entries without the quantity, by status."""
+"""Marker, colour and size [pt²] of entries without the quantity, by status."""
 
 
 def plot_map(
@@ -174,7 +174,10 @@ def plot_map(
 
 
 def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Return the colour scale of the values without outliers, and the ends that outliers exceed."""
+    """Return the colour scale of the values without outliers, and its ends that outliers exceed.
+
+    The ends are ``"neither"``, ``"min"``, ``"max"`` or ``"both"``.
+    """
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low, high = float(finite.min()), float(finite.max())
     wide = low > 0.0 and high > _WIDE * low
@@ -184,7 +187,7 @@ def _colors(values: Array) -> tuple[ScalarMappable, str]:
     low, high = float(inner.min()), float(inner.max())
     below, above = bool((finite < low).any()), bool((values > high).any())
     scale, name = LogNorm if wide and high > _WIDE * low else Normalize, COLOR_MAP
-    if low < 0.0 < high:  # a margin: the colour shows its sign first
+    if low < 0.0 < high:  # a margin: zero is in the middle of the scale, so colours show its sign
         low, high, name = -max(-low, high), max(-low, high), "PuOr"
     cmap = colormaps[name].with_extremes(under=BLACK, over=VERMILLION)
     extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[below, above]

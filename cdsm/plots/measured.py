@@ -38,7 +38,7 @@ _MOST_LABELS = 30  # above this number of measurements the axis shows numbers, n
 def plot_tensile_fit(fit: TensileFit) -> Figure:
     """Plot force over displacement with the fit, and the rigidity EA over tension.
 
-    The second panel shows the limits of the stages and, if the fit has one, its confidence band.
+    The second panel also shows the stages of the wire, and the 95 % band of EA if the fit has one.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
     tension, band = fit.tensions, fit.band
@@ -138,9 +138,9 @@ def _plot_loop(
 
 
 def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
-    """Plot the 95 % intervals that ``plan`` expects, and the gain by one more test, per candidate.
+    """Plot the 95 % interval expected of each parameter, and the gain by one more of each test.
 
-    The intervals are those of the parameters, of the planned tests and of evenly spaced ones.
+    Intervals are shown for the planned tests and for evenly spaced ones.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
     place, width = np.arange(len(plan.names)), 0.38

@@ -53,9 +53,9 @@ _WIDE: Final = {"linewidth": 4.0, "alpha": 0.4}  # a line under another one, bot
 def plot_paper(result: paper.Figure) -> Figure:
     """Plot one recomputed figure of the paper, with the numbers that the paper prints.
 
-    A stiffness has two readings: the paper's K_R above, a hung weight below. Each is shown with
-    the stretched length in EA/l_0, as in the paper, and with the original length. The cable
-    tension is the mean, and bars show the range over all cables, as in the paper.
+    Figures of stiffness show two readings: the paper's K_R above, a hung weight below. Each is
+    computed from EA/L with the stretched length, as in the paper, and from EA/l_0. The tension on
+    the horizontal axis is the mean of all cables; bars show their range, as in the paper.
 
     Args:
         result: Result of a function in :data:`cdsm.paper.FIGURES`.
@@ -74,7 +74,7 @@ def plot_paper(result: paper.Figure) -> Figure:
 def _grid(
     result: paper.StiffnessFigure, height: float, rows: int, **options: Any
 ) -> tuple[Figure, Any]:
-    """Build a figure as wide as two columns: panels for x, y and z in each row; height [inch]."""
+    """Build a figure as wide as two columns, of a height [inch]: each row has panels x, y and z."""
     figure, grid = panels(TWO_COLUMNS, height, 3, rows, sharex=True, **options)
     for axes, axis in zip(grid[0], XYZ, strict=True):
         caption(axes, axis)
@@ -84,7 +84,7 @@ def _grid(
 
 
 def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings of Fig. 3 over Young's modulus, and passive part minus total [%]."""
+    """Plot both readings of Fig. 3 over Young's modulus; below, passive part minus total [%]."""
     figure, grid = _grid(result, 5.4, 3)
     ratio, limit = (result.claims[k].paper or () for k in (0, 1))
     looks: tuple[dict[str, Any], ...] = (
@@ -122,7 +122,7 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_directions(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings of a figure over the tension, and the increment that the paper states."""
+    """Plot both readings of Fig. 6 over the tension, and the increment that the paper states."""
     figure, grid = _grid(result, 4.4, 2)
     increments = result.claims[0].paper or ()
     for row, (name, reading) in zip(grid, _READINGS.items(), strict=True):
@@ -147,7 +147,7 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
-    """Plot active part and change of stiffness since the first tension; a column for x, y and z."""
+    """Plot active part and change of stiffness over tension, in columns for x, y and z."""
     figure, grid = _grid(result, 5.6, 3, sharey="row")
     first, stated = result.curves[0], result.claims[0].paper or ()
     for i in range(3):
@@ -231,7 +231,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
 
 
 def _draw_curve(axes: Any, curve: paper.Curve, values: Array, **line: Any) -> None:
-    """Draw a stiffness (N,) [N/m] over the mean tension of a curve; bars: range over the cables."""
+    """Draw a stiffness (N,) [N/m] over the mean tension of ``curve``; bars: range of all cables."""
     low, mean, high = curve.tension.T
     axes.plot(mean, N_PER_MM * values, **line)
     some = np.linspace(0, len(mean) - 1, _BARS).round().astype(int)

@@ -106,12 +106,12 @@ def plot_experiment(result: paper.ExperimentFigure) -> Figure:
 
 
 def plot_prototype(result: paper.PrototypeFigure) -> Figure:
-    """Plot the residual of each number of Section V, for each reading of Table II."""
+    """Plot the residual of each number of Section V, for each interpretation of Section V."""
     names = result.fits[0].step.numbers
     figure, ((axes,),) = panels(TWO_COLUMNS, 5.0, 1)
     places = np.arange(len(names))
     looks = zip(result.fits, "os^D", (8, 5, 5, 5), (*COLORS, PURPLE), strict=True)
-    for fit, marker, size, color in looks:  # the first two hold the same values: a ring around
+    for fit, marker, size, color in looks:  # a ring: the first two fits have equal residuals
         axes.plot(
             100.0 * fit.residuals,
             places[: fit.residuals.size],

@@ -55,8 +55,8 @@ def plot_path(
         path: Postures of one arm, in order; or a plan, of which the planned samples are drawn.
         animate: A ``.gif`` to write too: the arm follows the path, its cables coloured by their
             tensions.
-        tensions: Tensions (n, C) [N] for the colours, one row per posture. Default: those of the
-            plan, if ``path`` is one.
+        tensions: Tensions (P, C) [N] for the colours, a row for each of P postures. Default: those
+            of the plan, if ``path`` is a plan.
 
     Raises:
         InvalidInput: ``path`` is not postures of one arm or is empty, or ``animate`` does not

@@ -1,4 +1,4 @@
-"""Plot the attainable stiffness of an arm, plans of stiffness, shares and saturation."""
+"""Plot the attainable stiffness of an arm, its saturation over tension, and plans along a path."""
 
 from __future__ import annotations
 
@@ -50,12 +50,13 @@ this factor."""
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
     """Plot the attainable stiffness [N/mm] over the direction, as a polar diagram.
 
-    Each entry gives a curve of its largest stiffness. The smallest stiffness of the last entry is
-    shaded. Both halves of the circle are equal, since ``along(-u)`` is ``along(u)``.
+    Each entry of ``ranges`` gives a curve of its largest stiffness. The area inside the smallest
+    stiffness of the last entry is shaded. Both halves of the circle are equal, since ``along(-u)``
+    is ``along(u)``.
 
     Args:
-        ranges: Ranges by label, such as the bound of the tensions. All directions are in one
-            coordinate plane, such as that of y and z, from 0° to below 180°.
+        ranges: Lists of ranges by label, such as the bound of the tensions; a range for each
+            direction. All directions are in one plane of two base axes, from 0° to below 180°.
 
     Raises:
         InvalidInput: A range is missing or of the wrong type, or the directions are not in one

@@ -1,4 +1,4 @@
-"""Shared by all figures: sizes, colours, units, scales of axes, and a check of the input type.
+"""Draw all figures alike: sizes, colours, units, axes and legends that the plots share.
 
 A figure is as wide as one or two columns of a journal, with text of 7 and 8 points. Colours are
 those of Okabe and Ito (2008), distinct to all kinds of colour vision; lines also differ in style.
@@ -29,11 +29,11 @@ from cdsm.support.values import Array
 
 ONE_COLUMN: Final = 3.5
 TWO_COLUMNS: Final = 7.16
-"""Widths [inch] of one and two columns of an IEEE journal."""
+"""Widths [inch] of figures as wide as one and two columns of an IEEE journal."""
 
 TEXT: Final = 8.0
 SMALL: Final = 7.0
-"""Sizes of text [pt]: of labels and titles; of ticks and legends."""
+"""Sizes of text [pt]: TEXT of labels and titles, SMALL of ticks and legends."""
 
 SCREEN: Final = 150.0
 PRINT: Final = 300.0
@@ -48,7 +48,7 @@ COLORS: Final = (BLUE, VERMILLION, GREEN)
 """Colours of the directions x, y and z."""
 
 COLOR_MAP: Final = "viridis"
-"""Colour map of numbers, such as tensions and stiffnesses; it too is clear to all colour vision."""
+"""Colour map of numbers, such as tensions and stiffnesses; clear to all kinds of colour vision."""
 
 STYLES: Final = ("-", "--", "-.", ":")
 MM: Final = 1e3
@@ -61,12 +61,12 @@ ROOM: Final = 1.15
 """Upper limit of an axis that begins at zero, divided by the largest value drawn."""
 
 NAMED: Final = 24
-"""Above this number of cables, lines are not distinct, so cables are not named."""
+"""Largest number of cables whose lines differ and have names; of more cables, all look alike."""
 
 _GAP: Final = 0.06  # free space around a picture [inch]
 
 BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
-"""Place of a legend: at the right of its panel."""
+"""Options that place a legend at the right of its panel."""
 
 _CABLES: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE, BLACK, "0.6")
 _FORMATS: Final = (".pdf", ".svg", ".png")
@@ -78,7 +78,7 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
     Equal figures give equal bytes: no date is written, and names in an SVG are not random.
 
     Args:
-        figure: Figure of a function of :mod:`cdsm.plots`, or any other.
+        figure: Figure of a function of :mod:`cdsm.plots`, or any other figure of matplotlib.
         path: The file. It is written completely or not at all.
 
     Raises:
@@ -94,9 +94,9 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
 
 
 def expect(name: str, value: object, kind: str) -> None:
-    """Raise :class:`InvalidInput` for the argument ``name`` unless its class is called ``kind``.
+    """Raise :class:`InvalidInput` for the argument ``name`` unless its value is a ``kind``.
 
-    The class is not imported, because results import this package for their ``plot`` methods.
+    The name of the class is compared. An import would be circular: results import this package.
     """
     if kind not in (base.__name__ for base in type(value).__mro__):
         raise InvalidInput(name, f"{value!r} given; a {kind} is needed.")
@@ -110,7 +110,10 @@ def direction_name(u: Array) -> str:
 def panels(
     width: float, height: float, columns: int, rows: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
-    """Build a figure of a size [inch], and its panels (rows, columns), each with grid lines."""
+    """Build a figure of a size [inch], and its panels (rows, columns), each with grid lines.
+
+    ``options`` are those of ``Figure.subplots`` of matplotlib.
+    """
     figure = Figure(figsize=(width, height), dpi=SCREEN, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     for panel in axes.flat:
@@ -174,7 +177,10 @@ def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> Non
 
 
 def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line: Any) -> None:
-    """Draw values (N, C) over x (N,), a line per cable; beside it the ``names``, if at most 24."""
+    """Draw values (N, C) over x (N,), a line per cable, with a legend of up to 24 ``names``.
+
+    ``line`` has further options of the lines.
+    """
     named = len(names) <= NAMED
     for c, name in enumerate(names):
         color = _CABLES[c % len(_CABLES)] if named else BLUE
@@ -195,7 +201,10 @@ def equal_axes(axes: Any, zoom: float = 0.75) -> None:
 
 
 class _Picture(Axes3D):  # type: ignore[misc]
-    """3D axes as wide as what they show, without the square around it: notebooks crop to it."""
+    """3D axes whose bounding box is that of the drawing; notebooks crop a figure to it.
+
+    The box of matplotlib is the whole square around the drawing.
+    """
 
     def get_tightbbox(self, renderer: Any = None, **options: Any) -> Bbox:
         """Return the box around the cube of the axes, with ticks and labels [pixel]."""
@@ -217,7 +226,7 @@ def picture_axes() -> tuple[Figure, Any]:
 
 
 def finish_picture(figure: Figure, axes: Any, title: str, right: float = 1.0) -> None:
-    """Write title and legend of a 3D picture, then enlarge it as :func:`fill_canvas` does."""
+    """Write title and legend of a 3D picture, then enlarge it by :func:`fill_canvas`."""
     heading(figure, title)
     handles, labels = axes.get_legend_handles_labels()
     if handles:
@@ -226,7 +235,7 @@ def finish_picture(figure: Figure, axes: Any, title: str, right: float = 1.0) ->
 
 
 def fill_canvas(axes: Any, right: float = 1.0) -> None:
-    """Enlarge a 3D picture to a fraction of the width of its figure, and fit the height."""
+    """Enlarge a 3D picture to the fraction ``right`` of its figure's width, and fit the height."""
     figure = axes.figure
     legends, titles = figure.legends, [figure._suptitle] if figure._suptitle else []
     for _ in range(4):  # text keeps its size, so the right scale is found step by step

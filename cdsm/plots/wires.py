@@ -31,13 +31,14 @@ if TYPE_CHECKING:
 
 _POINTS: Final = 400
 
-_ENDLESS: Final = 1000.0  # tension [N] to which a law without an end is drawn
+_ENDLESS: Final = 1000.0  # tension [N] up to which a law without a highest tension is drawn
 
 
 def plot_elasticity(law: Elasticity) -> Figure:
     """Plot tangent and secant rigidity EA [kN] over the tension [N].
 
-    A law without an end is drawn up to 1000 N. InvalidInput if ``law`` is not an elasticity.
+    A law without a highest tension is drawn up to 1000 N. InvalidInput if ``law`` is not an
+    elasticity.
     """
     expect("law", law, "Elasticity")
     tension = _tensions(law.domain)
