@@ -1,4 +1,4 @@
-"""Parameters of an arm by name: dimensions, masses, rigidity, springs, friction."""
+"""Build an arm from values of named parameters: dimensions, masses, rigidity, springs, friction."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from cdsm.support.validation import instance, one_of, scalar, text
 
 
 class _Kind(NamedTuple):
-    """Parameter of an arm."""
+    """Kind of parameter, and where its value is in a geometry or a :class:`~cdsm.Cable`."""
 
     unit: str  # unit shown to the user
     size: float  # size of ``unit`` in SI
-    # ``joints``, ``links`` or ``cables``: the part of the geometry that has it, if any
+    # part of the geometry: ``joints``, ``links`` or ``cables``; empty if it belongs to a Cable
     part: str = ""
-    attribute: str = ""  # its name in this part, or in a :class:`~cdsm.Cable`
+    attribute: str = ""  # its name in this part, or in the Cable
 
 
 KINDS: Final = {
@@ -35,13 +35,13 @@ KINDS: Final = {
     "link_length": _Kind("mm", 1e-3, "links", "length"),
     "link_mass": _Kind("g", 1e-3, "links", "mass"),
 }
-"""Parameters of an arm."""
+"""Kinds of parameters of an arm, by name."""
 
 
 @final
 @dataclass(frozen=True)
 class ArmParameters:
-    """Arm as a function of some of its parameters; a ``model_of`` for :func:`identify`.
+    """Arm as a function of some of its parameters; use it as ``model_of`` of :func:`identify`.
 
     A parameter belongs to all joints or links (``"hole_radius"``), or to one, counted from the base
     (``"hole_radius@2"``). ``lead``, ``friction``, ``rigidity`` and ``spring`` with a number belong
@@ -76,7 +76,7 @@ class ArmParameters:
 
     @property
     def geometry(self) -> Geometry:
-        """Geometry of the arm; an arm from a URDF has none."""
+        """Geometry of the arm; raises InvalidInput for an arm from a URDF, which has none."""
         return self.arm.geometry
 
     def _place(self, name: str) -> tuple[str, tuple[int, ...]]:

@@ -57,10 +57,10 @@ class Design(NamedTuple):
         return np.asarray(self.known + np.tensordot(counts, self.information, 1))
 
     def sensitivities(self, M: Array) -> tuple[Array, float]:
-        """Compute tr M_i G (n,), and the proved efficiency f/f_best of a design, in 0…1.
+        """Compute tr M_i G (n,), and a proved lower bound of the efficiency f/f_best of a design.
 
         The gain of one more test i is proportional to tr M_i G. ``M`` (r, r) is the information of
-        the design; G follows from it, see the module's docstring.
+        the design; G follows from it, see the module's docstring. The bound is between 0 and 1.
         """
         C = np.linalg.inv(M)
         right = C @ self.wanted.T
@@ -73,7 +73,7 @@ class Design(NamedTuple):
         return each, float(np.sum(M * G)) / most
 
     def shares(self) -> Array:
-        """Compute the best numbers of tests (n,), not whole, that add up to N."""
+        """Compute the best numbers of tests (n,) that add up to N; they are not whole numbers."""
         counts = np.full(len(self.information), self.tests / len(self.information))
         power = 1.0 if self.criterion == "D" else 0.5
         for _ in range(_ITERATIONS):
@@ -85,7 +85,7 @@ class Design(NamedTuple):
         return np.asarray(counts)
 
     def whole(self, shares: Array) -> Array:
-        """Round shares (n,) to whole tests and exchange tests while ln f rises."""
+        """Round numbers of tests ``shares`` (n,); then exchange single tests while ln f rises."""
         counts = np.floor(shares)
         left = self.tests - int(counts.sum())
         counts[np.argsort(counts - shares)[:left]] += 1.0
@@ -105,7 +105,7 @@ class Design(NamedTuple):
             here = best
 
     def best(self) -> tuple[Array, float]:
-        """Find whole tests (n,), and prove their efficiency f/f_best, in 0…1."""
+        """Find the whole number of each test (n,), and a proved lower bound of f/f_best in 0…1."""
         shares = self.shares()
         counts = self.whole(shares)
         M, ideal = self.total(counts), self.total(shares)

@@ -38,7 +38,7 @@ class Determination:
 
     @cached_property
     def correlation(self) -> Array:
-        """Correlations (P, P) [-]; ±1 where only a combination is determined."""
+        """Correlations (P, P) [-]; ±1 for a pair of which only a combination is determined."""
         firm = self.firm
         matrix = np.where(np.outer(firm, firm), self.covariance, 0.0)
         matrix = np.where(np.outer(~firm, ~firm), self._null_projector, matrix)
@@ -52,7 +52,7 @@ class Determination:
 
     @property
     def dependent(self) -> Any:
-        """One parameter per undetermined combination; if they are fixed, all are determined."""
+        """Indices of parameters, one per undetermined combination; fix them to determine all."""
         return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
 
     @property
@@ -97,7 +97,7 @@ class Determination:
 
     @cached_property
     def determined(self) -> Any:
-        """Whether each singular value is above rounding, so that its combination is determined."""
+        """Whether each singular value is above rounding: its combination is then determined."""
         values = self._svd[0]
         return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
 

@@ -91,8 +91,8 @@ def _open_ends(result: Identification, i: int) -> list[str]:
 def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str]:
     """Return a warning if χ² can still fall from ``point``, where a search ended.
 
-    For example, the model may not exist beyond it. ``point`` is in the unit cube of ``problem``;
-    ``jacobian`` (n, P) is ∂r/∂point there.
+    For example, the model may not exist beyond ``point`` (P,), which is in the unit cube of
+    ``problem``. ``jacobian`` (n, P) is ∂r/∂point there.
     """
     r = problem.residuals(point)
     gradient = r @ jacobian

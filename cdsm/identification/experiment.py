@@ -205,7 +205,10 @@ def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
 def _followed(
     model_of: Callable[..., Manipulator], values: dict[str, float], candidates: Sequence[WeightLoop]
 ) -> tuple[tuple[WeightLoop, ...], list[Array], tuple[tuple[str, str], ...]]:
-    """Return the loops that can be tested, the rows of each, and label and reason of the others."""
+    """Return the loops that can be tested, :func:`_rows` of each, and why the others cannot be.
+
+    The reasons are pairs (label of the loop, text of the error).
+    """
     rows, failures = list[Array](), dict[str, str]()
     for loop in track(candidates, "following the candidates"):
         try:

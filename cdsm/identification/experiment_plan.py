@@ -1,4 +1,4 @@
-"""Plan of an experiment: weight tests, their numbers, and the expected uncertainties."""
+"""Plan of an experiment: which weight tests to make how often, and the expected uncertainties."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class ExperimentPlan(ReadOnlyState):
 
     @property
     def even_tests(self) -> tuple[WeightLoop, ...]:
-        """The loops of the reference plan: as many, evenly spaced over the candidates."""
+        """The loops of the reference plan: as many as ``tests``, evenly spaced over candidates."""
         return self._tests(self.even)
 
     @cached_property

@@ -32,15 +32,17 @@ NEGLIGIBLE = 1e-3
 Side = Literal[-1, 1]
 
 _LONGEST = 0.25  # step at most, as a share of the range of the parameter
-_HALVINGS = 8  # of a step before the model counts as ended
-_NEAR, _REFINEMENTS = 0.25, 4  # relative distance of a knot from a goal; knots added to reach it
+_HALVINGS = 8  # of a step from which the model does not exist; then the profile ends
+
+_NEAR, _REFINEMENTS = 0.25, 4
+"""Largest relative distance of a knot from a goal; largest number of knots added to reach it."""
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8)
 """ftol, xtol and gtol of the fit at a knot. The cubic between knots is not more exact."""
 
 
 class LowerOptimumError(Exception):
-    """Error: χ² at this point is lower than at the supposed optimum."""
+    """Error of a profile: χ² at ``point`` is lower than at the supposed optimum."""
 
     def __init__(self, point: Array) -> None:
         self.point = point
@@ -71,9 +73,10 @@ class Profile(ReadOnlyState):
     def crossing(self, rise: float, side: Side) -> float | None:
         """Find the farthest value of the parameter on one ``side`` where Δχ² is at most ``rise``.
 
-        Between the values, Δχ² is a cubic over the searched parameter (or its logarithm). If Δχ²
-        stays below ``rise`` up to the bound or the end of the model, the crossing is infinite.
-        Return None if the profile does not reach that far.
+        ``side`` is −1 for values below the best one, 1 for values above. Between the values, Δχ² is
+        a cubic over the searched parameter (or its logarithm). If Δχ² stays below ``rise`` up to
+        the bound or the end of the model, the crossing is infinite. It is None if the profile does
+        not reach ``rise``.
         """
         outward = slice(self.best, None, side)
         values, height = self.values[outward], self.rise[outward]
@@ -108,7 +111,7 @@ class _Knot(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Profiler:
-    """Computation of the profile of parameter ``i``, from the optimum outward."""
+    """Compute the profile of parameter ``i``, knot by knot from the optimum outward."""
 
     problem: LeastSquares
     best: Array  # the optimum (P,), in the unit cube

@@ -81,8 +81,8 @@ class LeastSquares:
         count: Number n of residuals.
         bounds: (low, high) of each parameter.
         beside: Function (here, moved) → r (n,) at the parameters ``moved``, to first order in their
-            distance from ``here``. It is faster, and serves for differences. None: ``residuals_of``
-            serves.
+            distance from ``here``. Finite differences use it, since it is faster. None: they use
+            ``residuals_of``.
     """
 
     def __init__(

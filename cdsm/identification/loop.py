@@ -1,4 +1,4 @@
-"""Loops of a weight test: forces applied and removed again, and the motion of the tip."""
+"""Loops of a weight test: forces, readings of the tip, and the weights of the readings."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class WeightLoop:
 
     @property
     def informative(self) -> int:
-        """Number of independent readings: one less per axis, since its offset is unknown."""
+        """Number of independent readings: one less per axis, since each axis has a free offset."""
         return (len(self.forces) - 1) * len(self.axes)
 
     @property
@@ -179,7 +179,7 @@ class Weights:
         normal = zeros.T @ inverse
         self.zero = np.linalg.solve(normal @ zeros, normal)
         values, vectors = np.linalg.eigh(inverse - normal.T @ self.zero)
-        values[:axes] = 0.0  # the zeros themselves, but for rounding
+        values[:axes] = 0.0  # eigenvalues of the offsets, zero but for rounding
         self.root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
 
 

@@ -22,9 +22,9 @@ _NAMES: Final = ("test", "direction", "force", "displacement", *"xyz", "minimum"
 
 
 class _Column(NamedTuple):
-    at: int
+    at: int  # index in a row
     name: str
-    size: float  # its unit in SI
+    size: float  # size of its unit in SI
 
 
 def read_loops(
@@ -51,8 +51,8 @@ def read_loops(
       ``minimum [N]``, the lower bound from which they are distributed.
 
     A cell of a joint, a cable, ``direction`` or ``minimum`` may be empty after the first line of a
-    test. Other columns are ignored, unless their name is one of these but for a letter; lines
-    that begin with # are, too.
+    test. Lines that begin with # are ignored, and so are other columns; but a column whose name
+    looks like a misspelt one of these is an error.
 
     Args:
         path: The file.

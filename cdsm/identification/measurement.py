@@ -86,7 +86,10 @@ class Measurement:
 
 
 def checked_conditions(given: Measurement | WeightLoop) -> dict[str, object]:
-    """Check the conditions ``given`` for a measurement; return its fields as tuples of numbers."""
+    """Check direction, wrench, angles and tensions of a measurement; return them by field name.
+
+    Values are tuples of numbers, as the fields store them; ``minimum`` may be one number.
+    """
     if (given.tension is None) == (given.minimum is None):
         raise InvalidInput(
             "tension",

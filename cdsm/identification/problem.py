@@ -31,7 +31,10 @@ _STORED = 8  # sets of parameters whose paths are stored
 
 
 class UserFaultError(Exception):
-    """Error that carries the :class:`InvalidInput` of a user-defined function that fails."""
+    """A user-defined function has failed; its first argument is the :class:`InvalidInput` to raise.
+
+    It is no CdsmError, so a search does not take it for parameters without a model.
+    """
 
 
 @dataclass(frozen=True)
@@ -144,7 +147,7 @@ class Model:
         return np.concatenate(rows)
 
     def as_read(self, predicted: list[Array]) -> Array:
-        """Return the result of :meth:`predict` with fitted offsets of the loops (n,) [N/m, m]."""
+        """Add the fitted offsets of the loops to the result of :meth:`predict`; (n,) [N/m, m]."""
         rows = []
         for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
             if weights is not None:
@@ -213,8 +216,8 @@ class Model:
     def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
         """Compute the derivatives of the readings of ``loop``, whose equilibria are ``path``.
 
-        They are with respect to the forces (m, n) [m/N] and the tensions (m, C) [m/N]; without
-        columns if the loop has no errors of forces or of tensions.
+        The first are with respect to the forces (m, n) [m/N], the others with respect to the
+        tensions (m, C) [m/N]. Those of exact forces or tensions have no columns.
         """
         u, axes, pose = unit_direction("direction", loop.direction), loop.axes, path.start.pose
         by_forces = np.zeros((len(loop.forces) * len(axes), 0))

@@ -104,13 +104,15 @@ class Identification(ReadOnlyState):
 
     @property
     def correlation(self) -> Array:
-        """Correlations of the parameters (P, P) [-]. At ±1 only a combination is determined."""
+        """Correlations (P, P) [-]; ±1 for a pair of which only a combination is determined."""
         return self._determination.correlation
 
     def confidence(
         self, level: float = 0.95, *, scaled: bool = False
     ) -> dict[str, tuple[float, float]]:
-        """Compute intervals that contain each true parameter with a probability [m, kg, N/m, …].
+        """Compute an interval (low, high) for each parameter, by name [m, kg, N/m, …].
+
+        It contains the true value with the probability ``level``.
 
         The interval of p_i follows from profile likelihood: fix p_i, fit the other parameters
         within their bounds, and require Δχ² ≤ q². q is the quantile of a normal variable. For a
@@ -228,7 +230,7 @@ class Identification(ReadOnlyState):
 
     @property
     def _labels(self) -> list[str]:
-        """Name of each row: of a stiffness, or of a reading of a loop."""
+        """Name of each of the n measured numbers: of a stiffness, or of a reading of a loop."""
         names = []
         for i, each in enumerate(self.measurements):
             axes = len(each.axes) if isinstance(each, WeightLoop) else 0

@@ -40,7 +40,7 @@ _OF_LOOPS = (1e-6, 1e-8, 1e-8)  # ftol, xtol and gtol of searches with loops, wh
 _REWEIGHINGS = 2
 """Number of times that the weights of loops are computed again from the model found so far."""
 
-_EVALUATIONS = 200  # of a search, at most, without those of the differences
+_EVALUATIONS = 200  # largest number in a search, without those of the differences
 
 
 def identify(
@@ -182,8 +182,8 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
 def check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
     """Raise UnknownName or InvalidInput if ``function`` does not take these arguments.
 
-    They are ``positional`` positional arguments, and one by keyword for each of ``names``. The
-    error calls the function ``name``.
+    The arguments are ``positional`` positional ones, and one by keyword for each of ``names``. The
+    text of the error calls the function ``name``.
     """
     if not callable(function):
         raise InvalidInput(name, f"{function!r} given; a function is needed.")
@@ -213,7 +213,8 @@ def check_call(name: str, function: object, positional: int, names: Sequence[str
 def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Array]:
     """Choose points of the unit cube of ``problem`` to search from, where the model exists.
 
-    If ``start`` is given, it is the only one. Raises InvalidInput if the model exists at none.
+    If ``start`` is given, it is the only point. Raises InvalidInput if the model exists at none of
+    the points.
     """
     count = len(problem.names)
     if start is None:
