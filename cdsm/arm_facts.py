@@ -1,4 +1,4 @@
-"""What an arm is made of: names, cables, limits, gravity; and arms with other parts."""
+"""Properties of an arm: names, cables, limits, gravity; copies of an arm with other cables."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CablesOrFile = Sequence[Cable] | str | os.PathLike[str]
 
 
 class ArmFacts(Printed):
-    """Base class of :class:`~cdsm.Manipulator`: its parts, and copies with other parts."""
+    """Base class of :class:`~cdsm.Manipulator`: properties of the arm, and changed copies of it."""
 
     _cables: Cables
     _gravity: Array
@@ -89,7 +89,7 @@ class ArmFacts(Printed):
 
     @property
     def original_length(self) -> OriginalLength:
-        """Which length of a wire is l_0 in EA/l_0; see :class:`Manipulator`."""
+        """Which length of a wire is l_0 in EA/l_0: ``"unstrained"``, or ``"stretched"`` (paper)."""
         return self._parts.original_length
 
     @cached_property
@@ -123,11 +123,11 @@ class ArmFacts(Printed):
         return JointUnits(self.slides).coordinates
 
     def torque_unit(self, joint: int | None = None) -> str:
-        """Return the torque unit of a joint, N m or (if it slides) N; None: of all joints."""
+        """Return the torque unit of a joint or (None) of all joints: N m, N, or "N m or N"."""
         return JointUnits(self.slides).torque(joint)
 
     def stiffness_unit(self) -> str:
-        """Return the unit of the diagonal and eigenvalues of K_θ: N m/rad, N/m if joints slide."""
+        """Return the unit of eigenvalues of K_θ: N m/rad, N/m if all joints slide, else both."""
         return JointUnits(self.slides).stiffness()
 
     @property
@@ -220,7 +220,7 @@ class ArmFacts(Printed):
         return self._replace(gravity=gravity)
 
     def _with_laws(self, laws: Sequence[Elasticity]) -> Self:
-        """Return the same arm with other laws, one per cable; nothing else is computed again."""
+        """Return the same arm with other laws, one per cable, without building its robot again."""
         pairs = zip(self.cables, laws, strict=True)
         cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
         arm = type(self).__new__(type(self))

@@ -60,7 +60,7 @@ class ArmModel:
         blocks: Joints and cables in groups that are solved one after the other for a first guess
             of the tensions.
         laws: Elasticities of the cables.
-        arrays: All fields of tree, routing and masses: the arguments of ``single_pose`` before q.
+        arrays: Fields of tree, routing, masses: the arguments of kernel ``single_pose`` before q.
         lowest: Lower joint limits (nv,) [rad], minus the rounding tolerance.
         highest: Upper joint limits (nv,) [rad], plus the rounding tolerance.
     """
@@ -102,7 +102,7 @@ class ArmModel:
 
     @cached_property
     def chain_arrays(self) -> tuple[Any, ...]:
-        """Arguments of ``single_chains`` after the tree: routing, spans, holes, wraps."""
+        """Arguments of the kernel ``single_chains`` between tree and q: of segments and holes."""
         chains, routing = self.chains, route(self.body, self.tree, self.chains.segments)
         span = np.zeros((len(chains.segments), 3), dtype=np.intp)
         moving = routing.segment[:-1, 0]
@@ -111,10 +111,10 @@ class ArmModel:
 
     @cached_property
     def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
-        """Cable segments, and joints that change their length, as (a, b, segment, joint).
+        """Segments whose length the joints change, and these joints: (a, b, segment, joint).
 
         ``a`` and ``b`` (n,) are the indices of the two sites of each segment. ``segment`` and
-        ``joint`` (m,) are pairs of a segment and a joint between the links of its sites.
+        ``joint`` (m,) form pairs: the index of a segment, and the row of a joint between its sites.
         """
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
@@ -124,7 +124,7 @@ class ArmModel:
     def wire_laws(self) -> CableLaws:
         """Elasticities of the cables; cables with friction are taken as position-controlled.
 
-        Behind the first hole that sticks, a motor that controls force does not keep it constant.
+        A motor that controls force keeps no constant tension behind a hole where its cable sticks.
         """
         forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
         if not any(any(self._cables[c].friction) for c in forced):

@@ -1,4 +1,4 @@
-"""Cables as straight segments between sites on links, and the cables of a serpentine geometry."""
+"""Cables as straight segments between sites on links: length, stiffness and energy."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ class Cable:
 
     @property
     def _holes(self) -> range:
-        """Indices of the sites that the cable passes."""
+        """Indices of the sites that are holes, which the cable passes."""
         return range(0 if self.lead > 0.0 else 1, len(self.sites) - 1)
 
     @property

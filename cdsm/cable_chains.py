@@ -104,18 +104,18 @@ class Segments(ReadOnlyState):
 
     @property
     def grip(self) -> Array:
-        """μ φ (P,) [-]: wire sticks while the tensions beside a hole differ by less than e^μφ."""
+        """μ φ (P,) [-]: a cable sticks in a hole while its tensions there have a ratio < e^μφ."""
         return self.chains.friction * self.wrap
 
     @property
     def ratio(self) -> Array:
-        """Largest ratio of the next tension to that of each segment (S,) [-]: e^μφ, 1 at ends."""
+        """Largest ratio T_{j+1}/T_j (S,) [-] that the hole after segment j allows: e^μφ, else 1."""
         found = np.ones(self.lengths.size)
         found[self.chains.hole] = np.exp(self.grip)
         return found
 
     def tension_stiffness(self, tension: Array) -> Array:
-        """Compute Σ T_j ∂²l_j/∂θ² over each cable's segments j, (C, nv, nv) [N m/rad]; T (S,)."""
+        """Compute Σ T_j ∂²l_j/∂θ² over the segments j of each cable, (C, nv, nv); T (S,) [N]."""
         cable, (_, _, segment, joint, _) = self.chains.cable, self._routing
         return frozen(
             single_length_hessian(segment, joint, *self._frames, tension, cable, int(cable[-1]) + 1)

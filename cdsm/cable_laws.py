@@ -139,7 +139,7 @@ class CableLaws:
         return frozen(k)
 
     def _rigidity(self, tension: Array) -> Array:
-        """Compute EA (1 + ε) (C,) [N]; of linear laws its constant part."""
+        """Compute EA (1 + ε) (C,) [N] at F (C,); of linear laws only its constant part, EA."""
         if not self.without_kernel:
             arguments: tuple[Any, ...] = (self.constant, *self.wires[2:], tension)
             rigidity = single_rigidity(*arguments)
@@ -224,9 +224,9 @@ class CableLaws:
     def naming(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """Return an error of one law with the names and indices of the cables that it concerns.
+        """Return the error of a law, with names and indices of the cables outside its domain.
 
-        ``held`` selects the cables of this law.
+        ``held`` selects the cables that have this law.
         """
         outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
@@ -247,7 +247,8 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
 def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | None:
     """Return a law without its slack branch, with the kind, edges and coefficients of its pieces.
 
-    None if kernels cannot evaluate the law: polynomials must be positive on the whole domain.
+    The kind is POLYNOMIAL or CURVE. None if no kernel can evaluate the law, or if its polynomials
+    are not positive on its whole domain.
     """
     inside = law.law if isinstance(law, SlackBelow) else law
     if isinstance(inside, TabulatedElasticity):
@@ -258,7 +259,7 @@ def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | No
 
 
 def _joined(tables: list[Array]) -> Array:
-    """Join tables of coefficients side by side; zeros fill rows up to a multiple of AT_ONCE."""
+    """Join tables of coefficients side by side, with rows of zeros up to a multiple of AT_ONCE."""
     rows = AT_ONCE * -(-max(map(len, tables)) // AT_ONCE)
     return np.hstack([np.pad(each, ((0, rows - len(each)), (0, 0))) for each in tables])
 

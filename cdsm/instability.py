@@ -89,7 +89,7 @@ def find_remedies(K: Stiffness) -> tuple[Remedy, ...]:
 
 
 def verdict(K: Stiffness) -> str:
-    """Return one line about an unstable arm: the joint that moves most, and the eigenvalue."""
+    """Return a line that says that the arm is unstable: the joint that moves most, and λ."""
     arm, motion = K.posture.arm, abs(K.critical_direction)
     return (
         f"UNSTABLE: the arm buckles, {arm.joint_names[int(motion.argmax())]} most; the smallest "
@@ -171,9 +171,9 @@ def _remedy(
 
 
 def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) -> float | None:
-    """Return the factor where ``margin`` rises through 0 between 1 and ``factors``, or None.
+    """Return the factor at which ``margin(factor)`` rises through 0; None if none is found.
 
-    The root lies before the first factor with a positive margin.
+    ``factors`` are tried in order, until the margin is positive or cannot be computed.
     """
     from scipy.optimize import brentq  # slow to import
 

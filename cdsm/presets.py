@@ -34,19 +34,19 @@ def __dir__() -> list[str]:
 
 
 STRAND_1X19: Final = STRAND
-"""The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
+"""The paper's 1×19 steel strand of 1.2 mm (Section IV-C): Eq. 19, repaired and continuous."""
 
 STRAND_DIAMETER: Final = 1.2e-3
 """Diameter of the 1×19 strand [m]."""
 
 STEEL_WIRE_200GPA: Final = SOLID
-"""Solid wire with the strand's diameter and the 200 GPa of Section IV-B: EA = 226 kN."""
+"""Solid wire of the strand's diameter with the paper's 200 GPa (Section IV-B): EA = 226 kN."""
 
 ELASTIC_STAGE: Final = LinearElasticity(48e3)
 """Constant EA [N] of the strand in its elastic stage; assumed, from Eq. 19 at 600 N."""
 
 TEN_DEGREES: Final = np.deg2rad(10.0)
-"""All joint angles of the virtual prototype in Sections IV-A, B and D [rad]."""
+"""All joint angles of the virtual prototype in Sections IV-A, B and D of the paper [rad]."""
 
 
 def virtual_prototype_geometry(
@@ -86,7 +86,7 @@ def virtual_prototype(
     gravity: ArrayLike = (0.0, -9.81, 0.0),
     original_length: OriginalLength = "unstrained",
 ) -> Manipulator:
-    """Build the virtual prototype of Section IV; see :func:`virtual_prototype_geometry`.
+    """Build the paper's virtual prototype (Section IV); see :func:`virtual_prototype_geometry`.
 
     Args:
         elasticity: Elasticity of all cables. Default: Eq. 19 with the missing digits filled in, see
@@ -157,7 +157,7 @@ def experimental_prototype(
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     **dimensions: float,
 ) -> Manipulator:
-    """Build the prototype of Section V-A; each pair has a position- and a force-controlled cable.
+    """Build the paper's prototype (Section V-A): pairs of a position- and a force-controlled cable.
 
     The motor of the first cable of each pair (``cable1_1`` …) keeps its length constant. The motor
     of the second (``cable1_2`` …) keeps its tension constant and adds no passive stiffness. Give

@@ -86,7 +86,7 @@ class RigidBody:
     def locate(self, link: str) -> tuple[int, Array, Array]:
         """Return the row of a link's joint, and the link's frame in the frame of that joint.
 
-        The frame is a rotation (3, 3) and a translation (3,) [m]. UnknownName without the link.
+        The frame is a rotation (3, 3) and a translation (3,) [m]. UnknownName for an unknown link.
         """
         frame = self._model.frames[self._frame(link)]
         return (
@@ -180,7 +180,7 @@ class RigidBody:
         return whole
 
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
-        """Draw the shapes of the URDF below a node of a viser server; return None if it has none.
+        """Draw the URDF's shapes below a node of a viser server; None if the URDF has no shapes.
 
         UrdfError if a shape cannot be read; then nothing is drawn.
         """
@@ -204,11 +204,11 @@ class RigidBody:
         return Shapes(lambda q: drawn.display(q[self._ours]), rows)
 
     def _path(self, joint: int) -> list[int]:
-        """Return the Pinocchio joints from the base to a joint."""
+        """Return the indices in Pinocchio of the joints from the base to a joint, it included."""
         return list(self._model.supports[joint])[1:]
 
     def _row(self, joint: int) -> int:
-        """Return the row in :class:`Tree` of a Pinocchio joint; the base is 0 in both."""
+        """Return the row in :class:`Tree` of the joint with this index in Pinocchio; base: 0."""
         return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:

@@ -71,7 +71,7 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
 def first_order_loads(pose: Posture, tension: Array, gradient: Array, motion: Array) -> Array:
     """Compute the loads W_i (P,) [N] at which cables of a stuck arm begin to slide; inf: never.
 
-    T are the tensions (S,) [N], ``gradient`` ∂T/∂θ (S, nv) [N/rad], ``motion`` θ̇ (nv,) [rad/N].
+    ``tension`` is T (S,) [N], ``gradient`` ∂T/∂θ (S, nv) [N/rad], ``motion`` θ̇ (nv,) [rad/N].
     """
     segments = pose.segments
     chains, slack = segments.chains, tension == 0.0

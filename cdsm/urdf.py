@@ -40,8 +40,8 @@ _COMMENT = f"""
   Crosses carry {CROSS_MASS:g} kg and {CROSS_INERTIA:g} kg m2, so that every simulator accepts them.
   Effort and velocity limits are required by the format and mean nothing here.
 """
-_EFFORT = 1000.0
-_VELOCITY = 10.0
+_EFFORT = 1000.0  # limit of each joint's torque [N m]; a URDF must have one
+_VELOCITY = 10.0  # limit of each joint's velocity [rad/s]; a URDF must have one
 _COLORS = {"backbone": (0.35, 0.38, 0.42, 1.0), "disk": (0.85, 0.65, 0.25, 1.0)}
 
 

@@ -160,7 +160,7 @@ def _check_origin(faults: list[str], where: str, element: etree._Element) -> Non
 
 
 def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[float, ...] | None:
-    """Return the ``count`` numbers of an attribute's text; on failure add a fault, return None."""
+    """Return the ``count`` numbers in ``text``; on failure append to ``faults`` and return None."""
     try:
         return numbers(where, text, count)
     except XmlFault as error:
@@ -169,7 +169,7 @@ def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[
 
 
 def _tree_faults(links: list[str], joints: list[etree._Element]) -> list[str]:
-    """Return faults of the tree: a link without its one parent, a second root, a cycle."""
+    """Return the faults of the tree: unknown links, links with two parents, two roots, cycles."""
     faults: list[str] = []
     known = set(links)
     parents: dict[str, tuple[str, str]] = {}

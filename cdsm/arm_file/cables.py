@@ -176,7 +176,7 @@ def build_cables(
 ) -> tuple[Cable, ...]:
     """Build cables with ``wires``; ``settings`` apply to every cable without its own.
 
-    GeometryError lists every faulty setting. MissingWire if only the wires of some cables lack.
+    GeometryError lists every faulty setting. MissingWire if the only fault is a missing wire.
     """
     cables: list[Cable] = []
     faults: list[str] = []
@@ -205,7 +205,7 @@ def build_cables(
 
 
 def setting_lines(cable: Cable) -> list[str]:
-    """Return one line for each setting of a cable that is not the default."""
+    """Return one TOML line for each setting of a cable that is not the default."""
     defaults = {field.name: field.default for field in fields(Cable)}
     given = {key: getattr(cable, key) for key in SETTINGS if getattr(cable, key) != defaults[key]}
     return [f"{key} = {toml_value(value)}" for key, value in given.items()]

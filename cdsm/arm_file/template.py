@@ -84,7 +84,7 @@ def template(
 ) -> str:
     """Return the text of an ARM.toml called ``name``.
 
-    ``wire`` is a name or EA [N], ``gravity`` is in base axes [m/s²]. Each section of the arm has
+    ``wire`` is a name or EA [N], ``gravity`` is in base axes [m/s²]. Each of ``sections`` has
     ``"universal"`` or ``"hinged"``, and the keywords of this constructor of :class:`Geometry`.
     """
     lines = [

@@ -87,7 +87,7 @@ def _value(value: Tolerance | tuple[Tolerance, ...]) -> str:
 
 
 def _plain(value: Any) -> object:
-    """Return an array as nested tuples, as TOML is written from them."""
+    """Return an array as nested tuples, from which TOML is written; other values unchanged."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     return tuple(map(_plain, value)) if isinstance(value, list) else value

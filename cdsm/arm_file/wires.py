@@ -40,11 +40,11 @@ SETTINGS = ("series_stiffness", "control", "minimum", "maximum")
 
 
 class Wires(NamedTuple):
-    """The laws of a file: by name, the default of all cables, and one that replaces all others."""
+    """The laws of the wires in a file."""
 
-    named: dict[str, Elasticity]
-    usual: Elasticity | None
-    forced: Elasticity | None
+    named: dict[str, Elasticity]  # of the tables [wires.NAME]
+    usual: Elasticity | None  # of cables without a wire of their own
+    forced: Elasticity | None  # replaces the laws of all cables
 
     def of(self, given: object) -> Elasticity | None:
         """Return the law of a cable whose key ``wire`` is ``given``; None if it has no wire."""
@@ -53,7 +53,7 @@ class Wires(NamedTuple):
 
 
 def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
-    """Read the wires of a file, or raise GeometryError; ``forced`` replaces all, if given."""
+    """Read the wires of a file, or raise GeometryError; ``forced`` is as in :class:`Wires`."""
     if not isinstance(keys.wires, dict):
         raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
     named, usual, faults = {}, None, []
@@ -94,7 +94,7 @@ def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire")
 
 
 def wire_entries(cables: Sequence[Cable]) -> tuple[list[str], list[str]]:
-    """Return the value of the key ``wire`` of each cable, and the lines of the tables of wires."""
+    """Return the value of the key ``wire`` of each cable, and the TOML of tables [wires.NAME]."""
     values: dict[str, str] = {}
     lines: list[str] = []
     keys = []

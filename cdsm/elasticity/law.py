@@ -80,7 +80,7 @@ class Elasticity(ABC):
         return self if 0.0 in self.domain else SlackBelow(self)
 
     def scaled(self, factor: float) -> Elasticity:
-        """Return this law with ``factor`` times its rigidity: a stiffer or softer spool.
+        """Return this law with ``factor`` times its rigidity, as of a stiffer or softer spool.
 
         Strains and energies are divided by the factor [-]. InvalidInput if it is not positive.
         """
@@ -90,7 +90,7 @@ class Elasticity(ABC):
 
     @abstractmethod
     def rigidity(self, tension: ArrayLike) -> Array:
-        """Compute the tangent rigidity EA(F) = l_0 dF/dΔl [N]; K_L uses it (caption of Fig. 5).
+        """Compute the tangent rigidity EA(F) = l_0 dF/dΔl [N]; K_L uses it (the paper's Fig. 5).
 
         Args:
             tension: F [N], any shape.

@@ -12,7 +12,7 @@ def listed(faults: Sequence[str], most: int | None = None) -> str:
 
 
 def counted(faults: Sequence[str], most: int | None = None) -> str:
-    """Return the number of faults, and below it :func:`listed`, with at most ``most`` of them."""
+    """Return the number of faults, and below it one line for each of at most ``most`` faults."""
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     return f"{count}:{listed(faults, most)}"
 

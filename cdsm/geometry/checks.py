@@ -1,4 +1,4 @@
-"""Faults of a geometry, and doubts about it."""
+"""Find the faults of a geometry, and reasons to doubt it."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 
     The body of a link is the cylinder from its first disk to its last, with the larger of their
     radii; ``poses`` has the pose (4, 4) of each link. A point is projected onto both cylinders of a
-    pair in turn. Both are convex, so the distance of two such projections converges to theirs.
+    pair in turn. As both are convex, the distance of its two last places converges to their gap.
     """
     links = list(poses)
     apart = [(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1]

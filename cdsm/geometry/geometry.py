@@ -1,4 +1,4 @@
-"""Description of an arm as a frozen value: uniform arms, sections, TOML."""
+"""Geometry of a serpentine arm, a frozen value: built of joints or sections, or read from TOML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""TOML of a geometry: build a geometry from its tables, and write its full form."""
+"""Build a geometry from its tables in TOML, and write its TOML, joint by joint."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 
 
 def build_only(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
-    """Build the geometry from the TOML of a whole arm or of a geometry, or raise GeometryError."""
+    """Build a geometry as :func:`build` does, but ignore all other keys of an ARM.toml."""
     described, rest = split_geometry(data)
     if "urdf" in rest and not described:
         raise GeometryError(
@@ -99,7 +99,7 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
 
 
 def text_of(geometry: Geometry) -> str:
-    """Return the TOML text of a geometry in its full form."""
+    """Return the TOML text of a geometry: a table for each joint, link and cable."""
     lines = [
         "# cdsm geometry. Units: m, rad, kg.",
         "# axes: in the axes of the link before; angle: of the hole about x, from y towards z;",
@@ -109,7 +109,7 @@ def text_of(geometry: Geometry) -> str:
 
 
 def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
-    """Return the TOML lines of :func:`text_of`; ``prefix`` comes before the names of tables."""
+    """Return the TOML lines of a geometry; ``prefix`` (``geometry.``) precedes names of tables."""
     lines = toml_lines(geometry, ("name", "base_length", "hole_radius"))
     for joint in geometry.joints:
         lines += ["", f"[[{prefix}joints]]", *toml_lines(joint)]

@@ -30,7 +30,7 @@ HoleAngles = Annotated[
     Annotated[_Angles, Tag(ONE)] | Annotated[Sequence[_Angles], Tag(EACH)],
     Discriminator(_of_all_or_each),
 ]
-"""Angles of the holes of all joints, or of each joint [rad]."""
+"""Hole angles [rad]: one list for all joints, or a list of lists, one per joint."""
 
 
 _SIZES = (

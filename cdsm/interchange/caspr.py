@@ -133,7 +133,7 @@ def _read_cables(
 
 
 def _unique(name: str, used: dict[str, int]) -> str:
-    """Return the name, numbered if it is in ``used``, which has the highest number of each."""
+    """Return the name, with the next number (``#2``) if it is in ``used``; enter it there."""
     label, count = name, used.get(name, 1)
     while label in used:
         count += 1

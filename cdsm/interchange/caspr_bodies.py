@@ -45,12 +45,12 @@ _OBLIQUE: Final = {"R_AXIS": ("turn", "revolute"), "P_AXIS": ("slide", "prismati
 
 
 class SingleJoint(NamedTuple):
-    """Joint of one coordinate: name, URDF type, axis (3,), limits [rad], or [m] if it slides."""
+    """Joint of one coordinate."""
 
     name: str
-    kind: str
-    axis: tuple[float, ...]
-    lower: float
+    kind: str  # type in URDF: revolute or prismatic
+    axis: tuple[float, ...]  # (3,), any length
+    lower: float  # limit [rad], or [m] if the joint slides
     upper: float
 
 
@@ -71,7 +71,7 @@ class Body:
 
 
 def read_bodies(path: Path) -> tuple[Body, ...]:
-    """Read the links, in the order of their numbers from 1."""
+    """Read the links of a CASPR model in the order of their numbers from 1; FileError on faults."""
     faults: list[str] = []
     root = read_root(path, "bodies_system", "bodies")
     elements = root.findall("links/*")

@@ -217,7 +217,7 @@ def _checked(name: str, value: float | None) -> float | None:
 
 
 def _missing(K: Stiffness) -> Iterator[str]:
-    """Yield lines that say why the model leaves its posture: no load, or unbalanced tensions."""
+    """Yield lines on why the model leaves its posture: its load is left out, or no balance."""
     if K.wrench.any():
         load = f"{coordinates(K.wrench[:3])} N, {coordinates(K.wrench[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"

@@ -158,7 +158,7 @@ def _sticks(
 
 
 def _placed(element: etree._Element, kind: str | None = None, start: float = 0.0) -> dict[str, str]:
-    """Return pos and quat of an origin; a joint of a ``kind`` is moved to ``start``."""
+    """Return pos and quat of an origin; a joint, ``kind`` hinge or slide, is moved to ``start``."""
     place, turn = _origin(element)
     if kind is not None and start:
         axis = _axis(element) / np.linalg.norm(_axis(element))

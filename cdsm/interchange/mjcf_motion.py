@@ -70,7 +70,7 @@ def choose_motion(
 
 
 def _time_step(omega: float) -> float:
-    """Choose 1, 2 or 5 times 10ⁿ s for the natural frequency [rad/s] of the fastest mode."""
+    """Choose the time step, 1, 2 or 5 times 10ⁿ s, for the highest natural frequency [rad/s]."""
     if omega * _DEFAULT_STEP <= _PHASE:
         return _DEFAULT_STEP
     power = math.floor(math.log10(_PHASE / omega))

@@ -138,7 +138,7 @@ class _Search:
     def _nearest_step(self, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
         """Compute a Newton step of the joints ``free`` for min ½‖q − guess‖² subject to r = 0.
 
-        It has a part towards r = 0, and a part along it towards the guess.
+        One part of the step leads to r = 0; the other, in the null space of ∂r/∂q, to the guess.
         """
         r, J = self.residual.evaluate(q)
         away = q - self.guess

@@ -19,7 +19,7 @@ from cdsm.rigid_body import rotation_vector
 from cdsm.support.values import Array, frozen
 
 LIMIT_MARGIN = 1e-5
-"""A joint is at its limit if it is closer to it than this fraction of the limit."""
+"""A joint counts as at its limit if it is within this fraction of the limit's value."""
 
 _NO_WRENCH = frozen(np.zeros(6))
 

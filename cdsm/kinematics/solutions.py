@@ -103,10 +103,7 @@ class JointSolution(_Solution):
 
     @cached_property
     def residual(self) -> Array:
-        """Cable lengths at the posture found minus those asked for (C,) [m].
-
-        They are ``lengths`` − ``cable_lengths``.
-        """
+        """Cable lengths found minus wanted (C,) [m]: ``lengths`` − ``cable_lengths``."""
         return frozen(self.lengths - self.cable_lengths)
 
     @property

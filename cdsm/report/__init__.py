@@ -1,4 +1,4 @@
-"""Truth report: checks that show whether a stiffness matrix can be trusted."""
+"""Report on a stiffness matrix: checks that show whether it can be trusted."""
 
 from cdsm.report.facts import CableState, Rank, Readings
 from cdsm.report.optimality import Optimality

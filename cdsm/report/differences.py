@@ -28,10 +28,10 @@ _LEVELS = 16  # maximum number of step sizes; each is half the previous one
 _CONVERGING = 0.05  # two extrapolations have not converged if their relative difference is larger
 
 _AMPLIFIED = np.array([6.7, 99.0])
-"""Error of extrapolated first and second differences, over noise/h and noise/h².
+"""Rounding error of extrapolated first and second differences, divided by noise/h and noise/h².
 
-The extrapolation weighs differences of step h/4 by 64/45, of step h/2 by 20/45. A diagonal entry of
-the second differences has four times the noise of f.
+h is the largest of three steps. The extrapolation weighs differences of step h/4 by 64/45, of step
+h/2 by 20/45. A diagonal entry of the second differences has four times the noise of f.
 """
 
 

@@ -188,7 +188,7 @@ def cable_states(K: Stiffness) -> tuple[CableState, ...]:
 
 
 def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
-    """Call ``answer``, which evaluates the law of ``cable``; None if it raises a CdsmError."""
+    """Return the number that ``answer`` computes by the law of ``cable``; None on a CdsmError."""
     try:
         return float(evaluate_law(cable, answer))
     except CdsmError:

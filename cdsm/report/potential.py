@@ -38,7 +38,7 @@ _BESIDE = 1e-6
 
 
 class LockedCable(NamedTuple):
-    """A cable with locked motor, computed from strain and energy of its law."""
+    """A cable with a locked motor: tension and energy, from strain and energy of its law."""
 
     number: int  # index among the cables of the arm
     cable: Cable
@@ -46,7 +46,7 @@ class LockedCable(NamedTuple):
     free_length: float  # original length l_0, which the motor keeps [m]
 
     def tensions(self, longer: Array) -> Array:
-        """Compute the tensions (P,) [N] for P changes of length of all cables, (P, C) [m]."""
+        """Compute the tensions (P,) [N] if all cables are ``longer`` by (P, C) [m]."""
         cable, start = self.cable, self.free_length
         more = longer[:, self.number]
         return evaluate_law(
@@ -143,13 +143,13 @@ class Neighbourhood:
     # --- potentials ---------------------------------------------------------------------------
 
     def kinematic(self, places: Array) -> Array:
-        """Compute active, gravity and load part of U (P, 3) [N m], without the moment."""
+        """Compute the active, gravity and load part of U (P, 3) [N m], for the force f alone."""
         return self.work(places, np.zeros(3))
 
     def work(self, places: Array, moment: Array | None = None) -> Array:
-        """Compute the parts of U (P, 3) [N m] with the work of a moment, exact to first order.
+        """Compute the same parts of U (P, 3) [N m] with the work of a moment, exact to first order.
 
-        The moment is (3,) [N m]; None is that of the wrench.
+        ``moment`` (3,) [N m] acts at the tip; None: the moment of the wrench.
         """
         moment = self._wrench[3:] if moment is None else moment
         pose, arm = self._pose, self._pose.arm
@@ -215,12 +215,15 @@ class Neighbourhood:
 
     @property
     def first_step(self) -> float:
-        """Return a step, in :attr:`unit`, with which no cable segment loses half its length."""
+        """Return the first, largest step of differences; no cable segment loses half its length.
+
+        It is a joint displacement in :attr:`unit`.
+        """
         return min(_FIRST, self._closing_motion / 4.0)
 
     @property
     def first_elastic_step(self) -> float:
-        """Return a step ≤ :attr:`first_step` that keeps tensions between bounds and kinks."""
+        """Return a step ≤ :attr:`first_step`; no tension reaches a bound or kink of its law."""
         step = self.first_step
         for each in self.locked:
             rise = self._k[each.number] * self._arms[each.number]
@@ -269,7 +272,7 @@ class Neighbourhood:
         return noise
 
     def elastic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`elastic_torques` (1,) [N m] at this step."""
+        """Return the rounding error of :meth:`elastic_torques` (1,) at ``places`` of size step."""
         k = self._k
         errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
         tilted = 2.0 * step * (k * self._arms) @ self.length_noise

@@ -60,7 +60,7 @@ _NONE = _Recomputed(None)
 @final
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """Difference between a matrix and its value by central differences, in its unit.
+    """Difference between a matrix and its value by central differences, in the matrix's unit.
 
     Attributes:
         found: Largest magnitude of an entry of the difference.
@@ -86,9 +86,9 @@ class Agreement:
             the lengths, the longest.
         potential: Comparison with finite differences of the potential; None if there is none.
         torque: Comparison with finite differences of the torque, or None.
-        verdict: ``"DIFFERS"``: a difference is larger than expected. ``"agrees"``: no difference
-            is, and at least one comparison resolves :data:`RESOLVED` of the largest entry.
-            ``"not possible"``: no comparison resolves it.
+        verdict: ``"DIFFERS"``: a difference is larger than expected. ``"agrees"``: none is larger,
+            and the expected error of a comparison is at most :data:`RESOLVED` of the largest entry.
+            ``"not possible"``: the expected errors of all comparisons are larger.
         reason: Why the check is not possible, or what differs; mostly empty.
     """
 
@@ -195,7 +195,7 @@ def _differentiated(
     noise: Noise,
     step: float,
 ) -> list[_Recomputed]:
-    """Compute the derivatives of the parts ``f`` of ``near``; an error becomes their reason."""
+    """Differentiate each part that ``f`` of ``near`` computes; an error becomes its reason."""
     try:
         values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:
@@ -224,7 +224,10 @@ def _compare(
     torque: _Recomputed = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
-    """Compare ``given`` with its values by differences; ``whole`` is the largest entry of K_θ."""
+    """Compare ``given`` with its values by differences; ``largest`` is as in :class:`Agreement`.
+
+    ``whole`` is the largest entry of K_θ.
+    """
     unit = _UNITS.get(name, "N m/rad")
     enough = max(RESOLVED * largest, _NEGLIGIBLE * whole)
     differences = [

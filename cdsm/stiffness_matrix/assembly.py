@@ -1,4 +1,4 @@
-"""Computes K_θ from a posture, cable tensions and a wrench (Eq. 16)."""
+"""Compute K_θ from a posture, cable tensions and a wrench (Eq. 16)."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def table(K: Stiffness) -> list[tuple[str, ...]]:
-    """Return the rows of the printed table: a header, then a name and three numbers per row."""
+    """Return the rows of the printed table [N/mm]: a header, then a name and three numbers each."""
     axes = np.eye(3)
     shares: Callable[[int], Shares] = cache(lambda i: K.shares(axes[i]))
     lines: dict[str, Callable[[int], float]] = {
@@ -47,8 +47,8 @@ def table(K: Stiffness) -> list[tuple[str, ...]]:
 def _cartesian_entry(K: Stiffness, i: int) -> float:
     """Return the diagonal entry i of ``cartesian`` [N/m].
 
-    Where ``cartesian`` does not exist, it is that of ``cartesian_in`` the axes along which the tip
-    can move.
+    If ``cartesian`` does not exist, return the entry of axis i in the matrix of ``cartesian_in``
+    for those axes along which the tip can move.
     """
     try:
         return float(K.cartesian[i, i])

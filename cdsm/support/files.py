@@ -44,7 +44,7 @@ def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> st
 
 
 def _decoded(data: bytes) -> str:
-    """Decode UTF-8, Windows-1252, or UTF-16, which has a mark, or zero bytes between letters."""
+    """Decode UTF-16 (it has a byte-order mark, or a zero byte first), UTF-8, or Windows-1252."""
     if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return data.decode("utf-16")
     if b"\0" in data[:2]:

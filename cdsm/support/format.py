@@ -21,7 +21,7 @@ def coordinates(values: Iterable[float], form: str = ".4g") -> str:
 
 
 def rounded(value: float, *, up: bool) -> str:
-    """Return a bound with four digits, rounded to the safe side: ``up`` or down."""
+    """Return a bound as text with four digits, rounded ``up`` or down so that it still holds."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
     return f"{(math.ceil if up else math.floor)(value / step) * step:.4g}"
 
@@ -67,7 +67,7 @@ def place(value: float, unit: str) -> str:
 
 
 def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
-    """Return a sentence: a joint [rad or m] is beyond its limits ``low`` and ``high``."""
+    """Return a sentence that ``value`` of a joint [rad or m] is outside ``low`` to ``high``."""
     said = f"{joint} = {place(value, unit)} is outside {place(low, unit)} to {place(high, unit)}"
     return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
 
@@ -103,11 +103,11 @@ class JointUnits(NamedTuple):
         return tuple(("mm", 1e-3) if slides else ("deg", math.pi / 180.0) for slides in self.slides)
 
     def torque(self, joint: int | None = None) -> str:
-        """Return the unit of the torque of one joint, or of all joints together."""
+        """Return the torque unit of a joint or (None) of all joints: N m, N, or "N m or N"."""
         return self.joined("N m", "N", joint)
 
     def stiffness(self) -> str:
-        """Return the unit of the diagonal of K_θ and of the eigenvalues of K_θ."""
+        """Return the unit of eigenvalues of K_θ: N m/rad, N/m if all joints slide, else both."""
         return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
@@ -124,7 +124,7 @@ class JointUnits(NamedTuple):
         return found
 
     def joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
-        """Return ``turning`` or ``sliding``, as the joint moves; of all joints: both with "or"."""
+        """Return ``turning`` or ``sliding`` for a joint; None: for all, joined by "or" if mixed."""
         slides = self.slides if joint is None else self.slides[joint : joint + 1]
         if slides.all():
             return sliding

@@ -41,7 +41,7 @@ def _plain(value: object) -> object:
 
 
 def _in_range(kind: str, zero: bool = False) -> Callable[[float], float]:
-    """Return a validator that checks a value against the range ``kind`` of ``RANGES``, or zero."""
+    """Return a validator: a value is in the range ``kind`` of ``RANGES``, or 0 if ``zero``."""
 
     def check(value: float) -> float:
         problem = within(kind, value, zero=zero)
@@ -74,7 +74,7 @@ ONE, EACH = "(one)", "(each)"
 
 
 def one_or_each(value: object) -> str:
-    """Return the pydantic tag of a value: whether it is one for all joints, or one for each."""
+    """Return the pydantic tag of a value: EACH for a list or array (per joint), else ONE."""
     return EACH if isinstance(value, (list, tuple)) or getattr(value, "ndim", False) else ONE
 
 
@@ -117,7 +117,7 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
-    """Return ``validated`` such that it raises a GeometryError with the keywords of ``kind``."""
+    """Wrap ``validated``: pydantic's faults become one GeometryError; ``kind`` has the keywords."""
 
     @wraps(validated)
     def call(*args: object, **values: object) -> object:

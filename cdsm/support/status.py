@@ -22,8 +22,8 @@ from cdsm.errors import (
 class Status(IntEnum):
     """Status of one posture of a batch: which quantities exist; the others are NaN.
 
-    It is the first failure, with the error that a single posture raises. An unstable arm (negative
-    margin) and an infinite stiffness ``along`` (immobile direction) are not failures.
+    It names the first failure; a single posture raises the error in brackets. An unstable arm
+    (negative margin) and an infinite stiffness ``along`` (immobile direction) are not failures.
     """
 
     OK = 0

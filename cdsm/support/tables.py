@@ -46,7 +46,7 @@ class Table(NamedTuple):
         return self.rows[0][1]
 
     def column(self, at: int, refuse: Callable[[str], NoReturn], first: int = 1) -> Array:
-        """Return the numbers of column ``at`` from row ``first`` on; bad cells call ``refuse``."""
+        """Return the numbers of column ``at`` from row ``first`` on; ``refuse`` the others."""
         numbers = []
         for line, cells in self.rows[first:]:
             cell = cells[at] if at < len(cells) else ""
@@ -107,8 +107,8 @@ def named_columns(
 ) -> dict[str, tuple[int, str]]:
     """Return index and unit of each column of a table, by name.
 
-    A table may have columns beside the ``known`` ones. ``refuse`` is called for a name given twice
-    and for one that is a slip of the pen from a known one.
+    A table may have columns beside the ``known`` ones. ``refuse`` raises an error if a name is
+    given twice, or if it looks like a misspelt known name.
     """
     found: dict[str, tuple[int, str]] = {}
     for at, cell in enumerate(table.header):
@@ -131,7 +131,7 @@ def column_in(
 ) -> tuple[int, float]:
     """Return the index of the column ``name`` of ``found``, and the factor to SI of its unit.
 
-    ``known`` has the factor of each allowed unit. Without such a column ``refuse`` is called.
+    ``known`` has the factor of each allowed unit. ``refuse`` raises an error without such a column.
     """
     at, unit = found.get(name, (-1, ""))
     if unit not in known:

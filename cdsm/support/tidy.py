@@ -99,7 +99,7 @@ def status_names(dataset: xarray.Dataset) -> dict[int, str]:
 
 
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
-    """Build a table of a sweep: a row per entry, a column with units per component."""
+    """Build a table of a sweep: a row per entry of ``status``, a column with unit per component."""
     import pandas
 
     if not dataset["status"].ndim:

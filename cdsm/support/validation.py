@@ -76,7 +76,10 @@ XYZ: Final = ("x", "y", "z")
 
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
-    """Return why a value is outside the range of a quantity; empty if it is inside or allowed."""
+    """Return why ``value`` is outside ``RANGES[quantity]``, in words; empty if it is inside.
+
+    ``zero`` and ``infinite`` also allow 0 and inf.
+    """
     unit, low, high = RANGES[quantity]
     if low <= value <= high or (zero and value == 0.0) or (infinite and value == math.inf):
         return ""
@@ -161,7 +164,7 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | Non
 
 
 def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Array:
-    """Check bounds of tension: a number or (size,), with ±inf allowed; return (size,), read-only.
+    """Check bounds of tension [N]: a number or (size,), ±inf allowed; return (size,), read-only.
 
     If ``rows`` is given, an array (rows, size) is also allowed and keeps its shape.
     """

@@ -167,7 +167,7 @@ def checked_bounds(
 
 
 def _ordered(minimum: object, maximum: object) -> bool:
-    """Check whether both bounds are floats and allowed: the usual case, which must be fast."""
+    """Return whether both are floats, 0 ≤ minimum ≤ maximum: the usual case, which must be fast."""
     if not isinstance(minimum, float) or not isinstance(maximum, float):
         return False
     return 0.0 <= minimum <= maximum and minimum < math.inf

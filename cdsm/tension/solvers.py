@@ -53,7 +53,7 @@ def installed_solver(solver: str) -> str:
 
 
 def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
-    """Return the verified optimum x (C,) [-] of a dimensionless ``problem``, or why there is none.
+    """Return the verified optimum x (C,) [-] of a dimensionless ``problem``, or why none was found.
 
     The reason is a text. Raises SolverError if the solver fails or gives no multipliers.
     """
@@ -97,8 +97,8 @@ def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
 def onto_bounds(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
     """Return the point x (n,) with the entries at or outside a bound set exactly to the bound.
 
-    Multipliers z (n,) mark the bounds: negative at low, positive at high. A solver misses bounds by
-    up to ``rounding``. A law whose domain starts above zero needs an exact zero.
+    Multipliers z (n,) mark active bounds: negative at low, positive at high. A solver misses them
+    by up to ``rounding``, and a tension just outside the domain of its law would be an error.
     """
     point = np.empty_like(x)
     for j in range(x.shape[0]):

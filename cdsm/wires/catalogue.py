@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from cdsm.cable import Cable
 
 STRAND: Final = StrandElasticity.eq19_repaired()
-"""The 1×19 steel strand of 1.2 mm of Section IV-C: Eq. 19, repaired and continuous."""
+"""The paper's 1×19 steel strand of 1.2 mm (Section IV-C): Eq. 19, repaired and continuous."""
 
 SOLID: Final = LinearElasticity.of_wire(200e9, 1.2e-3)
-"""Solid wire with the strand's diameter and the 200 GPa of Section IV-B."""
+"""Solid wire of the strand's diameter with the paper's 200 GPa (Section IV-B)."""
 
 WIRES: Final[dict[str, Elasticity]] = {"1x19-1.2mm": STRAND, "solid-1.2mm": SOLID}
 """Laws by the name of their wire."""
 
-_FILES = (".toml", ".csv", ".txt", ".tsv")  # of tables too: their reader says to fit them first
+_FILES = (".toml", ".csv", ".txt", ".tsv")  # a table of points is refused: it must be fitted first
 _NAMED = 3  # largest number of different wires that a text names
 
 Wire = Elasticity | str | float | os.PathLike[str]

@@ -96,11 +96,11 @@ class StrandElasticity(Elasticity):
 
         The coefficient printed as −1e-3 is read as −1e-4: with −1e-3 the branch gives −787 884 N at
         31 N, where the other branch gives 11 352 N. The printed digits leave EA(31 N) uncertain by
-        6 kN and EA(810 N) by 35 kN. Within them, this law is continuous, as level as possible from
-        400 to 810 N, where the text calls EA near-constant, and else nearest to the printed values.
-        Linear programs find it (``tests/laws/test_errata.py``). At 31 N, the slope falls from 1022
-        to 368. No law with these digits has a continuous slope there. The polynomial is negative
-        below 2.11 N, so the domain is (2.2 N, 810 N].
+        6 kN and EA(810 N) by 35 kN. Within these limits, this law is continuous, as level as
+        possible from 400 to 810 N, where the paper calls EA near-constant, and otherwise nearest to
+        the printed values. Linear programs find it (``tests/laws/test_errata.py``). At 31 N, the
+        slope falls from 1022 to 368. No law with these digits has a continuous slope there. The
+        polynomial is negative below 2.11 N, so the domain is (2.2 N, 810 N].
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
@@ -186,10 +186,10 @@ class StrandElasticity(Elasticity):
 class TabulatedElasticity(Elasticity):
     """Rising curve of strain over tension through measured points of any wire.
 
-    Between two points dε/dF = c N/D², with θ from 0 to 1, θ' = 1 − θ, N = b θ² + 2 θ θ' + a θ'², D
-    = θ² + (a + b) θ θ' + θ'², c = Δε/ΔF of the chord, and slopes a c and b c at the points (Gregory
-    and Delbourgo, IMA J. Numer. Anal. 2, 1982). Strain and its inverse (force over strain) are C1.
-    EA = 1/(dε/dF) is continuous and positive.
+    Between two points, the chord has the slope c = Δε/ΔF, and the curve has dε/dF = c N/D²: a c at
+    the first point, b c at the second. N = b θ² + 2 θ θ' + a θ'² and D = θ² + (a + b) θ θ' + θ'²,
+    where θ rises with F from 0 to 1, and θ' = 1 − θ (Gregory and Delbourgo, IMA J. Numer. Anal. 2,
+    1982). Strain and its inverse are C1. EA = 1/(dε/dF) is continuous and positive.
 
     The slopes at the points follow from ln EA of the chords. Each value is assigned to the middle
     of the chord's strain, and the values are interpolated over the strain. At an end, ln EA changes
@@ -198,10 +198,10 @@ class TabulatedElasticity(Elasticity):
     EA on an interval is then at most 2.1 times the largest rigidity of its chord and the two
     neighbours: D²/N is convex in (a, b), so it is largest in a corner.
 
-    Accuracy of EA in the last interval from five or more exact points, if the wire stiffens (Eq.
-    19, power laws, exponential toes): 2 % for even steps, 8 % for steps that grow up to twofold, 9
-    % for steps of 1, 2, 5, 10, … N, 25 % and more for steps that grow faster. The points do not
-    show a wire that levels off between the last two (up to 31 %), or how EA rises from 0 at 0 N.
+    The error of EA in the last interval, from five or more exact points of a wire that stiffens
+    (Eq. 19, power laws, exponential toes), is 2 % for even steps, 8 % for steps that grow up to
+    twofold, 9 % for steps of 1, 2, 5, 10, … N, and 25 % or more for steps that grow faster. It is
+    up to 31 % if EA levels off between the last two points. Points do not show how EA rises at 0 N.
 
     Attributes:
         tensions: Tensions F of the points [N], rising from 0 or more.

@@ -42,7 +42,7 @@ def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
 
 
 def piecewise(joins: Array, table: Array, F: Array) -> Array:
-    """Evaluate at F the polynomials of a table, each valid up to its join; same shape as F."""
+    """Evaluate at F of any shape the polynomials of a table, column i up to the join i."""
     return np.asarray(_polynomials(joins, table, F.ravel()).reshape(F.shape))
 
 
@@ -91,7 +91,7 @@ class Panels(NamedTuple):
 
     @property
     def pieces(self) -> tuple[Array, Array]:
-        """Edges (3, P) and coefficients (powers, P) of :class:`~cdsm.kernels.wires.Wires`."""
+        """Edges (3, P) and coefficients (powers, P) as in :class:`~cdsm.kernels.wires.Wires`."""
         return np.array([self.edges[:-1], self.edges[1:], self.before[0]]), self.coefficients
 
     def integral(self, F: Array, power: int) -> Array:
@@ -101,7 +101,11 @@ class Panels(NamedTuple):
 
 
 def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
-    """Divide polynomials, lowest power first, into panels; ``edges`` bound their ranges."""
+    """Return panels on which a Gauss rule integrates Fⁿ dF/p to rounding, for polynomials p.
+
+    ``rows`` are the coefficients of each p, lowest power first. The range of polynomial i is from
+    ``edges[i]`` to ``edges[i + 1]`` [N]. The panels end where p is no longer positive.
+    """
     ends: list[float] = [edges[0]]
     piece: list[int] = []
     end = np.inf
@@ -127,7 +131,7 @@ def _significant(row: Sequence[float], high: float) -> list[float]:
 
 
 def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
-    """Return the ends of panels on which the Gauss rule is exact to rounding."""
+    """Return where the panels from ``low`` to ``high`` end; they follow from the ``roots`` of p."""
     narrowest = _NARROWEST * np.spacing(high)
     ends: list[float] = []
     intervals = [(low, high)] if low < high else []

@@ -1,4 +1,4 @@
-"""Rising C1 curve through rising points. Its slope is bounded by those of the chords nearby.
+"""Rising C1 curve through rising points. The slopes of the chords nearby bound its slope.
 
 Between two points, the curve is the rational quadratic of Gregory and Delbourgo (IMA J. Numer.
 Anal. 2, 1982) in the notation of :class:`cdsm.TabulatedElasticity`:
@@ -65,7 +65,7 @@ class RisingCurve:
 
     @property
     def pieces(self) -> tuple[Array, Array]:
-        """Edges (3, n − 1) and coefficients (4, n − 1) of :class:`~cdsm.kernels.wires.Wires`."""
+        """Edges (3, n − 1), coefficients (4, n − 1) as in :class:`~cdsm.kernels.wires.Wires`."""
         edges = np.array([self._x[:-1], self._x[1:], self._y[:-1]])
         return edges, np.array([self.chords, self._rise, *self._ends])
 
@@ -98,9 +98,9 @@ class RisingCurve:
 
 
 def slopes_at_points(chords: Array, rise: Array) -> Array:
-    """Compute slopes (n,) at n points from the slopes and rises (n − 1,) of the chords.
+    """Compute the slopes (n,) at n points from the slopes and rises Δy (n − 1,) of the chords.
 
-    Their logarithms are interpolated as :class:`~cdsm.TabulatedElasticity` says. At an
+    The logarithms of the slopes are interpolated as in :class:`~cdsm.TabulatedElasticity`. At an
     inner point, the value is the mean of two parabolas through three chords each, clipped to the
     neighbouring chords. At an end it follows one parabola, and the change is clipped.
     """

@@ -15,18 +15,18 @@ _GRID = 1200  # tensions: strain error below 1e-4 where EA varies thousandfold
 
 
 class Basis(NamedTuple):
-    """k B-splines at g tensions [N] (g, k), and the matrix (k, k) of their roughness penalty."""
+    """B-splines of log EA on a grid of tensions, with their roughness penalty."""
 
-    tensions: Array
-    splines: Array
-    roughness: Array
+    tensions: Array  # grid (g,) [N]
+    splines: Array  # values of k splines on the grid (g, k)
+    roughness: Array  # matrix (k, k) of the roughness penalty
 
     @classmethod
     def of(cls, points: Points, noise: float) -> Basis:
-        """Build splines over the tensions from the first force F_0 of ``points`` to the largest.
+        """Build splines from F_0, 3 ``noise`` [N] below the first force, to the largest force.
 
-        The knots are equally spaced in the mean of log(F − F_0 + corner) and F, each scaled to 0…1:
-        nearly equally in F below the corner, a small force well above the ``noise`` [N].
+        The knots are equally spaced in the mean of log(F − F_0 + corner) and F, each scaled to 0…1.
+        The corner is a small force well above the noise. Below it, they are nearly equal in F.
         """
         low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
         corner = max(low, 8.0 * noise, 5e-3 * high)

@@ -124,7 +124,7 @@ def _rows_of_data(table: Table, first: int) -> int:
 
 
 def _header(table: Table, k: int) -> Header:
-    """Read row k of a table as a header, with the units of the row below it, if it has units."""
+    """Read row k of a table as a header; the row below it may have the units."""
     below = table.rows[k + 1][1] if k + 1 < len(table.rows) else []
     units = [cell.strip("[]() ") for cell in below]
     has_units = not _KNOWN.isdisjoint(units)
@@ -145,7 +145,7 @@ def _numbered(table: Table) -> Header:
 
 
 def _column(at: int, cell: str, below: str) -> Column:
-    """Read cell ``at`` of a header. Its unit is in brackets, its last word, or the cell below."""
+    """Read cell ``at`` of a header. Its unit is in brackets, its last word, or in ``below``."""
     groups = [each.strip() for each in re.findall(r"[\[(]([^\])]*)[\])]", cell)]
     name = re.sub(r"\s*[\[(][^\])]*[\])]", "", cell).strip()
     known = [each for each in groups if each in _KNOWN]

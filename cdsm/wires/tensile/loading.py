@@ -19,7 +19,7 @@ _OUTLYING = 5e-3  # an outlier is farther from its neighbours than this fraction
 _AROUND = 25  # neighbouring points over which the noise is assumed constant
 _SURE = 3.0  # standard deviations beyond which a rise of the force is certain
 _MAD = 1.4826  # standard deviation of normal noise over its median magnitude
-_GAUGES = 5e-3, 50.0  # gauge lengths of tests [m]; outside, the gauge length is the mistake
+_GAUGES = 5e-3, 50.0  # gauge lengths of tests [m]; any other is taken for a mistake
 _MISTAKEN = (  # mistake, then factors that correct force, displacement and gauge length
     ("the displacement is in mm", 1.0, 1e-3, 1.0),
     ("the displacement is in µm", 1.0, 1e-6, 1.0),
@@ -116,7 +116,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
 def _outliers(values: Array) -> NDArray[np.bool_]:
     """Return which values (n,) are single values far from their neighbours.
 
-    A real peak stands out by at most the step between the values next to it, so it is no outlier.
+    A real peak is no outlier: the steps between the values on either side of it are similar.
     """
     # extrapolate the missing neighbour at each end
     first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
@@ -155,7 +155,10 @@ def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
 
 
 def _slack(points: Points, noise: float, least: float) -> int:
-    """Count the points of a slack cable, before the force begins to rise significantly."""
+    """Count the first points, where the force does not rise significantly: the wire is slack.
+
+    ``noise`` and ``least`` [N] are those of :func:`_trends`.
+    """
     slope, error = _trends(points, noise, least)
     flat = np.flatnonzero(slope <= _SURE * error)
     count = int(flat[-1]) + 1 if len(flat) else 0
@@ -169,7 +172,7 @@ def _slack(points: Points, noise: float, least: float) -> int:
 
 
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
-    """Compute the slope [N per point] of the first n points, for each n, and its standard error.
+    """Fit a line to the first n points, for each n; return slopes [N per point], standard errors.
 
     The error follows from the ``noise`` [N] or from the scatter of the points if that is smaller,
     but from ``least`` [N] at least.
@@ -217,7 +220,7 @@ def _check_rigidity(points: Points, gauge_length: float) -> None:
 
 
 def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
-    """Suggest the mistake of units or gauge length [m] that explains a rigidity [N]."""
+    """Name the mistakes in units or gauge length that explain rigidity [N] and strain ``reach``."""
     found = []
     low, high = _GAUGES
     for mistake, force, displacement, gauge in _MISTAKEN:

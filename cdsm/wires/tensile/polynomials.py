@@ -21,7 +21,10 @@ _FEWEST = 2 * _HALF + 2 * (_DEGREE + 1)  # points: twice as many slopes as coeff
 
 
 def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[str, ...]]:
-    """Fit two polynomials that meet at a join [N], or one, to the slopes; keep where EA > 0."""
+    """Fit two polynomials EA(F) that meet at ``join`` [N], or one, to measured slopes.
+
+    Return the law on the longest range where EA > 0, and a note if this is not the whole range.
+    """
     if len(points.force) < _FEWEST:
         raise TensileTestError(
             f"only {len(points.force)} points are left, and polynomials of degree {_DEGREE} need "
@@ -50,7 +53,7 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 
 
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
-    """Find the ranges of tension [N] where the polynomials ``rows`` are positive."""
+    """Find the ranges of tension [N] where the polynomials ``rows`` between ``edges`` are > 0."""
     tensions = np.linspace(edges[0], edges[-1], 400)
     values = piecewise(np.array(edges[1:-1]), coefficient_table(rows), tensions)
     margin = 1e-6 * float(abs(values).max())  # keeps the strain ∫ dF/EA finite

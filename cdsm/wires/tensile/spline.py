@@ -177,7 +177,7 @@ class Curve:
         return np.asarray(splines @ rough.coefficients), np.asarray(half)
 
     def _inverse(self, rows: Array) -> tuple[Array, Array]:
-        """Return the inverse of the penalised normal matrix, and the leverage of each point."""
+        """Return the inverse of the penalised normal matrix of ``rows``, and their leverages."""
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
         return inverse, np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
@@ -215,11 +215,11 @@ class Curve:
 
     @property
     def _penalty(self) -> Array:
-        """Matrix (k + 1, k + 1) of the roughness penalty on the unknowns."""
+        """Matrix (k + 1, k + 1) of the penalty on the unknowns: coefficients and anchor strain."""
         return np.pad(self.smoothing * self.basis.roughness, (0, 1))
 
     def _linearised(self, points: Points) -> tuple[Array, Array]:
-        """Return ∂force/∂unknowns (n, k + 1) and errors (n,), times √(points per average)."""
+        """Return :meth:`jacobian` and errors (n,) of the force, times √(points per average)."""
         weight = np.sqrt(points.count)
         error = weight * (points.force - self.force(points.strain))
         return weight[:, None] * self.jacobian(points.strain), error

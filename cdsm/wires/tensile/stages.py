@@ -21,7 +21,7 @@ _STEP = 1.25  # ratio of tensions to compute the exponent; a smaller one takes n
 
 
 def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Find the tension [N] from which EA stays below 0.8 of its plateau. None if uncertain.
+    """Find the tension [N] from which EA stays below 0.8 of its largest value; None if uncertain.
 
     The arguments are F (g,) [N], EA (g,) [N] and the standard deviation of log EA (g,) [-].
     """
@@ -57,7 +57,7 @@ def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float 
 
 
 def refuse_jumps(curve: Curve, points: Points) -> None:
-    """Raise TensileTestError if EA exceeds ten times that of every chord between points."""
+    """Raise TensileTestError if EA is above ten times the slope of the steepest measured chord."""
     first, last = curve.force(points.strain[[0, -1]])
     inside = (curve.basis.tensions >= first) & (curve.basis.tensions <= last)
     steepest = int(np.where(inside, curve.rigidity, 0.0).argmax())
