@@ -1,9 +1,10 @@
-"""True stiffness of a plant, its proved band of rest, and weight tests on it.
+"""Compute the true stiffness and the proved band of a state of a plant; hang a weight on it.
 
 An arm with friction has many stiffnesses. Here *the* stiffness of a state is the frictionless K_θ
 at the equilibrium without friction, with the same wire in every cable and the same load. A weight
-hung on the arm measures it if the load is shaken before and after (:func:`hung_weight`); without
-shaking, small weights measure the stuck arm, which is several times stiffer.
+hung on the arm measures this stiffness if the load is shaken before and after
+(:func:`hung_weight`). Without shaking, small weights measure the stuck arm, which is several times
+stiffer.
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ class Assessment(NamedTuple):
     tip: Array  # tip (3,) [m] at the equilibrium without friction
     stiffness: list[float]  # stiffness along each direction (D,) [N/m] there
     margin: float  # smallest eigenvalue of K_θ [N m/rad] there
-    # least and largest proved displacement from there along the first direction [m]
+    # least and largest proved displacement from ``tip`` along the first direction [m]
     band: tuple[float, float]
 
 
 def assess(state: PlantState, wrench: Array, directions: Array, *, banded: bool) -> Assessment:
-    """Assess a state under ``wrench`` (6,) along ``directions`` (D, 3); the band if ``banded``."""
+    """Assess a state under ``wrench`` (6,) along ``directions`` (D, 3); its band if ``banded``."""
     nan = math.nan
     try:
         K = frictionless_stiffness(state, wrench)
@@ -85,11 +86,12 @@ def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
 def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
     """Hang a weight on a plant with its motors stopped; return the stiffness [N/m] along u (3,).
 
-    ``state`` is the state of the plant before.
+    ``state`` is the state of the plant before the weight is hung.
 
     The load is shaken along u, first without the weight and then with it: its amplitude is three
     breakaway loads and fades in four cycles. The weight moves the tip by about 0.1 % of the arm's
-    length. NaN if no equilibrium is found on the way.
+    length. NaN if no equilibrium is found on the way. SingularStiffness or EquilibriumError as for
+    :func:`~cdsm.breakaway`.
     """
     arm, load = plant.arm, state.state.load
     try:

@@ -1,4 +1,4 @@
-"""Estimation of joint angles from wire and tension at the motors, with stretch and friction.
+"""Estimate joint angles from wire and tension at the motors, with stretch and friction.
 
 A cable with the wire l_0 and the tension F at its motor has the length
 
@@ -7,11 +7,11 @@ A cable with the wire l_0 and the tension F at its motor has the length
 with the length l_j and the tension ρ_j F of segment j, the strain ε of the law, the tension F_rest
 at which the series spring is at rest, and the rigidity factor s: the actual rigidity of all wires
 over that of their laws. There are more cables than joints. So their lengths give the angles and s:
-the wire is calibrated while the arm moves. s follows from all steps (recursive least squares), the
-angles from one step.
+the rigidity is calibrated while the arm moves. s follows from all steps (recursive least squares),
+the angles from one step.
 
 ρ_j is the tension of segment j over that at the motor; friction makes it differ from 1. The
-estimate contains the length of wire in each segment, which moves through the holes at each step
+estimate contains the length of wire in each segment. At each step wire slides through the holes
 according to the friction law.
 """
 
@@ -40,7 +40,7 @@ _FINEST: Final = 1e-9  # smallest assumed error of a length [m], also with exact
 _LEAST_SPREAD: Final = 1e-3  # smallest assumed error of a tension [N], also with exact load cells
 
 _STEPS, _CONVERGED = 8, 1e-8
-"""Gauss–Newton steps, and the step [rad] that ends them: the next is its square."""
+"""Largest number of Gauss–Newton steps, and the step [rad] that ends them."""
 
 
 class Estimate(NamedTuple):
@@ -70,7 +70,7 @@ class Observer:
     def begin(self, q: Array, reading: Reading) -> Estimate:
         """Return the first estimate, at known joint angles (nv,) and a reading there.
 
-        The tension is equal along each cable.
+        It assumes that the tension is equal along each cable.
         """
         pose = self.arm.at(q)
         cable = pose.segments.chains.cable
@@ -113,7 +113,7 @@ class Observer:
     def gain(self, estimate: Estimate, reading: Reading) -> Array:
         """Compute κ = −∂F/∂l_0 (C,) [N/m] at the estimated posture and the tensions of a reading.
 
-        The cable lengths are constant. κ is 0 for force-controlled motors.
+        The cable lengths are constant. κ is 0 for force-controlled cables.
         """
         F = np.maximum(reading.tension, self._least)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
@@ -152,7 +152,7 @@ class Observer:
         return np.asarray(np.linalg.lstsq(rows, wanted, rcond=None)[0])
 
     def _mean_strain(self, pose: Posture, shares: Array, F: Array) -> Array:
-        """Compute ε̄ (C,) [-] of the law over each cable; ``shares`` are ρ of its segments (S,)."""
+        """Compute the mean strain ε̄ (C,) [-] of each cable by its law; ``shares`` are ρ (S,)."""
         segments = pose.segments
         chains = segments.chains
         strain = np.zeros(segments.lengths.size)

@@ -1,4 +1,4 @@
-"""Numbers of a closed loop: as a Dataset, a table over time, JSON, and lines to print."""
+"""Convert a closed-loop run to a Dataset, a table over time, numbers for JSON, printed lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motor laws: pure functions of reference and readings, with the clamps of each.
+"""Motor laws: pure functions from references and readings to a command within the bounds.
 
 The motor of a position-controlled cable keeps the length of wire that it has paid out, l_0,
 constant. A law computes the next l_0. At rest a change of l_0 changes the tension by −k Δl_0, so
@@ -88,11 +88,11 @@ class Moment(NamedTuple):
 
 
 Law = Callable[[Moment], Command]
-"""A motor law."""
+"""A motor law: it computes the command of one step."""
 
 
 def limited(moment: Moment, wire: Array) -> Command:
-    """Clamp the wire (C,) [m] of a law so that the commanded tensions stay within the bounds.
+    """Return the command of the wire (C,) [m], clamped so that tensions stay within the bounds.
 
     The commanded tensions follow from the measured ones and the change of wire at constant posture.
     """

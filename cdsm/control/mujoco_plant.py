@@ -28,9 +28,9 @@ _TANGENTS: Final = 10  # number of updates of the motors' tangents and of the lo
 class MuJoCoState(NamedTuple):
     """State of a :class:`MuJoCoPlant`."""
 
-    model: Any
-    pose: Posture
-    true: Reading
+    model: Any  # mujoco.MjModel
+    pose: Posture  # true posture
+    true: Reading  # true wire and tension at the motors
     velocity: Array  # of the joints (nv,) [rad/s], in MuJoCo's order
 
 
@@ -66,7 +66,7 @@ class MuJoCoPlant:
             )
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> MuJoCoState:
-        """Return the arm at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
+        """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         import mujoco
 
         pose = self.arm.at(q)
@@ -76,7 +76,7 @@ class MuJoCoPlant:
         return MuJoCoState(model, pose, Reading(wire, tension), frozen(np.zeros(q.size)))
 
     def move(self, state: MuJoCoState, command: Command, wrench: Array) -> MuJoCoState:
-        """Return the arm one period after ``state``, under a command and a wrench (6,).
+        """Return the state one period after ``state``, under a command and a wrench (6,).
 
         Raises:
             SolverError: The simulation diverges.

@@ -1,4 +1,4 @@
-"""Plants: the controlled arm; here quasi-static, with friction and history."""
+"""Plants, the arms that a loop controls: the protocol, and a quasi-static arm with friction."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdsm.support.values import Array, frozen
 
 
 class PlantState(Protocol):
-    """Immutable state of a plant; a move returns a new one."""
+    """Immutable state of a plant; each move of the plant returns a new state."""
 
     @property
     def pose(self) -> Posture:
@@ -42,9 +42,9 @@ class Plant(Protocol[AnyState]):
         """Return the arm at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
 
     def move(self, state: AnyState, command: Command, wrench: Array) -> AnyState:
-        """Return the arm that was in ``state`` after its motors followed a command.
+        """Return the state that follows ``state`` when the motors have followed a command.
 
-        The load is a wrench (6,).
+        ``wrench`` (6,) is the load: force [N], then moment [N m].
 
         Raises:
             CdsmError: No equilibrium was found, or a tension leaves the domain of its law.
@@ -52,11 +52,11 @@ class Plant(Protocol[AnyState]):
 
 
 class SlowState(NamedTuple):
-    """State of a :class:`SlowPlant`: the wire in each segment stores its history."""
+    """State of a :class:`SlowPlant`, with its history: the wire in each segment."""
 
-    loading: SlowLoading
-    reference_wire: Array  # l_0 at the reference (C,) [m]
-    state: State
+    loading: SlowLoading  # the arm
+    reference_wire: Array  # l_0 (C,) [m] at the posture where the plant began
+    state: State  # posture, load and wire in each segment
 
     @property
     def pose(self) -> Posture:
@@ -108,7 +108,7 @@ class SlowPlant:
         return self.load(state, Load(wrench, np.zeros(self.arm.nv), motors))
 
     def load(self, state: SlowState, load: Load) -> SlowState:
-        """Return the arm that was in ``state`` under another load, which sets the motors too."""
+        """Return the state that follows ``state`` under another load, which sets the motors too."""
         return state._replace(state=state.loading.carry(state.state, load, "the step")[0])
 
 

@@ -71,8 +71,9 @@ class TrackingRun(ReadOnlyState):
         estimated_force: Force at the tip that the controller estimated (n, 3) [N].
         rigidity: Rigidity of the wires over that of their laws, as estimated (n,) [-].
         refused: Reasons why the outer loop could not plan and kept its previous tensions, by step.
-        outcome: ``"completed"``; ``"lost"``: the tip left its path, the loop is unstable; ``"no
-            rest"``: the arm buckled; ``"wire"``: a tension left the domain of its law.
+        outcome: ``"completed"``; ``"lost"``: the tip left its path or the plant diverged, since the
+            loop is unstable; ``"no rest"``: the arm buckled; ``"wire"``: a tension left the domain
+            of its law.
         reason: What stopped the loop, in words; or empty.
         states: States of the plant, which :meth:`hung_weight` loads further.
     """
@@ -150,8 +151,8 @@ class TrackingRun(ReadOnlyState):
             direction: Number of the direction.
 
         Raises:
-            InvalidInput: There is no such step or direction, the arm has no rest without friction
-                there, or the plant is not a :class:`SlowPlant`.
+            InvalidInput: There is no such step or direction, or the plant is no :class:`SlowPlant`.
+            SingularStiffness, EquilibriumError: As for :func:`~cdsm.breakaway`.
         """
         count, D = len(self.time), len(self.directions)
         k = whole_number("step", step, -count, count - 1) % count
@@ -162,7 +163,7 @@ class TrackingRun(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Faults, worst first; empty if the path was followed to its end."""
+        """Faults of the run, worst first; empty if there are none."""
         said = []
         if self.outcome != "completed":
             word = {"lost": "UNSTABLE", "no rest": "BUCKLES", "wire": "WIRE"}[self.outcome]
@@ -185,7 +186,7 @@ class TrackingRun(ReadOnlyState):
 
     @property
     def end(self) -> float:
-        """Time of the last step [s]; after a failure, the time of the failure."""
+        """Time of the last completed step [s]; 0 if no step was completed."""
         return float(self.time[-1]) if len(self.time) else 0.0
 
     def to_xarray(self) -> xarray.Dataset:

@@ -1,4 +1,4 @@
-"""References at each step of control, from a plan; choice of the tension-controlled cables."""
+"""Compute the references at each step from a plan; choose the tension-controlled cables."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Schedule(NamedTuple):
 
     @classmethod
     def of(cls, plan: PathPlan, steps: int) -> Self:
-        """Divide the path from each sample of a complete plan to the next into equal steps."""
+        """Divide the path between two samples of a complete plan into ``steps`` equal steps."""
         size = len(plan.planned)
         at = np.linspace(0.0, size - 1.0, (size - 1) * steps + 1)
         before = np.minimum(at.astype(int), max(size - 2, 0))
@@ -54,7 +54,7 @@ class Schedule(NamedTuple):
 
 
 def checked_plan(plan: PathPlan) -> Manipulator:
-    """Check that a plan can be followed; return its arm."""
+    """Check that a plan is complete and has directions; return its arm."""
     if plan.direction is None:
         raise InvalidInput("plan", "is one of cartesian; plan a stiffness along directions.")
     if not plan.complete:

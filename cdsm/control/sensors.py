@@ -13,7 +13,7 @@ from cdsm.errors import InvalidInput
 from cdsm.support.validation import quantity, scalar, whole_number
 
 LARGEST_NOISE: Final = 4.0
-"""Noise is cut off at this many standard deviations, so that bounds can be proved."""
+"""Number of standard deviations at which noise is cut off, so that bounds can be proved."""
 
 
 @final
@@ -54,7 +54,7 @@ class Sensors:
         )
 
     def read(self, truth: Sequence[Reading], random: np.random.Generator) -> Reading:
-        """Measure the newest of the true states ``truth``, or an earlier one if there is a delay.
+        """Measure the newest of the true values ``truth``, or an earlier one if there is a delay.
 
         The noise is drawn from ``random``; each call draws the same number of random numbers.
         """

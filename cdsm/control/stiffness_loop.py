@@ -32,7 +32,7 @@ class Replanned(NamedTuple):
 class StiffnessLoop:
     """Planner of the next tensions: the nearest to the previous ones with the target stiffness.
 
-    If the rate does not allow these tensions, the next ones lie on the way to them.
+    If the rate does not allow these tensions, the next ones miss the target as little as it allows.
     """
 
     arm: Manipulator  # the arm of the controller

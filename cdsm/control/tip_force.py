@@ -7,7 +7,7 @@ At a known posture the force f, and the tensions T of all segments, meet
 with the measured tension F of each cable, the gradient g_j of the length of segment j, the gravity
 torque g, the friction coefficient μ and the wrap angle φ of each hole. This is a polyhedron; the
 largest and the least u·f in it are two linear programs. The multipliers of each give a bound by
-weak duality, so that no answer of a solver is trusted.
+weak duality, which holds even if the solver's answer is not exact.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, proved_largest
 from cdsm.support.validation import Direction, instance, quantity, unit_direction, vector
 from cdsm.support.values import Array, ReadOnlyState
 
-_WIDEST = 1e6  # bound of the force in the programs, over the tensions, so that they are bounded
+_WIDEST = 1e6  # limit of T and f in the linear programs, over the largest tension
 
 
 @final
@@ -37,7 +37,7 @@ class TipForce(ReadOnlyState):
     Attributes:
         posture: The posture.
         tension: Measured tensions at the motors F (C,) [N].
-        error: Largest error of each of them [N].
+        error: Largest error of each tension [N].
         direction: Unit direction u (3,), base axes.
         low: Least force along u [N] that is possible with friction and errors.
         high: Largest force along u [N] that is possible with friction and errors.
@@ -60,12 +60,12 @@ class TipForce(ReadOnlyState):
 def tip_force(
     pose: Posture, tension: ArrayLike, direction: Direction, error: float = 0.0
 ) -> TipForce:
-    """Bound the tip force along a direction from motor tensions; the load has no moment.
+    """Bound the force on the tip along a direction from motor tensions; the load has no moment.
 
-    The bounds are proved for each state of the cables that friction admits, if posture, friction
-    and masses are those of the arm. The posture must be known, from joint encoders or a camera. At
-    a posture that :func:`track` estimates from the motors nothing is proved, since friction hides
-    the strain between the holes: ``estimated_force`` of its result has no bounds.
+    The bounds hold for each state of the cables that friction admits, if posture, friction and
+    masses are those of the arm. Measure the posture by joint encoders or a camera. A posture that
+    :func:`track` estimates proves nothing: friction changes the strain between the holes, which the
+    motors do not measure. So ``estimated_force`` of its result has no bounds.
 
     Args:
         pose: The true posture.
@@ -123,4 +123,4 @@ def tip_force(
 
 
 _ROUNDING = 1e-12
-"""Smaller reduced costs are rounding; for the force they would count a million times."""
+"""Reduced costs below this count as zero; ``_WIDEST`` would multiply their rounding by 1e6."""

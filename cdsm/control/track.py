@@ -84,11 +84,11 @@ def track(
         replan: Whether the outer loop runs; default: for ``"stiffness"`` only.
         tension_controlled: Names of the cables whose tension a mixed law controls. Default: C − nv
             cables, chosen so that the lengths of the others determine the posture best.
-        bands: Number of steps from one proved band to the next, some 20 ms each; 0: none. An arm
+        bands: A proved band is computed every ``bands`` steps, in some 20 ms; 0: never. An arm
             without friction has no band.
-        felt: Number of steps from one measurement of the stiffness with the motors to the next
-            (:mod:`cdsm.control.felt`); 0: none. This is done to a copy of the arm, so that the run
-            stays the same.
+        felt: The stiffness is measured with the motors every ``felt`` steps
+            (:mod:`cdsm.control.felt`); 0: never. A copy of the arm is moved, so that the run stays
+            the same.
         seed: Seed of the noise: the same seed gives the same bits.
 
     Raises:

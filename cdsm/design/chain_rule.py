@@ -1,7 +1,8 @@
 """Chain rule from the inputs of an arm to the variables of a design problem.
 
-A variable moves many holes and disks at once. Its column says which inputs, and how far. It may
-also move the postures, if they are random within the joint limits, and the bounds of the tensions.
+A variable, such as a hole radius, moves many inputs of the arm at once, such as holes and disks. It
+may also move the postures, if they are random within the joint limits, and the bounds of the
+tensions.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ class Chain:
     Args:
         problem: The problem; its variables are continuous.
         design: The design (n,).
-        arm: Its arm.
+        arm: The arm of this design.
     """
 
     def __init__(self, problem: DesignProblem, design: Array, arm: Manipulator) -> None:
@@ -49,7 +50,7 @@ class Chain:
         self._moved = still.moved(self.inputs.displaced(by_variable))
 
     def at(self, tension: Tension, loss: Array) -> Posed:
-        """Return the chain rule at the posture of a tension; ``loss`` (C,) is exp(Σ μ φ) [-]."""
+        """Return the chain rule at the posture of ``tension``; ``loss`` (C,) is exp(Σ μ φ) [-]."""
         pose = tension.posture
         turned, grip = pose.q[:, None] * self._limits, np.zeros_like(self._bound)
         if self._rough:
@@ -59,7 +60,8 @@ class Chain:
     def apply(self, by_input: dict[str, Array]) -> Array:
         """Compute the derivatives (n,) with respect to the variables at constant tension bounds.
 
-        ``by_input`` has those with respect to the inputs of each source.
+        ``by_input`` has the derivatives with respect to the inputs, by their source such as
+        ``link_mass``.
         """
         return np.array(
             [
@@ -69,7 +71,7 @@ class Chain:
         )
 
     def of_links(self, source: str) -> Array:
-        """Return the derivatives (n,) of the sum of all link masses [kg] or link lengths [m]."""
+        """Return the derivatives (n,) of the sum of ``link_mass`` or ``link_length`` over links."""
         return np.array([float(np.sum(column.get(source, 0.0))) for column in self._columns])
 
 
@@ -88,8 +90,9 @@ class Posed(NamedTuple):
     def slopes(self, by_input: dict[str, Array], by_tension: Array) -> Array:
         """Return the derivatives (n,) of a quantity.
 
-        ``by_input`` are its derivatives at constant tensions, empty if it depends on the tensions
-        alone; ``by_tension`` (C,) those with respect to the tensions.
+        ``by_input`` are its derivatives with respect to the inputs at constant tensions, by
+        source; empty if it depends on the tensions alone. ``by_tension`` (C,) are its derivatives
+        with respect to the tensions.
         """
         followed = self.balance.gradient(self.chain.inputs, by_tension)
         total = {name: by_input.get(name, 0.0) + g for name, g in followed.items()}
@@ -100,14 +103,14 @@ class Posed(NamedTuple):
 
 
 def _joints(arm: Manipulator, variable: Variable) -> list[int]:
-    """Return the joints (from 0) that a variable belongs to."""
+    """Return the numbers, from 0, of the joints that a variable changes."""
     if isinstance(variable.at, int):
         return [variable.at - 1]
     return [*range(len(arm.geometry.joints))]
 
 
 def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
-    """Return dλ/dx/λ (nv,) of joint limits λ = 2 atan(h/R), x a variable; 0 if λ is given."""
+    """Return (dλ/dx)/λ (nv,) for joint limits λ = 2 atan(h/R) and a variable x; 0 if λ is given."""
     geometry, joints = arm.geometry, _joints(arm, variable)
     found = []
     for k, (joint, limit) in enumerate(zip(geometry.joints, geometry.joint_limits, strict=True)):

@@ -1,4 +1,4 @@
-"""Evaluation of many designs: in this process, in several, or on a cluster."""
+"""Evaluate many designs: in this process, in several processes, or on a cluster."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Designs(ReadOnlyState):
 
     Attributes:
         problem: The problem.
-        designs: The designs (D, n) [m, rad, N, -], a row each; see :meth:`DesignProblem.values`.
-        values: Quantities (D, n) in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; a column for each
-            of ``problem.measures``. NaN where one does not exist.
+        designs: The designs (D, n) [m, rad, N, -], a column for each of ``problem.variables``.
+        values: Quantities (D, m) in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; a column for each
+            of ``problem.measures``. NaN where a quantity does not exist.
         faults: Why the values of a design do not make an arm; empty if they do.
     """
 
@@ -48,7 +48,7 @@ class Designs(ReadOnlyState):
     faults: tuple[str, ...]
 
     def __getitem__(self, key: str) -> Array:
-        """Return a quantity (D,) by its key, as ``mass`` or ``stiffness (0, 0, 1)``.
+        """Return a quantity (D,) by its key, such as ``mass`` or ``stiffness (0, 0, 1)``.
 
         Raises:
             InvalidInput: The quantity is not in ``problem.measures``.
@@ -62,8 +62,8 @@ class Designs(ReadOnlyState):
     def violations(self) -> Array:
         """Relative violation of each constraint (D, 1 + constraints) [-]; 0 if it is met.
 
-        A violation is relative to the limit. Column 0 is the share of postures that are not held if
-        all must be held; else it is 0.
+        A violation is relative to the limit. Column 0 is the share of postures and loads that are
+        not held if all must be held; else it is 0.
         """
         return violations(self.problem, self.values)
 
@@ -122,7 +122,7 @@ def evaluate_designs(
 
     Args:
         problem: The problem.
-        designs: (D, n) [m, rad, N, -], a row each; see :meth:`DesignProblem.values`.
+        designs: (D, n) [m, rad, N, -], a column for each of ``problem.variables``.
         jobs: Number of processes. With more than one, a script needs the usual guard
             ``if __name__ == "__main__":``.
         client: Client of a dask cluster, instead of processes.
@@ -187,7 +187,7 @@ def _on_cluster(problem: DesignProblem, client: Client) -> Compute:
     from cdsm.sweeps.cluster import checked_client
 
     checked_client(client)
-    # workers forget what is sent once nobody holds it, so it is sent once
+    # sent once for all calls: ``sent`` keeps the cluster from dropping the problem
     sent = client.scatter(problem, broadcast=True, hash=False)
     return lambda rows: client.gather(
         [client.submit(measure, sent, row, pure=False) for row in rows]

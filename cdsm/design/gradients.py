@@ -2,12 +2,12 @@
 
 The kernel of sensitivities gives the derivatives of a stiffness with respect to every hole, disk,
 link, lead and mass at constant tensions, and with respect to the tensions. The tensions depend on
-the design: they are the least that balance the arm. So the derivative of their distribution is
-added, with that of the bounds that friction narrows. These derivatives are exact.
+the design: they are the least that balance the arm. So the derivatives of the least tensions are
+added, and of their bounds, which friction narrows. These derivatives are exact.
 
-The margin for tolerances is made of such derivatives, so its own derivatives are second ones. They
-are central differences of exact first derivatives, or one-sided ones at an end of a range; both are
-of second order in the step.
+The margin for tolerances contains such derivatives, so its own derivatives are second derivatives.
+They are central differences of exact first derivatives, or one-sided ones at an end of a range; the
+error of both is of second order in the step.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _STEP = 1e-4
 
 _CENTRAL = {-1.0: -0.5, 1.0: 0.5}
 _ONE_SIDED = {1.0: -2.5, 2.0: 4.0, 3.0: -1.5}
-"""Weights of values at so many steps in a derivative of second order. The one-sided difference
-leaves out the end of the range, where a design may be special: without lead, no hole at the base.
+"""Number of steps: weight of the value there in a difference of second order. The one-sided
+difference leaves out the end of the range: there a design may be special, such as one without lead.
 """
 
 
@@ -53,7 +53,7 @@ def rows_and_gradients(
     Raises:
         InvalidInput: The quantity has no exact derivatives, or the tensions have none for this
             design.
-        InfeasibleTension: A posture is not held.
+        InfeasibleTension: No tensions within the bounds balance the arm at a posture.
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The arm is unstable at a posture.
     """
@@ -127,8 +127,8 @@ def _reading(K: Stiffness, measure: Measure, posed: Posed) -> tuple[float, Array
 def _displacement(K: Stiffness, force: Array) -> tuple[float, dict[str, Array]]:
     """Return |C_vv f| and its derivatives at constant tensions, by source.
 
-    With unit vectors n of the displacement and f̂ of the force f, and c(u) = uᵀ C_vv u, it is |f|
-    nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.
+    With unit vectors n of the displacement and f̂ of the force f, and c(u) = uᵀ C_vv u,
+    |C_vv f| = |f| nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.
     """
     if K.wrench[3:].any():
         raise InvalidInput("deflection", "under a moment has no exact derivatives here.")

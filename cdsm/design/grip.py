@@ -1,13 +1,14 @@
-"""Derivatives of Σ μ φ of each cable, by which friction narrows its tension bounds.
+"""Compute the derivatives of Σ μ φ of each cable; friction narrows its bounds by exp(Σ μ φ).
 
-Between the points a and b before a hole and c behind it, the cable has the unit directions u and v.
-If the points move, the wrap angle φ changes by the formula of :mod:`cdsm.kernels.chains`,
+A cable runs from a point a through a hole b to a point c. Its segments have the unit directions u
+and v and the lengths ℓ_u and ℓ_v. If the points move, the wrap angle φ of the hole changes by the
+formula of :mod:`cdsm.kernels.chains`,
 
     dφ = −(p·(db − da)/ℓ_u + q·(dc − db)/ℓ_v),
 
 with p = ((u × v) × u)/|u × v| and q = (v × (u × v))/|u × v|.
 
-Where the cable goes straight through, φ = 0 has a kink, and dφ = 0: the mean of both sides.
+Where the cable goes straight through, φ has a kink, and dφ = 0 is taken: the mean of both sides.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Error if no design meets all constraints: the nearest design, and its violations."""
+"""Raise the error if no design meets all constraints, with the violations of the nearest design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Page of a search: the front, on which a click shows a design, its arm and its numbers."""
+"""Build the page of a search: its front, on which a click shows the arm and numbers of a design."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from cdsm.tolerance import Tolerances
 from cdsm.wires.catalogue import as_wire
 
 MISSED = "held"
-"""Name of the requirement, in every problem without another goal for it, to hold all postures."""
+"""Key of the share of postures and loads that are held; every problem computes it."""
 
 
 @final
@@ -53,7 +53,7 @@ class DesignProblem(ReadOnlyState):
         maximum: Upper bound of all tensions [N].
         worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
             within the bounds, whatever loads came before. ``motor_force`` and the quantities of
-            wires are then of the largest tension that friction can cause along each cable.
+            wires then belong to the largest tension that friction can cause along each cable.
         diameter: Diameter of the cables [m], for clearances and the life of wires.
         breaking_load: Breaking load of the wire [N], for ``wire_safety``.
         bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
@@ -177,9 +177,10 @@ class DesignProblem(ReadOnlyState):
         return all(variable.is_continuous for variable in self.variables)
 
     def values(self, design: ArrayLike) -> tuple[Value, ...]:
-        """Return the value of each variable in a design: one number per variable (n,), in SI.
+        """Return the value of each variable in a design, which has one number per variable (n,).
 
-        Numbers are values, or indices of choices. InvalidInput if one is outside its range.
+        A number is a value in SI, or the index of a choice. InvalidInput if one is outside its
+        range.
         """
         x = number_array("design", design)
         low, high = self.bounds.T
@@ -198,7 +199,7 @@ class DesignProblem(ReadOnlyState):
         return tuple(found)
 
     def arm_of(self, design: ArrayLike) -> Manipulator:
-        """Build the arm of a design (n,), see :meth:`values`; its cables have the tension bounds.
+        """Build the arm of a design (n,), see :meth:`values`; its cables get the problem's bounds.
 
         Raises:
             InvalidInput: As for :meth:`values`.

@@ -1,4 +1,4 @@
-"""Quantities of one design: of its arm, over all postures and loads of a problem."""
+"""Compute the quantities of one design over all postures and loads of a problem."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _SURE: dict[str, tuple[Reading, float]] = {
     "margin": ("margin", -1.0),
     "motor_force": ("tension", 1.0),
 }
-"""Reading whose uncertainty counts in each quantity, and the sign with which it counts."""
+"""Reading whose uncertainty gives the margin of a quantity, and the sign of this margin."""
 
 
 class Found(NamedTuple):
@@ -56,7 +56,7 @@ def measure(problem: DesignProblem, row: Array) -> Found:
 
 
 def quiet_arm(problem: DesignProblem, design: Array) -> Manipulator:
-    """Build the arm of a design (n,) without warnings, as of cables that share a hole."""
+    """Build the arm of a design (n,) without warnings, such as that cables share a hole."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CdsmWarning)
         return problem.arm_of(design)
@@ -109,7 +109,7 @@ class _Arm:
         return np.array([self._value(each) for each in self.problem.measures])
 
     def rows(self, each: Measure) -> Array:
-        """Return a quantity that depends on tensions, at all postures and loads that are held."""
+        """Return a quantity that depends on tensions, at the R postures and loads that are held."""
         held, problem = self.held, self.problem
         C = self.found["compliance"][held][:, :3, :3]
         if each.of == "stiffness":
@@ -180,7 +180,7 @@ class _Arm:
 
 
 def has_margin(problem: DesignProblem, each: Measure) -> bool:
-    """Whether a quantity has a margin: it is constrained, and there are tolerances of it."""
+    """Whether a quantity has a margin: it has a constraint, and the problem has tolerances."""
     bounded = any(constraint.key == each.key for constraint in problem.constraints)
     return bounded and problem.tolerances is not None and each.of in _SURE
 
@@ -188,9 +188,9 @@ def has_margin(problem: DesignProblem, each: Measure) -> bool:
 def margin(
     problem: DesignProblem, each: Measure, tension: Tension, loss: Array, cable: int | None
 ) -> float:
-    """Compute ± coverage · u of a quantity that :func:`has_margin`, towards its worse side.
+    """Compute the margin ± coverage · u of a quantity, towards its worse side.
 
-    ``motor_force`` is that of one cable: its index. ``loss`` (C,) is exp(Σ μ φ) of the cables.
+    ``cable`` is the index of a cable for ``motor_force``, else None. ``loss`` (C,) is exp(Σ μ φ).
     """
     of, sign = _SURE[each.of]
     found = uncertainty(

@@ -1,4 +1,4 @@
-"""Refinement of a design by SLSQP of scipy, with derivatives of each posture and load."""
+"""Refine a design by SLSQP of scipy, with derivatives at each posture and load."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SAFE = 1e-7
 """Relative distance of a refined design from each limit, so that rounding violates none."""
 
 _FAR = 10.0
-"""Violation of the scaled constraints that stands for a design that does not hold all postures."""
+"""Violation of each condition that SLSQP gets for a design that does not hold all postures."""
 
 _AT_END = 1e-9  # distance from the end of a range, over the range, that is rounding
 _ROUNDS = 2  # number of times that a design is improved and then moved inside its limits
@@ -70,7 +70,7 @@ def refine_design(
     y = (begin - low) / (high - low)
     inside = [(0.0, 1.0)] * len(y)
     up = np.append(np.zeros(len(y)), 1.0)
-    # where smaller steps do not help either, the best before counts
+    # if smaller steps do not help either, the best design so far is the result
     with suppress(_PostureNotHeld):
         for _ in range(_ROUNDS):
             found = minimize(

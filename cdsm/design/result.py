@@ -39,8 +39,8 @@ class DesignProgress(NamedTuple):
         generation: Number of the generation, from 1.
         designs: Number of designs that were evaluated.
         feasible: Number of these that meet all constraints.
-        best: Best feasible value of the first objective, in SI; before there is one, that of the
-            design with the smallest violations.
+        best: Best feasible value of the first objective, in SI; before a design is feasible, the
+            value of the design with the smallest violations.
         missed: Smallest sum of violations [-]; 0 once a design is feasible.
     """
 
@@ -63,7 +63,7 @@ class DesignSearch(ReadOnlyState):
         front: Pareto front: indices (n,) into ``evaluated`` of the feasible designs for which no
             other is at least as good in all objectives and better in one; the best in the first
             objective comes first.
-        history: Number of designs so far and the best of them, after each generation.
+        history: State after each generation; of :func:`refine_design`, after each design.
     """
 
     problem: DesignProblem
@@ -145,8 +145,8 @@ class DesignSearch(ReadOnlyState):
         designs, in the quantities of the problem.
 
         Args:
-            jobs: As for :func:`evaluate_designs`.
-            client: As for :func:`evaluate_designs`.
+            jobs: Number of processes, as for :func:`evaluate_designs`.
+            client: Client of a dask cluster, instead of processes.
             progress: Show a bar, if there is a terminal.
 
         Raises:

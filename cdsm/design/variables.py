@@ -54,8 +54,8 @@ class Variable:
             A link keeps its mass per length. ``"lead"`` [m]: of the cables of one joint or of all.
             ``"phase"`` [rad]: added to the hole angles of the cables of one joint or of all.
             ``"hole_angle"`` [rad]: of one cable. ``"end"``: number of the joint at which a cable
-            ends: the routing. ``"cables_per_joint"``: evenly spaced. ``"wire"``: of all cables.
-            ``"minimum"`` [N]: lower bound of all tensions, the pretension.
+            ends: the routing. ``"cables_per_joint"``: number of evenly spaced cables of each joint.
+            ``"wire"``: of all cables. ``"minimum"`` [N]: lower bound of all tensions.
         low: Smallest value, in SI: [m], [rad] or [N]; None with ``choices``.
         high: Largest value, in SI: [m], [rad] or [N]; None with ``choices``.
         at: Number of the joint, or name of the cable, that is changed; None: all.

@@ -1,4 +1,4 @@
-"""Tensions that balance an arm within bounds and domains, and small QPs over them."""
+"""Compute tensions that balance an arm within bounds and domains, and solve small QPs over them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Optimum(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Admissible:
-    """Admissible tensions F (C,) [N]: J_Lᵀ F = J_Xᵀ W − g (Eq. 13) and low ≤ F ≤ high."""
+    """The set of admissible tensions F (C,) [N]: J_Lᵀ F = J_Xᵀ W − g (Eq. 13), low ≤ F ≤ high."""
 
     least: Tension  # the least admissible tensions (Eq. 17), with the bounds of the caller
     low: Array  # lower bounds (C,) [N], within the domains of the elasticities
@@ -43,7 +43,7 @@ class Admissible:
 
     @cached_property
     def kinks(self) -> list[tuple[int, float]]:
-        """Kinks of EA(F) (its slope is discontinuous) within bounds: (cable index, tension [N])."""
+        """Kinks of EA(F), where its slope jumps, within the bounds: (cable index, tension [N])."""
         return [
             (c, kink)
             for c, cable in enumerate(self.least.posture.arm.cables)
@@ -55,7 +55,7 @@ class Admissible:
     def piece(self, F: Array) -> tuple[Array, Array]:
         """Return the bounds (C,) [N] of the range without kinks that contains F (C,) [N].
 
-        A tension exactly at a kink belongs to the range below it, and so does the slope there.
+        A tension exactly at a kink belongs to the range below the kink; so its slope is used there.
         """
         low, high = self.low.copy(), self.high.copy()
         for c, kink in self.kinks:
@@ -70,7 +70,10 @@ class Admissible:
         return np.asarray(self.rows @ (self.least.values - F))
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
-        """Return the balancing tensions (C,) [N] in the bounds nearest to ``wanted``, or None."""
+        """Return the tensions (C,) [N] nearest to ``wanted`` that balance the arm within bounds.
+
+        None if there are no such tensions.
+        """
         size = max(self.scale, float(abs(wanted).max()))
         found = solve(
             np.eye(wanted.size),
@@ -81,7 +84,7 @@ class Admissible:
         return None if found is None else np.minimum(np.maximum(found.x * size, low), high)
 
     def within(self, change: Array, F: Array) -> Admissible | None:
-        """Return a copy with |ΔF| ≤ ``change`` (C,) [N] from F; None if it has no tensions."""
+        """Return the admissible tensions within F ± ``change`` (C,) [N]; None if there are none."""
         low, high = np.maximum(self.low, F - change), np.minimum(self.high, F + change)
         least = self.nearest(np.zeros_like(F), low, high) if (low <= high).all() else None
         if least is None:
@@ -89,7 +92,7 @@ class Admissible:
         return replace(self, least=replace(self.least, values=frozen(least)), low=low, high=high)
 
     def tension(self, F: Array) -> Tension:
-        """Convert F (C,) [N] to a :class:`Tension`; remove the rounding from its balance."""
+        """Convert F (C,) [N] to a :class:`Tension`; correct its rounding so that it balances."""
         exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
         values = frozen(F if exact is None else exact)
         return replace(self.least, values=values, least=False)

@@ -1,4 +1,4 @@
-"""Tensions along a path, planned sample by sample; a rate limits their change per step."""
+"""Plan tensions along a path, sample by sample; a rate limits their change per step."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Sample:
 
     index: int
     model: StiffnessModel  # K_θ over the admissible tensions at the sample
-    constraints: Constraints
-    F: Array  # (C,) [N]; the least tensions until it is planned
+    constraints: Constraints  # c(F) = 0 where the target is hit
+    F: Array  # tensions (C,) [N]; the least tensions until the sample is planned
 
 
 @dataclass(eq=False)
@@ -43,10 +43,10 @@ class Follower:
     def add(self, sample: Sample) -> InfeasibleSample | None:
         """Plan one more sample. Return None if it succeeds, else the reason of the failure.
 
-        The plan takes the least tensions within the rate of the last planned sample. If these miss
-        the target although others hit it, earlier samples are planned again so that they lead to
-        the others. Raises UnreachableStiffness or SingularStiffness if none do, even with an
-        unlimited rate.
+        The plan takes the least tensions that hit the target and that the rate allows after the
+        last planned sample. If only other tensions hit the target, earlier samples are planned
+        again so that the rate allows those. Raises UnreachableStiffness or SingularStiffness if no
+        tensions hit the target, even with an unlimited rate.
         """
         region = sample.model.region
         last = self.planned[-1] if self.planned else None
@@ -76,7 +76,7 @@ class Follower:
     def _search(
         self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
     ) -> Sample | None:
-        """Plan a sample by :func:`_search`; None if the result misses the target."""
+        """Plan a sample by one search of ``region``; None if the result misses the target."""
         found = _search(sample.model, region, sample.constraints, start, centre)
         return replace(sample, F=found[0]) if found and found[1] else None
 
@@ -88,7 +88,7 @@ class Follower:
         return replace(sample, F=sample.model.region.tension(found.evaluation.F).values)
 
     def _replan_towards(self, goal: Sample) -> bool:
-        """Plan the last samples again, backwards, to lead to ``goal``; return success.
+        """Plan the last samples again, backwards, to lead to ``goal``; return whether it succeeds.
 
         Each sample stays within the rate of its successor and comes as near as possible to its
         predecessor. The loop ends when a sample is within the rate of both.
@@ -126,9 +126,9 @@ def least_change(
 ) -> Array | None:
     """Return the tensions (C,) [N] nearest to ``before`` that meet ``constraints``, by one search.
 
-    No tension changes by more than ``rate`` (C,) [N]. If the search cannot meet them, return the
-    tensions of the smallest violation found. None if no tensions within ``rate`` balance the arm,
-    or if the arm is unstable at those nearest to ``before``.
+    No tension changes by more than ``rate`` (C,) [N]. If the search cannot meet the constraints,
+    return the tensions of the smallest violation found. None if no tensions within ``rate`` balance
+    the arm, or if the arm is unstable under the nearest of them to ``before``.
     """
     found = _search(model, model.region.within(rate, before), constraints, before, before)
     return found[0] if found else None

@@ -21,13 +21,13 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StiffnessGradient(ReadOnlyState):
-    """Derivatives of a :class:`~cdsm.Stiffness` with respect to tensions; same names as there.
+    """Derivatives with respect to tensions, named as the readings of :class:`~cdsm.Stiffness`.
 
     Posture and wrench are fixed. A change of one tension alone breaks the balance (Eq. 13), so
-    combine the derivatives along changes that keep it.
+    multiply the derivatives by changes ΔF that keep it: J_Lᵀ ΔF = 0.
 
     Attributes:
-        stiffness: K, whose tensions are the point of differentiation.
+        stiffness: K, at whose tensions the derivatives are taken.
         cable_stiffness: dk_c/dF_c (C,) [1/m] of each cable; 0 under force control.
     """
 
@@ -44,8 +44,8 @@ class StiffnessGradient(ReadOnlyState):
     def margin(self) -> Array:
         """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], where v is the critical direction.
 
-        A multiple eigenvalue has no gradient. Then this is an upper bound of its change, for one v
-        of its eigenspace.
+        A multiple eigenvalue has no gradient. Then this is computed for one v of its eigenspace,
+        and bounds the change of λ_min from above.
         """
         v = self.stiffness.critical_direction[:, None]
         return frozen(self._projected(v, v)[:, 0, 0])
@@ -62,8 +62,8 @@ class StiffnessGradient(ReadOnlyState):
     def along(self, direction: Direction) -> Array:
         """Return ∂s/∂F = s² wᵀ ∂K_θ/∂F w (C,) [1/m] of s = ``K.along(u)``, with w = K_θ⁻¹ J_vᵀ u.
 
-        Argument and errors are those of :meth:`cdsm.Stiffness.along`; SingularStiffness if s is
-        inf.
+        Argument and errors are those of :meth:`cdsm.Stiffness.along`. Also raises SingularStiffness
+        if s is inf.
         """
         u = unit_direction("direction", direction)
         self.stiffness._require_mobile(u)

@@ -1,4 +1,4 @@
-"""Stiffness of an arm half-way between two planned samples."""
+"""Compute the stiffness of an arm half-way between two planned samples."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def half_way(
 ) -> HalfWay:
     """Compute the arm half-way between sample number ``index`` and the next sample.
 
-    ``ends`` are the stiffnesses of both samples; l_0 (H,) [m] ``unstrained`` and ``target`` [N/m]
-    are means. ``directions`` are (3,) or (n, 3), None for ``cartesian``.
+    ``ends`` are the stiffnesses of both samples. ``unstrained`` (H,) [m] and ``target`` [N/m] are
+    the means of their lengths l_0 and targets. ``directions`` are (3,), (n, 3) or None.
     """
     K, value, off, reason = None, None, math.inf, ""
     try:

@@ -23,7 +23,8 @@ def stiffness_at(
 ) -> tuple[Array, Array, Array]:
     """Return K_θ = constant + Σ (F_c H_c + k_c J_c J_cᵀ), and its eigenvalues and eigenvectors.
 
-    They are those of the symmetric part. ``constant`` (nv, nv) are the terms of gravity and load.
+    The eigenvalues are those of the symmetric part. ``constant`` (nv, nv) are the terms of gravity
+    and load.
     """
     K = constant.copy()
     count, nv = length_jacobian.shape
@@ -154,7 +155,7 @@ def constraint_hessian(
 
 @compiled
 def convex(W: Array, null: Array, normals: Array) -> Array:
-    """Return a positive definite matrix that equals W on the admissible steps if W is convex there.
+    """Return a positive definite matrix; it equals W on admissible steps if W is convex there.
 
     Admissible steps keep the balance (columns of ``null`` (C, p) are an orthonormal basis) and, to
     first order, the constraints with the gradients ``normals`` (n, C).

@@ -1,4 +1,4 @@
-"""Checks of the arguments of the planners, and the constraints that follow from the targets."""
+"""Check the arguments of the planners, and build the constraints that follow from the targets."""
 
 from __future__ import annotations
 
@@ -14,19 +14,22 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import SMALLEST, number_array, whole_number
 from cdsm.support.values import Array, frozen
 
-_MOST_STARTS = 1000  # these take about a minute, and a late start is seldom the best
+_MOST_STARTS = 1000  # so many take about a minute, and a late start is seldom the best
 _SYMMETRIC = 1e-9  # a skew part of a matrix below this part of its largest entry is rounding
 
 
 def checked_starts(starts: object, seed: object) -> tuple[int, int]:
-    """Check and return the number of starting tensions and the seed of the random ones."""
+    """Check and return the number of starting tensions, 1 to 1000, and the seed of random ones."""
     return whole_number("starts", starts, 1, _MOST_STARTS), whole_number("seed", seed, 0)
 
 
 def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:
-    """Build the constraints of a target [N/m] of ``along``; of ``cartesian`` without directions."""
+    """Build the constraints along = target [N/m], or cartesian = target if directions are None.
+
+    SingularStiffness if the tip cannot move along a direction.
+    """
     K = stiffness(model.pose, model.region.least)
     if directions is None:
         _ = K.cartesian  # raises if it does not exist
@@ -50,7 +53,7 @@ def along_constraints(model: StiffnessModel, directions: Array, targets: Array) 
 def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
     """Build the constraints (cartesian − target)/‖target‖ for a target (3, 3) [N/m].
 
-    They are 6 values, whose norm is that of the symmetric part of the matrix (3, 3).
+    These are 6 values; their norm is the norm of the symmetric part of that matrix (3, 3).
     """
     k, (i, j), E = np.arange(6), np.triu_indices(3), np.zeros((6, 3, 3))
     E[k, i, j] = E[k, j, i] = np.where(i == j, 1.0, np.sqrt(0.5))
@@ -68,7 +71,10 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
 
 
 def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
-    """Return how far ``achieved`` is from ``target`` [-]; see :attr:`cdsm.StiffnessPlan.misfit`."""
+    """Return ‖achieved/target − 1‖ [-].
+
+    Without directions ‖S − target‖/‖target‖, with S the symmetric part of ``achieved``.
+    """
     if directions is None:
         off = (achieved + achieved.T) / 2.0 - target
         return float(np.linalg.norm(off) / np.linalg.norm(target))
@@ -105,7 +111,10 @@ def checked_targets(directions: Array | None, target: ArrayLike) -> Array:
 
 
 def check_positive(directions: Array | None, targets: Array) -> None:
-    """Check that targets along directions are positive, or that (…, 3, 3) are positive definite."""
+    """Raise InvalidInput unless all targets of stiffness [N/m] are positive.
+
+    Without ``directions`` they are matrices (…, 3, 3), symmetric and positive definite.
+    """
     if directions is not None:
         if not (targets >= SMALLEST).all():
             raise InvalidInput(

@@ -74,9 +74,9 @@ def plan_path(
     before it: k·rate if they are k samples apart. If no tensions within this limit hit the target
     although others do, up to 50 earlier samples are planned again, backwards, so that they still
     hit their targets and lead to this sample. If this fails, the sample has the status ``"rate"``,
-    and the next sample may change the tensions by one rate more. So after a step of the target the
-    plan misses samples until the motors can reach it. Give a ramp if the arm must follow in
-    between.
+    and the next sample may change the tensions by one rate more. So after a jump of the target, the
+    samples are not planned until the rate allows the new tensions. Give a ramp if the arm must
+    follow meanwhile.
 
     The plan hits the targets at the samples. ``between`` of the result gives the stiffness half-way
     between two samples. Its misfit is of second order in the step between samples.
@@ -88,7 +88,7 @@ def plan_path(
         target: The stiffness [N/m], one for all samples or one per sample: () or (S,) along u, (n,)
             or (S, n) along several directions, (3, 3) or (S, 3, 3) for ``cartesian``.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
-        maximum: Upper bound of the tensions [N], as for :func:`~cdsm.plan_stiffness`.
+        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W at ``tool0`` in base axes, (6,) or one per sample (S, 6): force [N], then moment
             [N m].
         angles: The path as joint angles (S, nv) [rad]. Give either ``angles`` or ``tips``.
@@ -97,7 +97,7 @@ def plan_path(
         guess: Joint angles (nv,) [rad] from which the first of ``tips`` is solved. Default: the
             straight arm.
         rate: Largest change of a tension per step [N], for all cables or (C,); inf for no limit.
-        margin: Smallest eigenvalue of K_θ [-], as for :func:`~cdsm.plan_stiffness`.
+        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest [-].
         starts: Number of starting tensions of a search from scratch, at most 1000.
         seed: Seed of the random starting tensions.
         progress: Show a bar on the standard error, if that is a terminal.
@@ -194,7 +194,7 @@ def checked_rate(arm: Manipulator, rate: ArrayLike) -> Array:
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:
-    """Return one value per sample (S, …) from one of shape ``tail`` for all, or from S values."""
+    """Return S = ``size`` values (S, …) from one of shape ``tail`` for all samples, or from S."""
     given = number_array(name, value)
     if given.shape not in (tail, (size, *tail)):
         raise InvalidInput(

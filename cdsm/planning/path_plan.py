@@ -1,4 +1,4 @@
-"""Plan of a path: tensions, stiffness, cable lengths for the motors, infeasible samples."""
+"""Result of :func:`plan_path`: tensions, stiffness, lengths for motors, infeasible samples."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class InfeasibleSample:
             u), ``"stiffness"`` (no tensions hit the target) or ``"rate"`` (tensions hit the target,
             but differ too much from those of the samples before).
         reason: The reason in words, with the remedy.
-        error: The error of a plan of this sample alone, with its data; or None.
+        error: The error that the plan of this sample raised, with its data; or None.
     """
 
     index: int
@@ -150,7 +150,7 @@ class PathPlan(ReadOnlyState):
             animate: A ``.gif`` to write too, in which the arm follows the path.
 
         Raises:
-            InvalidInput: The plan is one of ``cartesian``, or nothing to animate is planned.
+            InvalidInput: The plan is for ``cartesian``, or no sample to animate is planned.
             FileError: The animation cannot be written.
         """
         if animate is not None:

@@ -13,7 +13,7 @@ _NO_ANGLE = 1e-15  # a smaller joint coordinate [rad or m] of a path is rounding
 
 
 def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
-    """Return the header and a row for each sample of ``plan``, in SI; empty cells have no value."""
+    """Return the header and a row for each sample of ``plan``, in SI. Unknown values are empty."""
     arm, names, locked = plan.arm, plan.arm.cables.names, plan.arm.cables.position_controlled
     targets = plan.target.reshape(len(plan.target), -1)
     numbered = _numbered(plan, targets.shape[1])
@@ -44,7 +44,7 @@ def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
 
 
 def _numbered(plan: PathPlan, count: int) -> list[str]:
-    """Return suffixes of the column names of ``count`` targets of the plan; ``[""]`` for one."""
+    """Return the suffixes of the columns of the targets: xx, xy …; 1, 2 …; or none for one."""
     if plan.direction is None:
         return [f" {a}{b}" for a in "xyz" for b in "xyz"]
     return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]

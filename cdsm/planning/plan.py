@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class StiffnessPlan(ReadOnlyState):
-    """Tensions for a wanted stiffness, with the arguments of the plan.
+    """Tensions for a wanted stiffness, with the target; made by :func:`plan_stiffness`.
 
     Attributes:
         tension: The tensions. If several are equally near to the target, they have the least ‖F‖.
@@ -74,7 +74,7 @@ class StiffnessPlan(ReadOnlyState):
     def reached(self) -> bool:
         """Whether :attr:`misfit` is at most 1e-6, relative to the target.
 
-        With one direction, :func:`plan_stiffness` raises an error instead.
+        With one direction, :func:`plan_stiffness` raises an error if it is not.
         """
         return self.misfit <= REACHED
 
@@ -84,7 +84,7 @@ class StiffnessPlan(ReadOnlyState):
         return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
 
     def plot(self, attainable: StiffnessRange | None = None) -> Figure:
-        """Plot the planned tensions [N], between those of the softest and the stiffest arm.
+        """Plot the planned tensions [N]; with ``attainable``, also the softest and stiffest ones.
 
         InvalidInput if ``attainable`` is the range of another posture or direction.
         """
@@ -141,10 +141,10 @@ def plan_stiffness(
     """Plan least tensions for a wanted stiffness: min ‖F‖², along(u) = target (Eqs. 13, 17, 20).
 
     The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
-    position-controlled cables, and λ_min(K_θ), symmetric part, not below ``margin``. The target of
-    one direction is hit within 1e-6 of its value; otherwise an error is raised. Several directions
-    or ``cartesian`` are hit if possible. If not, the sum of their squared relative misses is least,
-    and ``reached`` is false.
+    position-controlled cables, and that the smallest eigenvalue λ_min of K_θ (symmetric part) is
+    not below ``margin``. The target of one direction is hit within 1e-6 of its value; otherwise an
+    error is raised. Several directions or ``cartesian`` are hit if possible. If not, the sum of
+    their squared relative misses is least, and ``reached`` is false.
 
     The searches are local. With the laws of this library they mostly end at the same effort ‖F‖.
     With one user-defined law, the effort found was 3.6 % above the least. A ``spread`` above zero

@@ -1,6 +1,6 @@
 """Search from several starts for the least tensions that hit a target.
 
-The search is local: :func:`~cdsm.planning.plan.plan_stiffness` gives its measured error.
+The search is local. :func:`~cdsm.planning.plan.plan_stiffness` says how far it can miss the least.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from cdsm.support.progress import track
 from cdsm.support.values import Array
 
 REACHED: Final = 1e-6
-"""Largest relative miss of a target that counts as hit. Searches mostly end at rounding."""
+"""Largest relative miss of a target that counts as hit. Most searches end much nearer to it."""
 
-_CORNERS = 1e3  # upper bound of unbounded tensions for the starts, over the least tensions
+_CORNERS = 1e3  # bound of otherwise unbounded starting tensions, over the least tensions
 _RANGE_STARTS = 24  # number of starts of the range search before a target is rejected
 _NEAREST_STARTS = 8  # number of additional corner starts for targets that cannot all be hit
-_NEARLY = 0.1  # tensions within this relative miss show how large the solution will be
+_NEARLY = 0.1  # starts with at most this relative miss show how large the solution will be
 _SIDES = 6  # number of nearest points on either side of a target that are connected
-_EDGE = 1e-9  # a target beyond an end of the range by this part is at the end
+_EDGE = 1e-9  # a target beyond an end of the range by up to this part counts as at the end
 _AS_NEAR = 1e-8  # misses up to this count as zero: next to buckling a search may come no nearer
 
 
@@ -79,8 +79,8 @@ class Planner:
     def _within_range(self, u: Array, target: float) -> ConstraintValues:
         """Return the constraint values at the least tensions that hit ``target`` [N/m] along u.
 
-        Raises UnreachableStiffness if the target is beyond the range that searches find, or not
-        hit.
+        Raises UnreachableStiffness if the target is beyond the range that searches find, or if no
+        search hits it.
         """
         softest, stiffest = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         low = 0.0 if softest.open else softest.value
@@ -136,7 +136,7 @@ class Planner:
         return best
 
     def _starts(self) -> Iterator[Evaluation]:
-        """Yield the starts: least tensions, points that hit a single target, and random points."""
+        """Yield stable starts: least tensions, points that hit a single target, random points."""
         anchor = self.begin.anchor
         least = anchor.backtracked(self.model.region.least.values)
         points = [] if least is None else [least]
@@ -149,7 +149,10 @@ class Planner:
     def _crossings(
         self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
     ) -> list[Evaluation]:
-        """Find stable points that hit the target, on lines from ``hub``; least effort first."""
+        """Find stable points that hit the target, on lines from ``hub`` to ``others``.
+
+        The point of least ‖F‖ is first. ``precision`` is their relative error on these lines.
+        """
         at_hub, guesses = self._miss(hub), []
         for other in others:
             at_other, step = self._miss(other), other.F - hub.F
@@ -169,7 +172,7 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find stable points that hit the target, between the nearest below and above it."""
+        """Find stable points that hit the target, between points a little below and above it."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]

@@ -1,4 +1,4 @@
-"""Smallest and largest stiffness that redundant cables can give an arm."""
+"""Compute the smallest and largest stiffness that redundant cables can give an arm."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARGIN = 1e-4
-"""Default ratio of the smallest to the largest eigenvalue of K_θ: arms of 40 joints reach 3e-4."""
+"""Default of ``margin``: λ_min/λ_max of K_θ that counts as stable. Arms of 40 joints have 3e-4."""
 
 _UPWARD = 4  # starts for the upper end if rigidities rise: there is mostly one maximum
 _LAW_SAMPLES = 257  # number of tensions at which a law is sampled to check that its rigidity rises
 _LAW_ROUNDING = 1e-12  # a relative fall of the rigidity below this is rounding
-_LIMITS = (1e2, 1e4, 1e6)  # upper bounds of unbounded tensions, over the least tensions
-_CAPPED = 0.999  # a tension above this part of the upper bound would rise further
+_LIMITS = (1e2, 1e4, 1e6)  # caps of unbounded tensions over the least tensions, tried in turn
+_CAPPED = 0.999  # a tension above this part of its cap would rise further
 
 
 @final
@@ -47,7 +47,7 @@ class StiffnessRange(ReadOnlyState):
     Attributes:
         direction: u (3,), a unit direction in base axes.
         low: Smallest attainable ``along(u)`` [N/m] that the searches found.
-        high: Largest attainable ``along(u)`` [N/m].
+        high: Largest attainable ``along(u)`` [N/m] that the searches found.
         low_tension: Tensions that give ``low``.
         high_tension: Tensions that give ``high``.
         floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
@@ -128,21 +128,21 @@ def stiffness_range(
     The constraints on F are those of :func:`~cdsm.plan_stiffness`. With a rigidity that is constant
     or levels off, ``along`` is a concave function of F, with one maximum and many minima in the
     corners, so ``low`` is searched from many starts. With other laws ``high`` is, too.
-    ``high_found`` shows how often ``high`` was found. More starts include the starts of a smaller
-    number. If tension can buckle the arm, it is softest just before, and ``low`` depends on
-    ``margin``.
+    ``high_found`` shows how often ``high`` was found. A larger number of starts includes those of a
+    smaller number. If tension can buckle the arm, the arm is softest just before it buckles, and
+    ``low`` depends on ``margin``.
 
-    No number of starts proves that ``low`` is the smallest. With the default, ``low`` was too high
-    by up to 0.16 % with constant rigidity (15 cables), and by up to 5.5 % with a user-defined law
-    whose rigidity has a hump.
+    No number of starts proves that ``low`` is the smallest. With the default number, ``low`` was
+    too high by up to 0.16 % with constant rigidity (15 cables), and by up to 5.5 % with a
+    user-defined law whose rigidity has a hump.
 
     Args:
         pose: The posture.
         direction: u: an axis such as ``"z"``, or (3,) in base axes, any length.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
-        maximum: Upper bound of the tensions [N], as for :func:`~cdsm.plan_stiffness`.
+        maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        margin: Smallest eigenvalue of K_θ [-], as for :func:`~cdsm.plan_stiffness`.
+        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest [-].
         starts: Number of starting tensions for ``low``, at most 1000. ``high`` has the same number,
             or a few if the rigidity of all cables is known to rise with the tension.
         seed: Seed of the random starting tensions.
@@ -187,9 +187,9 @@ class RangeEnd(NamedTuple):
 
     evaluation: Evaluation  # at the end of the best search
     tension: Tension  # there, with exact balance
-    value: float  # stiffness [N/m]; near buckling, if it cannot be computed, that of the search
+    value: float  # stiffness [N/m]; next to buckling the less accurate value of the search
     values: Array  # stiffness at the end of each search (S,) [N/m], the best first
-    open: bool = False  # whether tensions are unbounded and larger ones lead further
+    open: bool = False  # whether larger tensions, which no bound excludes, would lead further
 
 
 def range_ends(
@@ -197,8 +197,8 @@ def range_ends(
 ) -> tuple[RangeEnd, RangeEnd]:
     """Find the lowest and the highest stiffness of ``model`` along a unit direction ``u`` (3,).
 
-    If tensions are unbounded, a cap on them rises until both lie below it, or to its largest value.
-    ``starts`` and ``seed`` are as for :func:`stiffness_range`.
+    Unbounded tensions get a cap of 1e2 times the least tensions. It rises up to 1e6 times until the
+    tensions at both ends lie below it. ``starts`` and ``seed`` are as for :func:`stiffness_range`.
     """
     region = model.region
     if np.isfinite(region.high).all():

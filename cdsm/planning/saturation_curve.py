@@ -1,4 +1,4 @@
-"""Stiffness over the lower bound of the least tensions, as a frozen value."""
+"""Result of :func:`saturation`: stiffness over the lower bound of the least tensions."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class Saturation(ReadOnlyState):
         steepest_slope: Derivative of the stiffness with respect to the bound at ``steepest`` [1/m].
         stiffest: The lower bound [N] with the largest stiffness: an end of the curve, or a maximum
             between, above which tension softens the arm.
-        limit: Why the curve ends: ``"buckling"``, ``"maximum"`` (the bound ``maximum``),
+        limit: Why the curve ends: ``"buckling"``, ``"maximum"`` (the upper bound of the tensions),
             ``"elasticity"`` (a tension leaves the domain of its cable), ``"infeasible"`` (no
             tensions balance the arm) or ``"none"`` (the curve goes on).
-        curve: Lower bound [N], stiffness along u [N/m] and its slope [1/m], (n, 3).
+        curve: n rows (n, 3): lower bound [N], stiffness along u [N/m], its slope [1/m].
     """
 
     direction: Array

@@ -2,10 +2,11 @@ r"""Sequential quadratic programming over the admissible tensions of a stable ar
 
     min f(F)   subject to   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
 
-Only c and the last condition are nonlinear. Every iterate balances the arm and is stable, so K_θ
-can be inverted there. scipy's SLSQP with the same gradients ends at the same tensions
-(tests/planning/test_sqp.py), but needs twice the evaluations, sometimes a hundred times as many.
-With differences it takes three times as long (tests/benchmarks/test_planning_speed.py).
+Only c and the last condition, reserve = λ_min − floor ≥ 0, are nonlinear. Every iterate balances
+the arm and is stable, so K_θ can be inverted there. scipy's SLSQP with the same gradients ends at
+the same tensions (tests/planning/test_sqp.py), but needs twice the evaluations, sometimes a hundred
+times as many. SLSQP with finite differences takes three times as long
+(tests/benchmarks/test_planning_speed.py).
 
 **The quadratic program of a step.** Let d = ΔF/size, g = ∂f/∂d and G = ∂c/∂d. The Lagrangian is
 L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve
@@ -21,7 +22,7 @@ a curved c.
 
 **The curvature W.** W is the exact Hessian of L, made positive definite by
 :func:`cdsm.planning.kernels.convex` on the steps that keep the balance, c and, if z > 0, the
-reserve. If it is so already, the last steps converge quadratically.
+reserve. If it is positive definite there already, the last steps converge quadratically.
 
 **The trust region.** A step is accepted if the merit f + ρ (‖c‖₁ + ½ ‖c‖²) falls by at least 1e-4
 of the prediction. If c bends away from its tangent, a second program uses the value of c after the
@@ -31,7 +32,7 @@ anchor, a stable point well inside.
 **Kinks.** At a kink of a rigidity (Eq. 19 has one at 31 N) c is continuous, but its slope is not.
 Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search crosses kinks until a
 step across a kink fails. Then it stays in its piece, whose walls act as bounds. If it ends at a
-wall, it starts again on the other side with the other slope, until that is not better.
+wall, it starts again on the other side with the other slope, as long as this finds a better point.
 """
 
 from __future__ import annotations
@@ -54,9 +55,9 @@ _CROSSINGS = 60  # largest number of restarts beyond a kink
 _FIRST_RADIUS = 4.0
 _SMALLEST_RADIUS = 1e-13
 _FIRST_PRICE, _LARGEST_PRICE = 10.0, 1e8
-_PREMIUM = 3.0  # price over multiplier: above one the penalty is exact
+_PREMIUM = 3.0  # price over the largest multiplier: above one the penalty is exact
 _ROUNDING = 1e-15
-_ARRIVED = 1e-10  # smaller steps and misses end a search: the next would be their square
+_ARRIVED = 1e-10  # smaller steps and misses end a search: the next ones are of their square's size
 _AT_KINK = 1e-6  # relative distance from a kink that counts as zero
 
 
@@ -82,11 +83,11 @@ class Program:
     anchor: Evaluation  # stable point well inside, towards which steps are moved back
     constraints: Constraints  # c(F) = 0
     objective: Objective  # f(F)
-    unit: float  # of the effort [N], of the order of the tensions in the solution
+    unit: float  # unit of the effort [N], of the order of the tensions in the solution
     centre: Array | float = 0.0  # tensions (C,) [N] at which the effort is zero, or 0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return f at a point; for the effort plus ``price`` times the violation of c."""
+        """Return f at a point; for the effort, plus ``price`` times ‖c‖₁ + ½ ‖c‖²."""
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit
@@ -184,7 +185,7 @@ class _Step(NamedTuple):
 class _LocalModel:
     """Quadratic model of the program at an iterate, as a function of d = ΔF/size.
 
-    ``before`` is the step before, ``bounds`` limit the tensions [N], ``radius`` limits each |d_c|.
+    ``before`` is the previous step, ``bounds`` limit the tensions [N], ``radius`` limits all |d_c|.
     """
 
     def __init__(
@@ -218,7 +219,7 @@ class _LocalModel:
         self.W = kernels.convex(W, program.region.null, normals)
 
     def step(self, price: float, c: Array) -> _Step:
-        """Solve the quadratic program for a value of c; raise the price until it is enough."""
+        """Solve the quadratic program for values ``c`` (n,); raise the price until c is met."""
         region, evaluation, size = self.program.region, self.iterate.evaluation, self.size
         count, rank, m = self.g.size, len(region.rows), c.size
         low, high = ((bound - evaluation.F) / size for bound in self.bounds)
@@ -264,10 +265,10 @@ class _LocalModel:
         return _Step(d, best.y[rank:], float(best.z[0]), predicted, price)
 
     def take(self, step: _Step) -> tuple[ConstraintValues | None, float]:
-        """Evaluate a step; return the new point (None if unstable) and the fall of the merit."""
+        """Evaluate a step; return the new point (None if not stable) and the fall of the merit."""
         candidate, fall = self._after(step.d, step.price)
         if candidate is not None and fall < 0.75 * step.predicted and self.c.size:
-            # second-order correction: the value of c after the step, not that of its tangent
+            # second-order correction: use the value of c after the step, not of its tangent
             corrected = self.step(step.price, candidate.values - self.G @ step.d)
             other, more = self._after(corrected.d, step.price)
             if more > fall:

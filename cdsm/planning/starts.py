@@ -11,7 +11,7 @@ from cdsm.planning.objectives import unstable
 from cdsm.planning.stiffness_model import Evaluation, StiffnessModel
 from cdsm.support.values import Array
 
-_FAR = 1e4  # corners are searched in a direction at this multiple of the largest tension
+_FAR = 1e4  # distance of a point, over the largest tension; the nearest tensions are a corner
 _SAME = 1e-6  # corners closer to each other than this part of their size are one
 _ITERATIONS = 60
 _MODES = 24  # number of cutting planes that are kept
@@ -19,13 +19,14 @@ _NO_GAIN = 1e-9  # a gain of reserve below this part of the scale of K_θ is not
 
 
 class StartPoints:
-    """Stable tensions in a bounded region from which searches start; SingularStiffness without any.
+    """Stable tensions in a bounded region, from which searches start.
 
-    Corners are searched in the directions of the cables and in a number of random directions.
+    Corners of the region are searched in the directions of the cables and in a number of random
+    directions. SingularStiffness if no stable tensions are found.
 
     Attributes:
         anchor: A stable point well inside.
-        points: The anchor, and stable points towards the corners. More directions only add points.
+        points: The anchor, and stable points towards the corners; more directions only add some.
     """
 
     def __init__(
@@ -73,9 +74,9 @@ class StartPoints:
 def _stabilize(model: StiffnessModel, region: Admissible, start: Evaluation) -> Evaluation:
     """Find tensions in ``region`` with about the largest reserve λ_min − floor, by cutting planes.
 
-    vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue for every unit v, linear in F if K_θ
-    is. The bounds of the two softest modes of each iterate limit the reserve of the next, which
-    stays within a trust region. ``start`` need not be stable.
+    For every unit v, vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue. Each iterate adds
+    two such bounds, linearised, with v its two softest modes. The next iterate has the largest
+    reserve that the bounds allow within a trust region. ``start`` need not be stable.
     """
     iterate, radius, unit = start, 1.0, model.scale
     modes: list[Array] = []

@@ -23,7 +23,7 @@ _NEAREST = 1e-9  # smallest distance of two eigenvalues in a derivative, as a pa
 
 
 def checked_margin(margin: float) -> float:
-    """Check that ``margin`` is above rounding and below 1."""
+    """Check and return ``margin``: at least 1e-9, which is above rounding, and below 1."""
     part = scalar("margin", margin)
     if not _LEAST_MARGIN <= part < 1.0:
         raise InvalidInput(
@@ -35,7 +35,7 @@ def checked_margin(margin: float) -> float:
 
 
 class StiffnessModel:
-    """K_θ(F) over the admissible tensions at a posture, from the arguments of all planners.
+    """K_θ(F) over the admissible tensions at a posture; every planner builds one.
 
     Attributes:
         pose: The posture.
@@ -130,7 +130,7 @@ class Evaluation:
         return result
 
     def backtracked(self, F: Array) -> Evaluation | None:
-        """Return the first stable point on the line from F (C,) [N] to these tensions, or None."""
+        """Return the first stable point on the line from F (C,) [N] to ``self.F``, or None."""
         start = self.model.at(F)
         if start.reserve >= 0.0:
             return start
@@ -161,7 +161,7 @@ class Constraint(NamedTuple):
 class Constraints:
     """c(F): values of all constraints minus their targets, to be zero."""
 
-    parts: tuple[Constraint, ...]
+    parts: tuple[Constraint, ...]  # whose values are joined in this order
     targets: Array  # (n,) [-]
     single: tuple[Array, float] | None = None  # u (3,) and target [N/m] of one direction
 
@@ -174,14 +174,14 @@ class ConstraintValues:
     """Constraint values at stable tensions F, with their first and second derivatives.
 
     A value is a weighted sum of the entries of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹, minus a target.
-    R are rows of the tip Jacobian. M = K_θ⁻¹ Rᵀ X is the joint motion per motion of the tip, and P
-    = K_θ⁻¹ − M R K_θ⁻¹ that per torque with the tip fixed. With ∂_i = ∂/∂F_i for cable i,
+    R are rows of the tip Jacobian. M = K_θ⁻¹ Rᵀ X is the joint motion per motion of the tip, and
+    P = K_θ⁻¹ − M R K_θ⁻¹ is the joint motion per torque with the tip fixed. With ∂_i = ∂/∂F_i,
 
         ∂_i X = Mᵀ ∂_i K_θ M,
         ∂_i ∂_j X = −Mᵀ (∂_i K_θ P ∂_j K_θ + ∂_j K_θ P ∂_i K_θ) M + δ_ij Mᵀ J_i k″_i J_iᵀ M.
 
-    J_i is the gradient of the length of cable i, k″_i the second derivative of its stiffness, and δ
-    the Kronecker symbol. ``values`` are the values c (n,) [-] of :class:`Constraints`.
+    J_i is the gradient of the length of cable i, k″_i the second derivative of its stiffness by its
+    tension, δ the Kronecker symbol. ``values`` are the values c (n,) [-] of :class:`Constraints`.
     """
 
     def __init__(self, constraints: Constraints, evaluation: Evaluation) -> None:

@@ -1,4 +1,4 @@
-"""Saturation of the stiffness as the lower bound of the least tensions rises."""
+"""Find where the stiffness saturates as the lower bound of the least tensions rises."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def saturation(
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         fraction: Part of the largest slope, from 0 to below 1 [-].
-        solver: As for :func:`~cdsm.distribute_tension`.
+        solver: ``"daqp"``, ``"osqp"``, or another solver that qpsolvers finds installed.
 
     Raises:
         InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero;
@@ -139,8 +139,8 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
 def _kinks(at: StiffnessAt, places: Array) -> Array:
     """Find the lower bounds [N], rising, within ``places`` at which the slope is discontinuous.
 
-    There a cable reaches or leaves a bound, or passes a kink of its rigidity. Between, the least
-    tensions are linear in the bound.
+    There a cable reaches or leaves a bound, or passes a kink of its rigidity. Between these lower
+    bounds, the least tensions are linear in the bound.
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))

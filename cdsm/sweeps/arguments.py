@@ -1,4 +1,4 @@
-"""Arguments of a sweep: each is one value, several values, or several values by name."""
+"""Check the arguments of a sweep: each is one value, several values, or several by name."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def label(dims: tuple[str, ...], values: object, long_name: str, units: str = ""
 @final
 @dataclass(frozen=True, eq=False)
 class Choice(ReadOnlyState, Generic[_Values]):
-    """Value or values of an argument. Several become a dimension named after the argument."""
+    """Value or values of an argument; several values become a dimension named like the argument."""
 
     name: str  # of the argument
-    values: _Values  # one entry each, also for a single value
-    names: NDArray[np.str_] | NDArray[np.int64] | None  # None for a single value
+    values: _Values  # all values in order, also if there is only one
+    names: NDArray[np.str_] | NDArray[np.int64] | None  # their names or numbers; None for one value
 
     @property
     def labels(self) -> dict[str, Label]:
@@ -70,7 +70,7 @@ def laws_of(
 
 
 def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]:
-    """Return lower bounds of all tensions ``minimum`` (M,) [N], and the upper bound, checked."""
+    """Check and return the lower bounds (M,) [N] of all tensions, and their upper bound [N]."""
     lows = distinct("minimum", minimum)
     if lows.min() < 0.0:
         raise InvalidInput(
@@ -88,7 +88,7 @@ def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]
 
 
 def distinct(name: str, values: ArrayLike) -> Array:
-    """Check the labels of a dimension (n,): one or more different numbers."""
+    """Check and return the labels (n,) of a dimension: one or more different numbers."""
     array = np.atleast_1d(number_array(name, values))
     array = vector(name, array, array.size, "the values of a dimension")
     if not array.size:
@@ -125,7 +125,7 @@ def vectors_of(
 
 
 def outputs_of(outputs: Iterable[str]) -> tuple[str, ...]:
-    """Check names of quantities: one or more, each once."""
+    """Check and return names of quantities: one or more, each once."""
     if not isinstance(outputs, Iterable):
         raise InvalidInput("outputs", f"{outputs!r} given; names are needed.")
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)

@@ -1,4 +1,4 @@
-"""Division of a sweep into blocks of postures: contiguous rectangles of the pose set."""
+"""Divide a sweep into blocks of postures, which are contiguous boxes of the pose set."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import math
 from collections.abc import Mapping
 
 Block = Mapping[str, slice]
-"""Slice along each dimension of the pose set; its cases are computed, sent and stored together."""
+"""Part of a pose set: a slice of each dimension. A block is computed, sent and stored at once."""
 
 
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the size of a block of up to ``most`` postures along each dimension of ``poses``.
+    """Return the size along each dimension of a block of up to ``most`` postures.
 
-    A block takes the last dimensions completely, a part of the one before, and one entry of the
-    others. So the blocks cover all postures in order without gaps.
+    ``poses`` are the sizes of the pose set. A block takes its last dimensions completely, a part of
+    the one before, and one entry of the others. So the blocks cover all postures in order.
     """
     room, extent = most, {}
     for dim, size in reversed(list(poses.items())):
@@ -24,7 +24,7 @@ def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
 
 
 def blocks(poses: Mapping[str, int], extent: Mapping[str, int]) -> list[Block]:
-    """Return all blocks of a pose set in order; ``extent`` is the size of a block per dimension."""
+    """Return all blocks of a pose set in order; ``extent`` has the size of a block by dimension."""
     cuts = [
         [slice(start, min(start + extent[dim], size)) for start in range(0, size, extent[dim])]
         for dim, size in poses.items()

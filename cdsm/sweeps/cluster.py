@@ -1,4 +1,4 @@
-"""Computation of blocks on a dask cluster; if a worker dies, only its block can be lost."""
+"""Compute a sweep on a dask cluster, block by block; a block is lost only if its workers die."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def on_cluster(
     """Yield each block with its result as soon as a cluster has computed it; None if lost.
 
     If a worker dies, dask gives its blocks to other workers, at most ``allowed-failures`` times.
-    Then it gives up, also for blocks that only waited: each of these is tried once more, alone.
+    Then dask gives these blocks up, also those that only waited. Each of them is tried once more,
+    alone.
     """
     from distributed import as_completed
     from distributed.protocol.pickle import dumps  # pickles classes of a notebook by value

@@ -1,4 +1,4 @@
-"""Arm and laws of elasticity as texts, which a Dataset stores to identify its arm."""
+"""Describe an arm and its laws of elasticity as texts, by which a Dataset identifies its arm."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WITHIN = 65
 """Number of evenly spaced tensions over a domain; narrow domains contain few of ``_SAMPLES``."""
 
 _SAMPLED = re.compile(r"\b([\w.<>]+) (\w+), samples ([0-9a-f]{16})")
-"""Text of a user-defined law: its class, its state, and a digest of domain, EA and strain."""
+"""Pattern of :func:`law_text`: class, state, and a digest of domain, EA and strain."""
 
 
 def attributes_of(arm: Manipulator) -> dict[str, str]:
@@ -60,7 +60,10 @@ def law_text(law: Elasticity) -> str:
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Return the classes of the laws if only their digests differ between two texts of an arm."""
+    """Return the classes of the laws that changed, if two texts of an arm differ in digests alone.
+
+    Empty if they differ in more.
+    """
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()
     pairs = zip(_SAMPLED.findall(one), _SAMPLED.findall(other), strict=True)

@@ -1,4 +1,4 @@
-"""Evaluation of all cases at a block of postures, each with its status."""
+"""Compute all cases at a block of postures, each with its status."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _BATCH_NAMES = {
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SweepTask(ReadOnlyState):
-    """Quantities and cases to compute at each posture; with the postures, all a worker needs.
+    """Arm, quantities and cases of a sweep, which a worker computes at the postures that it gets.
 
     InvalidInput if an output needs an argument that is missing, or an argument is invalid.
     """
@@ -172,7 +172,7 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 def _bounds(
     task: SweepTask, q: Array, threads: int | None
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Return bounds of tension (R, C) [N], friction (R, C), and which of R rows have bounds.
+    """Return both bounds of tension (R, C) [N], friction (R, C), and which of R rows have bounds.
 
     Friction is the largest ratio of two tensions along a cable; 1 without ``worst_friction``.
     """
@@ -207,7 +207,7 @@ def _finish(
     loss: Array,
     names: list[str],
 ) -> None:
-    """Add the quantities of a law that a batch does not compute, and complete ``status``."""
+    """Add to ``rows`` those of ``names`` that a batch does not compute; complete ``status``."""
     if "wire_strain" in names:
         # friction may take a tension along a cable out of the domain of its law
         held = _exists("tension", status)
@@ -239,7 +239,10 @@ def _rows(
     bounded: NDArray[np.bool_] | None = None,
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """Compute quantities for rows; NaN where the status forbids. Unbounded rows are infeasible."""
+    """Compute the quantities ``names`` and the status of each row; NaN where one does not exist.
+
+    Rows that are not ``bounded`` get the status INFEASIBLE.
+    """
     outputs = [_BATCH_NAMES.get(name, name) for name in names]
     found = batch.evaluate(
         arm,

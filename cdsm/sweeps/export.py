@@ -1,4 +1,4 @@
-"""Files of sweeps: NetCDF with the complete Dataset, or CSV with a long table."""
+"""Write and read files of sweeps: NetCDF with the complete Dataset, or CSV with a long table."""
 
 from __future__ import annotations
 

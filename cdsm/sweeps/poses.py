@@ -59,7 +59,8 @@ class GridPoses(PoseSet):
         resting: Name of each joint in ``rest``, with its angle [rad].
 
     Raises:
-        InvalidInput: No joint is named; a joint has no angles, an angle twice, or also a ``rest``.
+        InvalidInput: No joint is named; or a joint has no angles, an angle twice, or is also in
+            ``rest``.
     """
 
     swept: tuple[tuple[str, tuple[float, ...]], ...]
@@ -204,7 +205,7 @@ def poses_of(arm: Manipulator, q: PoseSet | ArrayLike) -> Poses:
 
 
 def checked_angles(name: str, q: ArrayLike, arm: Manipulator) -> Array:
-    """Check joint angles (N, nv) [rad] of one or more postures of the arm."""
+    """Check and return joint angles (N, nv) [rad] of one or more postures of the arm."""
     angles = number_array(name, q)
     if angles.ndim != 2 or angles.shape[1] != arm.nv or not len(angles):
         raise InvalidInput(

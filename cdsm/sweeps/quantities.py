@@ -9,7 +9,10 @@ CASES: Final = ("elasticity", "wrench", "minimum")
 """Dimensions of the cases; each exists only if several values of the argument are given."""
 
 STAGES: Final = ("pose", "tension", "joint", "tip", "matrix", "principal")
-"""Conditions for a quantity to exist. Each needs all earlier ones; principal needs no matrix."""
+"""What must exist for a quantity: posture, tensions, K_θ, C, (C_vv)⁻¹, or a stable arm.
+
+Each stage needs all earlier stages; only ``principal`` does not need ``matrix``.
+"""
 
 
 @final

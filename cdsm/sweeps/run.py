@@ -1,4 +1,4 @@
-"""Run of a sweep, in memory or into a store, on this machine or on a cluster."""
+"""Run a sweep, in memory or into a store, on this machine or on a cluster."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def sweep(
     At each posture the tensions F are the least that balance the arm (Eqs. 13, 17), and the
     stiffness is that under F (Eq. 16). A failure sets the ``status`` of its entry, see
     :class:`~cdsm.SweepStatus`; NaN stands only where the status says so. Coordinates and variables
-    have ``long_name`` and ``units`` (SI). The attributes have geometry, cables and version.
+    have ``long_name`` and ``units`` (SI). The attributes describe geometry, cables and version.
 
     Args:
         arm: The arm.
@@ -89,8 +89,8 @@ def sweep(
             axes, (D, 3) or by name, make the dimension ``direction``.
         outputs: Names of quantities: keys of :data:`~cdsm.sweeps.quantities.QUANTITIES`.
         worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
-            within the bounds, whatever loads came before. Tensions, loads and stiffnesses are then
-            those of the narrower bounds; the wires are under the largest tension along each cable.
+            within the bounds, whatever loads came before. Then the bounds at the motors are
+            narrower, and safety, life and strain of a wire are at the largest tension along it.
         diameter: Diameter of the cables [m], for clearances and ``wire_life``.
         breaking_load: Breaking load of the wire [N], for ``wire_safety``.
         bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
@@ -162,7 +162,7 @@ def _run(
 ) -> None:
     """Compute all pending blocks, of the size ``extent``, and write the results into ``arrays``.
 
-    These are numpy arrays, or zarr arrays of the store at ``path``.
+    ``arrays`` are numpy arrays by name, or zarr arrays of the store at ``path``.
     """
     task, poses = specification.task, specification.poses
     every = blocks(poses.sizes, extent)
@@ -188,7 +188,7 @@ def _side_by_side(
 ) -> Iterator[tuple[Block, BlockResult]]:
     """Yield each block and its result in order; others are computed meanwhile, in threads.
 
-    If there are fewer blocks than threads of the machine, each block has several.
+    If there are fewer blocks than threads of the machine, each block has several threads.
     """
     task, poses, cores = specification.task, specification.poses, checked_threads(None)
     workers = max(1, min(cores, len(blocks)))

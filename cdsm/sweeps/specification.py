@@ -50,7 +50,7 @@ EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 @final
 @dataclass(frozen=True, eq=False)
 class Specification:
-    """Specification of a sweep."""
+    """Postures and task of a sweep; it gives dimensions, shapes and attributes of the Dataset."""
 
     task: SweepTask  # quantities and cases to compute at each posture
     poses: Poses
@@ -76,7 +76,7 @@ class Specification:
         return (*self.task.outputs, "status")
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Return the dimensions of an output or ``status``: of poses, of cases, of the quantity."""
+        """Return the dimensions of an output or ``status``: those of poses, of cases, its own."""
         quantity = QUANTITIES.get(name, _STATUS)
         wanted = (*self.poses.sizes, *quantity.cases, *quantity.dims)
         return tuple(dim for dim in wanted if dim in self.frame.sizes)

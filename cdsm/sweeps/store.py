@@ -36,7 +36,7 @@ def opened(
 ) -> Iterator[Mapping[str, Any]]:
     """Open or create the store at ``path``; yield an array for each output and ``status``.
 
-    It is locked against other runs; the system removes the lock when the process ends.
+    The store is locked against other runs; the system removes the lock when the process ends.
     """
     import zarr
 
@@ -81,7 +81,7 @@ def read(path: Path) -> xarray.Dataset:
 
 
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> bool:
-    """Write an empty store aside, with chunks of the size ``extent``, and rename it to ``path``.
+    """Write an empty store, with chunks of the size ``extent``, beside ``path``; then rename it.
 
     Returns False if another run has made a store there in the meantime.
     """

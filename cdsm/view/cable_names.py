@@ -1,4 +1,4 @@
-"""Labels of cables in the picture: of all cables, or of one that was clicked."""
+"""Label cables in the picture: all cables, or one that was clicked."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class CableNames:
         self.chosen: int | None = None
 
     def choose(self, shown: Shown, origin: Array, direction: Array) -> None:
-        """Choose the cable of ``shown`` that the ray of a click hits; None if it hits none."""
+        """Choose the cable of ``shown`` that the ray of a click hits; none if it hits no cable."""
         if shown.posture is not None:
             self.chosen = clicked_cable(shown.posture.cable_paths, origin, direction)
 

@@ -21,7 +21,7 @@ _FIRST: Final = np.array([0.2, -1.5, 0.75])
 _MARGIN = 1.3  # radius of the visible ball, over the radius of the arm
 
 _OUTSIDE, _SMALL = 1.3, 0.5
-"""The cameras are fitted again if the arm's extent/fitted radius is above or below these."""
+"""Largest and smallest reach of the arm over the radius of the fitted ball without a new fit."""
 
 _USUAL = 4.0 / 3.0  # width over height of the picture for which the first camera is placed
 
@@ -78,7 +78,7 @@ class _Browser:
 
 
 class Cameras:
-    """Cameras of all browsers, fitted to a ball again when their size changes, unless moved."""
+    """Cameras of all browsers; each is fitted again when its picture is resized, unless moved."""
 
     def __init__(self, server: viser.ViserServer, ball: Ball) -> None:
         self._server, self._ball = server, ball

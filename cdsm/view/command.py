@@ -17,7 +17,7 @@ _COPY: Final = (
     "getSelection().selectAllChildren(this.parentNode.querySelector('code'));"
     "document.execCommand('copy')"
 )
-"""Copy the command. ``navigator.clipboard`` would need https on other machines."""
+"""JavaScript that copies the command. ``navigator.clipboard`` would need https elsewhere."""
 
 _SAVE: Final = (
     "const size=one=>one.width*one.height;"
@@ -27,7 +27,7 @@ _SAVE: Final = (
     "link.download=document.title.split(':')[0]+'.png';"
     "link.click();window.URL.revokeObjectURL(link.href)})"
 )
-"""Save the largest canvas, which is the scene. In ``onclick``, ``URL`` alone is the address."""
+"""JavaScript that saves the largest canvas, the scene. ``URL`` alone would mean the address."""
 
 _BUTTON: Final = "padding:0.3em 0.8em;margin-right:0.6em;cursor:pointer"
 _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin-bottom:0.6em"
@@ -71,7 +71,7 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
 
 
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
-    """Return the HTML with the command, or Python without ``arm_arguments``, and two buttons."""
+    """Return HTML with the command (Python if ``arm_arguments`` is None) and two buttons."""
     if arm_arguments is None:
         where, command = "in Python", python_lines(arm, setting)
     else:

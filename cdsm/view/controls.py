@@ -40,8 +40,9 @@ class Controls:
 
     ``arm_arguments`` describe the arm in a shell. ``limits`` [N] are the ends of the sliders of the
     lower bound of all tensions, and of each force component (±). ``force_scale`` [m/N] is the
-    length of the force arrow per newton. ``changed`` is called from any thread, ``fit`` fits the
-    camera of a browser, ``admit`` receives every control that browsers may use.
+    length of the force arrow per newton. ``changed`` is called, in any thread, when a control has
+    changed. ``fit`` fits the camera of a browser. ``admit`` is called with every control that
+    browsers may use.
     """
 
     def __init__(

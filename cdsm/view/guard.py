@@ -62,7 +62,7 @@ Control = (
     | viser.GuiButtonGroupHandle
     | viser.GuiCheckboxHandle
 )
-"""Controls that a client may use."""
+"""Types of controls that a client may use."""
 
 
 class _Address(str):
@@ -151,7 +151,11 @@ class Guard:
         return response
 
     def _fault(self, hosts: list[str], origins: list[str], first: str) -> str:
-        """Return the reason to refuse a request, or an empty text; ``first`` begins its path."""
+        """Return why a request is refused; empty if it is not.
+
+        ``hosts`` and ``origins`` are its Host and Origin headers, ``first`` the first part of its
+        path.
+        """
         if len(hosts) != 1:
             return f"a request for {len(hosts)} hosts"
         host = hosts[0]

@@ -11,7 +11,7 @@ _FARTHEST = 1e6  # largest coordinate [m]; farther away no arm is seen
 
 
 def scene_message(message: Any) -> dict[str, Any] | None:
-    """Return the allowed part of a scene message; None for others. ValueError for bad points."""
+    """Return the allowed part of a scene message, or None. ValueError for bad points."""
     match message:
         case {"type": "ViewerCameraMessage"}:  # viser keeps a camera for each client
             return dict(message)

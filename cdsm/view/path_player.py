@@ -22,8 +22,8 @@ _PLAY, _PAUSE = "Play", "Pause"
 class PathPlayer:
     """Controls that play ``path``: joint angles (S, nv) or tip positions (S, 3).
 
-    ``go`` moves the arm to a row of it, and returns when that is shown. ``admit`` receives every
-    control that browsers may use.
+    ``go`` moves the arm to a row of ``path``, and returns when the page shows it. ``admit`` is
+    called with every control that browsers may use.
     """
 
     def __init__(

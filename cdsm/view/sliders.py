@@ -31,7 +31,7 @@ _ROUND = 1e-9  # largest difference of an end from a round number, as a fraction
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, step, first position and digits of a slider, in a unit of the SI value ``unit``."""
+    """Ends, step, first position and digits of a slider, in a shown unit of size ``unit`` in SI."""
 
     label: str
     low: float
@@ -45,8 +45,8 @@ class Range:
 def slider_range(label: str, low: float, high: float, initial: float, unit: float = 1.0) -> Range:
     """Return the range of a slider with round ends and round steps, in a unit shown to the user.
 
-    ``low``, ``high`` and ``initial`` are in SI. The ends are rounded inwards, but never beyond the
-    first position ``initial``, which is not rounded.
+    ``low``, ``high``, ``initial`` and the size of this ``unit`` are in SI. The ends are rounded
+    inwards, but never beyond the first position ``initial``, which is not rounded.
     """
     low, high, initial = (value / unit for value in (low, high, initial))
     if not high > low:

@@ -51,7 +51,10 @@ class TipHandle:
         self._changed()
 
     def solve(self, q: Array) -> Array | None:
-        """Return joint angles (nv,) near ``q`` for a new target of the tip; None without any."""
+        """Return joint angles (nv,) near ``q`` for a new target of the tip.
+
+        None if there is no new target, or if the inverse kinematics fails.
+        """
         target, self._target = self._target, None
         if target is None:
             return None
