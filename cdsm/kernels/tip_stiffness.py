@@ -17,9 +17,10 @@ import math
 import numpy as np
 
 from cdsm.kernels.compiling import Index, Width, inner, lanes, threaded, upwards
-from cdsm.kernels.linear_algebra import eliminate, singular_values
+from cdsm.kernels.linear_algebra import eliminate
 from cdsm.kernels.readings import FLAT, IMMOBILE, READ, SINGULAR
 from cdsm.kernels.records import copy
+from cdsm.kernels.singular_values import singular_values
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 

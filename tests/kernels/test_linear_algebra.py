@@ -5,11 +5,12 @@ import pytest
 from numpy.typing import ArrayLike
 
 from cdsm.kernels import linear_algebra
+from cdsm.kernels.singular_values import singular_values
 from cdsm.support.values import Array
 from tests.support.kernels import block, from_python
 
 _smallest_eigenvalue = from_python(linear_algebra.smallest_eigenvalue)
-_singular_values = from_python(linear_algebra.singular_values)
+_singular_values = from_python(singular_values)
 _eliminate = from_python(linear_algebra.eliminate)
 
 
