@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -65,21 +66,6 @@ def design(
     if refine:
         require_smooth(task)
 
-    def tell(step: cdsm.DesignProgress) -> None:
-        if not console().is_terminal:
-            return
-        first = task.objectives[0]
-        best = (
-            f"{first.words} {first.shown(step.best)}"
-            if step.feasible
-            else f"none feasible yet, the nearest misses by {100.0 * step.missed:.3g} %"
-        )
-        console().print(
-            f"generation {step.generation}: {step.designs} designs, {step.feasible} feasible, "
-            f"best: {best}",
-            highlight=False,
-        )
-
     processes = checked_threads(jobs)
     found = cdsm.search_designs(
         task,
@@ -88,7 +74,7 @@ def design(
         seed=file.seed if seed is None else seed,
         store=folder / _RECORD,
         jobs=processes,
-        report=tell,
+        report=partial(_tell, task.objectives[0]),
     )
     number = found.compromise if choose is None else choose
     every = found.evaluated.to_csv()
@@ -109,4 +95,20 @@ def design(
         lambda: {**found.to_dict(), **written},
         found,
         f"design {number} is written to {folder}: {names}",
+    )
+
+
+def _tell(first: cdsm.Objective, step: cdsm.DesignProgress) -> None:
+    """Print the state of a search on a terminal; ``first`` is its first objective."""
+    if not console().is_terminal:
+        return
+    best = (
+        f"{first.words} {first.shown(step.best)}"
+        if step.feasible
+        else f"none feasible yet, the nearest misses by {100.0 * step.missed:.3g} %"
+    )
+    console().print(
+        f"generation {step.generation}: {step.designs} designs, {step.feasible} feasible, "
+        f"best: {best}",
+        highlight=False,
     )

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from cdsm import errors
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.kinematics.maps import inverse_kinematics
+from cdsm.kinematics.solutions import KinematicSolution
 from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import Follower, Sample
 from cdsm.planning.objectives import achieved, check_positive, checked_starts, target_constraints
@@ -132,12 +133,7 @@ def plan_path(
             if tips is not None:
                 solved = inverse_kinematics(arm, path[i], near)
                 if not solved.reachable:
-                    reason = (
-                        f"the tip comes no nearer to {coordinates(1e3 * solved.target)} mm than "
-                        f"{1e3 * solved.position_error:.3g} mm. Ask for a place within reach, or "
-                        "start from a guess= nearer to it."
-                    )
-                    infeasible.append(InfeasibleSample(i, "posture", reason))
+                    infeasible.append(_out_of_reach(i, solved))
                     continue
                 q = near = solved.angles
             model = StiffnessModel(arm.at(q), minimum, maximum, loads[i], margin)
@@ -203,6 +199,15 @@ def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -
             "of them, is needed.",
         )
     return frozen(np.broadcast_to(given, (size, *tail)).copy())
+
+
+def _out_of_reach(index: int, nearest: KinematicSolution) -> InfeasibleSample:
+    reason = (
+        f"the tip comes no nearer to {coordinates(1e3 * nearest.target)} mm than "
+        f"{1e3 * nearest.position_error:.3g} mm. Ask for a place within reach, or start from a "
+        "guess= nearer to it."
+    )
+    return InfeasibleSample(index, "posture", reason)
 
 
 def _infeasible(index: int, error: CdsmError) -> InfeasibleSample:
