@@ -22,7 +22,7 @@ KINDS = ("cable_clearance", "link_clearance", "disk_clearance")
 """Clearances in the order of the kernel."""
 
 _BACKBONE = 0.2
-"""Radius of a link's backbone over hole radius of its first disk, as in the URDF's shapes."""
+"""Radius of a link's backbone, divided by the hole radius of its first disk, as in the URDF."""
 
 _ON = 1e-9  # a site this near to a disk [m] is on the disk
 
@@ -32,7 +32,7 @@ _ON = 1e-9  # a site this near to a disk [m] is on the disk
 class Clearance(ReadOnlyState):
     """Smallest signed distances of the cables of an arm; made by :func:`clearance`.
 
-    A negative distance is the depth of an overlap; inf: there are no two such bodies.
+    A negative distance is the depth of an overlap. A distance is inf if the arm has no such pair.
 
     Attributes:
         posture: The posture.
@@ -118,8 +118,9 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
 def clearances(
     arm: Manipulator, q: ArrayLike, diameter: float = 0.0, *, threads: int | None = None
 ) -> dict[str, Array]:
-    """Compute the distances of :func:`clearance` at postures q (B, nv) [rad], (B,) [m] by name.
+    """Compute the distances of :func:`clearance` at postures q (B, nv) [rad].
 
+    Returns ``cable_clearance``, ``link_clearance`` and ``disk_clearance``, (B,) [m] each.
     ``diameter`` [m] is that of all cables; ``threads`` is the largest number of threads, by default
     one for each core. Raises InvalidInput as :func:`clearance` does, and if ``q`` is not (B, nv)
     numbers.
@@ -131,15 +132,15 @@ def clearances(
 
 
 class _Shape(NamedTuple):
-    """Points, cable segments, backbones and disks of an arm for the kernel, with their names."""
+    """Points, cable segments, backbones and disks of an arm, as ``clearance_rows`` takes them."""
 
-    routing: Routing
-    segment: Indices
-    bone: Indices
-    bone_radius: Array
-    disk: Indices
-    disk_radius: Array
-    own: Indices
+    routing: Routing  # cable sites, ends of backbones, centres of disks and points on their axes
+    segment: Indices  # cable, and both ends among the points, of each segment (S, 3)
+    bone: Indices  # both ends of each backbone (n, 2)
+    bone_radius: Array  # (n,) [m]
+    disk: Indices  # centre of each disk, and a point on its axis 1 m away (D, 2)
+    disk_radius: Array  # (D,) [m]
+    own: Indices  # 1 or 2 if this end of a segment is in a hole of the disk, else 0 (S, D)
     bone_names: list[str]
     disk_names: list[str]
 

@@ -12,10 +12,10 @@ from cdsm.support.validation import instance
 def tension_factor(pose: Posture) -> float:
     """Compute the tension factor [-]: the largest min(F)/max(F) of F ≥ 0 with J_Lᵀ F = 0.
 
-    1: equal tensions cause no joint torque. 0: there is no wrench closure
-    (:func:`has_wrench_closure`). SolverError if the linear program fails. Pham, Yeo, Yang and Chen,
-    Robotics and Autonomous Systems 57 (2009), use the ratio of one solution, so their factor may be
-    smaller.
+    It is 1 if equal tensions cause no joint torque, and 0 without wrench closure
+    (:func:`has_wrench_closure`). Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57
+    (2009), use the ratio of one solution, so their factor may be smaller. Raises SolverError if the
+    linear program fails.
     """
     return tension_ratio(instance("pose", pose, Posture).length_jacobian)
 
@@ -24,17 +24,17 @@ def has_wrench_closure(pose: Posture) -> bool:
     """Return whether unlimited tensions F ≥ 0 can balance every joint torque.
 
     This needs J_Lᵀ of full rank, and F > 0 with J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE T-RO 22,
-    2006). With limits of the tensions, see :func:`force_polytope`. SolverError if the linear
+    2006). With limits of the tensions, see :func:`force_polytope`. Raises SolverError if the linear
     program fails.
     """
     return tension_factor(pose) > 0.0
 
 
 def isotropy(stiffness: Stiffness) -> float:
-    """Compute the least tip stiffness of all directions over the largest [-], for a stable arm.
+    """Compute the ratio of the least to the largest tip stiffness of all directions, 0 to 1 [-].
 
-    Both are extremes of 1/(uᵀ C_vv u), Eq. 20. 1: equal in all directions; 0: infinite in one.
-    Raises SingularStiffness if K_θ is singular.
+    The stiffness along u is 1/(uᵀ C_vv u), Eq. 20; the arm must be stable. The ratio is 0 if the
+    stiffness is infinite in a direction. Raises SingularStiffness if K_θ is singular.
     """
     K = instance("stiffness", stiffness, Stiffness)
     return float(principal_stiffness(K.compliance[:3, :3])["isotropy"])

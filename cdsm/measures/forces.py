@@ -173,9 +173,10 @@ def force_polytope(
 
 
 def directions_of(jacobian: Array, length: float) -> tuple[Array, Array]:
-    """Return unit directions (3, k) in which the joints move the tip, and the others (3−k, 3).
+    """Return k unit directions in which the joints move the tip (3, k), and the others (3−k, 3).
 
-    ``jacobian`` is J_X (6, nv); motions far below the ``length`` [m] of the arm are zero.
+    The first are columns, the others rows. ``jacobian`` is J_X (6, nv); motions of the tip per
+    radian far below the ``length`` [m] of the arm count as zero.
     """
     axes, size, _ = np.linalg.svd(jacobian[:3])
     moving = np.zeros(3, dtype=np.bool_)

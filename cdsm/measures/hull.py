@@ -21,12 +21,12 @@ _FLAT = 1e-8  # smaller widths of a polytope, relative to its size, count as zer
 
 
 class Hull(NamedTuple):
-    """Corners (n, k), triangles (m, 3), normals (n, k) and offsets (n,) of a polytope."""
+    """Polytope of k dimensions, 0 to 3; its points x have ``normals`` @ x ≤ ``offsets``."""
 
-    points: Array
-    faces: NDArray[np.intp]
-    normals: Array
-    offsets: Array
+    points: Array  # corners (n, k)
+    faces: NDArray[np.intp]  # corners of its triangles (m, 3), as indices; none if it is flat
+    normals: Array  # outward unit normals of the facets (f, k)
+    offsets: Array  # distances of the facets from zero (f,)
 
 
 _Farthest = Callable[[Array], tuple[float, Array]]

@@ -49,8 +49,10 @@ class Payload(ReadOnlyState):
         direction: Unit direction (3,) of the force, base axes.
         worst: Whether ``direction`` is the worst of all directions.
         force: The largest force [N]: the smallest of ``limits``.
-        limit: Which limit gives ``force``, a key of ``limits``.
-        limits: Largest force [N] for each limit alone; inf if it does not limit the force.
+        limit: Which limit gives ``force``, a key of ``limits``; ``"none"`` if the force is inf.
+        limits: Largest force [N] that each limit alone allows: ``"tension"``, ``"deflection"``,
+            ``"stability"`` (the arm buckles), ``"elasticity"`` (a tension leaves the domain of its
+            law); inf if it does not limit the force.
     """
 
     posture: Posture
@@ -159,10 +161,10 @@ def largest_force(loads: Loads) -> float:
 def _worst(
     polytope: ForcePolytope, compliance: Array, allowed: float
 ) -> tuple[Array, dict[str, float]]:
-    """Return the direction of least allowed force, and the largest forces there [N].
+    """Return the direction of least allowed force, and the largest forces there, by limit [N].
 
-    They are those that the tensions and the deflection allow. ``compliance`` is C_vv [m/N], and
-    ``allowed`` the largest deflection [m].
+    The limits are tension and deflection only. ``compliance`` is C_vv [m/N], and ``allowed`` the
+    largest deflection [m].
     """
     tension = polytope.margin()
     values, vectors = np.linalg.eigh(compliance.T @ compliance)
@@ -191,7 +193,7 @@ def _until_unstable(
 
     The reason is ``"buckling"`` (K_θ is not positive definite) or ``"elasticity"`` (a least tension
     leaves the domain of its law). The force is inf if neither happens up to ``most`` [N]. With
-    ``worst``, it is the least force of u and other directions.
+    ``worst``, it is the least force of u and 26 other directions.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

@@ -1,4 +1,4 @@
-"""Measures of many postures, from the arrays of a batch."""
+"""Compute measures (clearances, payloads, …) of many postures from the arrays of a batch."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ def require(
     breaking_load: float | None,
     bend_diameter: float | None,
 ) -> None:
-    """Raise InvalidInput if measures lack an argument of :func:`~cdsm.sweep`, or it is invalid."""
+    """Raise InvalidInput if an argument of :func:`~cdsm.sweep` for measures is missing or invalid.
+
+    ``names`` are the measures that the sweep computes.
+    """
     if flag("worst_friction", worst_friction) and not arm.has_friction:
         raise InvalidInput(
             "worst_friction",
@@ -66,7 +69,10 @@ def measured(
     diameter: float = 0.0,
     threads: int | None = None,
 ) -> dict[str, Array]:
-    """Compute ``names`` of :data:`MEASURED`, (B,) each, at q (B, nv); ``diameter`` of cables."""
+    """Compute the measures ``names`` of :data:`MEASURED`, (B,) each, at postures q (B, nv) [rad].
+
+    ``diameter`` [m] is that of all cables.
+    """
     found: dict[str, Array] = {}
     if any(name in KINDS for name in names):
         found |= clearances(arm, q, diameter, threads=threads)
@@ -116,7 +122,8 @@ def payloads(
 ) -> Array:
     """Compute the largest forces (B, D) [N] along unit directions (D, 3) that the bounds allow.
 
-    Each of the postures q (B, nv) has a wrench (B, 6). The bounds are (), (B,) or (B, C) [N].
+    A force is 0 if no tensions balance any. Each of the postures q (B, nv) has a wrench (B, 6). The
+    bounds are (), (B,) or (B, C) [N].
     """
     JX, J, torque, low, high = _balances(arm, q, wrench, minimum, maximum, threads)
     motion = np.einsum("nij,di->ndj", JX[:, :3], directions)
@@ -138,7 +145,8 @@ def capacity_margins(
 ) -> Array:
     """Compute :meth:`ForcePolytope.margin` (B,) [N] of the zero force at postures q (B, nv).
 
-    Arguments are those of :func:`payloads`; a posture takes milliseconds.
+    The other arguments are those of :func:`payloads`. The margin is 0 if no force is balanced. A
+    posture takes milliseconds.
     """
     margin = np.empty(len(q))
     rows = zip(*_balances(arm, q, wrench, minimum, maximum, None), strict=True)

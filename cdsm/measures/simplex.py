@@ -18,14 +18,15 @@ from cdsm.support.values import Array
 _ROUNDING = 1e-11  # reduced costs and pivots below this are rounding; coefficients are of order one
 _PROOF = 1e-10  # violation of a constraint, relative to the bounded quantity, that is rounding
 
-_AT_LOW, _AT_HIGH, _FREE, _BASIC = 0, 1, 2, 3
+_AT_LOW, _AT_HIGH, _FREE, _BASIC = 0, 1, 2, 3  # states of a variable
 
 
 @compiled
 def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: Array) -> bool:
     """Maximise cost · x with A x = b, low ≤ x ≤ high; return whether x is proved to be best.
 
-    False if there is no largest value, or rounding is too large. ``cost`` and A are of order one.
+    Fills ``x`` (n,). Returns False if no x is feasible, there is no largest value, or rounding is
+    too large; x is then meaningless. ``cost`` (n,) and A (m, n) are of order one.
     """
     m, n = A.shape
     # artificial variables n + i take what is missing of equation i; the first phase removes them

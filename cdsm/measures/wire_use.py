@@ -31,10 +31,10 @@ class WireUse(ReadOnlyState):
         tension: The tensions and their posture.
         largest: Largest tension along each cable (C,) [N]: F, or more with ``worst_friction``.
         strain: ε(F) of each cable (C,) [-].
-        safety: Breaking load over the largest tension (C,) [-].
-        bend_ratio: D/d: diameter of the bend over that of the wire [-].
-        life_margin: 0.001 over the ratio of bearing pressure to strength (C,) [-]; at least 1 means
-            a long life.
+        safety: Breaking load divided by the largest tension (C,) [-].
+        bend_ratio: D/d: diameter of the bend divided by that of the wire [-].
+        life_margin: 0.001 divided by the ratio of bearing pressure to strength (C,) [-]; a long
+            life needs at least 1.
     """
 
     tension: Tension
@@ -125,7 +125,7 @@ def wire_use(
 
 
 def safety(tension: Array, breaking_load: float) -> Array:
-    """Return ``breaking_load`` [N] over ``tension`` [N]; inf where a cable is slack."""
+    """Return ``breaking_load`` [N] divided by ``tension`` (…,) [N]; inf where a cable is slack."""
     with np.errstate(divide="ignore"):
         return np.where(tension > 0.0, breaking_load / tension, math.inf)
 

@@ -1,5 +1,5 @@
-"""Uncertainty of numbers: tolerances of an arm, uncertainty budgets, Monte Carlo.
+"""Uncertainty of stiffnesses and other readings of an arm that follows from its tolerances.
 
-The budgets follow the *Guide to the expression of uncertainty in measurement* (JCGM 100:2008), the
-Monte Carlo runs its Supplement 1 (JCGM 101:2008).
+Uncertainty budgets follow the *Guide to the expression of uncertainty in measurement*
+(JCGM 100:2008), Monte Carlo runs its Supplement 1 (JCGM 101:2008).
 """

@@ -1,4 +1,4 @@
-"""Gradients of distributed tensions: of the tension of a cable, and of the critical tension.
+"""Derivatives of the least tensions, and of the critical tension, by the inputs of an arm.
 
 The aim is the change Σ y_c dF_c of a weighted sum of the least tensions F (Eq. 17), with constant
 weights y, for small changes of the arm. The cables balance the torque τ = J_Xᵀ W − g (Eq. 13). Free
@@ -32,15 +32,15 @@ from cdsm.tolerances.inputs import Inputs, Places
 _NO_VELOCITY = np.zeros(3)
 
 _DETERMINED = 1e-12
-"""Free cables cannot balance the arm if a singular value of B Bᵀ over the largest is smaller."""
+"""Smallest ratio of singular values of B Bᵀ with which the free cables can balance the arm."""
 
 
 class Balance(NamedTuple):
-    """Free cables of a tension distribution, and (B Bᵀ)⁻¹ with B (nv, n) = J_Lᵀ of these cables."""
+    """Least tensions, and which cables are free: between their bounds; see the module."""
 
     tension: Tension
-    free: NDArray[np.bool_]
-    inverse: Array
+    free: NDArray[np.bool_]  # (C,)
+    inverse: Array  # (B Bᵀ)⁻¹ (nv, nv), with the columns B of J_Lᵀ of the free cables
 
     @classmethod
     def of(cls, tension: Tension) -> Balance:
@@ -62,12 +62,12 @@ class Balance(NamedTuple):
         return cls(tension, free, np.linalg.inv(B @ B.T))
 
     def multipliers(self, weights: Array) -> Array:
-        """Compute μ = (B Bᵀ)⁻¹ B y_f (nv,) of weights y (C,)."""
+        """Compute μ = (B Bᵀ)⁻¹ B y_f (nv,); y are the ``weights`` (C,)."""
         B = self.tension.posture.length_jacobian[self.free].T
         return np.asarray(self.inverse @ (B @ weights[self.free]))
 
     def by_bounds(self, weights: Array, low: Array, high: Array) -> Array:
-        """Compute Σ y_c dF_c (n,), y ``weights``, for n changes of the bounds.
+        """Compute Σ y_c dF_c (n,) for n changes of the bounds; y are the ``weights`` (C,).
 
         ``low`` and ``high`` (C, n) are the changes of the lower and upper bounds.
         """
@@ -77,9 +77,10 @@ class Balance(NamedTuple):
         return np.asarray((weights - J @ self.multipliers(weights))[~self.free] @ moved)
 
     def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
-        """Compute the derivatives of Σ y_c F_c, y ``weights``, by ``inputs`` of each source.
+        """Compute the derivatives of Σ y_c F_c by ``inputs``, as an array for each source.
 
-        They are 0 for the sources of wires, such as rigidity and lead.
+        y are the ``weights`` (C,). The derivatives by inputs of wires, such as rigidity and lead,
+        are 0.
         """
         F, free = self.tension.values, self.free
         B = self.tension.posture.length_jacobian[free].T
@@ -116,7 +117,7 @@ def buckling_gradient(
 ) -> dict[str, Array]:
     """Compute the derivatives of the critical tension F_min, at which λ_min(K_θ) = 0, by source.
 
-    ``balance`` is that of the critical tensions. ``margin`` are the derivatives of λ_min at
+    ``balance`` belongs to the tensions at F_min. ``margin`` are the derivatives of λ_min at
     constant tensions: ∂λ with respect to ``inputs``, by source, and y = ∂λ/∂F under the key
     ``tension``. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The derivative with respect
     to measured tensions is 0.

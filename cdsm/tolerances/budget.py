@@ -38,7 +38,7 @@ _ROUNDING = 1e-9
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Uncertainty(ReadOnlyState):
-    """A reading with its standard uncertainty, and the contributions to it (JCGM 100).
+    """Standard uncertainty of a reading and its contributions; made by :func:`uncertainty`.
 
     Attributes:
         question: The reading: its name, its stiffness, and its direction or cable.
@@ -66,15 +66,15 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def relative(self) -> float:
-        """Standard uncertainty over the magnitude of the value [-]."""
+        """Standard uncertainty divided by the magnitude of the value [-]; inf for the value 0."""
         return self.standard_uncertainty / abs(self.value) if self.value else math.inf
 
     @cached_property
     def nonlinearity(self) -> float:
         """RMS error of the linear approximation over 100 drawn arms, relative to u_c [-].
 
-        The standard uncertainty of Monte Carlo is larger or smaller than u_c, at most by this
-        fraction. It is inf if the reading does not exist for one of the arms.
+        The standard uncertainty of Monte Carlo differs from u_c by at most this fraction. It is inf
+        if the reading does not exist for one of the arms.
         """
         errors = self._drawn(np.random.default_rng(0), _PROBED)
         if not errors:
@@ -257,7 +257,7 @@ def uncertainty(
 
 
 def coverage_factor(probability: float) -> float:
-    """Return k with which value ± k u covers a normal distribution with this probability."""
+    """Return k for which value ± k u contains this ``probability`` of a normal distribution."""
     from scipy.special import ndtri
 
     return float(ndtri((1.0 + checked_probability(probability)) / 2.0))
@@ -272,7 +272,7 @@ def checked_probability(probability: float) -> float:
 
 
 def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
-    """Write ``value ± uncertainty`` in a unit of this size; two digits of the uncertainty."""
+    """Write ``value ± uncertainty`` in the unit of SI ``size``; the uncertainty has two digits."""
     u, places = uncertainty / size, 4
     if 0.0 < u < math.inf:
         places = min(max(1 - math.floor(math.log10(u)), 0), 12)
@@ -292,7 +292,7 @@ _SHOWN = {
 
 
 def shown(source: str, standards: Array) -> str:
-    """Return the smallest and largest of ``standards`` (n,) in the unit shown to the user."""
+    """Write the smallest and largest of ``standards`` (n,) in the unit of this ``source``."""
     size, unit = _SHOWN.get(source, (1e-3, " mm"))
     low, high = (f"{each / size:.3g}" for each in (standards.min(), standards.max()))
     return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"

@@ -23,20 +23,17 @@ _LONGEST = 0.2  # longest step relative to the tension
 
 
 class Drawn(NamedTuple):
-    """Arrays of N drawn arms, in the order of the fields.
+    """Arrays of N arms drawn at random; made by :meth:`DrawnArms.evaluate`."""
 
-    K_θ (N, nv, nv), J_v (N, 3, nv), tip (N, 3) [m], J_L (N, C, nv) and J_Xᵀ W − g (N, nv).
-    """
-
-    joint: Array
-    tip_rows: Array
-    tip: Array
-    length_jacobian: Array
-    torque: Array
+    joint: Array  # K_θ (N, nv, nv) [N m/rad]
+    tip_rows: Array  # J_v (N, 3, nv) [m/rad]
+    tip: Array  # position of the tip (N, 3) [m]
+    length_jacobian: Array  # J_L (N, C, nv) [m/rad]
+    torque: Array  # J_Xᵀ W − g (N, nv) [N m]
 
 
 class DrawnArms:
-    """N drawn arms: the arm of a stiffness, plus errors (N, inputs) of each source."""
+    """N arms drawn at random: the arm of K with ``errors`` (N, inputs) in each source's inputs."""
 
     def __init__(self, K: Stiffness, errors: Mapping[str, Array]) -> None:
         pose, model, inputs = K.posture, K.posture.arm._model, inputs_of(K.posture.arm)
@@ -67,12 +64,12 @@ class DrawnArms:
         )
 
     def evaluate(self, tension: Array | None = None) -> Drawn:
-        """Compute all arms at tensions (N, C) [N]; by default the drawn measured tensions."""
+        """Compute all arms at tensions (N, C) [N]; by default the measured ones with errors."""
         F = self._tension if tension is None else tension
         rigidity, strain = laws_at(self._K, F)
         locked = self._K.cable_stiffness > 0.0
         stretched = np.where(locked, rigidity * (self._scale + strain), 0.0)  # ε falls as EA rises
-        # a spring softer by c is in k = 1/(l_0/EA + 1/k_series) like a wire longer by c·EA
+        # in k = 1/(l_0/EA + 1/k_series), a spring softer by c equals a wire longer by c·EA
         laws, (lead, *own) = self._K.posture.arm._model.laws, self._own
         lead = lead + self._softer * (stretched - (F - laws.rest))
         count, (cables, nv) = self._count, self._K.posture.length_jacobian.shape
@@ -88,10 +85,10 @@ class DrawnArms:
         return found
 
     def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
-        """Distribute tensions (N, C) [N] of all arms.
+        """Compute the least tensions (N, C) [N] that balance the arms.
 
         ``minimum`` (N,) [N] is the lower bound of all cables of each arm; None: the bounds of the
-        nominal arm's tensions. ``drawn`` are the arrays of :meth:`evaluate`; None: computed here.
+        nominal arm's tensions. ``drawn`` is the result of :meth:`evaluate`; None: computed here.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.
@@ -153,7 +150,7 @@ def margins(joint: Array) -> Array:
 def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
     """Return EA [N] and ε of each cable at ``tension`` (…, C) [N], by the laws of the arm of ``K``.
 
-    ε is 0 if l_0 is the stretched length.
+    ε is 0 if ``original_length`` of the arm is not ``"unstrained"``.
     """
     arm = K.posture.arm
     laws = arm._model.laws

@@ -1,4 +1,4 @@
-"""Inputs of a stiffness that have tolerances, and how each of them changes the arrays of an arm.
+"""Inputs of an arm: the numbers that can have a tolerance, and how each one changes the arm.
 
 Site positions, joint origins, centres of mass and the tip depend linearly on hole radii, disk
 offsets and link lengths. One sparse matrix therefore serves two purposes: it turns drawn errors of
@@ -26,7 +26,7 @@ _NEAR = 1e-9  # a site this near to a disk [m] is on the disk
 
 _LENGTHS = ("lead", "hole_radius", "disk_offset", "link_length", "site")
 
-_LARGEST = 0.1  # largest standard uncertainty of a length, over the length of the arm
+_LARGEST = 0.1  # largest standard uncertainty of a length, divided by the length of the arm
 
 _ON_DISKS = ("hole_radius", "hole_angle", "disk_offset", "link_length")
 """Sources that only an arm with disks has."""
@@ -79,7 +79,7 @@ def inputs_of(arm: Manipulator) -> Inputs:
 
 
 class Inputs:
-    """Inputs of an arm, source by source.
+    """Inputs of an arm by source; the source ``hole_radius``, for example, has all hole radii.
 
     Attributes:
         places: The points of the nominal arm.
@@ -131,10 +131,9 @@ class Inputs:
         return {source: np.zeros(len(names)) for source, names in self.labels.items()}
 
     def by_source(self, by_place: Places) -> dict[str, Array]:
-        """Return derivatives with respect to the inputs, as an array for each source of error.
+        """Return derivatives of a quantity with respect to the inputs, as an array by source.
 
-        ``by_place`` are the derivatives of the same quantity with respect to the coordinates of
-        points of the arm. A source is for example the hole radius; its inputs are all holes.
+        ``by_place`` are its derivatives with respect to the coordinates of the points of the arm.
         """
         by_input = self._transposed @ by_place.stacked()
         return {source: by_input[columns] for source, columns in self.columns.items()}
@@ -142,7 +141,7 @@ class Inputs:
     def displaced(self, errors: Mapping[str, Array]) -> Array:
         """Return the displacements (N, n) [m] of all points of N arms, as in :meth:`Places.moved`.
 
-        ``errors`` (N, inputs) has the name of the source as its key; missing sources have none.
+        ``errors`` has an array (N, inputs) by source; a source that is missing has no errors.
         """
         count = len(next(iter(errors.values())))
         every = np.zeros((count, self.map.shape[1]))
@@ -152,7 +151,7 @@ class Inputs:
         return np.asarray((self.map @ every.T).T)
 
     def require(self, tolerances: Tolerances, arm: Manipulator) -> None:
-        """Raise InvalidInput if the arm does not have a source, or is smaller than its errors."""
+        """Raise InvalidInput if the arm lacks a source of the tolerances, or one is too large."""
         for name, parts in tolerances.given.items():
             if not self.labels.get(name):
                 lacks = {

@@ -38,7 +38,7 @@ _BLOCK = 1000  # number of draws in a block; each block has its own random numbe
 
 
 AGREES = 0.1
-"""Largest difference of the limits of 95 % intervals that agree, over the uncertainty."""
+"""Two 95 % intervals agree if their limits differ by at most this part of the uncertainty."""
 
 
 @final
@@ -67,10 +67,10 @@ class MonteCarlo(ReadOnlyState):
         return float(self.values.std(ddof=1))
 
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
-        """Return the interval that contains this ``probability``, the rest half on either side.
+        """Return the interval (low, high) that contains the part ``probability`` of the values.
 
-        It is the probabilistically symmetric coverage interval (JCGM 101, 7.7). Raises InvalidInput
-        if the probability is not between 0 and 1.
+        As many values are below it as above (JCGM 101, 7.7). Raises InvalidInput if
+        ``probability`` is not between 0 and 1.
         """
         p = checked_probability(probability)
         low, high = np.quantile(self.values, [(1.0 - p) / 2.0, (1.0 + p) / 2.0])
@@ -172,7 +172,8 @@ def monte_carlo(
 
     Raises:
         InvalidInput: As for :func:`~cdsm.uncertainty`, or ``draws`` or ``seed`` is out of range, or
-            no tensions balance a drawn arm, or it does not buckle, if the reading needs that.
+            no tensions balance a drawn arm (``"tension"``, ``"critical_tension"``), or a drawn arm
+            does not buckle (``"critical_tension"``).
         UnknownName: As for :func:`~cdsm.uncertainty`.
         ElasticityRangeError: A drawn tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.
@@ -216,7 +217,7 @@ def _errors(budget: Uncertainty, seed: int, block: int, count: int) -> dict[str,
 
 
 def _block(budget: Uncertainty, seed: int, folder: Path | None, block: int, count: int) -> Array:
-    """Compute the readings (count,) of a block's first ``count`` arms, or read its file."""
+    """Compute the readings (count,) of the first ``count`` arms of a block, or read its file."""
     path = None if folder is None else folder / f"{block:06d}.npy"
     if path is not None and path.exists():
         stored = np.load(path)

@@ -56,9 +56,10 @@ class Part(NamedTuple):
 def parts_of(
     tolerances: Tolerances, labels: Mapping[str, Sequence[str]], tension: Array
 ) -> dict[str, tuple[Part, ...]]:
-    """Find the inputs of each tolerance by name, and their standard uncertainties at ``tension``.
+    """Find the inputs of each tolerance by name, and their standard uncertainties, by source.
 
-    ``labels`` are the names of the inputs of each source; ``tension`` is (C,) [N].
+    ``labels`` are the names of the inputs of each source. A standard uncertainty may depend on the
+    ``tension`` (C,) [N].
 
     Raises:
         InvalidInput: No input has such a name, two tolerances are of one input, or a tension is

@@ -1,4 +1,4 @@
-"""Checked arguments of a budget or a Monte Carlo run: the reading, and the tolerances."""
+"""Check the arguments of an uncertainty budget or a Monte Carlo run: reading and tolerances."""
 
 from __future__ import annotations
 

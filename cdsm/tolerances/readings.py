@@ -1,4 +1,4 @@
-"""Readings with a budget: their values, gradients, and values at displaced inputs.
+"""Compute the readings of an arm that can have an uncertainty, and their derivatives.
 
 Each reading has two independent computations: the gradient with respect to all inputs, for the
 budget, and the values of many drawn arms, for Monte Carlo. The tests compare them.
@@ -31,10 +31,11 @@ _NOWHERE = np.zeros(3)
 
 @dataclass(frozen=True, eq=False)
 class Question(ReadOnlyState):
-    """A reading of one stiffness, in SI.
+    """A reading of an arm whose uncertainty is wanted, in SI.
 
     Attributes:
-        of: The reading.
+        of: ``"along"``, ``"stuck"``, ``"margin"``, ``"tip"``, ``"tension"`` or
+            ``"critical_tension"``, as for :func:`~cdsm.uncertainty`.
         stiffness: The stiffness; for ``critical_tension`` that at the critical tension, for
             ``stuck`` that of the equivalent arm (:mod:`cdsm.tolerances.stuck`).
         direction: The unit direction (3,) of ``along``, ``stuck`` and ``tip``; else None.
@@ -65,7 +66,7 @@ class Question(ReadOnlyState):
 
     @property
     def si_unit(self) -> str:
-        """Unit of the value."""
+        """SI unit of the value."""
         return {"along": "N/m", "stuck": "N/m", "tip": "m"}.get(self.of, self.unit[0])
 
     @property
@@ -152,7 +153,7 @@ def _along_gradient(
 
     ``motion`` (nv,) is K_θ⁻¹ J_vᵀ u.
     """
-    right, towards = along * motion, along * u  # squared, the derivative of 1/(uᵀ C_vv u)
+    right, towards = along * motion, along * u  # d(1/c) = −dc/c² with c = uᵀ C_vv u = 1/along
     if not K.wrench[3:].any():
         return _gradient(K, inputs, right, towards)
     # K_θ is not symmetric: a bilinear form of two motions, by the forms of sum and difference
@@ -231,9 +232,9 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
 
 
 def _stretched_slope(K: Stiffness, strain: Array) -> Array:
-    """Compute d(EA (1 + ε))/dF = EA′ (1 + ε) + 1 (C,) [-], ε ``strain`` (C,), at the tensions of K.
+    """Compute d(EA (1 + ε))/dF = EA′ (1 + ε) + 1 (C,) [-] at the tensions of K; ε is ``strain``.
 
-    It is EA′ if l_0 is the stretched length.
+    It is EA′ if ``original_length`` of the arm is not ``"unstrained"``.
     """
     arm = K.posture.arm
     slope = np.zeros_like(strain)

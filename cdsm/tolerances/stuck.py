@@ -1,8 +1,8 @@
 """Equivalent arm of a stuck arm: each block (cable between two sticking holes) is a cable.
 
-While all cables stick, K_θ is the stiffness of the equivalent arm ("arm of blocks"). Some of its
-inputs are the same input of the arm: the blocks of a cable have one rigidity and one tension, and
-both blocks at a hole have this hole.
+While all cables stick, K_θ is the stiffness of the equivalent arm ("arm of blocks"). Several of its
+inputs may belong to one input of the arm: the blocks of a cable have one rigidity and one tension,
+and the two blocks at a hole share this hole.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ class Ties(NamedTuple):
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
-        """Convert ``gradient`` by inputs of the arm of blocks to that by inputs of the arm."""
+        """Convert derivatives by inputs of the arm of blocks to derivatives by the arm's inputs."""
         found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
         for source, at in self.inputs.items():
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
         return found
 
     def scatter(self, errors: Mapping[str, Array]) -> dict[str, Array]:
-        """Convert ``errors`` (N, inputs) of the arm's inputs to those of the arm of blocks."""
+        """Convert errors (N, inputs) of the arm's inputs to errors of the arm of blocks."""
         found = {}
         for source, drawn in errors.items():
             at = self.inputs[source]
@@ -49,7 +49,10 @@ class Ties(NamedTuple):
 
 
 def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
-    """Return the arm of blocks at a posture, its tensions, and its ties to the arm."""
+    """Return the arm of blocks at a posture, the tensions of its blocks [N], and the ties.
+
+    ``tension`` is F (C,) [N] of the cables of the arm.
+    """
     arm, chains = pose.arm, pose.segments.chains
     sticks = holding(pose)
     where = zip(
@@ -92,8 +95,8 @@ def _matching_inputs(
 ) -> dict[str, Indices]:
     """Find the input of the arm for each input of the arm of blocks, ``stuck``, by its name.
 
-    ``names`` maps names of blocks and their sites to those of the arm. ``behind`` says which blocks
-    begin at a sticking hole, and so have no lead.
+    ``names`` maps names of blocks and of their sites to names in the arm. ``behind`` marks the
+    blocks that begin at a sticking hole, and so have no lead.
     """
     theirs, found = inputs_of(arm).labels, {}
     for source, labels in inputs_of(stuck).labels.items():
