@@ -126,7 +126,7 @@ def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
 
 
 def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, Array]:
-    """Return the derivatives of the inputs of each source with respect to a variable."""
+    """Return the derivatives of the arm's inputs, by source, with respect to a variable."""
     geometry, of, joints = arm.geometry, variable.of, _joints(arm, variable)
     labels = inputs.labels
     disks = [disk.joint - 1 for disk in geometry.disks]

@@ -103,7 +103,10 @@ def form_by_tension(
 def constraint_jacobian(
     hessian: Array, length_jacobian: Array, slope: Array, weights: Array, left: Array, right: Array
 ) -> Array:
-    """Return Σ_ab E_ab (leftᵀ (∂K_θ/∂F_c) right)_ab (n, C) for each of the weights E (n, r, r)."""
+    """Return the derivatives Σ_ab E_ab (leftᵀ (∂K_θ/∂F_c) right)_ab (n, C) of n constraints.
+
+    E (n, r, r) are the ``weights``; ``left`` and ``right`` (nv, r) come from :func:`tip_stiffness`.
+    """
     rates = form_by_tension(hessian, length_jacobian, slope, left, right)
     result = np.zeros((weights.shape[0], rates.shape[0]))
     for n in range(weights.shape[0]):
@@ -155,7 +158,7 @@ def constraint_hessian(
 
 @compiled
 def convex(W: Array, null: Array, normals: Array) -> Array:
-    """Return a positive definite matrix; it equals W on admissible steps if W is convex there.
+    """Return W (C, C) made positive definite, unchanged on admissible steps if it is so there.
 
     Admissible steps keep the balance (columns of ``null`` (C, p) are an orthonormal basis) and, to
     first order, the constraints with the gradients ``normals`` (n, C).

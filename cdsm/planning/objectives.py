@@ -82,7 +82,7 @@ def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
 
 
 def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
-    """Build the error of an arm that no tensions make stable; ``mode`` is its softest motion."""
+    """Build the error of an arm that no tensions make stable, with its softest ``mode`` (nv,)."""
     mode = mode * np.sign(mode[abs(mode).argmax()])
     remedy = "Change the bounds, the posture or the load, take stiffer cables, or lower margin."
     if all(cable.control == "force" for cable in arm.cables):

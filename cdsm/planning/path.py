@@ -190,7 +190,7 @@ def checked_rate(arm: Manipulator, rate: ArrayLike) -> Array:
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:
-    """Return S = ``size`` values (S, …) from one of shape ``tail`` for all samples, or from S."""
+    """Return the values (S, …) of S = ``size`` samples; one value of shape ``tail`` is repeated."""
     given = number_array(name, value)
     if given.shape not in (tail, (size, *tail)):
         raise InvalidInput(

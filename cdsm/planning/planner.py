@@ -108,7 +108,7 @@ class Planner:
         return found
 
     def _best(self, points: Iterable[Evaluation]) -> ConstraintValues | None:
-        """Search from all ``points``; return the hit of least ‖F‖, or None if all searches miss."""
+        """Search from all ``points``; return the end of least ‖F‖ that hits, None if all miss."""
         begin = list(points)
         near = [
             float(point.F.max())
@@ -172,7 +172,7 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find stable points that hit the target, between points a little below and above it."""
+        """Find stable points that hit the target, on lines from points below to points above it."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]

@@ -99,7 +99,7 @@ class Program:
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
-        """Return whether point ``one`` is better than ``other`` by more than rounding."""
+        """Return whether only ``one`` meets c = 0; else whether ``one`` has the smaller merit."""
         if self.met(one) != self.met(other):
             return self.met(one)
         price = 0.0 if self.met(one) else _LARGEST_PRICE

@@ -57,7 +57,7 @@ class Specification:
 
     @cached_property
     def frame(self) -> xarray.Dataset:
-        """Dataset of all coordinates and attributes, without variables."""
+        """Dataset with all coordinates and attributes, but without outputs and ``status``."""
         import xarray
 
         attributes = attributes_of(self.task.arm) | {"poses": self.poses.description}
