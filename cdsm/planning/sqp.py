@@ -99,7 +99,7 @@ class Program:
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
-        """Return whether only ``one`` meets c = 0; else whether ``one`` has the smaller merit."""
+        """Return whether ``one`` alone meets c = 0 or, if both or none do, has less merit."""
         if self.met(one) != self.met(other):
             return self.met(one)
         price = 0.0 if self.met(one) else _LARGEST_PRICE
