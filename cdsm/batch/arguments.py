@@ -1,4 +1,4 @@
-"""Arguments of the fused kernel as records of arrays: the arm, the postures, what is asked."""
+"""Records of arrays that the fused kernel takes: the arm, the postures, the wanted quantities."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class Arm(NamedTuple):
     masses: Masses  # masses on the joints, and place of the tip
     lowest: Array  # lower joint limits (nv,) [rad]
     highest: Array  # upper joint limits (nv,) [rad]
-    blocks: Blocks  # of joints and cables, from which tensions are guessed
-    smallest_arm: float  # moment arms below this are rounding in the balance of tensions [m]
-    laws: Wires  # laws of the cables; EA is 0 under force control
-    wires: Wires  # the same for cables that stick: EA is not 0 under force control
+    blocks: Blocks  # joints and cables in the order in which tensions are guessed
+    smallest_arm: float  # moment arms below this are rounding errors, and count as 0 [m]
+    laws: Wires  # laws of the cables; EA is 0 where the motor controls the force
+    wires: Wires  # laws for cables that stick: EA also where the motor controls the force
     holes: Holes  # holes, leads and series springs of the cables
 
 
 class Rows(NamedTuple):
-    """What is given for b postures; one row if it is the same for all, none if it is not given."""
+    """Inputs of b postures: an array has 1 row if they have it in common, 0 if it is not given."""
 
     q: Array  # joint angles (b, nv) [rad]
     wrench: Array  # W (b, 6)
@@ -37,7 +37,7 @@ class Rows(NamedTuple):
     low: Array  # lower bounds (b, C) [N] of distributed tensions
     high: Array  # upper bounds (b, C) [N]
     rigidity: Array  # EA (1 + ε) (b, C) [N], −1 outside the domain; none if kernels know all laws
-    wire: Array  # the same of the laws ``wires`` of the arm
+    wire: Array  # as ``rigidity``, but of the laws ``Arm.wires``
 
     def take(self, rows: slice | Indices) -> Rows:
         """Return some of the rows."""
@@ -45,26 +45,26 @@ class Rows(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """Quantities that are asked for, by their numbers in the layout."""
+    """Requested quantities, by their numbers in :mod:`cdsm.batch.layout`."""
 
     start: Indices  # index in the record at which each quantity begins
-    stored: Flags  # whether the kernel stores each quantity
+    stored: Flags  # whether the kernel copies each quantity to its output
     last: int  # largest number of a quantity that is needed
     slides: bool  # whether the passive stiffness of cables that slide freely is needed
     sticks: bool  # whether the passive stiffness of cables that stick is needed
 
 
 class Kept(NamedTuple):
-    """Arrays from which readings are computed: B blocks of W postures; W is the last axis.
+    """Arrays that the kernel fills and the readings need, of B blocks of W postures.
 
-    Arrays that no reading needs have no blocks.
+    B is 0 for arrays that no requested reading needs.
     """
 
     joint: Array  # K_θ (B, nv, nv, W)
-    parts: Array  # sum of the magnitudes of its terms (B, nv, nv, W)
+    parts: Array  # sum of the magnitudes of the four terms of K_θ (B, nv, nv, W)
     jacobian: Array  # J_X (B, 6, nv, W), zero before the kernel fills it
     stuck: Array  # K_θ while the cables stick (B, nv, nv, W)
-    stuck_parts: Array  # sum of the magnitudes of its terms (B, nv, nv, W)
+    stuck_parts: Array  # the same sum while the cables stick (B, nv, nv, W)
 
     def first(self, blocks: int) -> Kept:
         """Return the first blocks."""

@@ -88,8 +88,8 @@ def distribute_tensions(
     """Compute the least tensions that balance an arm at B postures: min ‖F‖² (Eqs. 13, 17).
 
     Tensions are accepted only if they meet the optimality conditions of
-    :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. Postures for
-    which the kernels find neither are solved by :func:`~cdsm.distribute_tension`.
+    :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. If the
+    kernels find neither tensions nor a proof, :func:`~cdsm.distribute_tension` solves the posture.
 
     Args:
         arm: The arm.

@@ -1,4 +1,4 @@
-"""Evaluation of the postures of a batch in ranges of rows, with checked arguments."""
+"""Evaluate the postures of a batch in ranges of rows; the arguments are already checked."""
 
 from __future__ import annotations
 
@@ -27,13 +27,15 @@ from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
 _SHORT, _LONG = 2**11, 2**15
-"""Sizes of a posture's record (counts of numbers) from which blocks are narrower, for the cache."""
+"""Counts of numbers in a posture's record from which a block has a half and a quarter of
+:data:`WIDTH` postures, so that the processor's cache holds it."""
 
 _CACHE, _FEWEST = 2**17, 4
-"""Count of numbers kept for readings (quantities that need K_θ⁻¹), and least count of blocks."""
+"""Readings keep K_θ of as many blocks as have this count of numbers, but at least of 4 blocks."""
 
 _BLOCK, _BATCH = 2**22, 2**27
-"""Numbers in the records of a block, and of a batch, up to which Python runs a new kernel."""
+"""Largest counts of numbers in the records of a block, and of a batch, that numpy computes while
+the kernel is not yet compiled."""
 
 _CODES = np.array([OK, Status.INFEASIBLE, UNDECIDED], dtype=np.uint8)
 """Status of each outcome of a search: OPTIMAL, INFEASIBLE, UNDECIDED."""
@@ -43,13 +45,12 @@ _INVERSE = QUANTITIES[layout.PSEUDOINVERSE + 1 :]
 
 
 class Evaluator:
-    """Evaluation of ranges of rows (postures); arguments as in :func:`cdsm.batch.evaluate`.
+    """Evaluation of a batch in ranges of rows (postures); arguments as in :func:`cdsm.evaluate`.
 
-    ``rows`` is what is given for b postures; ``found`` (b,) and ``out`` (b, n) are their status and
-    outputs, which the methods fill in place. ``wanted`` are the numbers of the requested
-    quantities.
     ``tension`` is F (C,) or (B, C) [N]. ``bounds`` are the lower and the upper bounds of
     distributed tensions, (C,) or (B, C) [N]. If neither is given, no output depends on tensions.
+    The private methods take the inputs of b postures as ``rows``, fill their status ``found`` (b,)
+    and outputs ``out`` (b, n) in place, and name quantities by their numbers, ``wanted``.
 
     Attributes:
         values: The outputs in the order of ``names``, filled by :meth:`run`.
@@ -173,7 +174,7 @@ class Evaluator:
         read, (nv, width) = wanted > layout.STUCK_JOINT, (self._arm.nv, self._block)
         stuck = np.isin(wanted, STUCK)
         blocks = -(-len(found) // width)
-        if read.any():  # readings keep K_θ of some blocks: few for the cache, but not for few calls
+        if read.any():  # keep K_θ of few blocks, for the cache, but not too few: calls take time
             blocks = min(blocks, max(_FEWEST, _CACHE // (2 * width * nv**2)))
         slides, free, held = (
             bool((~stuck & (wanted > layout.LOAD)).any()),
@@ -222,7 +223,7 @@ class Evaluator:
         found: Codes,
         out: Array,
     ) -> None:
-        """Fill the named readings, and the status of postures in which one does not exist."""
+        """Fill the readings ``names``: without, and with sticking cables; update the status."""
         status = np.full(len(kept.jacobian) * self._block, UNREAD)
         status[: found.size][found == OK] = READ
         for kind, quantities in enumerate(names):

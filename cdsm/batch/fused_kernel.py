@@ -80,9 +80,9 @@ def evaluate_rows(
             tensions, filled for POSTPONED ones; no rows if no tensions are distributed.
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or why no tensions were found; on return the status of the posture.
-            UNDECIDED: the guess of its tensions is neither the optimum nor a proof. POSTPONED: it
-            is the optimum, but few postures of the block have tensions; what depends on tensions
-            is left for a block of such postures.
+            UNDECIDED: the guess found neither the tensions nor a proof that there are none.
+            POSTPONED: it found the tensions, but of less than two thirds of the block; quantities
+            that depend on tensions are computed later, in a block of such postures.
     """
     tree, routing, masses, holes, blocks = arm.tree, arm.routing, arm.masses, arm.holes, arm.blocks
     start, stored, joint, stuck = asked.start, asked.stored, kept.joint, kept.stuck

@@ -1,4 +1,4 @@
-"""Checks of the arguments of a batch, and its division into ranges of rows (slices)."""
+"""Check the arguments of a batch, and divide it into ranges of rows (slices)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def postures(arm: Manipulator, q: ArrayLike) -> Array:
 def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, kind: str) -> Array:
     """Check ``value``, (width,) for all postures or (rows, width); return it read-only.
 
-    ``name`` and ``meaning`` describe it in an error; ``kind`` gives its range of numbers.
+    ``name`` and ``meaning`` describe it in an error; ``kind`` is the quantity that fixes its range.
     """
     array = number_array(name, value, kind)
     if array.shape not in ((width,), (rows, width)):

@@ -32,38 +32,38 @@ MOTIONS: Final = ("motion", "motion_column")
 AXES: Final = ("axis", "axis_column")
 
 DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
-    # of the joint angles alone
+    # these need the joint angles alone
     "tip": (("row", "column"), "1"),
     "jacobian": (("motion", "joint"), "1"),
     "cable_lengths": (("cable",), "m"),
     "length_jacobian": (("cable", "joint"), "m/rad"),
     "gravity_torque": (("joint",), "torque"),
     "gravity": (JOINTS, "stiffness"),
-    # which also need tensions
+    # these also need tensions
     "tension": (("cable",), "N"),
     "residual": (("joint",), "torque"),
     "active": (JOINTS, "stiffness"),
     "load": (JOINTS, "stiffness"),
-    # the rigidity of the cables
+    # these also need the rigidity of the cables
     "cable_stiffness": (("cable",), "N/m"),
     "passive": (JOINTS, "stiffness"),
     "joint": (JOINTS, "stiffness"),
     "stuck_joint": (JOINTS, "stiffness"),
-    # a regular K_θ
+    # these also need a regular K_θ
     "margin": ((), "stiffness"),
     "pseudoinverse": (AXES, "N/m"),
     "along": (("direction",), "N/m"),
     "compliance": (MOTIONS, "1"),
     "cartesian": (AXES, "N/m"),
-    # a regular K_θ of the stuck arm
+    # these need a regular K_θ of the stuck arm
     "stuck_along": (("direction",), "N/m"),
     "stuck_compliance": (MOTIONS, "1"),
     "breakaway": (("direction",), "N"),
 }
 """Dimensions of each quantity, in the order of the record, and its unit.
 
-The unit is 1 for matrices of SI units that differ; those of torque and joint stiffness are the
-arm's.
+The unit is 1 for matrices whose entries have different SI units. Units of "torque" and "stiffness"
+depend on the joints of the arm: N m and N m/rad, or N and N/m where joints slide.
 """
 
 QUANTITIES: Final = tuple(DIMENSIONS)

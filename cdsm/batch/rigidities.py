@@ -1,4 +1,4 @@
-"""Rigidities of cables whose law is a function of Python, at the tensions of many postures."""
+"""Compute rigidities of cables whose law is a function of Python, for many postures."""
 
 from __future__ import annotations
 

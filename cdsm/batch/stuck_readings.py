@@ -1,4 +1,4 @@
-"""Readings of an arm whose cables stick: tip stiffness, and the load at which they slide."""
+"""Read off an arm whose cables stick: tip stiffness, and the load at which the first one slides."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def read_stuck(
     """Compute readings of the stuck arm at the postures ``rows`` under tensions F (b, C) [N].
 
     ``names`` are those of the wanted readings, ``kept`` the arrays from which they follow.
-    ``directions`` (D, 3) are unit vectors, and ``status`` (B, W) is as for
-    :func:`~cdsm.kernels.read.read`. The posture is the last axis of all results.
+    ``directions`` (D, 3) are unit vectors. ``status`` (B, W) is READ or UNREAD; it becomes SINGULAR
+    where K_θ is singular. The posture is the last axis of all results.
     """
     blocks, width = status.shape
     load = np.zeros((status.size, len(directions)))

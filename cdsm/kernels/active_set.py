@@ -39,7 +39,7 @@ _STEPS = 20
 """Maximum number of steps per cable; one or two are usual."""
 
 _NONE, _STUCK = -1, -2
-"""In place of a cable: no cable; _STUCK − p if cable p can never reach its bound."""
+"""In place of the number of a cable: _NONE: no cable; _STUCK − p: cable p can't reach its bound."""
 
 
 class State(NamedTuple):
@@ -55,7 +55,7 @@ class State(NamedTuple):
         free: Σ J_cᵀ J_c over the free cables c, and a right-hand side (nv, nv + 1, W).
         cables: Scratch, such as a column and a row of the tableau (2, max(C, nv), W).
         scratch: Scratch; in the steps the last row is what counts as zero in T (4, W).
-        chosen: The cable that moves to its bound, and that of the pivot (2, W).
+        chosen: The cable that moves to its bound, and the cable of the pivot (2, W).
     """
 
     F: Array
@@ -72,7 +72,7 @@ class State(NamedTuple):
 
 @inner
 def empty_state(nv: int, cables: int, width: int) -> State:
-    """Allocate the working memory of :func:`search`."""
+    """Allocate the :class:`State` of :func:`search`, for a block of ``width`` postures."""
     return State(
         np.empty((cables, width)),
         np.empty((nv, width)),
@@ -89,11 +89,11 @@ def empty_state(nv: int, cables: int, width: int) -> State:
 
 @inner
 def search(J: Array, b: Array, low: Array, high: Array, state: State, width: Width) -> None:
-    """Find the least tensions within bounds that balance the arm; fill F and y of the state.
+    """Find the least tensions F within bounds that balance the arm; fill F and y of the state.
 
     J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and ``high`` are the bounds
-    (C, W). Where the search ends at a proof of infeasibility, y is that proof. F and y mean nothing
-    where rounding or too many steps end the search.
+    (C, W). y are the multipliers of the balance, or a proof that no tensions exist. Verify both:
+    rounding or too many steps can end the search before.
     """
     _start(J, b, state, width)
     entering, nothing = state.chosen[0], state.scratch[3]
@@ -159,7 +159,7 @@ def _set_gram(J: Array, side: Array, system: Array, width: Width) -> None:
 def _choose(
     F: Array, low: Array, high: Array, side: Array, entering: Indices, worst: Array, width: Width
 ) -> None:
-    """Choose the free cable farthest outside its bounds as ``entering``, where it is _NONE."""
+    """Choose the free cable farthest outside its bounds where ``entering`` (W,) is _NONE."""
     for w in lanes(width):
         worst[w] = 0.0 if entering[w] == _NONE else math.inf
     for c in upwards(0, F.shape[0]):

@@ -97,7 +97,7 @@ def gravity_torque(
     torque: Array,
     width: Width,
 ) -> None:
-    """Fill ``torque`` with g (nv, W), ``carried`` (nv+1, 7, W) with γ × z, z × r and M by joint.
+    """Fill g ``torque`` (nv, W), and γ × z, z × r and M of each joint ``carried`` (nv+1, 7, W).
 
     The symbols are those of the module's docstring.
     """

@@ -38,36 +38,27 @@ from cdsm.kernels.wires import Wires, set_rigidity, wire_scratch
 from cdsm.support.values import Array
 
 ROUNDING = 1e-12
-"""A hole never slides if its |Ṫ′ − Ṫ|/F − μ φ̇ is below this part of the largest |Ṫ′ − Ṫ|/F."""
+"""A hole never slides if its |Ṫ′ − Ṫ|/F − μ φ̇ is below this fraction of the largest |Ṫ′ − Ṫ|/F."""
 
 
 class Velocities(NamedTuple):
-    """Derivatives with respect to the force f.
+    """Derivatives with respect to the force f, called velocities."""
 
-    Angular velocity and velocity of the origin of each joint (nv+1, 3, W); velocities of the sites
-    (P, 3, W); derivatives (3, W) of the directions u and v of the cable before and after the
-    present hole; l̇ (W,) of the section up to this hole.
-    """
-
-    turn: Array
-    origin: Array
-    site: Array
-    before: Array
-    after: Array
-    longer: Array
+    turn: Array  # angular velocity of each joint (nv+1, 3, W)
+    origin: Array  # velocity of the origin of each joint (nv+1, 3, W)
+    site: Array  # velocity of each site (P, 3, W)
+    before: Array  # u̇ of the cable before the present hole (3, W)
+    after: Array  # v̇ of the cable after it (3, W)
+    longer: Array  # l̇ of the section up to this hole (W,)
 
 
 class SlipRates(NamedTuple):
-    """|Ṫ′ − Ṫ|/F, μ φ̇ and μ φ of each hole (P, W), in the row of the next hole that holds.
+    """Terms of the breakaway load of each hole, each in the row of the next hole that holds."""
 
-    μ φ is −1 in the other rows. ``last`` (3, W) are, at the last hole passed, Ṫ/F before it, μ φ̇
-    and μ φ.
-    """
-
-    jump: Array
-    turning: Array
-    limit: Array
-    last: Array
+    jump: Array  # |Ṫ′ − Ṫ|/F (P, W)
+    turning: Array  # μ φ̇ (P, W)
+    limit: Array  # μ φ (P, W), −1 in the rows of no hole
+    last: Array  # of the last hole passed: Ṫ/F before it, μ φ̇ and μ φ (3, W)
 
 
 @threaded

@@ -67,7 +67,7 @@ def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> f
             low, a, at_a = a, b, at_b
             b = low + _GOLDEN * (high - low)
             at_b = _off(*disk, b)
-    ends = min(_off(*disk, 0.0), _off(*disk, 1.0))  # the section never evaluates these two
+    ends = min(_off(*disk, 0.0), _off(*disk, 1.0))  # the golden-section search leaves these two out
     return math.sqrt(min(at_a, at_b, ends))
 
 

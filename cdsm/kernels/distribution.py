@@ -38,9 +38,10 @@ _NUMBERS = 2**17
 
 @inner
 def set_torque(jacobian: Array, force: Array, opposed: Array, torque: Array, width: Width) -> None:
-    """Fill ``torque`` (nv, W) with Jᵀ f − τ, of forces f (m, W), J (m, nv, W), and τ ``opposed``.
+    """Fill ``torque`` (nv, W) with Jᵀ f − τ, of J (m, nv, W), f ``force`` (m, W), τ ``opposed``.
 
-    The cables must balance J_Xᵀ W − g. The residual of Eq. 13 is J_Lᵀ F minus that.
+    With J_X, W and g it is the torque J_Xᵀ W − g that the cables must balance. With J_L, F and this
+    torque it is the residual of Eq. 13.
     """
     for i in upwards(0, torque.shape[0]):
         for w in lanes(width):

@@ -26,7 +26,7 @@ from numba.core.dispatcher import Dispatcher
 
 
 def python_kernel(function: FunctionType, wide: bool) -> Callable[..., Any]:
-    """Return a kernel that Python runs, also those it calls, for one posture or a wide block."""
+    """Return a kernel and those it calls as Python functions, for one posture or a wide block."""
     kernel: Callable[..., Any] = _names(function.__module__, wide)[function.__name__]
     return kernel
 
@@ -55,7 +55,7 @@ def _names(module: str, wide: bool) -> dict[str, Any]:
 
 
 def _atan2(y: Any, x: Any) -> Any:
-    """Return angles as the C library does, which numpy need not call."""
+    """Return angles with the bits of the C library; numpy may compute other ones."""
     return np.asarray(np.frompyfunc(math.atan2, 2, 1)(y, x), dtype=np.float64)[()]
 
 
@@ -87,7 +87,7 @@ _OPERATIONS = {
     "_where": np.flatnonzero,
     "_numbers": np.arange,
 }
-"""Names of the changed kernels."""
+"""Names that the kernels use after the change, and their values."""
 
 
 def _call(name: str, *arguments: ast.expr) -> ast.Call:
@@ -163,7 +163,7 @@ class _Operations(ast.NodeTransformer):
         return node
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
-        """Make ``node`` copy an array that it assigns to a name: a view changes with the array."""
+        """Make ``node`` assign copies of parts of arrays, since a view changes with its array."""
         self.generic_visit(node)
         if not isinstance(node.targets[0], ast.Subscript):
             copies = [

@@ -24,15 +24,18 @@ _STEPS = 200
 _ROUNDING = 2.0**-52
 
 _LEAST = 1e-90
-"""Smaller entries of a tridiagonal matrix are zero."""
+"""Smaller entries of a tridiagonal matrix count as zero."""
 
 _NOTHING = 1e-30
-"""Off-diagonal entries below this part of the largest entry do not change any eigenvalue."""
+"""Off-diagonal entries below this fraction of the largest entry count as zero.
+
+They do not change any eigenvalue.
+"""
 
 _PIVOT = 0.1
-"""Rows are exchanged where the pivot is below this part of the largest entry of its column.
+"""Rows are exchanged where the pivot is below this fraction of the largest entry of its column.
 
-K_θ of a stable arm needs no exchange, and exchanges are made posture by posture.
+Exchanges are slow, since they are made posture by posture. K_θ of a stable arm needs none.
 """
 
 

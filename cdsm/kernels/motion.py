@@ -12,15 +12,12 @@ from cdsm.support.values import Array
 
 
 class Motion(NamedTuple):
-    """Motion of all joint frames along q̇ = z, (nv+1, 3) each.
+    """Motion of all joint frames along q̇ = z, (nv+1, 3) each."""
 
-    Angular velocity ω and ω̇, velocity and acceleration of the origins.
-    """
-
-    turning: Array
-    turning_rate: Array
-    velocity: Array
-    acceleration: Array
+    turning: Array  # angular velocity ω
+    turning_rate: Array  # ω̇
+    velocity: Array  # of the origins
+    acceleration: Array  # of the origins
 
 
 @inner

@@ -18,7 +18,10 @@ from cdsm.support.values import Array
 
 @inner
 def fetch(rows: Array, first: int, block: Array, width: Width) -> None:
-    """Copy W rows of (b, n), from row ``first``, to a block (n, W); repeat the last if needed."""
+    """Copy W of ``rows`` (b, n), from row ``first`` on, to a block (n, W).
+
+    The last row is repeated at the end. Without rows, the block stays as it is.
+    """
     if rows.shape[0]:
         for i in upwards(0, rows.shape[1]):
             for w in lanes(width):
@@ -27,7 +30,7 @@ def fetch(rows: Array, first: int, block: Array, width: Width) -> None:
 
 @inner
 def copy(matrix: Array, block: Array, width: Width) -> None:
-    """Fill matrices (m, n, W) with the first m rows of others."""
+    """Fill ``block`` (m, n, W) with the first m rows of ``matrix`` (m or more, n, W)."""
     for i in upwards(0, block.shape[0]):
         for j in upwards(0, block.shape[1]):
             for w in lanes(width):
@@ -76,7 +79,10 @@ def store(
     out: Array,
     status: NDArray[np.uint8],
 ) -> None:
-    """Copy the ``stored`` quantities of a block to its rows; NaN where they are not known."""
+    """Copy the ``stored`` quantities of a block to the rows of ``out`` from ``first`` on.
+
+    ``code`` (W,) goes to ``status``. In posture w, quantities from number ``known[w]`` on are NaN.
+    """
     count = min(record.shape[1], out.shape[0] - first)
     for w in lanes(count):
         status[first + np.intp(w)] = code[w]

@@ -34,23 +34,19 @@ SHORTEST_SEGMENT = 1e-9
 
 
 class Segments(NamedTuple):
-    """Scratch of one segment in a block of W postures.
+    """Scratch of one segment in a block of W postures; symbols as at the top of the module."""
 
-    Direction u (3, W), length ℓ and 1/ℓ (W,), derivative d (3, W) of the vector ℓ u with respect to
-    a joint angle, u·d (W,), left factor c (3, W).
-    """
-
-    direction: Array
-    length: Array
-    inverse: Array
-    derivative: Array
-    along: Array
-    left_factor: Array
+    direction: Array  # u (3, W)
+    length: Array  # ℓ (W,)
+    inverse: Array  # 1/ℓ (W,)
+    derivative: Array  # d of one joint (3, W)
+    along: Array  # u·d (W,)
+    left_factor: Array  # c (3, W)
 
 
 @inlined
 def segment_scratch(nv: int, width: int) -> Segments:
-    """Allocate the scratch for a block."""
+    """Allocate the :class:`Segments` of a block of ``width`` postures."""
     a, vectors, left = np.empty((3, width)), np.empty((2, 3, width)), np.empty((nv, 3, width))
     return Segments(vectors[0], a[0], a[1], vectors[1], a[2], left)
 
@@ -190,7 +186,7 @@ def _set_factors(
 def _add_slide_factor(
     slide: Array, u: Array, inverse: Array, sign: float, weight: Array, c: Array, width: Width
 ) -> None:
-    """Add to c (3, W) what a slide s adds to it: ``weight`` times ±(s − (u·s) u)/ℓ."""
+    """Add the share of a slide s to the left factor c (3, W): ``weight`` times ±(s − (u·s) u)/ℓ."""
     for r in axes(c.shape[0], width):
         for w in lanes(width):
             along = u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w]

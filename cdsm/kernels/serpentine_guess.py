@@ -103,7 +103,7 @@ class Guess(NamedTuple):
 
 @inner
 def empty_guess(blocks: Blocks, nv: int, cables: int, width: int) -> Guess:
-    """Allocate a guess."""
+    """Allocate the :class:`Guess` of a block of ``width`` postures."""
     return Guess(
         np.empty((cables, width)),
         np.empty((nv, width)),
@@ -197,7 +197,10 @@ def _set_best(
 def _solve_pair(
     a: Array, b: Array, c: Array, d: Array, torque: Array, x: Array, y: Array, width: Width
 ) -> None:
-    """Fill the tensions x and y (W,) with which moment arms (a, b) and (c, d) give a torque."""
+    """Fill the tensions x and y (W,) of two cables: x (a, b) + y (c, d) = ``torque`` (2, W).
+
+    (a, b) and (c, d) are their moment arms about two axes, (W,) each.
+    """
     for w in lanes(width):
         determinant = a[w] * d[w] - b[w] * c[w]
         x[w] = (torque[0, w] * d[w] - torque[1, w] * c[w]) / determinant

@@ -1,4 +1,4 @@
-"""Multipliers of a guess of tensions, or of a proof that no tensions balance a serpentine arm."""
+"""Compute the multipliers of guessed tensions, or a proof that no tensions balance the arm."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ def set_proof(
 ) -> None:
     """Fill y of ``guess`` with what mostly proves that no tensions balance the block that failed.
 
-    In that block y is t + s n, with the missing torque t and n normal to t. The chosen cables
-    behind it do no work, J_c y = 0. The others shall do none or less: s is the number nearest to 0
-    for which J_c y ≤ 0. ``normal`` (nv, W) is scratch, ``zero`` (C, W) are zeros.
+    In that block y is t + s n, with the missing torque t and n normal to t. For the chosen cables
+    of the blocks behind it, J_c y = 0. For all others J_c y ≤ 0 is wanted; s is the number nearest
+    to 0 with that. ``normal`` (nv, W) is scratch, ``zero`` (C, W) are zeros.
     """
     row, row_start, cable, cable_start = blocks
     y, failed, missing, chosen = guess.y, guess.failed, guess.missing, guess.chosen

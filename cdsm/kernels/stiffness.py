@@ -44,7 +44,7 @@ def add_passive_stiffness(
 ) -> None:
     """Add J_Lᵀ K_L J_L to ``passive`` (nv, nv, W), for i ≤ j; scratch is (6, W).
 
-    Three cables and two rows at a time need fewer memory accesses.
+    It adds three cables to two rows of the matrix at a time, which needs fewer memory accesses.
     """
     J, k = length_jacobian, cable_stiffness
     count, nv, one = np.uint64(J.shape[0]), np.uint64(J.shape[1]), np.uint64(1)
@@ -145,9 +145,10 @@ def sum_terms(
     parts: Array,
     width: Width,
 ) -> None:
-    """Fill K_θ (nv, nv, W), and with the sum of the magnitudes of its terms ``parts``, if any.
+    """Fill K_θ ``K``, and ``parts`` with the sum of the magnitudes of its terms, (nv, nv, W) each.
 
-    Of all terms but the load's, only entries with i ≤ j are read.
+    ``parts`` may be empty; then it is left out. Of the symmetric terms, all but ``load``, only
+    entries with i ≤ j are read.
     """
     for i in upwards(0, K.shape[0]):
         for j in upwards(0, K.shape[0]):

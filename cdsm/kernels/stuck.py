@@ -49,26 +49,21 @@ class Holes(NamedTuple):
 
 
 class Sticking(NamedTuple):
-    """Scratch: the section of a cable whose segments are being added up, in W postures.
+    """Scratch of the section of a cable whose segments are being added up, in W postures."""
 
-    Its length l without the spring, the compliance of the spring, and 1 unless its motor controls
-    the force, (W,) each; ∂l/∂θ (nv, W); 1 where the present hole holds, the stiffness of the
-    section and a product, (W,) each; the direction of the cable before the hole (3, W).
-    """
-
-    length: Array
-    soft: Array
-    locked: Array
-    gradient: Array
-    holds: Array
-    stiffness: Array
-    product: Array
-    before: Array
+    length: Array  # l without the spring (W,) [m]
+    soft: Array  # compliance of the spring (W,) [m/N]
+    locked: Array  # 1, or 0 if its motor controls the force (W,)
+    gradient: Array  # g = ∂l/∂θ (nv, W)
+    holds: Array  # 1 where the present hole holds, else 0 (W,)
+    stiffness: Array  # k of the section (W,) [N/m]
+    product: Array  # scratch of :func:`_add_square` (W,)
+    before: Array  # direction of the cable before the hole (3, W)
 
 
 @inlined
 def sticking_scratch(nv: int, width: int) -> Sticking:
-    """Allocate the scratch for a block of postures."""
+    """Allocate the :class:`Sticking` of a block of ``width`` postures."""
     a, gradient, before = np.empty((6, width)), np.zeros((nv, width)), np.empty((3, width))
     return Sticking(a[0], a[1], a[2], gradient, a[3], a[4], a[5], before)
 

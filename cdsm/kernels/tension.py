@@ -30,7 +30,7 @@ _PROOF = 1e-8
 """Smallest margin of a proof of infeasibility, relative to the terms of its sum."""
 
 _MISSING = 10.0 * OPTIMALITY
-"""Missing torque, relative to the largest arm times the largest force, that may be accepted."""
+"""A proof needs a missing torque above this fraction of the largest arm times the largest force."""
 
 _ROUNDING = 1e-11
 """Torque, relative to the largest, that counts as zero for a cable without upper bound."""
@@ -57,24 +57,21 @@ class Scaled(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """Of r postures J_L (r, C, nv), moment arms of rounding set to zero, τ (r, nv) and F (r, C)."""
+    """Balance J_Lᵀ F = τ of r postures."""
 
-    arms: Array
-    torque: Array
-    tension: Array
+    arms: Array  # J_L (r, C, nv) [m]; moment arms that are rounding errors are set to zero
+    torque: Array  # τ (r, nv) [N m]
+    tension: Array  # F (r, C) [N]
 
 
 class Certificate(NamedTuple):
-    """Scratch and result of :func:`set_optimal` and :func:`set_infeasible`.
+    """Scratch and result of :func:`set_optimal` and :func:`set_infeasible`."""
 
-    Shapes: y (nv, W), z (C, W), sums (6, W), the largest force (W,), certified (W,).
-    """
-
-    y: Array
-    z: Array
-    sums: Array
-    force: Array
-    certified: Array
+    y: Array  # multipliers of the balance (nv, W)
+    z: Array  # multipliers of the bounds (C, W)
+    sums: Array  # scratch (6, W)
+    force: Array  # the largest force (W,)
+    certified: Array  # the result (W,): 1 if proved, else 0
 
 
 @inner

@@ -45,9 +45,10 @@ class Tree(NamedTuple):
         axis: Array,
         slide: Array,
     ) -> Tree:
-        """Build a tree from joint frames at q = 0 in their parents; axes in the joint frames.
+        """Build a tree from the joint frames at q = 0.
 
-        ``rotation`` is (nv+1, 3, 3); the other shapes are those of the attributes.
+        ``rotation`` (nv+1, 3, 3) and ``translation`` place each joint frame in its parent's frame;
+        ``axis`` and ``slide`` are in the joint frame. Shapes are those of the attributes.
         """
         along = axis[:, :, None] * axis[:, None, :]
         along[~axis.any(axis=1)] = np.eye(3)  # a sliding joint: the rotation is constant
@@ -105,7 +106,7 @@ class Frames(NamedTuple):
 
 @inlined
 def empty_frames(tree: Tree, routing: Routing, width: int) -> Frames:
-    """Allocate frames for a block."""
+    """Allocate the :class:`Frames` of a block of ``width`` postures."""
     rows, sites = tree.parent.shape[0], routing.row.shape[0]
     return Frames(
         np.zeros((rows, 3, width)),

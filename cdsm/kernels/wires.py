@@ -52,26 +52,22 @@ class Wires(NamedTuple):
 
 
 class WireScratch(NamedTuple):
-    """Scratch of one cable, (W,) each but the coefficients (rows, W).
+    """Scratch of one cable in W postures, (W,) each but the coefficients."""
 
-    The piece of each tension and where it begins and ends; the strain there, and from there on; a
-    node of the Gauss rule; EA.
-    """
-
-    piece: Indices
-    x: Array
-    begin: Array
-    end: Array
-    before: Array
-    strain: Array
-    node: Array
-    value: Array
-    coefficients: Array
+    piece: Indices  # piece of the law at each tension
+    x: Array  # the tension, or the least tension of the pieces if that is larger [N]
+    begin: Array  # start of the piece [N]
+    end: Array  # end of the piece [N]
+    before: Array  # strain at the start of the piece [-]
+    strain: Array  # strain from there on [-]
+    node: Array  # a node of the Gauss rule
+    value: Array  # EA [N]
+    coefficients: Array  # of the piece (rows, W)
 
 
 @inlined
 def wire_scratch(wires: Wires, width: int) -> WireScratch:
-    """Allocate the scratch for a block."""
+    """Allocate the :class:`WireScratch` of a block of ``width`` postures."""
     piece, a = np.empty(width, dtype=np.intp), np.empty((7, width))
     coefficients = np.empty((wires.coefficients.shape[0], width))
     return WireScratch(piece, a[0], a[1], a[2], a[3], a[4], a[5], a[6], coefficients)
@@ -126,7 +122,7 @@ def set_rigidity(
 
 @inner
 def _set_curve(scratch: WireScratch, width: Width) -> None:
-    """Fill EA and the strain from the start of the piece, of curves of strain."""
+    """Fill EA, and the strain from the start of the piece, if the piece is a curve of strain."""
     _, x, begin, end, _, strain, _, rigidity, coefficients = scratch
     chord, rise, a, b = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
     for w in lanes(width):
@@ -139,7 +135,7 @@ def _set_curve(scratch: WireScratch, width: Width) -> None:
 
 @inner
 def _set_integral(nodes: Array, scratch: WireScratch, width: Width) -> None:
-    """Fill the strain from the start of the piece, of polynomials EA: ∫ dF/EA by a Gauss rule."""
+    """Fill the strain from the start of the piece, ∫ dF/EA of a polynomial EA, by a Gauss rule."""
     _, x, begin, _, _, integral, node, value, coefficients = scratch
     for w in lanes(width):
         integral[w] = 0.0
