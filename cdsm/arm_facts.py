@@ -79,7 +79,7 @@ class ArmFacts(Printed):
 
     @property
     def cables(self) -> Cables:
-        """Cables of the arm, in the order of every (C,) array; ``cables[0]`` or by name."""
+        """Cables of the arm, in the order of every (C,) array; ``cables["cable1_1"]`` is one."""
         return self._cables
 
     @property

@@ -159,8 +159,8 @@ class Cable:
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute Δl = l_0 ε(F) + ΔF/k_series [m]; Δl, ε and ΔF are 0 at the elasticity's ``rest``.
 
-        Wire and series spring carry the same tension, and their elongations add up. Examples are a
-        hybrid cable (Fig. 11) and a wire on a compliant drive.
+        Wire and series spring carry the same tension, and their elongations add up. Examples are
+        the paper's hybrid cable, a wire and a spring (Fig. 11), and a wire on a compliant drive.
 
         Args:
             tension: F [N], any shape.

@@ -1,4 +1,4 @@
-"""Cables, divided into chains of segments between holes with friction.
+"""Cables, divided into the segments between their holes, for cables that stick in holes.
 
 The segments of a cable are its lead, then one segment between each two neighbouring sites. Between
 two segments is a hole. Where the cable sticks in a hole, the segments on both sides are separate

@@ -265,7 +265,7 @@ def _joined(tables: list[Array]) -> Array:
 
 
 def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
-    """Return EA(F) [N] of a law, same shape as F [N]; check it, since users define laws."""
+    """Return EA(F) [N] in the shape of F [N]; InvalidInput if the law gives no valid EA."""
     rigidity = np.asarray(law.rigidity(tension))
     _, least, most = RANGES["rigidity"]
     usable = (rigidity >= least) & (rigidity <= most)  # False for NaN
@@ -279,7 +279,7 @@ def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
 
 
 def _checked_strain(law: Elasticity, tension: Array) -> Array:
-    """Return ε(F) [-] of a law, same shape as F [N]; check it, since users define laws."""
+    """Return ε(F) [-] in the shape of F [N]; InvalidInput if the law gives no valid ε."""
     strain = np.asarray(law.strain(tension))
     usable = (strain > -1.0) & (strain <= LARGEST)  # False for NaN
     if strain.shape != tension.shape or np.count_nonzero(usable) < tension.size:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 @final
 class Manipulator(ArmFacts):
-    """A cable-driven arm: rigid links, revolute joints, cables.
+    """A cable-driven arm: rigid links, joints, cables.
 
     Args:
         geometry: The arm.
@@ -236,7 +236,7 @@ class Manipulator(ArmFacts):
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
     def _pose(self, q: Array) -> tuple[Array, ...]:
-        """Compute the arrays of :func:`single_pose` at checked joint angles."""
+        """Return what the kernel ``single_pose`` computes at checked joint angles q (nv,) [rad]."""
         arguments: tuple[Any, ...] = (*self._model.arrays, q)
         *pose, shortest = single_pose(*arguments)
         if shortest < SHORTEST_SEGMENT:

@@ -22,16 +22,16 @@ from cdsm.support.values import Array, frozen
 
 
 class BodyState(NamedTuple):
-    """Tip pose (4, 4), tip Jacobian (6, nv), gravity torque (nv,) and its derivative (nv, nv)."""
+    """Tip and gravity of an arm at joint angles."""
 
-    tip: Array
-    jacobian: Array
-    gravity_torque: Array
-    gravity_stiffness: Array
+    tip: Array  # pose (4, 4)
+    jacobian: Array  # of the tip (6, nv), linear rows first, base axes
+    gravity_torque: Array  # g (nv,) [N m]
+    gravity_stiffness: Array  # ∂g/∂θ (nv, nv) [N m/rad]
 
 
 class Shapes(NamedTuple):
-    """Drawn shapes of a URDF."""
+    """Shapes of a URDF, drawn by viser."""
 
     place: Callable[[Array], None]  # moves the shapes to joint angles (nv,) [rad]
     rows: frozenset[int]  # rows in Tree of the joints whose links have shapes
@@ -129,7 +129,7 @@ class RigidBody:
         )
 
     def masses(self) -> Masses:
-        """Build the arrays of the masses on the tree and the position of the tip."""
+        """Build :class:`Masses`: masses of the links on the tree, gravity, position of the tip."""
         model, tip = self._model, self._model.frames[self._tip]
         inertias = [model.inertias[i] for i in (0, *self._ids)]
         return Masses(

@@ -78,7 +78,7 @@ def to_urdf(geometry: Geometry) -> str:
 
 
 def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
-    """Return the indented URDF text of a robot with these links and joints, below a comment."""
+    """Return the indented URDF text of a robot, below a comment; ``parts`` are links and joints."""
     robot = E.robot(etree.Comment(comment), *parts, name=name)
     etree.indent(robot, space="  ")
     text: str = etree.tostring(robot, xml_declaration=True, encoding="UTF-8").decode() + "\n"
@@ -86,7 +86,7 @@ def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
 
 
 def joint(kind: str, name: str, parent: str, child: str, *parts: etree._Element) -> etree._Element:
-    """Build a joint of type ``kind`` between two links, with its origin, axis and limit."""
+    """Build a joint of type ``kind`` between two links; ``parts``: its origin, axis and limit."""
     return E.joint(E.parent(link=parent), E.child(link=child), *parts, name=name, type=kind)
 
 
@@ -96,7 +96,7 @@ def origin(xyz: Iterable[float], rpy: str = "0.0 -0.0 0.0") -> etree._Element:
 
 
 def inertial(mass: float, inertia: Array, *place: etree._Element) -> etree._Element:
-    """Build the inertial element of a mass [kg] and its moments (3, 3) [kg m²] at an origin."""
+    """Build the inertial element: mass [kg], inertia (3, 3) [kg m²], at the origin ``place``."""
     moments = {
         f"i{'xyz'[i]}{'xyz'[j]}": float(inertia[i, j]) for i in range(3) for j in range(i, 3)
     }
@@ -172,7 +172,7 @@ def _cross(name: str, radius: float) -> etree._Element:
 
 
 def _cylinder(material: str, x: float, radius: float, length: float) -> etree._Element:
-    """Build a cylinder of a radius and a length [m] along x, centred at x [m]."""
+    """Build a drawn cylinder along x, centred at x [m]; ``material`` is the name of its colour."""
     shape = E.geometry(E.cylinder(radius=radius, length=length))
     place = origin((x, 0.0, 0.0), f"-0.0 {math.pi / 2.0} 0.0")
     return E.visual(shape, place, E.material(name=material))

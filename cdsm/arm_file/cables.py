@@ -131,17 +131,17 @@ _ANY = LinearElasticity(1.0)
 
 
 class Routed(NamedTuple):
-    """A cable without its wire: its key in the file, its path and its own settings."""
+    """A cable in a file, whose wire is not read yet."""
 
-    where: str
+    where: str  # key in the file, which errors name
     name: str
     sites: tuple[Site, ...]
-    lead: float
-    own: CableSettings
+    lead: float  # [m]
+    own: CableSettings  # settings of this cable alone
 
 
 def read_routed(cables: object) -> list[Routed]:
-    """Read the tables ``[[cables]]``; raise GeometryError with every fault."""
+    """Read the cables of the parsed tables ``[[cables]]``; GeometryError lists every fault."""
     entries = parse(_Entries, {"cables": cables} if cables is not None else {}).cables
     names = [entry.name for entry in entries]
     faults = [
@@ -161,7 +161,7 @@ def read_routed(cables: object) -> list[Routed]:
 
 
 def _sites(entry: _Entry) -> tuple[Site, ...]:
-    """Build the sites of the cable in ``entry``; its friction is the default for its holes."""
+    """Build the sites of the cable ``entry``; the cable's friction is the default of its holes."""
     passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
     sites = []
     for i, site in enumerate(entry.sites):
@@ -214,7 +214,7 @@ def setting_lines(cable: Cable) -> list[str]:
 def cable_lines(
     cables: Sequence[Cable], wires: Sequence[str], settings: Sequence[Sequence[str]]
 ) -> list[str]:
-    """Return the tables ``[[cables]]`` with a wire (left out if empty) and settings per cable."""
+    """Return the TOML of ``[[cables]]``, each with its wire (``""``: none) and its settings."""
     lines = []
     for cable, wire, given in zip(cables, wires, settings, strict=True):
         lines += ["[[cables]]", f"name = {toml_value(cable.name)}"]

@@ -111,7 +111,7 @@ def template(
 
 
 def _line(key: str, value: object, comment: str) -> str:
-    """Return a key with its value, and its unit and meaning as a comment."""
+    """Return a TOML line: a key with its value, and with unit and meaning as a comment."""
     words = [f"[{_UNITS[key]}]"] if key in _UNITS else []
     if _UNITS.get(key) == "rad" and isinstance(value, float):
         words.append(f"{math.degrees(value):.4g} degrees;")

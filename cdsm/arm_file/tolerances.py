@@ -51,7 +51,7 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
 
 
 def _tolerance(name: str, value: object) -> Tolerance:
-    """Build one tolerance from a number or a table; raise CdsmError."""
+    """Build one tolerance from a number or a table; CdsmError if it is invalid."""
     if not isinstance(value, dict):
         return Tolerance(value, correlation=float(name in COMMON))  # type: ignore[arg-type]
     for key in value:
@@ -73,7 +73,7 @@ def tolerance_lines(tolerances: Tolerances) -> list[str]:
 
 
 def _value(value: Tolerance | tuple[Tolerance, ...]) -> str:
-    """Return a tolerance as a table, or tolerances as a list of tables."""
+    """Return a tolerance as a TOML table, or several as a list of TOML tables."""
     if isinstance(value, tuple):
         return f"[{', '.join(map(_value, value))}]"
     values: dict[str, Any] = {"standard": value.standard, "correlation": value.correlation}

@@ -29,7 +29,7 @@ class CableSettings:
 
 @record
 class CableKeys(CableSettings):
-    """Top-level keys of a file. Fields of type Any are checked by their own readers."""
+    """Top-level keys of a file with cables. Fields of type Any are checked by their own readers."""
 
     wires: Any = Field(default_factory=dict)
     cables: Any = None

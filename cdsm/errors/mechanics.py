@@ -43,11 +43,12 @@ class InfeasibleTension(CdsmError):
     """No cable tension within the bounds balances the arm at this posture.
 
     Attributes:
-        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] where a joint slides), for
-            the tensions within the bounds that make the sum of its magnitudes smallest.
+        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] where a joint slides). The
+            tensions within the bounds are chosen so that the sum of its magnitudes is smallest.
         joint: Name of the joint with the largest missing torque.
-        relaxation: Widening of all bounds that makes the problem feasible [N]; inf if none does.
-        binding: Names of the cables that are at a bound with these tensions.
+        relaxation: Widening of the bounds of all cables without a fixed tension that makes the
+            problem feasible [N]; inf if none does.
+        binding: Names of the cables at a bound with these tensions; fixed ones are left out.
         fixed: Names of the cables with fixed tensions, if these make the problem infeasible; else
             empty.
     """

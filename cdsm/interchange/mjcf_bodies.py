@@ -91,7 +91,7 @@ def _axis(joint: etree._Element) -> Array:
 
 
 def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Give a body the mass of its link, or a tiny mass if it moves and has none."""
+    """Give a body its link's mass, or a tiny one if it moves without mass; return what it got."""
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
     if inertial is not None and mass > _SMALLEST:

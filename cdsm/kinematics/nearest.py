@@ -89,7 +89,7 @@ def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, 
 
 
 class _Search:
-    """Search within the joint limits (nv,) [rad]; counts the evaluations of r."""
+    """Search for the joint angles of :func:`nearest`; counts the evaluations of r."""
 
     def __init__(self, residual: Residual, guess: Array) -> None:
         self.residual = residual
@@ -206,7 +206,8 @@ class _Search:
 def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
     """Return the step −|H|⁻¹ gradient, and whether H has no negative eigenvalue.
 
-    The step is zero along eigenvectors whose eigenvalue is zero to rounding.
+    |H| has the magnitudes of the eigenvalues of H. The step is zero along eigenvectors whose
+    eigenvalue is zero to rounding.
     """
     values, vectors = np.linalg.eigh((H + H.T) / 2.0)
     flat = abs(values) <= _FLAT * abs(values).max(initial=0.0)

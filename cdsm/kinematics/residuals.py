@@ -74,7 +74,7 @@ class TipResidual(Residual):
     """
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Compute the residual r (3,) or (6,) and ∂r/∂q at q (nv,)."""
+        """Compute the residual r (3,) or (6,) and ∂r/∂q (3, nv) or (6, nv) at q (nv,)."""
         state, length = self.arm._model.body.state(q), self.arm.length
         linear, angular = state.jacobian[:3] / length, state.jacobian[3:]
         if self.target.ndim == 1:

@@ -36,7 +36,7 @@ class _Solution(ReadOnlyState, ABC):
     @property
     @abstractmethod
     def _misfit(self) -> float:
-        """Misfit [-] that is compared with the tolerance."""
+        """Distance [-] from the target, in arm lengths and rad; the tolerance is its limit."""
 
     @property
     def reachable(self) -> bool:

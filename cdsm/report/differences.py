@@ -50,7 +50,7 @@ def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
 
 
 def hessians(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
-    """Compute Hessians (T, n, n) of T functions at zero, and error bounds, as `gradients` does."""
+    """Compute Hessians (T, n, n) and their error bounds (T,); see :func:`gradients`."""
     unit = np.eye(size)
     i, j = np.triu_indices(size, 1)
     pairs = (s * unit[i] + t * unit[j] for s in (1.0, -1.0) for t in (1.0, -1.0))

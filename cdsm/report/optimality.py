@@ -42,7 +42,7 @@ class Optimality:
 
     @property
     def optimal(self) -> bool:
-        """Return whether no violation exceeds :data:`~cdsm.kernels.tension.DISTANCE`."""
+        """Return whether no violation exceeds :data:`~cdsm.kernels.tension.DISTANCE`, 1e-6."""
         return max(self.feasibility, self.stationarity or 0.0) <= DISTANCE
 
 

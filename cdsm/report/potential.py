@@ -54,7 +54,7 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute the stored energy minus the work F ΔL (P,) [J]; ``longer`` as in `tensions`."""
+        """Compute the rise of stored energy minus F ΔL (P,) [J] if ``longer`` by (P, C) [m]."""
         cable, F, start = self.cable, self.tension, self.free_length
         tensions = self.tensions(longer)
         more = evaluate_law(cable, lambda: cable.energy(tensions, start) - cable.energy(F, start))
@@ -252,7 +252,7 @@ class Neighbourhood:
         return np.asarray(_ULPS * (self._pose.cable_lengths + self._pose.arm.length))
 
     def kinematic_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`kinematic` (3,) [N m], the same for all steps."""
+        """Return the rounding error of :meth:`kinematic` (3,) [N m]; any ``step`` has the same."""
         pose, arm = self._pose, self._pose.arm
         far = arm.length + float(np.linalg.norm(pose.tip[:3, 3]))
         weight = float(arm._model.masses.mass.sum() * np.linalg.norm(arm.gravity)) * far
@@ -266,7 +266,7 @@ class Neighbourhood:
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
 
     def kinematic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`kinematic_torques` (3,) [N m], for all steps."""
+        """Return the rounding error of :meth:`kinematic_torques` (3,) [N m], for any ``step``."""
         noise = self.kinematic_noise(step)
         noise[0] *= 1.0 + 1.0 / self._closing_motion
         return noise

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from cdsm.support.values import Array
 
 BALANCED = 1e-6
-"""Tensions balance an arm if the residual is at most this part of the torque size."""
+"""Tensions balance an arm if the residual is at most this fraction of the torque size."""
 
 APART = 0.1
-"""A note is given if the three tip stiffnesses differ by more than this part."""
+"""A note is given if the three tip stiffnesses along an axis differ by more than this fraction."""
 
 CLOSE = 0.05
-"""A note is given if a tension is nearer than this part of itself to a bound of its law."""
+"""A note is given if the distance of a tension to a bound of its law is below this fraction."""
 
 _SINGULAR = 1e-12  # an eigenvalue of at most this part of the norm of K_θ is rounding
 _DIGITS = 1e10  # condition number of K_θ above which K_θ⁻¹ has less than six digits

@@ -123,7 +123,7 @@ class SelfCheck(ReadOnlyState):
 
     @property
     def compared(self) -> tuple[Agreement, ...]:
-        """Return all comparisons."""
+        """Return all comparisons: of the terms, the torque residual and the lengths."""
         return (*self.terms, self.statics, self.lengths)
 
     def __str__(self) -> str:
@@ -170,7 +170,7 @@ def self_check(K: Stiffness) -> SelfCheck:
 
 
 def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Recomputed]]:
-    """Compute the four terms by second differences of the potential, and by first of the torque."""
+    """Compute the terms by second differences of the potential, and by first ones of the torque."""
     step = near.first_step
     moved = _differentiated(hessians, near, near.kinematic, near.kinematic_noise, step)
     turned = _differentiated(

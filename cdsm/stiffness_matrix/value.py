@@ -200,7 +200,7 @@ class Stiffness(CartesianReadings):
         return prints.numbers(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return terms, tensions and k as a labelled Dataset in SI; MissingExtra without xarray."""
+        """Return K_θ, its terms, F and k as a labelled Dataset; MissingExtra without xarray."""
         arm, square = self.posture.arm, ("joint", "joint_column")
         unit = arm.stiffness_unit()
         terms = {name: (square, getattr(self, name), unit) for name in get_args(Term)}

@@ -8,7 +8,7 @@ from cdsm.errors import MissingExtra
 
 
 def need(extra: str, *packages: str) -> None:
-    """Raise :class:`~cdsm.MissingExtra` if a package of the extra is not installed."""
+    """Raise :class:`~cdsm.MissingExtra` if one of the ``packages`` of ``extra`` is missing."""
     for package in packages:
         try:
             importlib.import_module(package)

@@ -27,7 +27,7 @@ _outermost: ContextVar[bool] = ContextVar("_outermost", default=True)
 
 
 class _Items(Sized, Iterable[_Item], Protocol[_Item]):
-    """Items whose number is known."""
+    """Items of :func:`track`: an iterable with a length."""
 
 
 def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:

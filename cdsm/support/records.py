@@ -41,7 +41,7 @@ def _plain(value: object) -> object:
 
 
 def _in_range(kind: str, zero: bool = False) -> Callable[[float], float]:
-    """Return a validator: a value is in the range ``kind`` of ``RANGES``, or 0 if ``zero``."""
+    """Return a validator that refuses values outside ``RANGES[kind]``; ``zero`` also allows 0."""
 
     def check(value: float) -> float:
         problem = within(kind, value, zero=zero)
@@ -117,7 +117,7 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
-    """Wrap ``validated``: pydantic's faults become one GeometryError; ``kind`` has the keywords."""
+    """Wrap ``validated``, with the keywords of ``kind``: its faults raise one GeometryError."""
 
     @wraps(validated)
     def call(*args: object, **values: object) -> object:

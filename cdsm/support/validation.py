@@ -190,7 +190,7 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
 
 
 def wrench_vector(name: str, value: ArrayLike) -> Array:
-    """Check a wrench; return it as a read-only vector (6,)."""
+    """Check a wrench, force [N] and moment [N m]; return it as a read-only vector (6,)."""
     return _ZERO if value is NO_WRENCH else vector(name, value, 6, WRENCH, "wrench")
 
 
@@ -276,7 +276,7 @@ def text(name: str, value: object) -> str:
 
 
 def one_of(kind: str, name: object, known: Iterable[str], remedy: str = "") -> str:
-    """Return ``name`` if it is in ``known``; else raise UnknownName for an unknown ``kind``."""
+    """Return ``name`` if it is ``known``; else raise UnknownName, which calls it a ``kind``."""
     known = tuple(known)
     if not isinstance(name, str) or name not in known:
         raise UnknownName(kind, name, known, remedy)

@@ -77,7 +77,7 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
 
 
 def _names_dtd(text: str, system: str) -> bool:
-    """Check that the text has one DOCTYPE, which only names a DTD of the pattern ``system``."""
+    """Return whether the text has one DOCTYPE that only names a DTD matching ``system``."""
     literal = rf"""(?:"{system}"|'{system}')"""
     alone = rf"""<!DOCTYPE\s+[^\s"'<>\[]+\s+(?:SYSTEM|PUBLIC\s+(?:""|''))\s+{literal}\s*>"""
     return text.count("<!DOCTYPE") == 1 and re.search(alone, text) is not None

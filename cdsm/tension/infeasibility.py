@@ -1,4 +1,4 @@
-"""Reasons why no tensions exist: the missing torque and the widening of bounds, by LPs."""
+"""Find why no tensions balance an arm: the missing torque, and how far bounds must widen."""
 
 from __future__ import annotations
 

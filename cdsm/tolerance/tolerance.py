@@ -164,7 +164,7 @@ class Tolerance(ReadOnlyState):
 
 
 def _correlation(value: object) -> float | Array:
-    """Return one correlation, or a checked, read-only matrix of correlations."""
+    """Check one correlation or a matrix of correlations; return a float or a read-only (n, n)."""
     matrix = number_array("correlation", value)  # type: ignore[arg-type]
     if matrix.ndim == 0:
         if not 0.0 <= matrix <= 1.0:

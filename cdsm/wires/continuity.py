@@ -17,11 +17,11 @@ _JUMP = 1e-4  # share of EA: a smaller step counts as rounding of the law
 
 
 class Jump(NamedTuple):
-    """Discontinuity of EA: the tension [N] there, and EA [N] just below and just above it."""
+    """Discontinuity of EA."""
 
-    tension: float
-    below: float
-    above: float
+    tension: float  # at which it is [N]
+    below: float  # EA just below this tension [N]
+    above: float  # EA just above this tension [N]
 
 
 def find_jump(law: Elasticity) -> Jump | None:

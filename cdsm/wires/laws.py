@@ -168,7 +168,7 @@ class StrandElasticity(Elasticity):
         return panels(self.coefficients, (self.low, *self.joins, self.high))
 
     def _integral(self, tension: ArrayLike, power: int) -> Array:
-        """Integrate F^power dF/EA(F) from the low end of the domain."""
+        """Integrate F^power dF/EA(F) from the low end of the domain to ``tension``, any shape."""
         values = self.domain.check(tension)
         bad = values > self.panels.end
         if np.count_nonzero(bad):

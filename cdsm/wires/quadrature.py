@@ -42,7 +42,7 @@ def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
 
 
 def piecewise(joins: Array, table: Array, F: Array) -> Array:
-    """Evaluate at F of any shape the polynomials of a table, column i up to the join i."""
+    """Evaluate the polynomials of a table at F, any shape; column i is valid up to the join i."""
     return np.asarray(_polynomials(joins, table, F.ravel()).reshape(F.shape))
 
 

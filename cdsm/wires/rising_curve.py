@@ -90,7 +90,7 @@ class RisingCurve:
         return np.searchsorted(self._x[1:-1], x)
 
     def _locate(self, x: Array) -> tuple[NDArray[np.intp], Array, Array, Array, Array, Array]:
-        """Return the index of the piece at x, and θ, θ', a, b and D there, see the module."""
+        """Return the index of the piece at x, and its θ, θ', a, b and D, defined in the module."""
         k = self._piece(x)
         t, u = (x - self._x[k]) / self._widths[k], (self._x[k + 1] - x) / self._widths[k]
         a, b = self._ends[:, k]

@@ -66,11 +66,11 @@ class Column(NamedTuple):
 
 
 class Header(NamedTuple):
-    """Header of a table: its line in the file, its columns, the index of the first data row."""
+    """Header of a table."""
 
-    line: int
+    line: int  # number in the file
     columns: list[Column]
-    first: int
+    first: int  # index of the first row of data
 
     def __str__(self) -> str:
         return f"the header {[column.name for column in self.columns]} of line {self.line}"

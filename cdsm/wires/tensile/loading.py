@@ -33,11 +33,11 @@ _MISTAKEN = (  # mistake, then factors that correct force, displacement and gaug
 
 @dataclass(frozen=True)
 class Points:
-    """Averaged points of a test: rising strain [-], force [N], and points per average, (n,)."""
+    """Points of a test; points of equal strain, or of a dense record, are averaged."""
 
-    strain: Array
-    force: Array
-    count: Array
+    strain: Array  # rising (n,) [-]
+    force: Array  # (n,) [N]
+    count: Array  # recorded points in each average (n,)
 
     def part(self, kept: NDArray[np.bool_] | slice) -> Points:
         """Return the points that the mask or slice ``kept`` selects."""
@@ -53,7 +53,7 @@ class Points:
 
 
 def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
-    """Return the points of a test to fit, the noise of one [N], and notes on points left out."""
+    """Return the points of a test to fit, their noise [N] (one sigma), notes on points left out."""
     notes: list[str] = []
     _require(test.force.size, "points are given")
     outlier = _outliers(test.force)
@@ -244,7 +244,7 @@ def _is_loading(strain: Array) -> NDArray[np.bool_]:
 
 
 def _noise(points: Points) -> float:
-    """Estimate the noise [N] of one point from its distance to the line through its neighbours."""
+    """Estimate the noise [N] of a point: how far points are off lines through their neighbours."""
     before, at, after = points.strain[:-2], points.strain[1:-1], points.strain[2:]
     share = (at - before) / (after - before)
     error = points.force[1:-1] - (1.0 - share) * points.force[:-2] - share * points.force[2:]

@@ -89,7 +89,7 @@ class Curve:
         return np.asarray(self.anchor_strain + stretch - stretch[self.anchor])
 
     def force(self, strain: Array) -> Array:
-        """Compute the tension (n,) [N] at strains (n,), by straight lines beyond the ends."""
+        """Compute the tension (n,) [N] at strains (n,); beyond the grid the curve is straight."""
         tensions, rigidity, grid = self.basis.tensions, self.rigidity, self.strain
         inside = np.interp(strain, grid, tensions)
         before = np.minimum(strain - grid[0], 0.0) * rigidity[0]
@@ -177,7 +177,7 @@ class Curve:
         return np.asarray(splines @ rough.coefficients), np.asarray(half)
 
     def _inverse(self, rows: Array) -> tuple[Array, Array]:
-        """Return the inverse of the penalised normal matrix of ``rows``, and their leverages."""
+        """Return the inverse of the penalised normal matrix, and the leverage of each row."""
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
         return inverse, np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
@@ -234,7 +234,7 @@ class Curve:
 
 
 def fit_curve(points: Points, noise: float) -> Curve:
-    """Fit the curve; restricted likelihood sets the smoothing (Fellner-Schall iteration)."""
+    """Fit a curve; restricted likelihood sets its smoothing (Fellner-Schall iteration)."""
     basis = Basis.of(points, noise)
     tensions, size = basis.tensions, basis.splines.shape[1]
     # start from secants so coarse that they are positive
