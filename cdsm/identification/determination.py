@@ -16,7 +16,7 @@ from cdsm.support.values import Array, frozen
 
 @dataclass(frozen=True, eq=False)
 class Determination:
-    """Linear analysis of which parameters measurements determine."""
+    """Which combinations of parameters measurements determine, from derivatives of residuals."""
 
     names: tuple[str, ...]  # names of the parameters p (P,)
     jacobian: Array  # J = ∂r/∂p (n, P) with the residuals r in standard deviations

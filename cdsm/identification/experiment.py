@@ -205,7 +205,7 @@ def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
 def _followed(
     model_of: Callable[..., Manipulator], values: dict[str, float], candidates: Sequence[WeightLoop]
 ) -> tuple[tuple[WeightLoop, ...], list[Array], tuple[tuple[str, str], ...]]:
-    """Return the loops that can be tested, :func:`_rows` of each, and why the others cannot be.
+    """Return the loops that can be tested, the :func:`_rows` of each, and why others cannot be.
 
     The reasons are pairs (label of the loop, text of the error).
     """

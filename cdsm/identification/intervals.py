@@ -152,7 +152,7 @@ class Profiler:
     def _next(self, here: _Knot, side: Side, goal: float) -> _Knot | str:
         """Compute a knot beyond ``here`` on one ``side``, near where Δχ² reaches ``goal``.
 
-        Returns the reason as text if there is none.
+        If there is no such knot, the reason is returned as text.
         """
         u = float(here.point[self.i])
         room = 1.0 - u if side > 0 else u
@@ -185,7 +185,7 @@ class Profiler:
             knots.insert(last + 1, between)
 
     def _moved(self, here: _Knot, step: float) -> _Knot | str:
-        """Compute the knot after one step along the tangent, or the reason why there is none."""
+        """Compute the knot one ``step`` of u along the tangent; if there is none, return why."""
         problem, others = self.problem, self.others
         point = np.clip(here.point + step * here.tangent, 0.0, 1.0)
         if (failure := problem.failure(point)) is not None:

@@ -74,7 +74,7 @@ class Box:
 
 
 class LeastSquares:
-    """Problem min Σ r² over the unit cube.
+    """Problem min Σ r² over the unit cube of the scaled parameters.
 
     Args:
         residuals_of: Function from parameters by name to r (n,). May raise :class:`NoModelError`.

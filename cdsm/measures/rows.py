@@ -165,7 +165,10 @@ def _balances(
     maximum: ArrayLike,
     threads: int | None,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Return J_X, J_L, J_Xᵀ W − g and both bounds at each posture; see :func:`payloads`."""
+    """Return J_X (B, 6, nv), J_L (B, C, nv), J_Xᵀ W − g (B, nv) and both bounds (B, C).
+
+    The arguments are those of :func:`payloads`.
+    """
     names = ("jacobian", "length_jacobian", "gravity_torque")
     found = evaluate(arm, q, outputs=names, check_limits=False, threads=threads)
     JX, J, g = (found[name] for name in names)

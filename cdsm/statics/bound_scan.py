@@ -106,7 +106,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 def log_samples(low: float, high: float) -> Array:
     """Return bounds (N,) [N] from ``low`` to ``high``, evenly spaced on a log scale.
 
-    The scale has at most four decades; below it there is only ``low``.
+    They cover at most the four decades below ``high``, besides ``low``.
     """
     if high <= low:
         return np.array([low])

@@ -168,7 +168,7 @@ class CriticalLoad(ReadOnlyState):
 
 
 def _describe_mode(names: tuple[str, ...], mode: Array) -> str:
-    """Name the joints with the largest shares in a mode."""
+    """Write the names and entries of the joints with the largest entries in ``mode`` (nv,)."""
     order = np.argsort(-abs(mode))[:4]
     shares = ", ".join(f"{names[i]} {mode[i]:+.2f}" for i in order)
     return f"softest joint motion: {shares}" + (", …" if len(mode) > len(order) else "")

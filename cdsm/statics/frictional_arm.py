@@ -60,7 +60,7 @@ class FrictionalArm(NamedTuple):
         return self.limits
 
     def moved(self, q: Array, near: Settled) -> Settled:
-        """Compute the arm at joint angles ``q`` (nv,) [rad], with tensions searched from ``near``.
+        """Compute the state at joint angles ``q`` (nv,) [rad]; ``near`` is a state close to it.
 
         Raises CableError if two sites coincide.
         """

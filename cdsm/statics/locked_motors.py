@@ -89,7 +89,7 @@ class LoadedArm:
         return Iterate(K, K.residual, rounding(K))
 
     def moved(self, q: Array, near: Iterate) -> Iterate:
-        """Compute the arm at joint angles ``q`` (nv,) [rad], with tensions searched from ``near``.
+        """Compute the state at joint angles ``q`` (nv,) [rad]; ``near`` is a state close to it.
 
         Raises CableError if two sites coincide.
         """
@@ -149,7 +149,7 @@ def require_domains(
 
 
 def stops(reference: Posture) -> tuple[Array, Array]:
-    """Return the lowest and highest angles (nv,) [rad] of the joints; ``reference`` is between."""
+    """Return the angles (nv,) [rad] of lower and upper stops; ``reference`` is between them."""
     arm, q = reference.arm, reference.q
     touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
     if arm.is_serpentine:

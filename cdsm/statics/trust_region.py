@@ -41,7 +41,7 @@ a step is accepted above the third (Nocedal and Wright, Numerical Optimization, 
 
 
 class Iterate(Protocol):
-    """Arm at one posture, balanced or not: a state of the search."""
+    """What :func:`find_rest` needs of a state: an arm at one posture, balanced or not."""
 
     @property
     def q(self) -> Array:
@@ -70,7 +70,7 @@ class Loaded(Protocol[State]):
     """What :func:`find_rest` needs of a loaded arm: its state at joint angles, and its stops."""
 
     def moved(self, q: Array, near: State) -> State:
-        """Compute the arm at joint angles ``q`` (nv,) [rad], with tensions searched from ``near``.
+        """Compute the state at joint angles ``q`` (nv,) [rad]; ``near`` is a state close to it.
 
         Raises CableError if two sites coincide.
         """

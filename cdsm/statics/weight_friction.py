@@ -21,7 +21,8 @@ SLIDING = 1.25
 """The arm slides where its tangent stiffness is at most this times the frictionless one."""
 
 _SETTLED, _MOST_CYCLES = 0.01, 64
-"""Dither has converged if doubling its cycles changes less than this part; most cycles tried."""
+"""Relative change of the stiffness by twice the cycles at which dither has converged; most cycles
+that are tried."""
 
 _GROWTH, _MOST = 1.25, 100.0
 """Factor of the load from trial to trial; largest load as a multiple of the breakaway load."""

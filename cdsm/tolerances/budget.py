@@ -168,7 +168,7 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence if first order is not enough; see :attr:`is_linear`."""
+        """A sentence if first-order error propagation is not enough; see :attr:`is_linear`."""
         if self.is_linear:
             return ()
         off = f"{100.0 * self.nonlinearity:.2g} %"
@@ -272,7 +272,7 @@ def checked_probability(probability: float) -> float:
 
 
 def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
-    """Write ``value ± uncertainty`` in the unit of SI ``size``; the uncertainty has two digits."""
+    """Write ``value ± uncertainty``, the uncertainty with two digits, in a unit of SI ``size``."""
     u, places = uncertainty / size, 4
     if 0.0 < u < math.inf:
         places = min(max(1 - math.floor(math.log10(u)), 0), 12)

@@ -105,7 +105,7 @@ class Question(ReadOnlyState):
         return float(self.direction @ K.posture.tip[:3, 3])
 
     def gradient(self) -> dict[str, Array]:
-        """Compute the derivatives (inputs,) of the reading with respect to each source's inputs."""
+        """Compute the derivatives of the reading by its inputs, as an array (n,) by source."""
         K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
         if self.of in ("along", "stuck"):
             assert self.direction is not None
