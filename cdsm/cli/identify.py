@@ -1,4 +1,4 @@
-"""``cdsm identify``: parameters of an arm from loops of weight tests, or a plan of such tests."""
+"""``cdsm identify``: find parameters of an arm from loops of weight tests, or plan such tests."""
 
 from __future__ import annotations
 

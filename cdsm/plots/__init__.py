@@ -1,4 +1,4 @@
-"""Figures of arms, maps, plans, loads, and of the paper. Axes show mm and N/mm.
+"""Plot arms, maps, plans, loads, and the figures of the paper. Axes show mm and N/mm.
 
 Every function returns a new :class:`matplotlib.figure.Figure`, as wide as one or two columns of a
 journal. Show it in a notebook, or write it with :func:`save_figure`. No function changes the global

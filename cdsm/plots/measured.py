@@ -138,9 +138,9 @@ def _plot_loop(
 
 
 def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
-    """Plot the 95 % interval expected of each parameter, and the gain by one more of each test.
+    """Plot the expected 95 % interval of each parameter, and the gain of repeating each candidate.
 
-    Intervals are shown for the planned tests and for evenly spaced ones.
+    The intervals are shown for the planned tests, and for as many evenly spaced ones.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
     place, width = np.arange(len(plan.names)), 0.38

@@ -104,7 +104,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 
 
 def plot_saturation(found: Saturation) -> Figure:
-    """Plot stiffness, and its gain per newton, over the lower bound of the tensions.
+    """Plot stiffness, and its gain per newton of bound, over the lower bound of the tensions.
 
     InvalidInput if ``found`` is no result of :func:`~cdsm.saturation`.
     """

@@ -1,4 +1,4 @@
-"""Plot a closed loop over time: tip, stiffness, tensions, and the band of rest of the tip."""
+"""Plot a closed loop over time: tip, stiffness, tensions, and where friction lets the tip rest."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ _HALF = 0.5
 
 
 def plot_tracking_run(run: TrackingRun) -> Figure:
-    """Plot a closed loop over time: tip error with the band of rest states, stiffness, tensions.
+    """Plot a closed loop over time: tip error, stiffness, the tip in its band of rest, tensions.
+
+    The band is the range, along the first direction, in which friction lets the tip rest.
 
     InvalidInput if ``run`` is no result of :func:`~cdsm.track`.
     """
