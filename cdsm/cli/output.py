@@ -1,4 +1,4 @@
-"""Shared by all commands: answers as text or JSON, pictures, errors and exit codes."""
+"""Print answers and errors of all commands as text or JSON, write files, and set exit codes."""
 
 from __future__ import annotations
 

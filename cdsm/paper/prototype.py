@@ -80,7 +80,7 @@ class Prototype:
 
     @property
     def levels(self) -> Array:
-        """Tensions of the rows of Table II (5,) [N]."""
+        """Reported tensions of the rows of Table II (5,) [N]."""
         return np.array([TENSIONS[0], self.level_2, self.level_3, self.level_4, TENSIONS[-1]])
 
     @property
@@ -112,7 +112,7 @@ class Prototype:
         return self._measured(pose, tensions, np.zeros((3, 3)))
 
     def weigh(self, pose: Posture, tensions: ArrayLike) -> Array:
-        """Compute weight over displacement (N, 3) [N/m] at N reported tensions [N].
+        """Compute weight over displacement in x, y, z (N, 3) [N/m] at N reported tensions [N].
 
         Errors are those of :meth:`measure`.
         """
