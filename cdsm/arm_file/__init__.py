@@ -1,1 +1,1 @@
-"""Arms as TOML files: robot, cables, wires, gravity, tolerances."""
+"""Read and write arms as TOML files: robot, cables, wires, gravity, tolerances."""

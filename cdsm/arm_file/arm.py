@@ -1,4 +1,4 @@
-"""ARM.toml: a robot, its cables and their wires, gravity and tolerances in one file."""
+"""Read and write ARM.toml: a robot, its cables, their wires, gravity and tolerances in one file."""
 
 from __future__ import annotations
 

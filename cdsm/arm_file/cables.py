@@ -1,4 +1,4 @@
-"""Cables in TOML: sites, wire, lead, spring, control and tension bounds."""
+"""Read and write cables in TOML: sites, wire, lead, spring, control and tension bounds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text of a new, complete ARM.toml with a comment on every key."""
+"""Write the text of a new, complete ARM.toml with a comment on every key."""
 
 from __future__ import annotations
 

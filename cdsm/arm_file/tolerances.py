@@ -1,4 +1,4 @@
-"""Tolerances in TOML: a file of their own, or ``[tolerances]`` of an ARM.toml."""
+"""Read and write tolerances in TOML: a file of their own, or ``[tolerances]`` of an ARM.toml."""
 
 from __future__ import annotations
 

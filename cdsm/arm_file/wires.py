@@ -1,4 +1,4 @@
-"""Wires in TOML: names, rigidities and tables of laws, and the settings that cables share."""
+"""Read and write wires in TOML: names, rigidities, tables of laws, settings that cables share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inverse of a rising function of the tension, such as the strain of a law."""
+"""Invert a rising function of the tension, such as the strain of a law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cables of a serpentine arm, through the holes of its disks."""
+"""Route the cables of a serpentine arm through the holes of its disks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Links of an arm that overlap at a posture."""
+"""Find links of an arm that overlap at a posture."""
 
 from __future__ import annotations
 

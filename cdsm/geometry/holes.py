@@ -1,4 +1,4 @@
-"""Angles of the holes of uniform arms, and cables that share a hole."""
+"""Compute the hole angles of uniform arms, and find cables that share a hole."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts of arms with similar joints; each size is one number, or one number per joint."""
+"""Build joints, links and cables of uniform arms; a size is one number, or one per joint."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Files of other programs: export to MuJoCo, import from CASPR."""
+"""Exchange arms with other programs: export to MuJoCo, import from CASPR."""

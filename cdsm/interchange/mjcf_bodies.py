@@ -1,4 +1,4 @@
-"""Bodies, joints, shapes and sites of an arm for MuJoCo, in its initial configuration."""
+"""Write bodies, joints, shapes and sites of an arm for MuJoCo, in its initial configuration."""
 
 from __future__ import annotations
 

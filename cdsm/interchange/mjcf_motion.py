@@ -1,4 +1,4 @@
-"""Time step and damping of an arm in MuJoCo, from its natural frequencies."""
+"""Choose time step and damping of an arm in MuJoCo, from its natural frequencies."""
 
 from __future__ import annotations
 

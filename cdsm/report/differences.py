@@ -1,4 +1,4 @@
-"""Derivatives by extrapolated central differences, with error estimates.
+"""Compute derivatives by extrapolated central differences, with error estimates.
 
 Hessian of a function of the virtual prototype's ten joints: ``scipy.differentiate.hessian`` (order
 4) needs 22 500 evaluations and 2.7 s. This module needs 1 200 evaluations and 0.2 s for three

@@ -1,4 +1,4 @@
-"""Numbers that the report shows: ranks, residual, cable states, tip stiffnesses."""
+"""Compute the numbers that the report shows: ranks, residual, cable states, tip stiffnesses."""
 
 from __future__ import annotations
 

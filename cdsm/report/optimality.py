@@ -1,4 +1,4 @@
-"""Optimality conditions of the tensions in a report, derived a second time."""
+"""Check the optimality of the tensions in a report, by conditions derived a second time."""
 
 from __future__ import annotations
 

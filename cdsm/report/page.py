@@ -1,4 +1,4 @@
-"""Contents of a report, section by section, as text and as HTML."""
+"""Write a report, section by section, as text and as HTML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Potential U of an arm near a posture, term by term, and the residual torque there.
+"""Compute the potential U of an arm near a posture, term by term, and the residual torque.
 
     U(q) = Σ F_c (L_c − L_c0) + Σ [E_c(F_c(L_c)) − E_c(F_c) − F_c (L_c − L_c0)] + V(q) − f·x(q)
            active               passive                                           gravity  load

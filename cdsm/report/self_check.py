@@ -1,4 +1,4 @@
-"""Check of K_θ by central finite differences at the same posture, in two ways.
+"""Check K_θ by central finite differences at the same posture, in two ways.
 
 First, K_θ is the Hessian of the potential, computed from lengths, poses and energies alone. This
 check shares with Eq. 16 only the positions of cables and links. Second, K_θ is the derivative of

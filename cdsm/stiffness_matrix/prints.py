@@ -1,4 +1,4 @@
-"""Text and JSON of a stiffness: the printed table, the notes below it, the numbers."""
+"""Write a stiffness as text and JSON: the printed table, the notes below it, the numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks that optional packages are installed."""
+"""Check that optional packages are installed."""
 
 from __future__ import annotations
 

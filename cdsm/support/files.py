@@ -1,4 +1,4 @@
-"""Reading and writing of whole files: named errors, size limits, no half-written files."""
+"""Read and write whole files: named errors, size limits, no half-written files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formats for printed output: coordinates, units, keys of JSON."""
+"""Format printed output: coordinates, units, keys of JSON."""
 
 from __future__ import annotations
 

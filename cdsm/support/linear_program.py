@@ -1,4 +1,4 @@
-"""Linear programs, solved by HiGHS (Huangfu and Hall, Math. Prog. Comp. 10, 2018) of scipy."""
+"""Solve linear programs by HiGHS (Huangfu and Hall, Math. Prog. Comp. 10, 2018) of scipy."""
 
 from __future__ import annotations
 

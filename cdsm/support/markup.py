@@ -1,4 +1,4 @@
-"""HTML elements whose text is escaped."""
+"""Build HTML elements whose text is escaped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of numbers in text files: comment lines that begin with #, a header, and rows."""
+"""Read and write tables of numbers in text: comment lines that begin with #, a header, rows."""
 
 from __future__ import annotations
 

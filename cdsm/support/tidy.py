@@ -1,4 +1,4 @@
-"""Labelled data: pandas tables and xarray Datasets of results."""
+"""Turn results into labelled data: pandas tables and xarray Datasets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of all inputs: native float64, right shape, finite, of a plausible size.
+"""Check all inputs: native float64, right shape, finite, of a plausible size.
 
 A quantity outside its range in :data:`RANGES` raises a named error here, so other code need not
 guard against overflow or denormal numbers.

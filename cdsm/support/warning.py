@@ -1,4 +1,4 @@
-"""Warnings of cdsm, shown at the line of the user's program."""
+"""Issue warnings of cdsm at the line of the user's program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Strict reading of untrusted XML: no recovery, no expansion of entities, no network access."""
+"""Read untrusted XML strictly: no recovery, no expansion of entities, no network access."""
 
 from __future__ import annotations
 

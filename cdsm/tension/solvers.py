@@ -1,4 +1,4 @@
-"""Quadratic-programming solvers, their settings, and the check of their solutions.
+"""Call quadratic-programming solvers with suitable settings, and check their solutions.
 
 A solution is accepted only if it meets the optimality conditions.
 """

@@ -1,4 +1,4 @@
-"""Tolerances of an arm, source by source."""
+"""Tolerances of an arm, one or more for each source of uncertainty."""
 
 from __future__ import annotations
 

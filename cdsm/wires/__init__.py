@@ -1,1 +1,1 @@
-"""Laws of the rigidity of a wire over its tension, files of these laws, and tensile tests."""
+"""Laws EA(F) of wires, files of these laws, and fits of tensile tests."""

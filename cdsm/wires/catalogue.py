@@ -1,4 +1,4 @@
-"""Wires by name, by a rigidity EA, or by a file."""
+"""Find the law of a wire by its name, its rigidity EA, or its file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Slack branch: a law of rigidity, continued below its domain down to zero tension."""
+"""Continue a law of rigidity below its domain, down to zero tension: the slack branch."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Fit of a law of rigidity to the forces and extensions of a tensile test."""
+"""Fit a law of rigidity to the forces and extensions of a tensile test."""

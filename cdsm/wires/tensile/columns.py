@@ -1,4 +1,4 @@
-"""Columns of a tensile test in the table of a testing machine, in several languages."""
+"""Find the columns of a tensile test in a testing machine's table, in several languages."""
 
 from __future__ import annotations
 

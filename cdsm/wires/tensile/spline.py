@@ -96,7 +96,10 @@ class Curve:
         return np.asarray(inside + before + np.maximum(strain - grid[-1], 0.0) * rigidity[-1])
 
     def jacobian(self, strain: Array) -> Array:
-        """Compute the derivatives (n, k + 1) of :meth:`force` by coefficients and anchor strain."""
+        """Compute the derivatives (n, k + 1) of :meth:`force` at strains (n,) by the unknowns.
+
+        These are the coefficients and the anchor strain.
+        """
         tensions, grid = self.basis.tensions, self.strain
         inside = np.clip(strain, grid[0], grid[-1])
         at = np.clip(np.searchsorted(grid, inside) - 1, 0, len(grid) - 2)
