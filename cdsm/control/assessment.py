@@ -90,25 +90,21 @@ def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
 
     The load is shaken along u, first without the weight and then with it: its amplitude is three
     breakaway loads and fades in four cycles. The weight moves the tip by about 0.1 % of the arm's
-    length. NaN if no equilibrium is found on the way. SingularStiffness or EquilibriumError as for
-    :func:`~cdsm.breakaway`.
+    length. NaN if no equilibrium is found on the way or the arm is about to buckle; inf if the tip
+    cannot move along u.
     """
-    arm, load = plant.arm, state.state.load
+    arm, load, tips = plant.arm, state.state.load, []
     try:
         near = frictionless_stiffness(state, load.wrench)
-    except CdsmError:
-        return math.nan
-    weight = near.along(u) * _DISPLACED * arm.length
-    if not math.isfinite(weight):
-        return math.inf
-    swing = _SHAKEN * breakaway(near.posture, near.tension, u, near.wrench).load
-    carried, tips = state, []
-    try:
+        weight = near.along(u) * _DISPLACED * arm.length
+        if not math.isfinite(weight):
+            return math.inf
+        swing = _SHAKEN * breakaway(near.posture, near.tension, u, near.wrench).load
         for hung in (0.0, weight):
             for force in (*(hung + fading(swing, _CYCLES) if arm.has_friction else ()), hung):
                 wrench = load.wrench + np.append(force * u, np.zeros(3))
-                carried = plant.load(carried, Load(wrench, load.holding, load.motors))
-            tips.append(carried.pose.tip[:3, 3])
+                state = plant.load(state, Load(wrench, load.holding, load.motors))
+            tips.append(state.pose.tip[:3, 3])
     except CdsmError:
         return math.nan
     return weight / float(u @ (tips[1] - tips[0]))

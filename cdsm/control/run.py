@@ -144,7 +144,8 @@ class TrackingRun(ReadOnlyState):
         """Hang a weight on the true arm as it was after a step; return the stiffness [N/m].
 
         The motors stand still. The load is shaken with fading amplitude before and after the weight
-        is hung, so that friction hardly affects the result. NaN if no equilibrium is found.
+        is hung, so that friction hardly affects the result. NaN if no equilibrium is found or the
+        arm is about to buckle; inf if the tip cannot move along the direction.
 
         Args:
             step: Number of the step; negative numbers count from the last.
@@ -152,7 +153,6 @@ class TrackingRun(ReadOnlyState):
 
         Raises:
             InvalidInput: There is no such step or direction, or the plant is no :class:`SlowPlant`.
-            SingularStiffness, EquilibriumError: As for :func:`~cdsm.breakaway`.
         """
         count, D = len(self.time), len(self.directions)
         k = whole_number("step", step, -count, count - 1) % count
