@@ -201,7 +201,7 @@ def test_figure_and_animation_are_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "run.gif").read_bytes()[:3] == b"GIF"
     assert [axes.get_ylabel() for axes in figure.axes] == [
         "tip error [mm]",
-        "stiffness [N/mm]",
+        "frictionless\nstiffness [N/mm]",
         "off the rest\nwithout friction [mm]",
         "tension [N]",
     ]
