@@ -122,7 +122,8 @@ class StiffnessPlan(ReadOnlyState):
                 f"along {coordinates(u)}: {value:.4g} N/mm ({wanted:.4g} N/mm wanted)"
                 for u, (value, wanted) in zip(self.direction.reshape(-1, 3), pairs, strict=True)
             ]
-        return "\n".join([*rows, f"({MODEL})"])
+        margin = f"{self.stiffness.margin:.4g} {self.tension.posture.arm.stiffness_unit()}"
+        return "\n".join([*rows, f"smallest joint stiffness {margin} ({MODEL})"])
 
 
 def plan_stiffness(

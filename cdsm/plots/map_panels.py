@@ -116,10 +116,12 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
     return f"{dim} {value:g}" + (f" {units}" if units != "1" else "")
 
 
-def slices_of(points: Array, section: tuple[str, float, float] | None) -> tuple[list[Slice], bool]:
+def slices_of(
+    points: Array, section: tuple[str, float, float] | None, path: bool
+) -> tuple[list[Slice], bool]:
     """Return the slabs of tips (N, 3) [mm] to show, and whether they are slices of a cloud.
 
-    ``section`` has the lengths in [m].
+    ``section`` has the lengths in [m]. The tips of a ``path`` are all seen along each axis.
     """
     if section is not None:
         return [_slab(section)], False
@@ -129,6 +131,9 @@ def slices_of(points: Array, section: tuple[str, float, float] | None) -> tuple[
     normal = int(extent.argmin())
     if extent[normal] <= _FLAT * extent.max():
         return [Slice("", normal, 0.0, np.inf, _others(normal))], False
+    if path:
+        seen = (1, 2, 0)
+        return [Slice(f"seen along {XYZ[i]}", i, 0.0, np.inf, _others(i)) for i in seen], False
     middle = np.median(points, axis=0)
     half = _SLICE * np.ptp(points, axis=0)
     slices = [_slab((XYZ[axis], middle[axis] / MM, half[axis] / MM)) for axis in (1, 2, 0)]

@@ -54,7 +54,7 @@ _MIDDLE = (0.05, 0.95)
 """A value is an outlier if it is further outside these quantiles than they are apart."""
 
 _TALLEST = 4.0  # largest height of a panel [inch]
-_NARROWEST = 1.3  # least width of a panel with its labels [inch]
+_NARROWEST = 1.2  # least width of a title, and of a panel without its ticks [inch]
 
 Statistic = Literal["median", "min", "max"]
 
@@ -84,12 +84,12 @@ def plot_map(
     """Plot the tips of a sweep in mm, coloured by a quantity, with a panel for each case.
 
     Tips in a plane and sections are dots, or cells if a statistic is given. A cloud of tips is
-    shown in three slices through its middle, as cells. Many postures may put the tip into one cell;
-    the statistic determines which value it shows. Entries without the quantity are marked by their
-    status; in maps of cells, a mark in a cell with a value is left out. Unstable entries are marked
-    too, because their stiffness has no meaning, except in a map of the margin. Outliers, far from
-    the middle 90 % of the values, and infinite values have a colour of their own, at the ends of
-    the colour bar.
+    shown in three slices through its middle, as cells; a path is seen along each axis, as dots.
+    Many postures may put the tip into one cell; the statistic determines which value it shows.
+    Entries without the quantity are marked by their status; in maps of cells, a mark in a cell with
+    a value is left out. Unstable entries are marked too, because their stiffness has no meaning,
+    except in a map of the margin. Outliers, far from the middle 90 % of the values, and infinite
+    values have a colour of their own, at the ends of the colour bar.
 
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
@@ -123,7 +123,7 @@ def plot_map(
     cases = list(cases_of(dataset, quantity, poses, words))
     points = tips.values.reshape(-1, 3)
     known = np.isfinite(points).all(axis=1)
-    slices, cloud = slices_of(points[known], section)
+    slices, cloud = slices_of(points[known], section, "distance" in dataset.coords)
     factor, unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))
     maps = [
         Map(
@@ -149,7 +149,8 @@ def plot_map(
     rows = -(-len(maps) // columns)
     ratio = max(np.ptp(each.limits[1]) / np.ptp(each.limits[0]) for each in maps)
     height = min((TWO_COLUMNS - 1.3) / columns * ratio, _TALLEST)
-    width = max(height / ratio, _NARROWEST)
+    titled = max(height / ratio, _NARROWEST)
+    width = max(height / ratio, _NARROWEST + 0.4)
     size = 1.3 + width * columns + 0.5, 0.9 + (0.45 + height) * rows
     figure, grid = panels(*size, columns, rows)
     for axes, each in itertools.zip_longest(grid.flat, maps):
@@ -157,7 +158,7 @@ def plot_map(
             axes.set_axis_off()
             continue
         _draw(axes, each, colors, words, shown, bins)
-        caption(axes, textwrap.fill(each.title, round(16 * width)))
+        caption(axes, textwrap.fill(each.title, round(16 * titled)))
         axes.locator_params("x", nbins=min(TICKS, round(2.4 * height / ratio)))
     name = dataset[quantity].long_name.split(",")[0]
     bar = figure.colorbar(colors, ax=grid, extend=extend)

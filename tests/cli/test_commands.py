@@ -217,6 +217,7 @@ def test_plan_tells_range_and_plan_of_the_api(geometry: Path, tmp_path: Path) ->
     text = call(*options, "--target", 45).output
     for part in ("the stiffness can be", "tension [N]", "cable3_3", "45 N/mm wanted"):
         assert part in text
+    assert f"\nsmallest joint stiffness {plan.stiffness.margin:.4g} N m/rad (" in text
 
 
 PATHS = {
@@ -384,7 +385,7 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
         (("weigh", "{geometry}", "--force", "0,0,0"), "--force: is zero"),
         (("weigh", "{geometry}", "--force", "0,0,-1", "--steps", "0"), "--steps: 0 given"),
         (("weigh", "{geometry}", "--force", "0,0,-900"), "810 N"),
-        (("buckle", "{geometry}", "--force", "0,0,0"), "wrench: is zero"),
+        (("buckle", "{geometry}", "--force", "0,0,0"), "--force: is zero"),
         (("plan", "{geometry}", "--direction", "0,0,0", "--target", "9"), "--direction: is the"),
         (("plan", "{geometry}", "--direction", "0,0,1", "--path", "no.csv"), "does not exist"),
         (("urdf", "{geometry}", "-o", "absent/arm.urdf"), "folder absent does not exist"),

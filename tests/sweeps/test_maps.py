@@ -68,6 +68,18 @@ def test_titles_and_ticks_of_narrow_panels_stay_apart(planar: xr.Dataset) -> Non
         assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
 
 
+def test_a_path_is_seen_whole_along_each_axis() -> None:
+    arm = short_arm()
+    ends = np.array([[0.3, -0.2, 0.1, 0.2, -0.1, 0.3], [-0.1, 0.2, 0.2, 0.3, 0.2, -0.2]])
+    found = cdsm.sweep(arm, cdsm.PathPoses(ends, 20), minimum=20.0)
+    figure = plots.plot_map(found, "softest")
+    tips = 1e3 * found.tip_position.values
+    for panel, (axis, shown) in enumerate((("y", [0, 2]), ("z", [0, 1]), ("x", [1, 2]))):
+        (colors,) = drawn(figure, panel)
+        np.testing.assert_allclose(places(colors), tips[:, shown], rtol=1e-12)
+        assert figure.axes[panel].get_title() == f"seen along {axis}"
+
+
 def test_unstable_entries_are_marked_and_counted(planar: xr.Dataset) -> None:
     unstable = (planar.status == cdsm.SweepStatus.UNSTABLE).values
     assert not unstable[..., 0].any()
