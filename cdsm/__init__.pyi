@@ -145,10 +145,10 @@ from cdsm.tension import Tension as Tension
 from cdsm.tension import distribute_tension as distribute_tension
 from cdsm.tolerance import Tolerance as Tolerance
 from cdsm.tolerance import Tolerances as Tolerances
-from cdsm.tolerances.budget import Uncertainty as Uncertainty
-from cdsm.tolerances.budget import uncertainty as uncertainty
-from cdsm.tolerances.monte_carlo import MonteCarlo as MonteCarlo
-from cdsm.tolerances.monte_carlo import monte_carlo as monte_carlo
+from cdsm.uncertainties.budget import Uncertainty as Uncertainty
+from cdsm.uncertainties.budget import uncertainty as uncertainty
+from cdsm.uncertainties.monte_carlo import MonteCarlo as MonteCarlo
+from cdsm.uncertainties.monte_carlo import monte_carlo as monte_carlo
 from cdsm.urdf import to_urdf as to_urdf
 from cdsm.urdf import write_urdf as write_urdf
 from cdsm.wires.files import read_elasticity as read_elasticity

@@ -40,7 +40,7 @@ CHAPTERS = {
     "sweeps": "Many postures",
     "support": "Many postures",
     "planning": "Planning",
-    "tolerances": "Uncertainty",
+    "uncertainties": "Uncertainty",
     "identification": "Identification",
     "interchange": "Other programs",
     "control": "Control",

@@ -19,8 +19,8 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array
 from cdsm.sweeps.poses import RandomPoses
 from cdsm.tension import Tension
-from cdsm.tolerances.balanced import Balance
-from cdsm.tolerances.inputs import Inputs, Places, inputs_of
+from cdsm.uncertainties.balanced import Balance
+from cdsm.uncertainties.inputs import Inputs, Places, inputs_of
 
 
 class Chain:

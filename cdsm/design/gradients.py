@@ -23,7 +23,7 @@ from cdsm.design.quantities import balanced, has_margin, margin, quiet_arm
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array
-from cdsm.tolerances.readings import Question
+from cdsm.uncertainties.readings import Question
 
 SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "length")
 """Quantities with exact derivatives."""

@@ -18,7 +18,7 @@ import numpy as np
 from cdsm.kernels.chains import STRAIGHT
 from cdsm.posture import Posture
 from cdsm.support.values import Array
-from cdsm.tolerances.inputs import Inputs, Places, rotations
+from cdsm.uncertainties.inputs import Inputs, Places, rotations
 
 
 def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> Array:

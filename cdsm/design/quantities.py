@@ -27,8 +27,8 @@ from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 from cdsm.tension import Tension, distribute_tension, grip
-from cdsm.tolerances.budget import uncertainty
-from cdsm.tolerances.readings import Reading
+from cdsm.uncertainties.budget import uncertainty
+from cdsm.uncertainties.readings import Reading
 
 _SURE: dict[str, tuple[Reading, float]] = {
     "stiffness": ("along", -1.0),

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from cdsm.plots.style import COLORS, expect, legend_below, panels
 
 if TYPE_CHECKING:
-    from cdsm.tolerances.budget import Uncertainty
-    from cdsm.tolerances.monte_carlo import MonteCarlo
+    from cdsm.uncertainties.budget import Uncertainty
+    from cdsm.uncertainties.monte_carlo import MonteCarlo
 
 
 def plot_uncertainty(budget: Uncertainty) -> Figure:

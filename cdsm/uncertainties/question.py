@@ -14,8 +14,8 @@ from cdsm.stiffness_matrix import stiffness
 from cdsm.support.validation import instance, one_of, unit_direction
 from cdsm.tension import Tension, distribute_tension
 from cdsm.tolerance import Tolerances
-from cdsm.tolerances.readings import Question, Reading
-from cdsm.tolerances.stuck import blocks_of
+from cdsm.uncertainties.readings import Question, Reading
+from cdsm.uncertainties.stuck import blocks_of
 
 READINGS = get_args(Reading)
 """Names of all readings."""

@@ -18,10 +18,10 @@ from cdsm.support.validation import scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
-from cdsm.tolerances.inputs import inputs_of
-from cdsm.tolerances.parts import Part, draw, standards, variance
-from cdsm.tolerances.question import checked_question, chosen_tolerances
-from cdsm.tolerances.readings import Question, Reading
+from cdsm.uncertainties.inputs import inputs_of
+from cdsm.uncertainties.parts import Part, draw, standards, variance
+from cdsm.uncertainties.question import checked_question, chosen_tolerances
+from cdsm.uncertainties.readings import Question, Reading
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

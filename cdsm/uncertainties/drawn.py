@@ -13,7 +13,7 @@ from cdsm.kernels.draws import stiffness_of_draws
 from cdsm.kernels.tension import NO_ARM
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array, frozen
-from cdsm.tolerances.inputs import inputs_of
+from cdsm.uncertainties.inputs import inputs_of
 
 _CONVERGED = 1e-10
 """Relative step at which the search for a critical tension ends; its error is the step's square."""

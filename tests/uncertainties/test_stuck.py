@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.tolerances.question import checked_question
+from cdsm.uncertainties.question import checked_question
 from tests.support import arms
-from tests.tolerances.test_budget import WORKSHOP, posture, readme_arm
+from tests.uncertainties.test_budget import WORKSHOP, posture, readme_arm
 
 
 def rough(kind: str) -> cdsm.Manipulator:

@@ -10,9 +10,9 @@ import pytest
 import cdsm
 from cdsm.support.values import Array
 from cdsm.tolerance import SOURCES
-from cdsm.tolerances.drawn import DrawnArms
-from cdsm.tolerances.question import checked_question
-from cdsm.tolerances.readings import Question, Reading
+from cdsm.uncertainties.drawn import DrawnArms
+from cdsm.uncertainties.question import checked_question
+from cdsm.uncertainties.readings import Question, Reading
 from tests.support import arms
 from tests.support.differences import assert_second_order
 

@@ -26,9 +26,14 @@ from cdsm.support.validation import flag, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
-from cdsm.tolerances.budget import Uncertainty, checked_probability, uncertainty, with_uncertainty
-from cdsm.tolerances.question import chosen_tolerances
-from cdsm.tolerances.readings import Reading
+from cdsm.uncertainties.budget import (
+    Uncertainty,
+    checked_probability,
+    uncertainty,
+    with_uncertainty,
+)
+from cdsm.uncertainties.question import chosen_tolerances
+from cdsm.uncertainties.readings import Reading
 
 if TYPE_CHECKING:
     import xarray

@@ -18,11 +18,11 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tolerance import Tolerances
-from cdsm.tolerances.balanced import Balance, buckling_gradient
-from cdsm.tolerances.drawn import DrawnArms, laws_at, margins
-from cdsm.tolerances.inputs import Inputs, Places, inputs_of, rotations
-from cdsm.tolerances.parts import Part, parts_of
-from cdsm.tolerances.stuck import Ties
+from cdsm.uncertainties.balanced import Balance, buckling_gradient
+from cdsm.uncertainties.drawn import DrawnArms, laws_at, margins
+from cdsm.uncertainties.inputs import Inputs, Places, inputs_of, rotations
+from cdsm.uncertainties.parts import Part, parts_of
+from cdsm.uncertainties.stuck import Ties
 
 Reading = Literal["along", "stuck", "margin", "tip", "tension", "critical_tension"]
 
@@ -37,7 +37,7 @@ class Question(ReadOnlyState):
         of: ``"along"``, ``"stuck"``, ``"margin"``, ``"tip"``, ``"tension"`` or
             ``"critical_tension"``, as for :func:`~cdsm.uncertainty`.
         stiffness: The stiffness; for ``critical_tension`` that at the critical tension, for
-            ``stuck`` that of the equivalent arm (:mod:`cdsm.tolerances.stuck`).
+            ``stuck`` that of the equivalent arm (:mod:`cdsm.uncertainties.stuck`).
         direction: The unit direction (3,) of ``along``, ``stuck`` and ``tip``; else None.
         cable: Index of the cable of ``tension``; else None.
         ties: For ``stuck``, which inputs of the equivalent arm belong to which input of the arm;
@@ -80,7 +80,7 @@ class Question(ReadOnlyState):
         return "smallest joint stiffness" if self.of == "margin" else "critical lower bound"
 
     def parts(self, tolerances: Tolerances) -> dict[str, tuple[Part, ...]]:
-        """Find the inputs of each tolerance; see :func:`~cdsm.tolerances.parts.parts_of`."""
+        """Find the inputs of each tolerance; see :func:`~cdsm.uncertainties.parts.parts_of`."""
         tension = (self.ties or self.stiffness).tension
         return parts_of(tolerances, self.labels, tension)
 

@@ -11,8 +11,8 @@ import pytest
 
 import cdsm
 from cdsm.tolerance.sources import SOURCES
-from cdsm.tolerances.inputs import inputs_of
-from cdsm.tolerances.parts import draw, parts_of
+from cdsm.uncertainties.inputs import inputs_of
+from cdsm.uncertainties.parts import draw, parts_of
 from tests.support import arms
 from tests.support.arms import readme_geometry
 

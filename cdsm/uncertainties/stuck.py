@@ -21,7 +21,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.sticking import holding
 from cdsm.support.values import Array
-from cdsm.tolerances.inputs import inputs_of
+from cdsm.uncertainties.inputs import inputs_of
 
 
 class Ties(NamedTuple):

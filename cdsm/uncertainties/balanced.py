@@ -27,7 +27,7 @@ from cdsm.kernels.sensitivity import single_gradient
 from cdsm.kernels.tension import OPTIMALITY
 from cdsm.support.values import Array
 from cdsm.tension import Tension
-from cdsm.tolerances.inputs import Inputs, Places
+from cdsm.uncertainties.inputs import Inputs, Places
 
 _NO_VELOCITY = np.zeros(3)
 
