@@ -60,7 +60,7 @@ class ArmModel:
         blocks: Joints and cables in groups that are solved one after the other for a first guess
             of the tensions.
         laws: Elasticities of the cables.
-        arrays: Fields of tree, routing, masses: the arguments of kernel ``single_pose`` before q.
+        arrays: All fields of tree, routing and masses, in turn, as ``single_pose`` takes them.
         lowest: Lower joint limits (nv,) [rad], minus the rounding tolerance.
         highest: Upper joint limits (nv,) [rad], plus the rounding tolerance.
     """
@@ -102,7 +102,7 @@ class ArmModel:
 
     @cached_property
     def chain_arrays(self) -> tuple[Any, ...]:
-        """Arguments of the kernel ``single_chains`` between tree and q: of segments and holes."""
+        """Routing, spans, holes and wraps of the segments, as ``single_chains`` takes them."""
         chains, routing = self.chains, route(self.body, self.tree, self.chains.segments)
         span = np.zeros((len(chains.segments), 3), dtype=np.intp)
         moving = routing.segment[:-1, 0]

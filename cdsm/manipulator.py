@@ -10,7 +10,7 @@ import os
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -237,8 +237,7 @@ class Manipulator(ArmFacts):
 
     def _pose(self, q: Array) -> tuple[Array, ...]:
         """Return what the kernel ``single_pose`` computes at checked joint angles q (nv,) [rad]."""
-        arguments: tuple[Any, ...] = (*self._model.arrays, q)
-        *pose, shortest = single_pose(*arguments)
+        *pose, shortest = single_pose(self._model.arrays, q)
         if shortest < SHORTEST_SEGMENT:
             site = pose[-1]
             for cable, path in zip(self.cables, site_paths(self.cables, site), strict=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,8 +181,8 @@ class Posture(ReadOnlyState):
     def segments(self) -> Segments:
         """Segments of the cables between their holes, and wrap angles, computed on first use."""
         model = self.arm._model
-        arguments: tuple[Any, ...] = (*model.tree, *model.chain_arrays, self.q)
-        lengths, jacobian, wrap, gradient, *frames = chain_kernels.single_chains(*arguments)
+        found = chain_kernels.single_chains(model.arrays[:6], model.chain_arrays, self.q)
+        lengths, jacobian, wrap, gradient, *frames = found
         return Segments(
             chains=model.chains,
             lengths=frozen(lengths),

@@ -20,8 +20,6 @@ BEYOND_LIMITS = int(Status.BEYOND_LIMITS)
 COINCIDENT_SITES = int(Status.COINCIDENT_SITES)
 INFEASIBLE = int(Status.INFEASIBLE)
 OUTSIDE_ELASTICITY = int(Status.OUTSIDE_ELASTICITY)
-SINGULAR = int(Status.SINGULAR)
-IMMOBILE = int(Status.IMMOBILE)
 UNDECIDED = 255
 """Internal status: the guess of tensions is not optimal; a search or a solver follows."""
 POSTPONED = 254

@@ -17,6 +17,7 @@ mean of both sides.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -79,42 +80,27 @@ def _set_wraps(
 
 @compiled
 def single_chains(
-    parent: Indices,
-    order: Indices,
-    turn: Array,
-    translation: Array,
-    joint_axis: Array,
-    joint_slide: Array,
-    row: Indices,
-    point: Array,
-    segment: Indices,
-    joint: Indices,
-    fixed: Array,
-    span: Indices,
-    hole: Indices,
-    own: Array,
-    q: Array,
+    arm: tuple[Any, ...], chains: tuple[Any, ...], q: Array
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
     """Compute the segments and wrap angles of one posture at q (nv,).
 
-    The arguments are the fields of :class:`Tree`, those of the :class:`Routing` of the segments,
-    and those that :func:`_set_wraps` needs.
+    ``arm`` holds the fields of its tree, ``chains`` those of the routing of the segments, then the
+    arguments ``span``, ``hole`` and ``own`` of :func:`_set_wraps`.
 
     Returns:
         l (S,), ∂l/∂θ (S, nv), φ (P,), ∂φ/∂θ (P, nv), and the fields of :class:`Frames`, all
         without the last axis.
     """
-    tree = Tree(parent, order, turn, translation, joint_axis, joint_slide)
-    routing = Routing(row, point, segment, joint, fixed)
-    nv, count, holes, rows = q.shape[0], fixed.shape[0], hole.shape[0], parent.shape[0]
+    tree, routing, (span, hole, own) = Tree(*arm), Routing(*chains[:5]), chains[5:]
+    nv, rows, count = q.shape[0], tree.parent.shape[0], routing.fixed.shape[0]
     before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)
     frames = empty_frames(tree, routing, 1)
     length, J, shortest = np.empty((count, 1)), np.empty((count, nv, 1)), np.empty(1)
-    wrap, gradient = np.empty(holes), np.zeros((holes, nv))
+    wrap, gradient = np.empty(hole.shape[0]), np.zeros((hole.shape[0], nv))
     rotation = np.empty((rows, 3, 3, 1))
     forward_kinematics(tree, routing, q.reshape(nv, 1), np.empty((2, 1)), rotation, frames, None)
     set_lengths(routing, frames, before, length, J, shortest, None)
-    _set_wraps(span, joint, hole, own, frames, before, after, wrap, gradient)
+    _set_wraps(span, routing.joint, hole, own, frames, before, after, wrap, gradient)
     return (
         length.reshape(count),
         J.reshape(count, nv),
@@ -122,8 +108,8 @@ def single_chains(
         gradient,
         frames.origin.reshape(rows, 3),
         frames.axis.reshape(rows, 3),
-        frames.slide.reshape(joint_slide.shape[0], 3),
-        frames.site.reshape(row.shape[0], 3),
+        frames.slide.reshape(tree.slide.shape[0], 3),
+        frames.site.reshape(routing.row.shape[0], 3),
     )
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
 from cdsm.kernels.compiling import compiled, inner
 from cdsm.kernels.records import mirror
 from cdsm.kernels.segments import segment_scratch, set_lengths
-from cdsm.kernels.tree import Indices, Routing, Tree, empty_frames, forward_kinematics
+from cdsm.kernels.tree import Routing, Tree, empty_frames, forward_kinematics
 from cdsm.support.values import Array
 
 _Pose = tuple[Array, Array, Array, Array, Array, Array, Array, Array, Array, Array, float]
@@ -50,32 +52,9 @@ def compute_pose(tree: Tree, routing: Routing, masses: Masses, q: Array) -> _Pos
 
 
 @compiled
-def single_pose(
-    parent: Indices,
-    order: Indices,
-    turn: Array,
-    translation: Array,
-    joint_axis: Array,
-    joint_slide: Array,
-    row: Indices,
-    point: Array,
-    segment: Indices,
-    joint: Indices,
-    fixed: Array,
-    mass: Array,
-    centre: Array,
-    gravity: Array,
-    tip: int,
-    tip_joints: Indices,
-    tip_rotation: Array,
-    tip_point: Array,
-    q: Array,
-) -> _Pose:
-    """Compute a posture from the fields of :class:`Tree`, :class:`Routing` and :class:`Masses`.
+def single_pose(arm: tuple[Any, ...], q: Array) -> _Pose:
+    """Compute a posture; ``arm`` holds the fields of its tree, its routing and its masses, in turn.
 
     Python passes and receives plain arrays: named tuples took a third of the total time.
     """
-    tree = Tree(parent, order, turn, translation, joint_axis, joint_slide)
-    routing = Routing(row, point, segment, joint, fixed)
-    masses = Masses(mass, centre, gravity, tip, tip_joints, tip_rotation, tip_point)
-    return compute_pose(tree, routing, masses, q)
+    return compute_pose(Tree(*arm[:6]), Routing(*arm[6:11]), Masses(*arm[11:]), q)

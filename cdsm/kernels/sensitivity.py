@@ -209,9 +209,8 @@ def single_gradient(
     forward_kinematics(tree, routing, q.reshape(nv, 1), np.empty((2, 1)), rotation, frames, None)
     origin, axis = frames.origin.reshape(rows, 3), frames.axis.reshape(rows, 3)
     slide = frames.slide.reshape(tree.slide.shape[0], 3)
-    motion = Motion(
-        np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3))
-    )
+    still = np.zeros((4, rows, 3))
+    motion = Motion(still[0], still[1], still[2], still[3])
     set_motion(tree, origin, axis, slide, z, motion)
     turning, rate, moving, acceleration = motion
     # all points: sites, centres of mass, tip
@@ -261,13 +260,12 @@ def single_gradient(
         spin_rate[r] = -bent * wrench[3 + r]
         value += weight[last, 1, r] * x[last, 1, r] + weight[last, 2, r] * x[last, 2, r]
     value += dot(spin, turning[tip]) + dot(spin_rate, rate[tip])
-    by_q, by_site, by_centre = np.empty(nv), np.empty((sites, 3)), np.empty((rows, 3))
-    by_origin, by_tip, back, scratch = np.zeros((rows, 3)), np.empty(3), np.empty(3), np.empty(3)
+    by_q, by_point, by_origin = np.empty(nv), np.empty((count, 3)), np.zeros((rows, 3))
+    back, scratch = np.empty(3), np.empty(3)
     for n in range(count):
         i = at[n]
         pull_back(turning[i], rate[i], weight[n], scratch, back)
-        into = by_site[n] if n < sites else by_centre[i] if n < sites + rows else by_tip
-        to_frame(rotation[i], back, into)
+        to_frame(rotation[i], back, by_point[n])
     beyond = np.empty(rows)
     for k in range(rows - 1):
         i = order[k]
@@ -281,4 +279,5 @@ def single_gradient(
             tip, back,
         )  # fmt: skip
         to_frame(rotation[parent[i]], back, by_origin[i])
+    by_site, by_centre, by_tip = by_point[:sites], by_point[sites:last], by_point[last]
     return value, by_q, by_site, by_origin, by_centre, by_tip, by_mass, by_tension, by_stiffness
