@@ -19,8 +19,9 @@ from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, InvalidInput
 from cdsm.geometry import Geometry
 from cdsm.rigid_body import RigidBody
+from cdsm.support.directions import Direction, gravity_vector
 from cdsm.support.format import JointUnits, plural
-from cdsm.support.validation import Direction, gravity_vector, instance, one_of, sequence_of
+from cdsm.support.validation import instance, one_of, sequence_of
 from cdsm.support.values import Array, Printed
 from cdsm.tolerance import Tolerances
 

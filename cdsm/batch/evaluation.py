@@ -19,9 +19,10 @@ from cdsm.batch.labels import to_dataset
 from cdsm.batch.layout import DIRECTIONAL, QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import Manipulator
+from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.status import summary
 from cdsm.support.tidy import tidy
-from cdsm.support.validation import Direction, instance, one_of, unit_directions
+from cdsm.support.validation import instance, one_of
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
 

@@ -24,7 +24,7 @@ from cdsm.cli.output import Json, answer, by_cable, write
 from cdsm.cli.values import direction_of, misuse
 
 if TYPE_CHECKING:
-    from cdsm.support.validation import Direction
+    from cdsm.support.directions import Direction
 
 _Given = Annotated[
     Path | None,

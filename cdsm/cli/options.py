@@ -39,7 +39,7 @@ def _wires() -> list[str]:
 
 def directions() -> list[str]:
     """Return the names of directions, such as ``-z``, for completion in a shell."""
-    from cdsm.support.validation import AXES
+    from cdsm.support.directions import AXES
 
     return list(AXES)
 

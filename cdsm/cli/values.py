@@ -53,7 +53,7 @@ def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
 
 def axis(text: str) -> tuple[float, float, float] | None:
     """Return the unit vector of an axis such as ``-z``; None if the text is not an axis."""
-    from cdsm.support.validation import AXES
+    from cdsm.support.directions import AXES
 
     return AXES.get(text.strip())
 

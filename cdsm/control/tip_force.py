@@ -21,9 +21,10 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, SolverError
 from cdsm.posture import Posture
+from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, proved_largest
-from cdsm.support.validation import Direction, instance, quantity, unit_direction, vector
+from cdsm.support.validation import instance, quantity, vector
 from cdsm.support.values import Array, ReadOnlyState
 
 _WIDEST = 1e6  # limit of T and f in the linear programs, over the largest tension

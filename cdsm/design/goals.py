@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, final, get_args
 
 from cdsm.errors import InvalidInput
+from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
-from cdsm.support.validation import Direction, one_of, scalar, unit_direction
+from cdsm.support.validation import one_of, scalar
 
 MeasureName = Literal[
     "stiffness",

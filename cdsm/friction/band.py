@@ -17,8 +17,8 @@ from cdsm.friction.rest_states import RestStates
 from cdsm.posture import Posture
 from cdsm.sticking import holding
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
-from cdsm.support.validation import Direction, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 

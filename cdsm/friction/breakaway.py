@@ -20,8 +20,8 @@ from cdsm.friction.stuck import assemble_segments, stuck_stiffness
 from cdsm.posture import Posture
 from cdsm.sticking import SLACK, first_order_loads, holding
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
-from cdsm.support.validation import Direction, unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 

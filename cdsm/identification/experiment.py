@@ -17,15 +17,9 @@ from cdsm.identification.loop import WeightLoop, up_and_down
 from cdsm.identification.problem import Model, UserFaultError
 from cdsm.identification.search import check_call
 from cdsm.manipulator import Manipulator
+from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.progress import progress_allowed, track
-from cdsm.support.validation import (
-    Direction,
-    number_array,
-    one_of,
-    scalar,
-    unit_directions,
-    whole_number,
-)
+from cdsm.support.validation import number_array, one_of, scalar, whole_number
 from cdsm.support.values import Array, frozen
 
 _STEP = 1e-5  # relative change of a parameter for its central difference

@@ -11,14 +11,8 @@ from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import Measurement, checked_conditions
 from cdsm.manipulator import Manipulator
 from cdsm.statics.loading_path import LoadingPath
-from cdsm.support.validation import (
-    SMALLEST,
-    Axis,
-    instance,
-    number_array,
-    scalar,
-    unit_direction,
-)
+from cdsm.support.directions import Axis, unit_direction
+from cdsm.support.validation import SMALLEST, instance, number_array, scalar
 from cdsm.support.values import Array
 from cdsm.tension import distribute_tension
 

@@ -10,16 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import (
-    SMALLEST,
-    Axis,
-    axis_vector,
-    number_array,
-    scalar,
-    unit_direction,
-    vector,
-    wrench_vector,
-)
+from cdsm.support.directions import Axis, axis_vector, unit_direction
+from cdsm.support.validation import SMALLEST, number_array, scalar, vector, wrench_vector
 
 if TYPE_CHECKING:
     from cdsm.identification.loop import WeightLoop

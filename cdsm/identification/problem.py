@@ -20,7 +20,8 @@ from cdsm.statics.loading_path import LoadingPath, same_segments
 from cdsm.statics.rest_search import equilibrium
 from cdsm.statics.weight_test import WeightTest, weight_test
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import SMALLEST, unit_direction
+from cdsm.support.directions import unit_direction
+from cdsm.support.validation import SMALLEST
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from cdsm.errors import FileError, counted
+from cdsm.support.directions import AXES
 from cdsm.support.files import read_text
-from cdsm.support.validation import AXES
 from cdsm.support.values import Array
 from cdsm.support.xml import XmlFault, numbers, parse_xml
 from cdsm.urdf import TIP

@@ -16,16 +16,10 @@ from cdsm.measures.program import Loads
 from cdsm.posture import Posture
 from cdsm.statics.buckling import critical_load
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates, plain
 from cdsm.support.status import Status
-from cdsm.support.validation import (
-    NO_WRENCH,
-    Direction,
-    instance,
-    quantity,
-    unit_direction,
-    wrench_vector,
-)
+from cdsm.support.validation import NO_WRENCH, instance, quantity, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import bounds_at, distribute_tension
 

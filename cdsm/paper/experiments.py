@@ -16,7 +16,7 @@ import numpy as np
 from cdsm.paper.claims import Claim, Figure, floats
 from cdsm.paper.prototype_fit import STEPS, PrototypeFit, identified, section_v_claim
 from cdsm.paper.section_v import DROPS, HYBRID, RISES, TENSIONS
-from cdsm.support.validation import XYZ
+from cdsm.support.directions import XYZ
 from cdsm.support.values import Array, frozen
 
 _POINTS: Final = 40

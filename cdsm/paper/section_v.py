@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cdsm.support.validation import XYZ
+from cdsm.support.directions import XYZ
 from cdsm.support.values import frozen
 
 TABLE_II: Final = frozen(

@@ -14,7 +14,8 @@ import numpy as np
 
 from cdsm.planning.kernels import form_by_tension
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import Direction, instance, unit_direction
+from cdsm.support.directions import Direction, unit_direction
+from cdsm.support.validation import instance
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 

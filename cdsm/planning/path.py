@@ -21,17 +21,10 @@ from cdsm.planning.path_plan import InfeasibleSample, PathPlan, Status
 from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel, checked_margin
 from cdsm.stiffness_matrix import stiffness
+from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.format import coordinates
 from cdsm.support.progress import track
-from cdsm.support.validation import (
-    NO_WRENCH,
-    Direction,
-    bound,
-    flag,
-    instance,
-    number_array,
-    unit_directions,
-)
+from cdsm.support.validation import NO_WRENCH, bound, flag, instance, number_array
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 

@@ -22,9 +22,10 @@ from cdsm.planning.range import MARGIN
 from cdsm.planning.stiffness_model import StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.format import MODEL, coordinates, key, plain
 from cdsm.support.progress import progress_allowed
-from cdsm.support.validation import NO_WRENCH, Direction, unit_directions
+from cdsm.support.validation import NO_WRENCH
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 

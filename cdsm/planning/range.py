@@ -18,9 +18,10 @@ from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import Constraints, Evaluation, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
+from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import MODEL, coordinates, plain, span
 from cdsm.support.progress import progress_allowed, track
-from cdsm.support.validation import NO_WRENCH, Direction, unit_direction
+from cdsm.support.validation import NO_WRENCH
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity

@@ -28,7 +28,8 @@ from cdsm.statics.bound_scan import (
     tension_domain,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
+from cdsm.support.directions import Direction, unit_direction
+from cdsm.support.validation import NO_WRENCH, bound, instance, scalar
 from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
 

@@ -23,7 +23,7 @@ from cdsm.plots.style import (
     finish_picture,
     picture_axes,
 )
-from cdsm.support.validation import XYZ
+from cdsm.support.directions import XYZ
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:

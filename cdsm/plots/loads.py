@@ -23,7 +23,7 @@ from cdsm.plots.style import (
     legend,
     panels,
 )
-from cdsm.support.validation import XYZ
+from cdsm.support.directions import XYZ
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

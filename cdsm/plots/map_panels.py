@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.style import MM
-from cdsm.support.validation import XYZ, one_of, scalar
+from cdsm.support.directions import XYZ
+from cdsm.support.validation import one_of, scalar
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:

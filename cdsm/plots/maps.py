@@ -33,8 +33,9 @@ from cdsm.plots.style import (
     panels,
     plain_log_ticks,
 )
+from cdsm.support.directions import XYZ
 from cdsm.support.tidy import check_sweep, status_names
-from cdsm.support.validation import XYZ, one_of, whole_number
+from cdsm.support.validation import one_of, whole_number
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:

@@ -33,7 +33,7 @@ from cdsm.plots.style import (
     plain_log_ticks,
     styled,
 )
-from cdsm.support.validation import XYZ
+from cdsm.support.directions import XYZ
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:

@@ -22,9 +22,9 @@ from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import Axes3D, proj3d  # type: ignore[import-untyped]
 
 from cdsm.errors import InvalidInput
+from cdsm.support.directions import XYZ
 from cdsm.support.files import as_path, write_file
 from cdsm.support.format import coordinates
-from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 
 ONE_COLUMN: Final = 3.5

@@ -17,8 +17,8 @@ from cdsm.posture import Posture
 from cdsm.statics.locked_motors import rounding
 from cdsm.statics.trust_region import FLAT
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.directions import unit_direction
 from cdsm.support.format import aligned, coordinates, plain
-from cdsm.support.validation import unit_direction
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:

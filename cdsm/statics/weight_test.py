@@ -19,9 +19,10 @@ from cdsm.statics.following import follow_load
 from cdsm.statics.load_cycle import load_cycle
 from cdsm.statics.rest_search import equilibrium
 from cdsm.statics.weight_friction import WeightFriction
+from cdsm.support.directions import unit_direction
 from cdsm.support.format import MODEL, coordinates, plain
 from cdsm.support.tidy import data_frame
-from cdsm.support.validation import unit_direction, vector, whole_number
+from cdsm.support.validation import vector, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 

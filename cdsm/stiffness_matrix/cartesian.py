@@ -20,8 +20,9 @@ from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.kernels import readings
 from cdsm.kernels.read import read
 from cdsm.posture import Posture
+from cdsm.support.directions import Direction, unit_direction, unit_directions
 from cdsm.support.format import coordinates
-from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
+from cdsm.support.validation import one_of
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]

@@ -13,9 +13,9 @@ from cdsm.kernels.read import read_margin
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.cartesian import CartesianReadings, Term
 from cdsm.stiffness_matrix.shares import Shares
+from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.markup import element, row
 from cdsm.support.tidy import dataset
-from cdsm.support.validation import Direction, unit_direction
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import Direction, number_array, one_of, scalar, text, vector
+from cdsm.support.directions import Direction
+from cdsm.support.validation import number_array, one_of, scalar, text, vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.sweeps.quantities import QUANTITIES
 

@@ -17,19 +17,11 @@ from cdsm.batch.inputs import checked_threads
 from cdsm.elasticity import Elasticity
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
+from cdsm.support.directions import XYZ, Direction, unit_direction
 from cdsm.support.extras import need
 from cdsm.support.files import as_path
 from cdsm.support.progress import progress_bar
-from cdsm.support.validation import (
-    NO_WRENCH,
-    XYZ,
-    Direction,
-    flag,
-    instance,
-    unit_direction,
-    whole_number,
-    wrench_vector,
-)
+from cdsm.support.validation import NO_WRENCH, flag, instance, whole_number, wrench_vector
 from cdsm.sweeps.arguments import bounds_of, laws_of, outputs_of, vectors_of
 from cdsm.sweeps.blocks import Block, blocks, extents, postures
 from cdsm.sweeps.cluster import checked_client, on_cluster

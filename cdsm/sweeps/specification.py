@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
+from cdsm.support.directions import XYZ
 from cdsm.support.format import MODEL, JointUnits
-from cdsm.support.validation import XYZ
 from cdsm.sweeps.arguments import Label, label
 from cdsm.sweeps.blocks import Block
 from cdsm.sweeps.description import attributes_of, law_text

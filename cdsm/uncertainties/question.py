@@ -11,7 +11,8 @@ from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
 from cdsm.statics.buckling import critical_tension
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.validation import instance, one_of, unit_direction
+from cdsm.support.directions import unit_direction
+from cdsm.support.validation import instance, one_of
 from cdsm.tension import Tension, distribute_tension
 from cdsm.tolerance import Tolerances
 from cdsm.uncertainties.readings import Question, Reading

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import XYZ
+from cdsm.support.directions import XYZ
 from cdsm.support.values import Array
 from cdsm.view.command import command_text
 from cdsm.view.panel import basis_text, page_text, tensions_text

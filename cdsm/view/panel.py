@@ -12,9 +12,9 @@ import numpy as np
 from cdsm.manipulator import Manipulator
 from cdsm.plots.style import COLOR_MAP, MM, N_PER_MM
 from cdsm.stiffness_matrix.prints import model_of
+from cdsm.support.directions import XYZ
 from cdsm.support.format import coordinates, plural
 from cdsm.support.markup import Markup, element
-from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 from cdsm.view.state import ELLIPSOID, FORCE, SLIDES, STICKS, Condition, Shown
 from cdsm.wires.catalogue import wires_text

@@ -19,8 +19,8 @@ from scipy.stats import binomtest
 
 import cdsm
 from cdsm.identification import WeightLoop
+from cdsm.support.directions import Axis
 from cdsm.support.progress import track
-from cdsm.support.validation import Axis
 from tests.support.coverage import Experiment
 
 TRUE = {

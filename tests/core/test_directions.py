@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.validation import AXES, unit_directions
+from cdsm.support.directions import AXES, unit_directions
 from tests.support.sweeps import short_arm
 
 ARM = short_arm()
