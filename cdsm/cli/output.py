@@ -135,7 +135,9 @@ def reported(as_json: bool) -> Iterator[None]:
     except KeyboardInterrupt:
         if debug_wanted.get():
             raise
-        console().print("interrupted: no file is half-written; finished parts in --resume or --out stay")
+        console().print(
+            "interrupted: no file is half-written; what --resume, or a search in --out, keeps stays"
+        )
         raise typer.Exit(INTERRUPTED) from None
     # OSError: of the terminal or pipe
     except (cdsm.CdsmError, OSError) as error:
