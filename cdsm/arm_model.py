@@ -113,8 +113,9 @@ class ArmModel:
     def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
         """Segments whose length the joints change, and these joints: (a, b, segment, joint).
 
-        ``a`` and ``b`` (n,) are the indices of the two sites of each segment. ``segment`` and
-        ``joint`` (m,) form pairs: the index of a segment, and the row of a joint between its sites.
+        ``a`` and ``b`` (n,) are the indices of the two sites of each of these segments. ``segment``
+        and ``joint`` (m,) form pairs: the index of a segment in ``a``, and the row in :attr:`tree`
+        of a joint between its sites.
         """
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))

@@ -14,7 +14,7 @@ from cdsm.support.values import Array, frozen
 
 
 class Arm(NamedTuple):
-    """Arm with nv joint coordinates and C cables."""
+    """Arrays of an arm with nv joint coordinates and C cables, as the fused kernel takes them."""
 
     tree: Tree  # joints
     routing: Routing  # cables

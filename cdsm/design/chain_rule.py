@@ -71,7 +71,10 @@ class Chain:
         )
 
     def of_links(self, source: str) -> Array:
-        """Return the derivatives (n,) of the sum of ``link_mass`` or ``link_length`` over links."""
+        """Return the derivatives (n,) of total link mass or length with respect to the variables.
+
+        ``source`` is ``link_mass`` or ``link_length``.
+        """
         return np.array([float(np.sum(column.get(source, 0.0))) for column in self._columns])
 
 

@@ -108,9 +108,9 @@ def inverse_kinematics(
 
 
 def _solve(residual: Residual, guess: Array, tolerance: float) -> dict[str, Any]:
-    """Find the angles nearest to ``guess`` (nv,) with ‖r‖ ≤ ``tolerance``, r of ``residual``.
+    """Find the angles nearest to ``guess`` (nv,) with ‖r‖ ≤ ``tolerance``, or else least ‖r‖.
 
-    Returns the fields that both classes of solutions have.
+    r is the ``residual``. Returns the fields that JointSolution and KinematicSolution share.
     """
     tolerance = scalar("tolerance", tolerance)
     if not _SMALLEST_TOLERANCE <= tolerance < 1.0:

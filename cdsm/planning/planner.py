@@ -136,7 +136,10 @@ class Planner:
         return best
 
     def _starts(self) -> Iterator[Evaluation]:
-        """Yield stable starts: least tensions, points that hit a single target, random points."""
+        """Yield up to ``starts`` stable points: least tensions, hits, the anchor, random points.
+
+        A hit is a point on target; hits are sought only if there is a single target.
+        """
         anchor = self.begin.anchor
         least = anchor.backtracked(self.model.region.least.values)
         points = [] if least is None else [least]

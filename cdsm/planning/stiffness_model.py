@@ -166,7 +166,7 @@ class Constraints:
     single: tuple[Array, float] | None = None  # u (3,) and target [N/m] of one direction
 
     def at(self, evaluation: Evaluation) -> ConstraintValues:
-        """Return the constraint values c at the stable tensions of ``evaluation``."""
+        """Return the constraint values c at the tensions of ``evaluation``, which are stable."""
         return ConstraintValues(self, evaluation)
 
 

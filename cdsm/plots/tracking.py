@@ -36,7 +36,8 @@ _HALF = 0.5
 def plot_tracking_run(run: TrackingRun) -> Figure:
     """Plot a closed loop over time: tip error, stiffness, the tip in its band of rest, tensions.
 
-    The band is the range, along the first direction, in which friction lets the tip rest.
+    The band is where friction lets the tip rest, along the first direction of the plan, counted
+    from the rest without friction.
 
     InvalidInput if ``run`` is no result of :func:`~cdsm.track`.
     """

@@ -116,10 +116,11 @@ def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> 
 def no_rest(
     reference: Posture, pose: Posture, residual: Array, reached: float, load: str = "the load"
 ) -> EquilibriumError:
-    """Return the error of a search that found no equilibrium beyond a part ``reached`` of the load.
+    """Return the error of a search that found no equilibrium beyond a part ``reached`` of ``load``.
 
-    ``residual`` (nv,) is that of the last iterate, at ``pose``. The error names a cable whose
-    sites meet there, compared with ``reference``.
+    ``residual`` (nv,) is the torque out of balance at ``pose``, the last iterate. The error names
+    the joint where it is largest, and a cable if two neighbouring sites meet: at ``pose`` they are
+    1000 times nearer to each other than at ``reference``.
     """
     frozen(residual)
     worst = int(abs(residual).argmax())

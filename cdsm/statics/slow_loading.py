@@ -171,7 +171,10 @@ class SlowLoading(NamedTuple):
         return State(load, search.state, reaction, search.state.q - old.q), search
 
     def _energies(self, start: State, middle: State, end: State) -> tuple[Passage, float]:
-        """Compute the energies of a sub-step from its equilibria, and their rounding error [J]."""
+        """Return energies and slips of a sub-step, and the rounding error of its balance [J].
+
+        The energies follow from the equilibria at start, middle and end.
+        """
         states = (start, middle, end)
         torque = [s.load.wrench @ s.pose.jacobian + s.load.holding for s in states]
         P = [self.problem.potential(s.settled.chain.tension) for s in states]

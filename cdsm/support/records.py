@@ -117,7 +117,10 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
-    """Wrap ``validated``, with the keywords of ``kind``: its faults raise one GeometryError."""
+    """Wrap ``validated``, which pydantic checks: all its faults raise one GeometryError.
+
+    ``kind`` is the record or function behind it, for the keywords in the messages.
+    """
 
     @wraps(validated)
     def call(*args: object, **values: object) -> object:

@@ -207,7 +207,11 @@ def _finish(
     loss: Array,
     names: list[str],
 ) -> None:
-    """Add to ``rows`` those of ``names`` that a batch does not compute; complete ``status``."""
+    """Add to ``rows`` the outputs in ``names`` that a batch does not compute; complete ``status``.
+
+    These are ``wire_strain`` and those of the stage ``principal``. ``tension`` [N] and ``loss``
+    have the shape (R, C); ``loss`` is the largest ratio of two tensions along a cable.
+    """
     if "wire_strain" in names:
         # friction may take a tension along a cable out of the domain of its law
         held = _exists("tension", status)

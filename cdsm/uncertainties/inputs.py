@@ -79,15 +79,15 @@ def inputs_of(arm: Manipulator) -> Inputs:
 
 
 class Inputs:
-    """Inputs of an arm by source; the source ``hole_radius``, for example, has all hole radii.
+    """Inputs of an arm, the numbers that can have a tolerance, by source such as ``hole_radius``.
 
     Attributes:
-        places: The points of the nominal arm.
-        first: First site of each cable, and the number of sites, (C+1,).
+        places: Points of the arm without errors; they have n coordinates.
+        first: Index of the first site of each cable, then the number of sites, (C+1,).
         link_rows: Row of the joint that moves each link with a mass, (links,).
         labels: Names of the inputs of each source.
-        columns: Columns of the inputs of each source in :attr:`map`.
-        map: Displacement of all coordinates of :attr:`places` per input (n, inputs), sparse.
+        columns: Columns of :attr:`map` of each source that moves points.
+        map: Derivatives of the n coordinates by the inputs of these sources (n, inputs), sparse.
     """
 
     def __init__(self, arm: Manipulator) -> None:

@@ -57,10 +57,10 @@ def serve(
         arm: The arm; it is not changed.
         host: Address to listen at; the default allows this machine only.
         port: Port to listen at; 0 for any free port.
-        q: First joint angles (nv,) [rad]; by default zero, or the nearest joint limit.
-        minimum: First lower bound of all tensions [N].
+        q: Joint angles at the start (nv,) [rad]; by default zero, or the nearest joint limit.
+        minimum: Lower bound of all tensions at the start [N].
         maximum: Upper bound of all tensions [N].
-        force: First force at the tip, in base axes (3,) [N].
+        force: Force at the tip at the start, in base axes (3,) [N].
         sag: Whether the force first moves the arm to its :func:`~cdsm.equilibrium`. Otherwise the
             tensions balance the force at the posture.
         angles: A path to play, as joint angles (S, nv) [rad]; the arm starts at the first.
@@ -68,13 +68,13 @@ def serve(
         solver: Solver of :func:`~cdsm.distribute_tension`.
         largest_tension: Right end of the slider of the lower bound [N].
         largest_force: The sliders of the force go to ± this [N], or further if ``force`` does.
-        arm_arguments: Arguments that describe the arm in a shell. The page then gives a command of
-            the shell, otherwise lines of Python.
+        arm_arguments: The arm as arguments of ``cdsm``. The page then shows the command that
+            computes its numbers, otherwise lines of Python.
 
     Raises:
         MissingExtra: viser is not installed (extra ``[view]``).
         InvalidInput: A value has the wrong type or shape, or the port is not available.
-        CdsmError: The server of the installed viser cannot be protected.
+        CdsmError: The installed viser starts its server so that other sites cannot be refused.
         JointLimitError: An angle is beyond its limit.
         UnknownName: The solver is not installed.
     """

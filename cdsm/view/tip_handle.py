@@ -1,4 +1,4 @@
-"""A handle at the tip of the arm: inverse kinematics moves the joints where it is dragged."""
+"""A handle at the tip of the arm; inverse kinematics moves the joints so that the tip follows."""
 
 from __future__ import annotations
 

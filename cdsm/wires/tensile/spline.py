@@ -202,7 +202,10 @@ class Curve:
         return chosen
 
     def _likelihood(self, points: Points) -> float:
-        """Compute −2 log of the restricted likelihood of the smoothing; the curve is linearised."""
+        """Compute −2 log of the restricted likelihood (REML) of the smoothing, up to a constant.
+
+        The force is linearised in the coefficients and the anchor strain.
+        """
         rows, error = self._linearised(points)
         unknowns = np.append(self.coefficients, self.anchor_strain)
         factor, scale = self._factored(rows)

@@ -35,9 +35,10 @@ def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | N
 
 
 def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Find the tension [N] from which EA grows slower than √F; arguments of :func:`yield_onset`.
+    """Find the tension [N] where pre-tensioning ends: beyond it, EA grows slower than √F.
 
-    None if EA nowhere grows faster than √F, beyond its uncertainty.
+    √F is midway from EA ∝ F to constant EA. None if EA nowhere grows faster than √F, beyond its
+    uncertainty. The arguments are those of :func:`yield_onset`.
     """
     level = np.log(rigidity)
     inner = (tensions > _STEP * tensions[0]) & (tensions < tensions[-1] / _STEP) & (tensions > 0)
