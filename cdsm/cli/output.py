@@ -135,9 +135,7 @@ def reported(as_json: bool) -> Iterator[None]:
     except KeyboardInterrupt:
         if debug_wanted.get():
             raise
-        console().print(
-            "interrupted: no file is half-written; what --resume, or a search in --out, keeps stays"
-        )
+        console().print("interrupted: no file is half-written; what --resume or --out keeps stays")
         raise typer.Exit(INTERRUPTED) from None
     # OSError: of the terminal or pipe
     except (cdsm.CdsmError, OSError) as error:
