@@ -83,15 +83,11 @@ def stiffness(
         along = along | {direction: (u := direction_of(direction))}
         more = {"direction": u, "along_direction_N_per_m": K.along(u)}
         parts += [f"along {direction}: {K.along(u) / 1000.0:.4g} N/mm"]
-    breakaways = _breakaways(tension, along)
-    stuck = {
-        axis: {"stuck_N_per_m": each.stiffness.along(along[axis]), "breakaway_N": each.load}
-        for axis, each in breakaways.items()
-    }
-    parts += [_sticking(breakaways)] if breakaways else []
-    more |= {"sticking": stuck} if breakaways else {}
+    lines, stuck = _sticking(_breakaways(tension, along), along)
     tables, sure = _uncertainty(tension, tolerances, along)
-    answer(as_json, lambda: K.to_dict() | more | sure, *parts, *tables, warnings=K.warnings[:1])
+    numbers = more | stuck | sure
+    parts += [*lines, *tables]
+    answer(as_json, lambda: K.to_dict() | numbers, *parts, warnings=K.warnings[:1])
 
 
 def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[str, cdsm.Breakaway]:
@@ -110,17 +106,29 @@ def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[s
     return found
 
 
-def _sticking(breakaways: dict[str, cdsm.Breakaway]) -> str:
-    """Write the stuck stiffness and the breakaway load, one line for each axis."""
+def _sticking(
+    breakaways: dict[str, cdsm.Breakaway], along: Mapping[str, Direction]
+) -> tuple[list[str], Json]:
+    """Compute the stuck stiffness of each of ``breakaways``, as lines of text and for JSON.
+
+    Both are empty if there are no ``breakaways``. They also hold the breakaway loads.
+    """
     from cdsm.stiffness_matrix.prints import model_of
 
-    K = next(iter(breakaways.values())).stiffness
+    if not breakaways:
+        return [], {}
+    stuck = {name: each.stiffness.along(along[name]) for name, each in breakaways.items()}
     lines = [
-        f"along {axis} {each.stiffness.along(each.direction) / 1000.0:.4g} N/mm below "
-        f"{each.load:.4g} N"
-        for axis, each in breakaways.items()
+        f"along {name} {stuck[name] / 1000.0:.4g} N/mm below {each.load:.4g} N"
+        for name, each in breakaways.items()
     ]
-    return "\n".join([f"small loads measure ({model_of(K)}):", *lines])
+    numbers = {
+        name: {"stuck_N_per_m": stuck[name], "breakaway_N": each.load}
+        for name, each in breakaways.items()
+    }
+    K = next(iter(breakaways.values())).stiffness
+    head = f"small loads measure ({model_of(K)}):"
+    return ["\n".join([head, *lines])], {"sticking": numbers}
 
 
 def _uncertainty(
