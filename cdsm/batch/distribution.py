@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.batch.evaluator import Evaluator
 from cdsm.batch.inputs import given_wrench, postures
 from cdsm.batch.labels import to_dataset
@@ -56,9 +57,7 @@ class Tensions(ReadOnlyState):
 
     def plot(self) -> Figure:
         """Plot median tension [N] and range of each cable; InvalidInput if none were found."""
-        from cdsm.plots import plot_tensions  # matplotlib imports slowly
-
-        return plot_tensions(self)
+        return cdsm.plots.plot_tensions(self)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return tensions and status as a labelled Dataset in SI; MissingExtra without xarray."""
