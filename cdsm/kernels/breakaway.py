@@ -182,8 +182,8 @@ def _set_slip_rates(
         open_first_section(holes, c, tension, section, width)
         set_lead(routing, holes, c, rotation, section.before, width)
         # the lead turns with the link of the first site, and keeps its length
-        turn, rest = rates.turn[np.uint64(routing.row[holes.first[c]])], rates.origin[0]
-        _set_velocity(turn, rest, rest, section.before, rates.before, width)
+        turn, zero = rates.turn[np.uint64(routing.row[holes.first[c]])], rates.origin[0]
+        _set_velocity(turn, zero, zero, section.before, rates.before, width)
         for w in lanes(width):
             rates.longer[w], slips.last[2, w] = 0.0, -1.0
         end = np.uint64(holes.first[c + np.uint64(1)]) - np.uint64(1)
