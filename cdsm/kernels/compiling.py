@@ -199,7 +199,7 @@ def _patient(function: _Function) -> _Function:
         wide = (dict(zip(names, arguments, strict=False)).get("width") or 1) > WIDTH
         known = is_kept(*map(kernel.typeof_pyval, arguments))
         seconds, numbers = _KEPT if known else _NEW
-        few = sum(getattr(each, "size", 0) for each in arguments) <= numbers and spent < seconds
+        few = _count(arguments) <= numbers and spent < seconds
         patient = not known and spent < _PATIENCE if wide else few
         if patient and not _at_once:
             return partial(run, start, wide)
@@ -215,6 +215,11 @@ def is_new(kernel: Callable[..., Any]) -> bool:
     """Check whether Python would run the next call of ``kernel`` with a block wider than WIDTH."""
     new: Callable[[], bool] = getattr(kernel, "is_new", lambda: False)
     return new()
+
+
+def _count(values: Any) -> int:
+    """Count the numbers in an array, or in nested tuples of arrays."""
+    return sum(map(_count, values)) if isinstance(values, tuple) else getattr(values, "size", 0)
 
 
 def _native(result: Any) -> Any:

@@ -75,6 +75,19 @@ set_margins(np.ones((1, 2, 2, 4000)), np.empty((1, 4000)), 4000)
 print(len(set_margins.signatures))
 """
 
+MANY = """
+import numpy as np
+from cdsm.kernels.compiling import compiled
+
+@compiled
+def total(pair):
+    return pair[0].sum() + pair[1].sum()
+
+for count in (100, 2**15):
+    total((np.ones(count), np.ones(100)))
+    print(len(total.signatures))
+"""
+
 
 def run(program: str, *arguments: str, cwd: Path = ROOT, **environment: str) -> tuple[str, str]:
     """What a process prints, and what it writes to its error stream."""
@@ -160,3 +173,8 @@ def test_a_kernel_compiled_for_one_posture_is_not_compiled_for_the_first_blocks(
     folder = str(tmp_path)
     assert run(WIDE, "first", NUMBA_CACHE_DIR=folder)[0] == "1"  # that of one posture
     assert run(WIDE, NUMBA_CACHE_DIR=folder)[0] == "0"  # which is in the cache now
+
+
+def test_python_runs_no_call_with_many_numbers_in_a_record() -> None:
+    """It took seconds for records of ten thousand postures, whose kernel was in the cache."""
+    assert run(MANY)[0].split() == ["0", "1"]
