@@ -19,8 +19,12 @@ _ITERATIONS = 60
 _UNDAMPED = 20
 """Number of full Newton steps; later steps are halved, since kinks of a law may make them cycle."""
 
-_CONVERGED = 1e-13
-"""Relative change of the tensions that ends the iteration: the remaining error is its square."""
+_CONVERGED = 1e-9
+"""Relative change of the tensions that ends the iteration.
+
+The remaining error is some ten times its square. The rounding of a tension is some 1e-16 EA/T, so
+changes below 1e-13 may never occur.
+"""
 
 
 class Chain(NamedTuple):

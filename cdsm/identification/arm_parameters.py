@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 
-from cdsm.elasticity import LinearElasticity
+from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
@@ -123,7 +123,7 @@ class ArmParameters:
                     own[i] = replace(own[i], **{attribute: value})
         if parts:
             geometry = geometry.replace(**{part: tuple(own) for part, own in parts.items()})
-        cables = []
+        cables, laws = [], dict[tuple[int, float], Elasticity]()
         routed = serpentine_cables(geometry, LinearElasticity(1.0))
         for old, new, route in zip(self.arm.cables, routed, geometry.cables, strict=True):
             sites = tuple(
@@ -134,7 +134,10 @@ class ArmParameters:
             if "friction" in given:
                 cable = cable.with_friction(given["friction"])
             if "rigidity" in given:
-                cable = replace(cable, elasticity=cable.elasticity.scaled(given["rigidity"]))
+                law, factor = cable.elasticity, given["rigidity"]
+                # cables share their law: they are computed together
+                shared = laws.setdefault((id(law), factor), law.scaled(factor))
+                cable = replace(cable, elasticity=shared)
             if "spring" in given:
                 cable = replace(cable, series_stiffness=given["spring"])
             cables.append(cable)

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.least_squares import Box, LeastSquares
+from cdsm.identification.least_squares import METHODS, Box, LeastSquares
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 RANK_TOLERANCE = 1e-6
@@ -193,9 +193,11 @@ class Profiler:
         try:
             beside = np.empty((problem.count, 0))
             if others:
-                point = problem.search(
-                    point, method="dogbox", tolerances=_TOLERANCES, most=50, over=others
-                )
+                # dogbox alone may zigzag along a curved valley
+                for method in METHODS:
+                    point = problem.search(
+                        point, method=method, tolerances=_TOLERANCES, most=50, over=others
+                    )
                 beside = problem.jacobian(point, others)
             along = problem.jacobian(point, [self.i])[:, 0]
         except InvalidInput as error:

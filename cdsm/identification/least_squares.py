@@ -26,6 +26,15 @@ _DECADES = 100.0
 _ONE_SIDED, _CENTRAL = 1e-7, 1e-5
 """Steps of the finite differences in the unit cube. They balance rounding and truncation."""
 
+Method = Literal["trf", "dogbox"]
+METHODS: tuple[Method, ...] = ("trf", "dogbox")
+"""Searches of scipy in a useful order.
+
+``trf`` converges from far away, but only approaches a bound. ``dogbox`` then goes exactly onto it.
+"""
+
+_INSIDE = 1e-6  # nearest start to a bound of trf, which may stop where it starts on one
+
 _CACHED = 64  # points whose residuals are kept: a search evaluates some points repeatedly
 
 
@@ -180,7 +189,7 @@ class LeastSquares:
         self,
         start: Array,
         *,
-        method: Literal["trf", "dogbox"],
+        method: Method,
         tolerances: tuple[float, float, float],
         most: int,
         over: Sequence[int] | None = None,
@@ -190,8 +199,7 @@ class LeastSquares:
 
         Args:
             start: First point of the search.
-            method: ``trf`` converges from far away. ``dogbox`` goes exactly onto a bound, while
-                ``trf`` only approaches it.
+            method: One of :data:`METHODS`.
             tolerances: scipy's ftol, xtol and gtol.
             most: Largest number of evaluations, without those of the differences.
             over: Indices of the parameters that move; all if not given.
@@ -204,9 +212,12 @@ class LeastSquares:
             point[moving] = x
             return point
 
+        first = start[moving]
+        if method == "trf":
+            first = np.clip(first, _INSIDE, 1.0 - _INSIDE)
         found = least_squares(
             lambda x: self.residuals(at(x)),
-            start[moving],
+            first,
             lambda x: self.jacobian(at(x), moving, central=central),
             bounds=(0.0, 1.0),
             method=method,

@@ -225,8 +225,6 @@ def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Ar
         points = [np.full(count, 0.5), *spread]
     else:
         points = [problem.box.point(_checked_start(problem, start))]
-    # a search that starts on a bound may stop there
-    points = [np.clip(point, 1e-6, 1.0 - 1e-6) for point in points]
     if usable := [point for point in points if math.isfinite(problem.cost(point))]:
         return sorted(usable, key=problem.cost)[:_STARTS]
     failure = problem.failure(points[0])

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import clarabel
 import numpy as np
@@ -339,6 +339,30 @@ def test_any_law_conserves_wire_and_balances_its_energy(law: cdsm.Elasticity) ->
         assert lost > 1e-5
     assert abs(errors[-1]) < 0.02 * lost
     assert abs(errors[-1]) < 0.6 * abs(errors[0])
+
+
+def test_newtons_method_ends_where_rounding_moves_the_tensions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    steps = list[int]()
+
+    def counted(*arguments: Any) -> Any:
+        steps.append(1)
+        return solve_chains(*arguments)
+
+    monkeypatch.setattr("cdsm.friction.chain_problem.solve_chains", counted)
+    # EA/T is 30 000, so tensions round to 1e-11
+    problem, lengths, F = one_cable(LAWS[1].scaled(100.0), True)
+    T, ratio = np.full(6, F), np.full(6, math.exp(0.03))
+    natural = problem.natural(lengths, T)
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        steps.clear()
+        near = problem.settle(
+            lengths + 1e-6 * rng.normal(size=6), natural, ratio, np.array([np.nan]), T
+        )
+        assert len(steps) <= 6
+        T = near.tension
 
 
 def test_slack_cable_forgets_and_is_tightened_again() -> None:

@@ -40,6 +40,7 @@ def test_each_parameter_is_where_it_says() -> None:
     assert (first.series_stiffness, second.series_stiffness) == (2e4, math.inf)
     assert (first.lead, second.lead) == (0.3, 0.4)
     assert all(cable.elasticity == cdsm.LinearElasticity(24e3) for cable in arm.cables)
+    assert len({id(cable.elasticity) for cable in arm.cables}) == 1  # computed together
     radii = [math.hypot(*site.position[1:]) for site in second.sites]
     assert radii == pytest.approx([0.03, 0.03, 0.02, 0.02])
     assert [link.mass for link in arm.geometry.links] == [0.2, 0.2]

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import cdsm
-from cdsm.identification.least_squares import Box, LeastSquares, NoModelError
+from cdsm.identification.least_squares import METHODS, Box, LeastSquares, NoModelError
 from cdsm.support.values import Array
 
 
@@ -59,3 +60,20 @@ def test_search_moves_the_parameters_it_may() -> None:
         np.array([0.5, 0.25]), method="dogbox", tolerances=(1e-12,) * 3, most=100, over=[1]
     )
     np.testing.assert_allclose(best, [0.5, 1.0])
+
+
+def test_both_searches_in_turn_leave_a_bound_along_a_curved_valley() -> None:
+    def residuals(p: dict[str, float]) -> Array:
+        x, y = p["x"], p["y"]
+        return np.array([30.0 * (y - x * (x + 0.3)), x - 0.9, 0.3 * (y - 0.2)])
+
+    problem = LeastSquares(residuals, 3, {"x": (0.0, 1.0), "y": (0.0, 1.0)})
+    goals, corner = (1e-4, 1e-6, 1e-8), np.ones(2)
+    point = corner
+    for method in METHODS:
+        point = problem.search(point, method=method, tolerances=goals, most=50)
+    # x solves the problem on the curve y = x (x + 0.3), from which y differs by 1e-4
+    x = brentq(lambda x: x - 0.9 + 0.09 * (x * (x + 0.3) - 0.2) * (2.0 * x + 0.3), 0.0, 1.0)
+    assert point == pytest.approx([x, x * (x + 0.3)], abs=1e-3)
+    alone = problem.search(corner, method="dogbox", tolerances=goals, most=50)
+    assert problem.cost(alone) > 1.1 * problem.cost(point)
