@@ -155,15 +155,15 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
 def plot_load_history(history: LoadHistory) -> Figure:
     """Plot the force over the displacement of the tip, and the tensions of one cable's segments.
 
-    Force and displacement are components along the largest force of the history. If no load has a
-    force, the displacement is plotted over the number of the load. The cable is the one whose
-    segments differ most in tension. InvalidInput if ``history`` is no result of
-    :func:`~cdsm.load_cycle`.
+    Both begin at the reference. Force and displacement are components along the largest force of
+    the history. If no load has a force, the displacement is plotted over the number of the load.
+    The cable is the one whose segments differ most in tension. InvalidInput if ``history`` is no
+    result of :func:`~cdsm.load_cycle`.
     """
     expect("history", history, "LoadHistory")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
-    forces = history.wrenches[:, :3]
-    moved = MM * history.displacement
+    forces = np.vstack([history.reference_wrench, history.wrenches])[:, :3]
+    moved = MM * np.vstack([np.zeros(3), history.displacement])
     size = np.linalg.norm(forces, axis=1)
     line = {"marker": "o", "markersize": 2.0, "linewidth": 0.9}
     if size.any():
@@ -171,9 +171,8 @@ def plot_load_history(history: LoadHistory) -> Figure:
         left.plot(moved @ u, forces @ u, color=BLUE, **line)
         left.set(xlabel="displacement along the force [mm]", ylabel="force [N]")
     else:
-        loads = np.arange(1, len(moved) + 1)
         for axis, color, part in zip(XYZ, COLORS, moved.T, strict=True):
-            left.plot(loads, part, color=color, label=axis, **line)
+            left.plot(part, color=color, label=axis, **line)
         left.set(xlabel="number of the load", ylabel="displacement of the tip [mm]")
         legend(left)
     spread = [float(np.ptp(T, axis=1).max()) for T in history.tensions]

@@ -96,7 +96,7 @@ def load_cycle(
         )
         _require_domains(loading, state, k)
         history.append((state, passage))
-    return _labelled(pose, F, loads, commands, history)
+    return _labelled(pose, F, W, loads, commands, history)
 
 
 def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:
@@ -149,6 +149,7 @@ def _require_domains(loading: SlowLoading, state: State, load: int) -> None:
 def _labelled(
     pose: Posture,
     tension: Array,
+    wrench: Array,
     wrenches: Array,
     commands: Array,
     history: Sequence[tuple[State, Passage]],
@@ -164,6 +165,7 @@ def _labelled(
     return LoadHistory(
         reference=pose,
         reference_tension=tension,
+        reference_wrench=wrench,
         wrenches=frozen(wrenches),
         motors=frozen(commands),
         angles=frozen(np.array([state.pose.q for state in states])),

@@ -41,6 +41,7 @@ class LoadHistory(ReadOnlyState):
     Attributes:
         reference: Posture at which the motors were locked.
         reference_tension: F (C,) [N] at the reference, the same in all segments of a cable.
+        reference_wrench: W at the reference (6,): force [N], then moment [N m].
         wrenches: W at each load (n, 6): force [N], then moment [N m].
         motors: Commands at each load (n, C): natural length [m] that a position-controlled motor
             has taken in since the reference, or the tension [N] of a force-controlled one.
@@ -60,6 +61,7 @@ class LoadHistory(ReadOnlyState):
 
     reference: Posture
     reference_tension: Array
+    reference_wrench: Array
     wrenches: Array
     motors: Array
     angles: Array

@@ -362,6 +362,9 @@ def test_history_is_labelled_and_printed() -> None:
     assert "lost in the holes" in text[-1]
     figure = history.plot()
     assert figure.axes[0].get_xlabel() == "displacement along the force [mm]"
+    moved, force = np.array(figure.axes[0].lines[0].get_data())
+    assert (moved[0], force[0], force[-1]) == (0.0, 0.0, 5.0)
+    np.testing.assert_allclose(moved[1:], 1e3 * history.displacement[:, 2], rtol=1e-12)
     with pytest.raises(cdsm.InvalidInput, match="whole number from -30 to 29"):
         history.pose(30)
 
