@@ -18,6 +18,7 @@ from cdsm.cli.options import (
     LoadOptions,
     TensionOptions,
     directions,
+    file_option,
     out_option,
 )
 from cdsm.cli.output import Json, answer, by_cable, write
@@ -206,7 +207,7 @@ def export(
         out_option(metavar="FILE.xml", help="MuJoCo model to write, its cables under tension."),
     ] = None,
     cables_out: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help="File to write the cables to.")
+        Path | None, file_option(metavar="FILE.toml", help="File to write the cables to.")
     ] = None,
     angles: Angles = "0",
     actuators: Annotated[

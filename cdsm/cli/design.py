@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson, out_option
+from cdsm.cli.options import AsJson, out_folder
 from cdsm.cli.output import answer, console
 
 _RECORD = "designs.jsonl"
@@ -22,7 +22,7 @@ def design(
             metavar="PROBLEM.toml", help="The problem; examples/design.toml is one with comments."
         ),
     ],
-    out: Annotated[Path, out_option(help="Folder for the results.")],
+    out: Annotated[Path, out_folder(help="Folder for the results.")],
     generations: Annotated[
         int | None, typer.Option(help="Generations; default: those of the file, or 40.", min=1)
     ] = None,

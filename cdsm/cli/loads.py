@@ -122,7 +122,10 @@ def cycle(
         bool, typer.Option("--one-sided", help="Unload to zero; do not reverse the load.")
     ] = False,
     out: Annotated[
-        Path | None, options.out_option(help="File to write: .nc (NetCDF) or .csv, SI units.")
+        Path | None,
+        options.out_option(
+            endings=(".nc", ".csv"), help="File to write: .nc (NetCDF) or .csv, SI units."
+        ),
     ] = None,
     figure: Picture = None,
     as_json: AsJson = False,
@@ -133,12 +136,8 @@ def cycle(
     """
     import numpy as np
 
-    from cdsm.sweeps.export import check_target
-
     if not weight.given:
         raise misuse("--force", "give it or --mass: the largest load.")
-    if out is not None:
-        check_target(out)
     pose = arm.at(angles)
     tension = tensions.distribute(pose, wrench_of(wrench))
     up = np.arange(1, steps + 1) / steps

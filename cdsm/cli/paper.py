@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson, out_option
+from cdsm.cli.options import AsJson, out_folder
 
 
 def reproduce(
-    out: Annotated[Path, out_option(help="Folder for the figures and tables.")] = Path(
+    out: Annotated[Path, out_folder(help="Folder for the figures and tables.")] = Path(
         "reproduction"
     ),
     kind: Annotated[

@@ -53,7 +53,11 @@ def plan(
     figure: Picture = None,
     animation: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.gif", help="Animation of the arm along --path to write."),
+        options.file_option(
+            endings=(".gif",),
+            metavar="FILE.gif",
+            help="Animation of the arm along --path to write.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -106,7 +106,12 @@ class MeasureOptions:
 
 def sweep(
     arm: ArmOptions,
-    out: Annotated[Path, options.out_option(help="File to write: .nc (NetCDF) or .csv, SI units.")],
+    out: Annotated[
+        Path,
+        options.out_option(
+            endings=(".nc", ".csv"), help="File to write: .nc (NetCDF) or .csv, SI units."
+        ),
+    ],
     poses: PoseOptions,
     load: LoadOptions,
     measures: MeasureOptions,
@@ -130,11 +135,8 @@ def sweep(
     as_json: AsJson = False,
 ) -> None:
     """Compute the stiffness over a grid, a path or random postures, under one or more bounds."""
-    from cdsm.sweeps.export import check_target
-
     robot = arm.read()
     wanted = poses.read(robot)
-    check_target(out)  # before the long computation
     low = numbers("--min-tension", min_tension)
     dataset = cdsm.sweep(
         robot,
@@ -157,7 +159,12 @@ def map_sweep(
     sweep: Annotated[
         Path, typer.Argument(metavar="SWEEP", help="Sweep to read: .nc, or a --resume folder.")
     ],
-    out: Annotated[Path, options.out_option(help="Picture to write.", metavar="FILE.pdf|svg|png")],
+    out: Annotated[
+        Path,
+        options.out_option(
+            endings=options.PICTURES, help="Picture to write.", metavar="FILE.pdf|svg|png"
+        ),
+    ],
     quantity: Annotated[
         str,
         typer.Option(

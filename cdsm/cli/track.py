@@ -132,12 +132,15 @@ def track(
     out: Annotated[
         Path | None,
         options.out_option(
-            metavar="RUN.nc|RUN.csv", help="Results over time to write; .nc has all."
+            endings=(".nc", ".csv"),
+            metavar="RUN.nc|RUN.csv",
+            help="Results over time to write; .nc has all.",
         ),
     ] = None,
     animate: Annotated[
         Path | None,
-        typer.Option(
+        options.file_option(
+            endings=(".gif", ".csv"),
             metavar="RUN.gif|RUN.csv",
             help="Motion of the true arm to write: a GIF, or a table over time that `cdsm view "
             "ARM.toml --path RUN.csv` plays.",
@@ -154,9 +157,6 @@ def track(
     """
     from cdsm.cli.path_file import one_target, read_path
 
-    _require_target("--out", out, ".nc", ".csv")
-    _require_target("--animate", animate, ".gif", ".csv")
-    _require_target("--figure", figure, ".pdf", ".svg", ".png")
     true.check()
     robot = arm.read()
     file = read_path(path, robot)
@@ -191,16 +191,6 @@ def track(
     table = animate is not None and animate.suffix.lower() == ".csv"
     write(animate, run.write if table else run.animate)
     answer(as_json, run.to_dict, conditions, run, warnings=run.warnings)
-
-
-def _require_target(option: str, path: Path | None, *endings: str) -> None:
-    """Check ending and folder of ``path`` of ``option`` before a long simulation."""
-    from cdsm.support.files import require_folder
-
-    if path is not None:
-        if path.suffix.lower() not in endings:
-            raise misuse(option, f"{path} ends in none of {', '.join(endings)}.")
-        require_folder(path)
 
 
 def _wanted(text: str) -> tuple[Sequence[float], float | None]:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson, Picture, out_option
+from cdsm.cli.options import AsJson, Picture, file_option, out_option
 from cdsm.cli.output import Json, answer, write, write_picture
 from cdsm.cli.values import misuse
 
@@ -43,7 +43,7 @@ def fit(
     out: Annotated[Path | None, out_option(help="Law of rigidity to write, as TOML.")] = None,
     tolerances: Annotated[
         Path | None,
-        typer.Option(metavar="T.toml", help="Tolerances to write: the 95 % band of the rigidity."),
+        file_option(metavar="T.toml", help="Tolerances to write: the 95 % band of the rigidity."),
     ] = None,
     figure: Picture = None,
     as_json: AsJson = False,

@@ -69,10 +69,8 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
     path = as_path(path)
     aside: Path | None = None
     try:
+        require_writable(path)
         target = path.resolve()
-        if target.exists() and not target.is_file():
-            raise FileError(path, "is not a regular file; give the path of a file.")
-        require_folder(path)
         aside = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
         mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666
         os.close(os.open(aside, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
@@ -89,10 +87,23 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
     return path
 
 
+def require_writable(path: Path) -> None:
+    """Raise a FileError if there is no folder for a file to write, or something else at its path.
+
+    Something else is a folder or a device.
+    """
+    if path.exists() and not path.is_file():
+        raise FileError(path, "is not a regular file; give the path of a file.")
+    require_folder(path)
+
+
 def require_folder(path: Path) -> None:
-    """Raise a FileError if the folder of a file to write does not exist."""
-    if not path.resolve().parent.is_dir():
+    """Raise a FileError if the folder of a path to write does not exist or is read-only."""
+    folder = path.resolve().parent
+    if not folder.is_dir():
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
+    if not os.access(folder, os.W_OK):
+        raise FileError(path, f"the folder {path.parent} is read-only; choose another.")
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from cdsm.errors import FileError, InvalidInput
 from cdsm.support.extras import need
-from cdsm.support.files import as_path, require_folder, write_file
+from cdsm.support.files import as_path, write_file
 from cdsm.support.tidy import check_sweep, checked_suffix, tidy
 
 if TYPE_CHECKING:
@@ -36,8 +36,7 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
         FileError: The file cannot be written.
     """
     check_sweep(dataset)
-    check_target(path)
-    write = _write_table if as_path(path).suffix.lower() == ".csv" else _write_netcdf
+    write = _write_table if checked_suffix(path) == ".csv" else _write_netcdf
     return write_file(path, lambda aside: write(dataset, aside))
 
 
@@ -83,15 +82,6 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
     except InvalidInput:
         raise FileError(path, "is not a sweep of cdsm: it has no status.") from None
     return dataset
-
-
-def check_target(path: str | os.PathLike[str]) -> None:
-    """Check a path as :func:`write_sweep` does, with its errors, before the sweep runs."""
-    checked_suffix(path)
-    path = as_path(path)
-    if path.is_dir():
-        raise FileError(path, "is a folder; give the path of a file.")
-    require_folder(path)
 
 
 def _read_netcdf(path: Path) -> xarray.Dataset:

@@ -388,8 +388,6 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
         (("buckle", "{geometry}", "--force", "0,0,0"), "--force: is zero"),
         (("plan", "{geometry}", "--direction", "0,0,0", "--target", "9"), "--direction: is the"),
         (("plan", "{geometry}", "--direction", "0,0,1", "--path", "no.csv"), "does not exist"),
-        (("urdf", "{geometry}", "-o", "absent/arm.urdf"), "folder absent does not exist"),
-        (("check", "{geometry}", "--out", "absent/r.html"), "folder absent does not exist"),
         (("check", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
         (("reproduce", "--out", "{geometry}"), "cannot be created as a folder"),
     ],

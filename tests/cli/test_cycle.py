@@ -58,12 +58,6 @@ def test_cycle_writes_netcdf(arm: Path, tmp_path: Path) -> None:
         np.testing.assert_allclose(data["wrench"].sel(component="fz"), [2.0, 4.0, 2.0, 0.0] * 2)
 
 
-def test_cycle_refuses_a_file_before_it_computes(arm: Path, tmp_path: Path) -> None:
-    result = call("cycle", arm, *OPTIONS, "--force", "0,0,4", "-o", tmp_path / "loop.txt")
-    assert result.exit_code == 1
-    assert "neither in .nc" in result.output
-
-
 def test_weigh_says_which_weights_measure_what(arm: Path) -> None:
     result = call("weigh", arm, *OPTIONS, "--force", "0,0,3")
     assert result.exit_code == 0, result.output

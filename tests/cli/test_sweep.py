@@ -77,8 +77,6 @@ def test_map_draws_a_sweep(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("--random", "8", "--out", "{folder}/s.txt"), 1, "ends neither in .nc"),
-        (("--random", "8", "--out", "{folder}/absent/s.nc"), 1, "does not exist; create it"),
         (("--random", "0"), 2, "--random"),
         (("--grid", "joint9=0:1:2"), 1, "no joint is called 'joint9'"),
         (("--grid", "joint1_1=0:1"), 2, "a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE"),
@@ -123,15 +121,6 @@ def test_options_that_say_nothing_are_refused(
     result = call("sweep", geometry, "--out", tmp_path / "s.nc", *arguments)
     assert result.exit_code == 2
     assert said in " ".join(result.stderr.replace("│", " ").split())
-
-
-def test_folder_in_the_place_of_the_file_is_told_before_the_work(
-    geometry: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "s.nc").mkdir()
-    result = call("sweep", geometry, "--out", tmp_path / "s.nc", "--random", "5")
-    assert result.exit_code == 1
-    assert "is a folder" in result.stderr
 
 
 def test_map_of_no_sweep_is_one_message(tmp_path: Path) -> None:

@@ -119,10 +119,6 @@ def test_wrong_stiffness_is_refused(stiffness: str, files: tuple[Path, Path]) ->
         ("--felt", "-1", "--felt: -1"),
         ("--seed", "-1", "--seed: -1"),
         ("--max-tension", "5", "--max-tension: 5 N"),
-        ("--out", "run.txt", ".nc, .csv"),
-        ("--animate", "run.mp4", ".gif, .csv"),
-        ("--figure", "run.bmp", ".pdf, .svg, .png"),
-        ("--figure", "absent/run.png", "the folder absent does not exist"),
     ],
 )
 def test_each_wrong_option_is_named(
