@@ -152,7 +152,7 @@ def _remedies(K: Stiffness) -> Iterator[Remedy]:
 
     if given.minimum.any():
         yield _remedy("tension", given.minimum, tension, _LESS, _MORE)
-    if arm.is_serpentine and _with_disks(K, 1.0) == arm.cables:
+    if _is_in_holes(K):
         offsets = [joint.disk_offset for joint in arm.geometry.joints]
         yield _remedy("disk offset", offsets, offset, _LESS, _MORE)
 
@@ -186,6 +186,14 @@ def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) ->
             return None
         before = factor
     return None
+
+
+def _is_in_holes(K: Stiffness) -> bool:
+    """Check whether the cables run through the holes of the arm's disks, as its geometry says."""
+    arm = K.posture.arm
+    if not arm.is_serpentine or len(arm.cables) != len(arm.geometry.cables):
+        return False
+    return _with_disks(K, 1.0) == arm.cables
 
 
 def _with_disks(K: Stiffness, factor: float) -> tuple[Cable, ...]:

@@ -1,6 +1,7 @@
 """What would hold an arm that buckles: each remedy, applied, brings it to the edge of stability."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -154,3 +155,13 @@ def test_disks_do_not_touch_where_their_offset_is_less() -> None:
         if each.change == "disk offset" and each.factor is not None:
             least = SIZES["hole_radius"] * math.tan(bent / 2.0) / SIZES["disk_offset"]
             assert each.factor >= least
+
+
+def test_a_cable_beside_those_of_the_disks_leaves_out_the_disk_offsets() -> None:
+    """The geometry then does not say how the cables run; the other remedies are there."""
+    arm = K.posture.arm
+    more = arm.with_cables([*arm.cables, replace(arm.cables[0], name="other")])
+    pose = more.at(Q, check_limits=False)
+    unstable = cdsm.stiffness(pose, cdsm.distribute_tension(pose, MINIMUM))
+    assert not unstable.is_stable
+    assert [each.change for each in unstable.remedies] == ["wire", "spring", "tension"]
