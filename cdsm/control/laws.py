@@ -9,16 +9,21 @@ any function of a :class:`Moment` that returns :func:`limited` of its wire.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.errors import InvalidInput
+from cdsm.support.validation import vector
 from cdsm.support.values import Array
 
 PROPORTIONAL, INTEGRAL = 0.2, 0.3
 """Gains of the tension control [-]: parts of the tension error that one step corrects."""
+
+
+_ROUNDING = 1e-9  # distance of a tension beyond its bound [N] that counts as rounding
 
 
 class Reference(NamedTuple):
@@ -99,6 +104,30 @@ def limited(moment: Moment, wire: Array) -> Command:
     reading, k = moment.reading, moment.reference.stiffness
     asked = reading.tension + k * (reading.wire - wire)
     return _clamped(moment, wire, np.where(k > 0.0, asked, moment.reference.tension))
+
+
+def checked_command(command: object, moment: Moment, names: Sequence[str]) -> Command:
+    """Return what a law has computed; InvalidInput if the motors ``names`` (C,) cannot follow it.
+
+    The wire of each must be positive, and its tension within the bounds.
+    """
+    if not isinstance(command, Command):
+        raise InvalidInput(
+            "law", f"returned {command!r}; a Command is needed: return limited(moment, wire)."
+        )
+    wire = vector("wire of the law", command.wire, len(names), "one length [m] per cable")
+    tension = vector("tension of the law", command.tension, len(names), "one [N] per cable")
+    low, high = moment.minimum - _ROUNDING, moment.maximum + _ROUNDING
+    wrong = ~((wire > 0.0) & (low <= tension) & (tension <= high))
+    if wrong.any():
+        c = int(wrong.argmax())
+        raise InvalidInput(
+            "law",
+            f"commanded {tension[c]:.6g} N and {wire[c]:.6g} m of wire for {names[c]}; a tension "
+            f"from {moment.minimum[c]:g} to {moment.maximum[c]:g} N and a positive length are "
+            "needed. Return limited(moment, wire).",
+        )
+    return command
 
 
 def feedforward(moment: Moment) -> Command:

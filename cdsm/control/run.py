@@ -70,6 +70,7 @@ class TrackingRun(ReadOnlyState):
         wrench: Load (n, 6): force [N], then moment [N m].
         estimated_force: Force at the tip that the controller estimated (n, 3) [N].
         rigidity: Rigidity of the wires over that of their laws, as estimated (n,) [-].
+        short: Whether the outer loop found no tensions within the bounds that give the target (n,).
         refused: Reasons why the outer loop could not plan and kept its previous tensions, by step.
         outcome: ``"completed"``; ``"lost"``: the tip left its path or the plant diverged, since the
             loop is unstable; ``"no rest"``: the arm buckled; ``"wire"``: a tension left the domain
@@ -102,6 +103,7 @@ class TrackingRun(ReadOnlyState):
     wrench: Array
     estimated_force: Array
     rigidity: Array
+    short: NDArray[np.bool_]
     refused: dict[int, str]
     outcome: Outcome
     reason: str
@@ -179,6 +181,12 @@ class TrackingRun(ReadOnlyState):
             said.append(
                 f"NOT PLANNED at {len(self.refused)} of {len(self.time)} steps, from "
                 f"{self.time[first]:.4g} s: {self.refused[first]}"
+            )
+        if self.short.any():
+            said.append(
+                f"OUT OF REACH at {np.count_nonzero(self.short)} of {len(self.time)} steps, from "
+                f"{self.time[self.short.argmax()]:.4g} s: within the bounds no tensions were found "
+                "that give the target"
             )
         if not self.inside.all():
             said.append(f"OUTSIDE ITS BAND at {np.count_nonzero(~self.inside)} steps")

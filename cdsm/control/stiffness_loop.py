@@ -26,6 +26,7 @@ class Replanned(NamedTuple):
     reference: Reference  # planned tensions at the motors, and the wire for them
     mean: Array  # mean tensions along each cable (C,) [N], from which the stiffness follows
     refused: str  # why nothing could be planned, so that the previous tensions were kept; or empty
+    short: bool  # whether no tensions within the bounds were found that give the target
 
 
 @dataclass(eq=False)
@@ -57,17 +58,21 @@ class StiffnessLoop:
             estimate: Estimated posture, load, wire and friction.
             before: Mean tensions of the previous step (C,) [N].
         """
-        arm, mean, refused = self._with_softness(estimate.softness), before, ""
+        arm, mean, refused, short = self._with_softness(estimate.softness), before, "", False
         try:
             bounds = self.minimum * estimate.ratio, self.maximum * estimate.ratio
             wrench = np.append(estimate.force, np.zeros(3))
             model = StiffnessModel(arm.at(estimate.pose.q), *bounds, wrench, MARGIN)
             constraints = target_constraints(model, self.directions, target)
-            found = least_change(model, constraints, before, self.rate)
+            within = np.clip(before, *bounds)  # as the motors hold them
+            found = least_change(model, constraints, within, self.rate)
             if found is None:
                 refused = "no tensions within the rate balance the arm and hold it"
             else:
-                mean = found
+                mean, met = found
+                if not met:
+                    found = least_change(model, constraints, mean, np.full_like(mean, np.inf))
+                    short = found is None or not found[1]
         except CdsmError as error:
             refused = str(error)
         lengths = arm.cable_lengths(wanted.angles)
@@ -77,7 +82,7 @@ class StiffnessLoop:
             wire=laws.original_lengths(lengths, mean),
             stiffness=laws.stiffness(lengths, mean),
         )
-        return Replanned(reference, mean, refused)
+        return Replanned(reference, mean, refused, short)
 
     def _with_softness(self, softness: float) -> Manipulator:
         """Return the arm with the rigidity of its wires divided by the estimated ``softness``."""

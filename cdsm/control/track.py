@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from cdsm.control.assessment import Assessment, assess
 from cdsm.control.estimates import Estimate, Observer
 from cdsm.control.felt import felt_stiffness
-from cdsm.control.laws import LAWS, Command, Law, Moment, Reading, Reference
+from cdsm.control.laws import LAWS, Command, Law, Moment, Reading, Reference, checked_command
 from cdsm.control.plant import Plant, PlantState, SlowPlant, require_unstrained
 from cdsm.control.run import Outcome, TrackingRun
 from cdsm.control.schedule import Schedule, checked_plan
@@ -67,7 +67,8 @@ def track(
 
     The plan's arm, with its friction, is the model of the controller. The loop starts at rest at
     the first sample with the planned tensions. An unstable loop, an arm that buckles and a target
-    that cannot be planned are answers: ``outcome``, ``reason`` and ``warnings`` of the result.
+    that cannot be planned or reached are answers: ``outcome``, ``reason`` and ``warnings`` of the
+    result.
 
     Args:
         plan: A complete plan along one or more directions.
@@ -93,7 +94,7 @@ def track(
 
     Raises:
         InvalidInput: The plan is not complete, or is for ``cartesian`` instead of directions; or
-            another argument is invalid.
+            another argument is invalid; or a law returns no :class:`Command` within the bounds.
         UnknownName: There is no such law or cable.
     """
     arm = checked_plan(instance("plan", plan, PathPlan))
@@ -103,6 +104,8 @@ def track(
     command_of = LAWS[one_of("law", law, LAWS)] if isinstance(law, str) else law
     sensors = Sensors() if sensors is None else instance("sensors", sensors, Sensors)
     plant = SlowPlant(arm) if plant is None else plant
+    if not hasattr(plant, "begin"):  # an arm by itself, for example
+        raise InvalidInput("plant", f"{plant!r} given; a plant is needed, such as SlowPlant(arm).")
     schedule = Schedule.of(plan, whole_number("steps", steps, 1, _MOST_STEPS))
     size = len(schedule.references)
     from_step = math.ceil(_share("payload_from", payload_from) * (size - 1))
@@ -126,6 +129,7 @@ def track(
     before, mean, wire = None, reference.tension, last.wire
     records: list[_Step] = []
     refused: dict[int, str] = {}
+    short = False
     outcome: Outcome = "completed"
     reason = ""
     for k in progress.track(range(size), "following the path"):
@@ -135,10 +139,11 @@ def track(
         if outer is not None:
             planned = outer.next(wanted, schedule.targets[k], estimate, mean)
             wanted, mean = planned.reference, planned.mean
+            short = planned.short
             if planned.refused:
                 refused[k] = planned.refused
         moment = Moment(wanted, reading, before or wanted, last, wire, low, high, forced)
-        command = command_of(moment)
+        command = checked_command(command_of(moment), moment, arm.cables.names)
         try:
             state = plant.move(state, command, wrenches[k])
         except CdsmError as error:
@@ -151,7 +156,9 @@ def track(
             felt_stiffness(plant, state, wrenches[k], observer, estimate, (low, high), u, apart)
             for u in (schedule.directions if feels and k % feels == 0 else ())
         ]
-        records.append(_Step(wanted, reading, estimate, command, state, judged, banded, found))
+        records.append(
+            _Step(wanted, short, reading, estimate, command, state, judged, banded, found)
+        )
         before, last, wire = wanted, reading, command.wire
         off = float(np.linalg.norm(state.pose.tip[:3, 3] - schedule.tips[k]))
         if off > _LOST * arm.length:
@@ -185,6 +192,7 @@ def _share(name: str, value: float) -> float:
 
 class _Step(NamedTuple):
     wanted: Reference
+    short: bool
     reading: Reading
     estimate: Estimate
     command: Command
@@ -221,6 +229,7 @@ def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[
         "stiffness": rows([record.judged.stiffness for record in records], len(u)),
         "margin": rows([record.judged.margin for record in records]),
         "felt": rows([record.felt or [math.nan] * len(u) for record in records], len(u)),
+        "short": frozen(np.array([record.short for record in records], dtype=np.bool_)),
         "banded": frozen(np.array([record.banded for record in records], dtype=np.bool_)),
         "band": rows([record.judged.band for record in records], 2),
         "displacement": frozen((tips - rests) @ u[0]),

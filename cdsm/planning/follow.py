@@ -123,15 +123,14 @@ class Follower:
 
 def least_change(
     model: StiffnessModel, constraints: Constraints, before: Array, rate: Array
-) -> Array | None:
-    """Return the tensions (C,) [N] nearest to ``before`` that meet ``constraints``, by one search.
+) -> tuple[Array, bool] | None:
+    """Search once for the tensions (C,) [N] nearest to ``before`` that meet ``constraints``.
 
-    No tension changes by more than ``rate`` (C,) [N]. If the search cannot meet the constraints,
-    return the tensions of the smallest violation found. None if no tensions within ``rate`` balance
-    the arm, or if the arm is unstable under the nearest of them to ``before``.
+    No tension changes by more than ``rate`` (C,) [N]. Also return whether the constraints are met;
+    if not, the tensions are those of the smallest violation found. None if no tensions within
+    ``rate`` balance the arm, or if the arm is unstable under the nearest of them to ``before``.
     """
-    found = _search(model, model.region.within(rate, before), constraints, before, before)
-    return found[0] if found else None
+    return _search(model, model.region.within(rate, before), constraints, before, before)
 
 
 def _search(

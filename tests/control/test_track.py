@@ -1,6 +1,7 @@
 """The closed loop: what it holds, what it survives, and what it says when it fails."""
 
 import dataclasses
+import math
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ def test_feedforward_on_the_arm_it_believes_in_follows_to_rounding() -> None:
     run = cdsm.track(plan, "feedforward", sensors=cdsm.Sensors(encoder=0.0), **BOUNDS)
     assert run.outcome == "completed"
     assert not run.warnings
+    assert not run.short.any()
     at_samples = run.tip_error[::5]
     assert at_samples.max() < 1e-11
     assert run.tip_error.max() < 1e-5  # in between, wires and angles move evenly
@@ -81,6 +83,28 @@ def test_own_law_is_called_with_what_is_wanted_and_measured() -> None:
     assert run.tip_error[-1] > 1e-3  # it never pays out any wire
 
 
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (lambda moment: moment.command, "law: returned array.* return limited"),
+        (lambda moment: None, "law: returned None"),
+        (lambda moment: control.limited(moment, moment.command * math.nan), "wire of the law"),
+        (lambda moment: control.limited(moment, moment.command[:2]), "broadcast|wire of the law"),
+        (
+            lambda moment: control.Command(0.0 * moment.command, moment.reference.tension, None),
+            "0 m of wire for cable1_1; .* a positive length",
+        ),
+        (
+            lambda moment: control.Command(moment.command, moment.maximum + 1.0, None),
+            "law: commanded 251 N .* from 10 to 250 N .* Return limited",
+        ),
+    ],
+)
+def test_own_law_that_motors_cannot_follow_is_refused(law: Any, said: str) -> None:
+    with pytest.raises((cdsm.InvalidInput, ValueError), match=said):
+        cdsm.track(small_path(), law, bands=0, **BOUNDS)
+
+
 # --- loops that fail ------------------------------------------------------------------------
 
 
@@ -108,10 +132,16 @@ def test_payload_that_is_too_heavy_is_named() -> None:
 
 def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() -> None:
     plan = small_path()
-    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, bands=0)
+    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, bands=0, rate=20.0)
     assert (run.commanded_tension <= 60.0).all()
     assert run.saturated.any()
     assert abs(run.stiffness_error).max() > 0.05
+    assert run.short[-1]  # plan_stiffness finds none either
+    with pytest.raises(cdsm.UnreachableStiffness):
+        cdsm.plan_stiffness(
+            plan.arm.at(plan.angles[-1]), plan.direction, plan.target[-1], 10.0, 60.0
+        )
+    assert run.warnings[0].startswith(f"OUT OF REACH at {run.short.sum()} of {len(run.time)} steps")
     assert set(run.saturated_motors) <= set(plan.arm.cables.names)
 
 
@@ -129,6 +159,7 @@ def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() 
         ({"bands": -1}, "bands"),
         ({"felt": 0.5}, "felt"),
         ({"payload": float("nan")}, "payload"),
+        ({"plant": small_path().arm}, r"plant: .* such as SlowPlant"),
     ],
 )
 def test_wrong_arguments_are_refused(wrong: dict[str, object], said: str) -> None:

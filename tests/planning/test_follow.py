@@ -125,6 +125,7 @@ def test_least_change_stays_within_the_rate_and_goes_no_further_than_it_must() -
     goal = along_constraints(model, np.array([DOWN]), np.array([along_hinge(32.0)]))
     before = np.full(2, 20.0)
     for rate, expected in ((50.0, 32.0), (12.5, 32.0), (5.0, 25.0)):
-        F = follow.least_change(model, goal, before, np.full(2, rate))
-        assert F is not None
-        np.testing.assert_allclose(F, expected, rtol=1e-6)
+        found = follow.least_change(model, goal, before, np.full(2, rate))
+        assert found is not None
+        np.testing.assert_allclose(found[0], expected, rtol=1e-6)
+        assert found[1] == (rate > 12.0)
