@@ -28,6 +28,12 @@ from cdsm.tolerance import Tolerances
 CablesOrFile = Sequence[Cable] | str | os.PathLike[str]
 """Cables, or the path of their file."""
 
+ANOTHER_ARM = (
+    "another arm; distribute it for this one. with_cables, with_friction, with_gravity and "
+    "with_tolerances return another arm."
+)
+"""What is wrong with tensions of another arm, and what to do."""
+
 
 class ArmFacts(Printed):
     """Base class of :class:`~cdsm.Manipulator`: properties of the arm, and changed copies of it."""

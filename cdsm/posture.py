@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import cdsm
 from cdsm.cable import Cable
 from cdsm.cable_chains import Segments
-from cdsm.errors import first_of
+from cdsm.errors import InvalidInput, first_of
 from cdsm.geometry.contacts import overlapping
 from cdsm.kernels import chains as chain_kernels
 from cdsm.kernels import stiffness as stiffness_kernels
@@ -240,8 +240,14 @@ class MomentArms(ReadOnlyState):
     def __getitem__(self, names: tuple[str, str]) -> float:
         """Return the moment arm of a cable about a joint [m], or [-] where the joint slides.
 
-        Raises UnknownName for an unknown name.
+        Raises InvalidInput if there are not two names, UnknownName for an unknown name.
         """
+        if not isinstance(names, tuple) or len(names) != 2:
+            raise InvalidInput(
+                "moment_arms",
+                f"{names!r} given; give a cable and a joint, such as "
+                f'moment_arms["{self.cables[0]}", "{self.joints[0]}"].',
+            )
         cable, joint = names
         row = self.cables.index(one_of("cable", cable, self.cables))
         return float(self.values[row, self.joints.index(one_of("joint", joint, self.joints))])

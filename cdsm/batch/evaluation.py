@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.arm_facts import ANOTHER_ARM
 from cdsm.batch import layout
 from cdsm.batch.distribution import Tensions
 from cdsm.batch.evaluator import Evaluator
@@ -23,7 +24,7 @@ from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.status import summary
 from cdsm.support.tidy import tidy
 from cdsm.support.validation import instance, one_of
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, Named, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
 
 if TYPE_CHECKING:
@@ -39,9 +40,10 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Batch(ReadOnlyState):
-    """Quantities at B postures: ``batch["joint"]`` is K_θ (B, nv, nv).
+class Batch(ReadOnlyState, Named):
+    """Quantities at B postures: ``batch["joint"]`` is K_θ (B, nv, nv); ``len(batch)`` is B.
 
+    ``"joint" in batch``, ``list(batch)`` and ``dict(batch)`` are of :attr:`outputs`.
     Names, shapes and units are those of :class:`~cdsm.Posture` and :class:`~cdsm.Stiffness`, with
     the posture as first axis. A quantity that does not exist is NaN; :attr:`status` says why.
     A batch has no ``plot``, since its rows have no order: plot :meth:`to_pandas`, or draw a
@@ -81,6 +83,10 @@ class Batch(ReadOnlyState):
         if name not in self.outputs:
             raise UnknownName("output", name, self.outputs, "Name it in outputs=.")
         return self.values[self.outputs.index(name)]
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the names of the quantities, :attr:`outputs`."""
+        return self.outputs
 
     @cached_property
     def ok(self) -> Flags:
@@ -226,8 +232,10 @@ def _checked_load(
     if not isinstance(tension, Tensions):
         given = None if tension is None else given_tension(arm, tension, len(q))
         return given, given_wrench(wrench, len(q)), np.zeros(len(q), dtype=np.uint8)
-    if tension.arm != arm or not np.array_equal(tension.q, q):
+    if not np.array_equal(tension.q, q):
         raise InvalidInput("tension", "was distributed at other postures; distribute it at these.")
+    if tension.arm != arm:
+        raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
     if wrench is not None:
         raise InvalidInput("wrench", "comes with the Tensions; leave it out here.")
     return tension.values, tension.wrench, tension.status.copy()

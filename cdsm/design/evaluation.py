@@ -21,7 +21,7 @@ from cdsm.errors import InvalidInput
 from cdsm.support.progress import progress_bar
 from cdsm.support.tables import csv_text
 from cdsm.support.validation import number_array, whole_number
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, Named, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     from multiprocessing.synchronize import Semaphore
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Designs(ReadOnlyState):
+class Designs(ReadOnlyState, Named):
     """Designs of a problem with all their quantities; made by :func:`evaluate_designs`.
 
     Attributes:
@@ -53,10 +53,14 @@ class Designs(ReadOnlyState):
         Raises:
             InvalidInput: The quantity is not in ``problem.measures``.
         """
-        keys = [each.key for each in self.problem.measures]
+        keys = self.keys()
         if key not in keys:
             raise InvalidInput("measure", f"{key!r} given; give {', '.join(keys)}.")
         return np.asarray(self.values[:, keys.index(key)])
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the keys of the quantities."""
+        return tuple(each.key for each in self.problem.measures)
 
     @property
     def violations(self) -> Array:

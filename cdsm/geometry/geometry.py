@@ -213,8 +213,11 @@ class Geometry(Description):
     def replace(self, **changes: Any) -> Geometry:
         """Return this geometry with other attributes, e.g. ``replace(hole_radius=0.02)``.
 
-        Raises GeometryError, which lists every fault, if the changed geometry is invalid.
+        A ``hole_radius`` without ``joints`` is that of all joints. Raises GeometryError, which
+        lists every fault, if the changed geometry is invalid.
         """
+        if "hole_radius" in changes and "joints" not in changes:
+            changes["joints"] = tuple(replace(joint, hole_radius=None) for joint in self.joints)
         return replace(self, **changes)
 
     def to_toml(self) -> str:

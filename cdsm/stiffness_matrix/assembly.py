@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.arm_facts import ANOTHER_ARM
 from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.value import Stiffness
@@ -28,7 +29,7 @@ def stiffness(
 
     Raises:
         InvalidInput: An argument has the wrong shape or is not numbers, a tension is negative, the
-            tensions are of another posture, or a wrench is given with a ``Tension``.
+            tensions are of another posture or arm, or a wrench is given with a ``Tension``.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     F, W = checked_tension(pose, tension, wrench)
@@ -42,10 +43,12 @@ def checked_tension(
     """Check the arguments of :func:`stiffness`; return F (C,) [N] and W (6,)."""
     arm = instance("pose", pose, Posture).arm
     if isinstance(tension, Tension):
-        if not tension.posture._equals(pose):
+        if not np.array_equal(tension.posture.q, pose.q):
             raise InvalidInput(
                 "tension", "was distributed at another posture; distribute it at this one."
             )
+        if not tension.posture._equals(pose):
+            raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
         if wrench is not None:
             raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
         F, W = tension.values, tension.wrench

@@ -11,7 +11,7 @@ from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import aligned, coordinates, plain
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import one_of
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, Named, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     import pandas
@@ -24,7 +24,7 @@ _ROUNDING = 1e-15  # contributions below this fraction of the total are printed 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Shares(ReadOnlyState):
+class Shares(ReadOnlyState, Named):
     """Contributions to the stiffness in one direction; their sum is :attr:`total`.
 
     Attributes:
@@ -45,8 +45,12 @@ class Shares(ReadOnlyState):
 
     def __getitem__(self, cable: str) -> float:
         """Return passive + active contribution of a cable [N/m], or raise UnknownName."""
-        names = self.stiffness.posture.arm.cables.names
+        names = self.keys()
         return float(self.cables[names.index(one_of("cable", cable, names))])
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the names of the cables."""
+        return self.stiffness.posture.arm.cables.names
 
     @property
     def cables(self) -> Array:

@@ -196,7 +196,7 @@ def did_you_mean(key: str, known: Iterable[str], least: float = 0.6) -> str:
     ``least`` is the least similarity, from 0 to 1.
     """
     near = difflib.get_close_matches(key[:100], list(known), n=1, cutoff=least)
-    return f"; did you mean {near[0]}?" if near else ""
+    return f"; did you mean {near[0]}?" if near and near[0] != key else ""
 
 
 def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:

@@ -7,7 +7,7 @@ guard against overflow or denormal numbers.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -238,6 +238,10 @@ def _native(name: str, value: ArrayLike) -> Array:
         array = np.asarray(value)
     except Exception as error:  # a user-defined __array__ may raise anything
         raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
+    if isinstance(value, Mapping):
+        raise InvalidInput(
+            name, f"a {type(value).__name__} given; give its numbers alone, in order, as an array."
+        )
     if array.dtype.kind not in "iuf":
         raise InvalidInput(name, f"holds {array.dtype} entries; real numbers are needed.")
     if array.dtype == np.float64:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, TypeVar
 
@@ -26,6 +27,20 @@ class Printed:
 
     def _repr_html_(self) -> str:
         return str(element("pre", str(self)))
+
+
+class Named:
+    """Base class of values that are indexed by name: ``in`` and iteration are of the names."""
+
+    def keys(self) -> tuple[Any, ...]:
+        """Return the names, in the order of the arrays."""
+        raise NotImplementedError
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.keys())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.keys()
 
 
 class ReadOnlyState(Printed):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, final
@@ -15,7 +14,7 @@ from cdsm.posture import Posture
 from cdsm.support.format import aligned, key, plain, plural
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import one_of
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, Named, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     import pandas
@@ -24,11 +23,11 @@ if TYPE_CHECKING:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Tension(ReadOnlyState):
+class Tension(ReadOnlyState, Named):
     """Cable tensions that balance an arm, with the data of their problem.
 
-    A mapping from the name of a cable to its tension [N]: ``tension["cable1_1"]``,
-    ``dict(tension)``, ``len(tension)``. :attr:`values` is the array, as in ``np.array(tension)``.
+    Indexed by the name of a cable [N]: ``tension["cable1_1"]``, ``"cable1_1" in tension``,
+    ``dict(tension)``. By index there is the array :attr:`values`, equal to ``np.array(tension)``.
 
     Attributes:
         posture: The posture.
@@ -65,13 +64,8 @@ class Tension(ReadOnlyState):
 
     def __getitem__(self, cable: str) -> float:
         """Return the tension of a cable [N]; UnknownName if there is no such cable."""
-        return dict(self.items())[one_of("cable", cable, self.keys())]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.keys())
-
-    def __contains__(self, cable: object) -> bool:
-        return cable in self.keys()
+        remedy = "" if isinstance(cable, str) else "By index there is the array tension.values."
+        return dict(self.items())[one_of("cable", cable, self.keys(), remedy)]
 
     def __len__(self) -> int:
         return self.values.size

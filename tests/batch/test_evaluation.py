@@ -421,6 +421,11 @@ def test_a_batch_says_what_it_holds_and_survives_pickling() -> None:
     assert repr(batch) == f"<Batch of {arm.geometry.name}, 3 postures: 2 OK, 1 BEYOND_LIMITS>"
     assert str(batch).splitlines()[0] == "3 postures: 2 OK, 1 BEYOND_LIMITS"
     assert "(3, 6, 6)" in str(batch)
+    assert len(batch) == 3
+    assert tuple(batch) == batch.outputs
+    assert "tip" in batch
+    assert "joint" not in batch
+    assert dict(batch)["margin"] is batch["margin"]
     np.testing.assert_array_equal(batch.ok, [True, False, True])
     again = pickle.loads(pickle.dumps(batch))
     np.testing.assert_array_equal(again["compliance"], batch["compliance"])
@@ -718,6 +723,10 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
     "tensions of elsewhere": (
         lambda: cdsm.evaluate(ARM, Q, cdsm.distribute_tensions(ARM, 0.5 * Q)),
         ("tension: was distributed at other postures",),
+    ),
+    "tensions of another arm": (
+        lambda: cdsm.evaluate(ARM.with_gravity("z"), Q, cdsm.distribute_tensions(ARM, Q)),
+        ("tension: was distributed for another arm", "with_gravity"),
     ),
     "tensions and wrench": (
         lambda: cdsm.evaluate(ARM, Q, cdsm.distribute_tensions(ARM, Q), W),

@@ -151,10 +151,16 @@ def test_replace_checks_what_it_changes() -> None:
     geometry = universal()
     wider = geometry.replace(hole_radius=0.025)
     assert wider == universal(hole_radius=0.025)
+    assert universal(hole_radius=[0.03, 0.02, 0.01]).replace(hole_radius=0.025) == wider
+    joints = universal(hole_radius=[0.02, 0.03, 0.02]).joints
+    both = geometry.replace(hole_radius=0.025, joints=joints)
+    assert both.hole_radii == (0.025, 0.03, 0.025)
     with pytest.raises(cdsm.GeometryError, match="did you mean hole_radius"):
         geometry.replace(hole_radus=0.025)
     with pytest.raises(cdsm.GeometryError, match="hole_radius: -1 m given"):
         geometry.replace(hole_radius=-1.0)
+    with pytest.raises(cdsm.GeometryError, match=r"lead: is not a key that is known here$"):
+        geometry.replace(lead=0.1)
 
 
 # --- holes ----------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ K = cdsm.stiffness(POSE, PULL)
 NAMES = [cable.name for cable in POSE.arm.cables]
 
 
-def test_tension_is_a_mapping_by_cable_whose_values_are_an_array() -> None:
+def test_tension_is_indexed_by_cable_and_its_values_are_an_array() -> None:
     assert dict(PULL) == dict(zip(NAMES, PULL.values.tolist(), strict=True))
     assert dict(PULL.items()) == {**PULL}
     assert list(PULL) == NAMES
@@ -32,6 +32,8 @@ def test_tension_is_a_mapping_by_cable_whose_values_are_an_array() -> None:
     assert PULL.values[0] > 0.0
     with pytest.raises(cdsm.UnknownName, match="did you mean"):
         _ = PULL["cabel1_1"]
+    with pytest.raises(cdsm.UnknownName, match=r"By index there is the array tension\.values"):
+        _ = PULL[0]  # type: ignore[index]
     np.testing.assert_array_equal(cdsm.stiffness(POSE, np.array(PULL)).joint, K.joint)
 
 
@@ -62,6 +64,9 @@ def test_moment_arms_times_tensions_are_the_torque_that_balances_gravity() -> No
     for wrong in ((NAMES[0], "joint9"), ("cable9", joint)):
         with pytest.raises(cdsm.UnknownName):
             _ = arms[wrong]
+    for short in ("mid", "ab", 0, (NAMES[0],)):
+        with pytest.raises(cdsm.InvalidInput, match=r"such as moment_arms\[\"cable1_1\", \"joint1"):
+            _ = arms[short]  # type: ignore[index]
 
 
 def test_moment_arms_of_sliding_joints_have_no_unit() -> None:
@@ -73,6 +78,9 @@ def test_moment_arms_of_sliding_joints_have_no_unit() -> None:
 
 def test_shares_are_printed_by_name_and_add_up() -> None:
     shares = K.shares("z")
+    assert list(shares) == NAMES
+    assert NAMES[0] in shares
+    assert "cable9_9" not in shares
     assert shares[NAMES[4]] == shares.cables[4]
     rows = {line.split()[0]: line.split() for line in str(shares).splitlines()[1:-1]}
     assert rows[NAMES[4]][3] == f"{shares.cables[4] / 1e3:z.4g}"

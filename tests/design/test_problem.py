@@ -75,6 +75,8 @@ def test_quantities_are_those_of_single_postures(rough: bool) -> None:
     arm = task.arm_of(row)
     assert arm.geometry.hole_radii == (0.025,) * 3
     found = cdsm.evaluate_designs(task, [row])
+    assert "mass" in found
+    assert next(iter(found)) == "stiffness (0, 0, 1)"
     poses = [arm.at(q) for q in BENT]
     bounds, worst = (20.0, 400.0, task.loads[0]), {"worst_friction": rough}
     pulls = [cdsm.distribute_tension(p, *bounds, worst_friction=rough) for p in poses]

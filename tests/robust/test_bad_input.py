@@ -67,7 +67,7 @@ NOT_SIX_NUMBERS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "record": (np.zeros(6, [("a", float)]), ("'a'", "real numbers")),
     "ragged": ([[0.0], [0.0, 1.0]], ("not an array of numbers",)),
     "huge integers": ([10**400] * 6, ("object", "real numbers")),
-    "dictionary": ({"joint1_1": 0.1}, ("object", "real numbers")),
+    "dictionary": ({"joint1_1": 0.1}, ("a dict given", "its numbers alone")),
     "generator": ((x for x in range(6)), ("object", "real numbers")),
 }
 
@@ -438,7 +438,12 @@ CASES |= {
             cdsm.Manipulator(GEOMETRY, STEEL, gravity=(0.0, 0.0, 1.0)).at(POSE.q), PULL
         ),
         cdsm.InvalidInput,
-        ("tension", "another posture"),
+        ("tension: was distributed for another arm", "with_gravity"),
+    ),
+    "tension as a dict": (
+        lambda: cdsm.stiffness(POSE, dict(PULL)),  # type: ignore[arg-type]
+        cdsm.InvalidInput,
+        ("tension: a dict given", "its numbers alone, in order"),
     ),
     "wrench beside a Tension": (
         lambda: cdsm.stiffness(POSE, PULL, np.zeros(6)),
