@@ -14,6 +14,7 @@ from cdsm.errors import ElasticityRangeError, SolverError
 from cdsm.friction.neighbourhood import Neighbourhood
 from cdsm.friction.remainders import Bends
 from cdsm.friction.rest_states import RestStates
+from cdsm.instability import verdict
 from cdsm.posture import Posture
 from cdsm.sticking import holding
 from cdsm.stiffness_matrix import Stiffness, stiffness
@@ -69,7 +70,8 @@ class RestBand(ReadOnlyState):
             f"at rest from {1e3 * self.low:.4g} to {1e3 * self.high:.4g} mm along "
             f"{coordinates(self.direction)}, whatever came before"
         )
-        return said if self.proved else f"{said} (to first order, not proved)"
+        said = said if self.proved else f"{said} (to first order, not proved)"
+        return said if self.stiffness.is_stable else f"{verdict(self.stiffness)}\n{said}"
 
     @cached_property
     def tensions(self) -> Array:

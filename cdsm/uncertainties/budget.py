@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
+from cdsm.instability import verdict
 from cdsm.posture import Posture
 from cdsm.support.validation import scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -148,6 +149,7 @@ class Uncertainty(ReadOnlyState):
         unit, size = self.question.unit
         low, high = self.interval()
         lines = [
+            *self._unstable,
             f"{self._headline} (one standard uncertainty, {100.0 * self.relative:.2g} %)",
             f"95 % of such arms: {low / size:.4g} to {high / size:.4g} {unit}",
             f"{'source':<14}{'tolerance':>16}{f'contribution [{unit}]':>24}{'of variance':>14}",
@@ -164,11 +166,22 @@ class Uncertainty(ReadOnlyState):
         without = [source for source, u in self.contributions.items() if u == 0.0]
         if without:
             lines.append(f"without influence on it: {', '.join(without)}")
-        return "\n".join([*lines, *self.warnings])
+        return "\n".join([*lines, *self._nonlinear])
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence if first-order error propagation is not enough; see :attr:`is_linear`."""
+        """Sentences if the arm is UNSTABLE, or if first-order error propagation is not enough."""
+        return self._unstable + self._nonlinear
+
+    @property
+    def _unstable(self) -> tuple[str, ...]:
+        """A sentence if a stiffness of an unstable arm is read, which no weight can measure."""
+        K = self.question.stiffness
+        read = self.question.of in ("along", "stuck", "margin")
+        return (verdict(K),) if read and not K.is_stable else ()
+
+    @property
+    def _nonlinear(self) -> tuple[str, ...]:
         if self.is_linear:
             return ()
         off = f"{100.0 * self.nonlinearity:.2g} %"

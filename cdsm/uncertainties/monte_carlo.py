@@ -131,6 +131,7 @@ class MonteCarlo(ReadOnlyState):
         first = ", ".join(f"{end / size:.4g}" for end in self.budget.interval())
         return "\n".join(
             [
+                *self.budget._unstable,
                 f"{self.budget.question.name}: {self._headline}, {self.values.size} draws",
                 f"95 % of the draws: {low:.4g} to {high:.4g} {unit}, which {word} first order "
                 f"({first})",

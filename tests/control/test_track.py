@@ -91,11 +91,11 @@ def test_own_law_is_called_with_what_is_wanted_and_measured() -> None:
         (lambda moment: control.limited(moment, moment.command * math.nan), "wire of the law"),
         (lambda moment: control.limited(moment, moment.command[:2]), "broadcast|wire of the law"),
         (
-            lambda moment: control.Command(0.0 * moment.command, moment.reference.tension, None),
+            lambda moment: control.Command(0.0 * moment.command, moment.maximum, moment.forced),
             "0 m of wire for cable1_1; .* a positive length",
         ),
         (
-            lambda moment: control.Command(moment.command, moment.maximum + 1.0, None),
+            lambda moment: control.Command(moment.command, moment.maximum + 1.0, moment.forced),
             "law: commanded 251 N .* from 10 to 250 N .* Return limited",
         ),
     ],

@@ -398,3 +398,19 @@ def test_an_arm_from_a_urdf_has_sites_but_no_holes() -> None:
         pose, np.full(12, 50.0), cdsm.Tolerances(site=1e-4, rigidity=0.05), direction=[0, 0, 1]
     )
     assert 0.0 < budget.contributions["site"] < budget.contributions["rigidity"]
+
+
+def test_reading_of_an_unstable_arm_says_so_first() -> None:
+    arm = cdsm.Manipulator(readme_geometry(), cdsm.LinearElasticity(300.0)).with_friction(0.1)
+    pose = arm.at(np.full(arm.nv, 0.1))
+    tension, own = cdsm.distribute_tension(pose, 30.0), cdsm.Tolerances(rigidity=0.05)
+    verdict = cdsm.stiffness(pose, tension).warnings[0]
+    budget = cdsm.uncertainty(pose, tension, own, direction="z")
+    assert budget.warnings[0] == verdict
+    drawn = cdsm.monte_carlo(pose, tension, own, direction="z", draws=100)
+    band = cdsm.rest_band(pose, tension, "z")
+    for said in (budget, drawn, band):
+        assert str(said).splitlines()[0] == verdict
+    # friction holds it while no cable slides
+    stuck = cdsm.uncertainty(pose, tension, own, direction="z", of="stuck")
+    assert "UNSTABLE" not in str(stuck)
