@@ -147,6 +147,12 @@ class _Reader:
             given |= {"minimum": tensions[0]} if alone else {"minimum": None, "tension": tensions}
         read = np.array([[self._number(row, each) for each in self._read] for row in rows])
         if self._read:
+            moved = float(np.ptp(read, axis=0).max())
+            if moved > self._arm.length:
+                self._refuse(
+                    f"test {label}: its readings span {moved:.4g} m, more than the arm is long, "
+                    f"{self._arm.length:.4g} m; give the unit in which they were read"
+                )
             given["displacements"] = read[:, 0] if read.shape[1] == 1 else read
         try:
             return WeightLoop(

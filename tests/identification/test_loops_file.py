@@ -77,6 +77,7 @@ def test_planned_tests_have_no_readings(tmp_path: Path) -> None:
         ),
         ("side,-10,z,150,0", ",-10,z,150,0", ("line 6", "no name")),
         ("side,-10,z,150,5", "side,-10,z,150,0", ("test side", "two sizes")),
+        ("displacement [mm]", "displacement [m]", ("test up", "0.249 m, more than the arm is")),
         ("remark", "force [N]", ("two columns called force",)),
         ("remark", "cable1_1 [N]", ("minimum and cable1_1",)),
         ("minimum [N]", "tension", ("no tensions", "cable1_1 [N]")),
