@@ -25,8 +25,8 @@ from cdsm.support.validation import instance, one_of, sequence_of
 from cdsm.support.values import Array, Printed
 from cdsm.tolerance import Tolerances
 
-CablesOrFile = Sequence[Cable] | str | os.PathLike[str]
-"""Cables, or the path of their file."""
+CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
+"""One or more cables, or the path of their file."""
 
 ANOTHER_ARM = (
     "another arm; distribute it for this one. with_cables, with_friction, with_gravity and "
@@ -246,7 +246,8 @@ def _checked_cables(cables: CablesOrFile) -> Cables:
         from cdsm.arm_file.cables import read_cables
 
         return Cables(read_cables(cables))
-    cables = Cables(sequence_of("cables", cables, Cable))
+    given = [cables] if isinstance(cables, Cable) else cables
+    cables = Cables(sequence_of("cables", given, Cable))
     if not cables:
         raise InvalidInput("cables", "none given; an arm needs at least one.")
     counts = Counter(cable.name for cable in cables)

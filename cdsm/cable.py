@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity, tension_at
+from cdsm.elasticity.law import checked_law
 from cdsm.errors import CableError, CdsmError, InvalidInput
 from cdsm.support.validation import (
     number_array,
@@ -98,10 +99,7 @@ class Cable:
     def __post_init__(self) -> None:
         try:
             text("name", self.name)
-            if not isinstance(self.elasticity, Elasticity):
-                raise InvalidInput(
-                    "elasticity", f"{self.elasticity!r} given; an Elasticity is needed."
-                )
+            checked_law(self.elasticity)
             sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
             lead = quantity("lead", self.lead, "length", zero=True)

@@ -268,7 +268,7 @@ def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
     """Return EA(F) [N] in the shape of F [N]; InvalidInput if the law gives no valid EA."""
     rigidity = np.asarray(law.rigidity(tension))
     _, least, most = RANGES["rigidity"]
-    usable = (rigidity >= least) & (rigidity <= most)  # False for NaN
+    usable = rigidity.dtype.kind in "iuf" and (rigidity >= least) & (rigidity <= most)  # not NaN
     if rigidity.shape != tension.shape or np.count_nonzero(usable) < tension.size:
         raise InvalidInput(
             "elasticity",
@@ -281,7 +281,7 @@ def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
 def _checked_strain(law: Elasticity, tension: Array) -> Array:
     """Return ε(F) [-] in the shape of F [N]; InvalidInput if the law gives no valid ε."""
     strain = np.asarray(law.strain(tension))
-    usable = (strain > -1.0) & (strain <= LARGEST)  # False for NaN
+    usable = strain.dtype.kind in "iuf" and (strain > -1.0) & (strain <= LARGEST)  # not NaN
     if strain.shape != tension.shape or np.count_nonzero(usable) < tension.size:
         raise InvalidInput(
             "elasticity",

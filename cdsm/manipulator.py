@@ -115,8 +115,8 @@ class Manipulator(ArmFacts):
             FileError: The file cannot be read.
             UrdfError: The URDF is not a supported robot; lists every fault.
             UnknownName: No link is called ``tip``, or ``original_length`` is unknown.
-            InvalidInput: ``joint_names`` does not name each moving joint once, or the rigidity of a
-                user-defined law is discontinuous.
+            InvalidInput: ``urdf`` is neither a path nor a text, ``joint_names`` does not name each
+                moving joint once, or the rigidity of a user-defined law is discontinuous.
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)

@@ -13,7 +13,7 @@ from collections import Counter
 import numpy as np
 from lxml import etree
 
-from cdsm.errors import UrdfError, listed
+from cdsm.errors import InvalidInput, UrdfError, listed
 from cdsm.geometry import MAXIMUM_JOINTS
 from cdsm.support.files import read_text
 from cdsm.support.validation import RANGES, flag
@@ -47,6 +47,10 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
     Arguments and errors are those of :meth:`cdsm.Manipulator.from_urdf`.
     """
     flag("check_inertia", check_inertia)
+    if not isinstance(source, (str, os.PathLike)) or source == "":
+        raise InvalidInput(
+            "urdf", f"{source!r:.100} given; the path of a URDF is needed, or its text as str."
+        )
     inline = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
     text = (str(source) if inline else read_text(source)).lstrip("\ufeff \t\r\n")
     name = "the URDF" if inline else os.fspath(source)

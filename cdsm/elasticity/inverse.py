@@ -48,8 +48,7 @@ def tension_at(
         raise ElasticityRangeError(
             f"no tension of the domain {domain} gives the {name} {first:.6g}; it reaches "
             f"{reached[-1]:.6g}.",
-            [high],
-            np.flatnonzero(outside).tolist(),
+            indices=np.flatnonzero(outside).tolist(),
         )
     above = np.searchsorted(reached[1:-1], wanted) + 1
     guess = np.interp(wanted, reached, grid)

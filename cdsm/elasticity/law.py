@@ -155,6 +155,23 @@ class Elasticity(ABC):
         return secant
 
 
+def checked_law(law: object) -> Elasticity:
+    """Return the law of a cable; InvalidInput if it is no Elasticity, or its domain no Domain."""
+    if not isinstance(law, Elasticity):
+        raise InvalidInput(
+            "elasticity",
+            f"{law!r} given; an Elasticity is needed: LinearElasticity(EA), a law of presets, or "
+            "an object of your own subclass. The name of a wire is taken only in files, and by "
+            "wire= of Manipulator.read and read_cables.",
+        )
+    if not isinstance(law.domain, Domain):
+        raise InvalidInput(
+            "elasticity",
+            f"{law!r} has the domain {law.domain!r}; a Domain is needed, as Domain(0.0, 500.0).",
+        )
+    return law
+
+
 def positive_factor(factor: float) -> float:
     """Check the factor of :meth:`Elasticity.scaled`; raise InvalidInput if it is not positive."""
     number = scalar("factor", factor)

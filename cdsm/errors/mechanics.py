@@ -18,15 +18,15 @@ class ElasticityRangeError(CdsmError, ValueError):
 
     Attributes:
         problem: The fault, as text.
-        tension: The invalid tensions [N].
-        indices: Indices of these tensions in the input array.
+        tension: The invalid tensions [N]; empty if a strain or an elongation has no tension.
+        indices: Indices of these tensions, or strains, in the input array.
         cables: Names of the cables with these tensions; empty if no cable is known.
     """
 
     def __init__(
         self,
         problem: str,
-        tension: Sequence[float],
+        tension: Sequence[float] = (),
         indices: Sequence[int] = (),
         cables: Sequence[str] = (),
     ) -> None:
@@ -34,9 +34,10 @@ class ElasticityRangeError(CdsmError, ValueError):
         self.tension = tuple(float(value) for value in tension)
         self.indices = tuple(int(index) for index in indices)
         self.cables = tuple(cables)
-        names = f" (cable {named(self.cables)})" if self.cables else ""
-        values = named(distinct_texts(self.tension))
-        super().__init__(f"tension {values} N{names}: {problem}")
+        names = f"cable {named(self.cables)}" if self.cables else ""
+        values = f"tension {named(distinct_texts(self.tension))} N" if self.tension else ""
+        where = f"{values} ({names})" if values and names else values or names
+        super().__init__(f"{where}: {problem}" if where else problem)
 
 
 class InfeasibleTension(CdsmError):

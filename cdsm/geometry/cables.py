@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from cdsm.cable import Cable, Control, Site
 from cdsm.elasticity import Elasticity
+from cdsm.elasticity.law import checked_law
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
 from cdsm.support.validation import instance
@@ -34,14 +35,18 @@ def serpentine_cables(
         control: Motor control of all cables, as in :class:`Cable`.
 
     Raises:
-        InvalidInput: The number of elasticities is neither one nor the number of cables.
+        InvalidInput: ``elasticity`` is no law, or the number of laws is not that of the cables.
         CableError: A cable is invalid.
     """
     count = len(instance("geometry", geometry, Geometry).cables)
-    elasticities = (elasticity,) * count if isinstance(elasticity, Elasticity) else elasticity
-    if not isinstance(elasticities, Sequence) or len(elasticities) != count:
+    if isinstance(elasticity, (list, tuple)):
+        elasticities = tuple(elasticity)
+    else:
+        elasticities = (checked_law(elasticity),) * count
+    if len(elasticities) != count:
         raise InvalidInput(
-            "elasticity", f"{elasticity!r} given; give one Elasticity, or one for each of {count}."
+            "elasticity",
+            f"{len(elasticities)} laws given; give one, or one for each of {count} cables.",
         )
     cables, disks = [], geometry.disks
     for name, route, material in zip(

@@ -124,7 +124,9 @@ def as_path(path: str | os.PathLike[str]) -> Path:
     try:
         found = Path(path)
     except TypeError:
-        raise InvalidInput("path", f"{path!r} given; the path of a file is needed.") from None
+        raise InvalidInput("path", f"{path!r:.100} given; the path of a file is needed.") from None
+    if path == "":  # which Path takes for the folder
+        raise FileError("''", "is an empty path; the path of a file is needed.")
     try:
         found.lstat()
     except (FileNotFoundError, NotADirectoryError):

@@ -217,8 +217,13 @@ class TabulatedElasticity(Elasticity):
     def __post_init__(self) -> None:
         for name in ("tensions", "strains"):
             row = _row(name, getattr(self, name))
-            if len(row) < 2 or any(a >= b for a, b in pairwise(row)):
-                raise InvalidInput(name, f"{len(row)} points given; two or more, rising, needed.")
+            if len(row) < 2:
+                raise InvalidInput(name, f"{len(row)} given; two or more are needed.")
+            for i, (a, b) in enumerate(pairwise(row)):
+                if a >= b:
+                    raise InvalidInput(
+                        name, f"entry [{i + 1}] is {b:g} after {a:g}; they must rise."
+                    )
             object.__setattr__(self, name, row)
         F, strains = self.tensions, self.strains
         if len(F) != len(strains):

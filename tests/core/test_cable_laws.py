@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,8 +56,10 @@ def test_own_elasticity_need_not_be_hashable() -> None:
         lambda tension: tension + INF,
         lambda tension: np.array([1e3]),
         lambda tension: 1e3,
+        lambda tension: "stiff",
+        lambda tension: None,
     ],
-    ids=["NaN", "negative", "zero", "infinite", "one for all", "a scalar"],
+    ids=["NaN", "negative", "zero", "infinite", "one for all", "a scalar", "a text", "nothing"],
 )
 def test_own_elasticity_without_a_positive_rigidity_is_refused(
     answer: Callable[[Array], Any],
@@ -64,6 +67,19 @@ def test_own_elasticity_without_a_positive_rigidity_is_refused(
     arm = cdsm.Manipulator(GEOMETRY, Own(answer))
     with pytest.raises(cdsm.InvalidInput, match=r"elasticity.*rigidity.*positive"):
         cdsm.stiffness(arm.at(np.zeros(arm.nv)), np.full(len(arm.cables), 50.0))
+
+
+class Paired(Own):
+    domain = (0.0, 500.0)  # type: ignore[assignment]
+
+
+def test_own_elasticity_without_a_domain_is_refused_where_it_enters_a_cable() -> None:
+    law = Paired(np.ones_like)
+    said = r"Paired object.*has the domain \(0\.0, 500\.0\); a Domain is needed"
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        cdsm.Manipulator(GEOMETRY, law)
+    with pytest.raises(cdsm.CableError, match=said):
+        replace(ARM.cables[0], elasticity=law)
 
 
 @pytest.mark.parametrize(

@@ -188,8 +188,10 @@ def test_strain_out_of_reach_is_refused_with_the_reach(name: str) -> None:
     for strain, said in ((-1e-9, "it reaches"), (beyond, f"it reaches {largest:.6g}.")):
         with pytest.raises(cdsm.ElasticityRangeError) as caught:
             law.tension([0.0, strain])
+        assert str(caught.value).startswith("no tension of the domain")
         assert f"gives the strain {strain:.6g}; {said}" in str(caught.value)
         assert caught.value.indices == (1,)
+        assert caught.value.tension == ()
     with pytest.raises(cdsm.ElasticityRangeError, match="strain -1;") as caught:  # the first of two
         law.tension([0.0, -1.0, 0.0, -2.0])
     assert caught.value.indices == (1, 3)

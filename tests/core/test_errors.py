@@ -29,6 +29,7 @@ def test_only_the_first_tensions_outside_a_law_are_named() -> None:
     assert str(error) == "tension 1, 2, 3, 4, … N (cable a, b, c, d, …): too far."
     assert error.cables == tuple("abcdef")
     assert str(cdsm.ElasticityRangeError("too far.", [5.0])) == "tension 5 N: too far."
+    assert str(cdsm.ElasticityRangeError("too far.", cables=["a", "b"])) == "cable a, b: too far."
 
 
 @pytest.mark.parametrize(

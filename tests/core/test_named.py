@@ -44,6 +44,7 @@ def test_cables_of_an_arm_are_found_by_number_and_by_name() -> None:
     assert cables == tuple(cables)
     assert cables[:2] == tuple(cables)[:2]
     assert POSE.arm.with_cables(cables) == POSE.arm
+    assert POSE.arm.with_cables(cables[0]).cables == (cables[0],)
     with pytest.raises(cdsm.UnknownName, match="no cable is called 'cabel1_1'; did you mean"):
         _ = cables["cabel1_1"]
 

@@ -106,7 +106,17 @@ CASES |= {
     "elasticity a number": (
         lambda: cdsm.Manipulator(GEOMETRY, 2e5),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("elasticity: 200000.0", "one Elasticity", str(C)),
+        ("elasticity: 200000.0", "an Elasticity is needed: LinearElasticity(EA)"),
+    ),
+    "elasticity a function": (
+        lambda: cdsm.Manipulator(GEOMETRY, lambda F: 5e4),  # type: ignore[arg-type]
+        cdsm.InvalidInput,
+        ("elasticity: <function", "an object of your own subclass"),
+    ),
+    "elasticity a name": (
+        lambda: cdsm.Manipulator(GEOMETRY, "1x19-1.2mm"),  # type: ignore[arg-type]
+        cdsm.InvalidInput,
+        ("elasticity: '1x19-1.2mm'", "only in files, and by wire= of Manipulator.read"),
     ),
     "too few elasticities": (
         lambda: cdsm.Manipulator(GEOMETRY, [STEEL]),
@@ -148,10 +158,20 @@ CASES |= {
         cdsm.InvalidInput,
         ("cables: 3", "Cable is needed"),
     ),
-    "one cable instead of a list": (
-        lambda: cdsm.Manipulator(GEOMETRY, cables=ARM.cables[0]),  # type: ignore[arg-type]
+    "cables without a path": (
+        lambda: ARM.with_cables(""),
+        cdsm.FileError,
+        ("'': is an empty path", "the path of a file is needed"),
+    ),
+    "no text of a URDF": (
+        lambda: cdsm.Manipulator.from_urdf("", ARM.cables, tip="tool0"),
         cdsm.InvalidInput,
-        ("cables: ", "Cable is needed"),
+        ("urdf: '' given", "the path of a URDF is needed, or its text"),
+    ),
+    "a URDF of bytes": (
+        lambda: cdsm.Manipulator.from_urdf(ARM.urdf.encode(), ARM.cables, tip="tool0"),  # type: ignore[arg-type]
+        cdsm.InvalidInput,
+        ("urdf: b'<?xml", "its text as str"),
     ),
     "duplicate cable names": (
         lambda: cdsm.Manipulator(GEOMETRY, cables=[cdsm.Cable("a", (BASE, END), STEEL)] * 2),
@@ -273,7 +293,7 @@ CASES |= {
     "cables of no elasticity": (
         lambda: cdsm.serpentine_cables(GEOMETRY, None),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("elasticity: None", "one Elasticity"),
+        ("elasticity: None", "an Elasticity is needed"),
     ),
     "cables of too few elasticities": (
         lambda: cdsm.serpentine_cables(GEOMETRY, [STEEL] * (C - 1)),
