@@ -139,7 +139,7 @@ def _own_folder() -> str:
 
 
 _NEW, _KEPT = (0.5, 2**15), (0.02, 2**12)
-"""Python runs a kernel up to so many seconds in all, for calls of up to so many numbers.
+"""Python runs a kernel up to so many seconds in all, for arrays of up to so many numbers.
 
 The first pair is for a new kernel, the second for one that is compiled on the disk.
 """
@@ -199,7 +199,7 @@ def _patient(function: _Function) -> _Function:
         wide = (dict(zip(names, arguments, strict=False)).get("width") or 1) > WIDTH
         known = is_kept(*map(kernel.typeof_pyval, arguments))
         seconds, numbers = _KEPT if known else _NEW
-        few = _count(arguments) <= numbers and spent < seconds
+        few = _largest(arguments) <= numbers and spent < seconds
         patient = not known and spent < _PATIENCE if wide else few
         if patient and not _at_once:
             return partial(run, start, wide)
@@ -217,9 +217,11 @@ def is_new(kernel: Callable[..., Any]) -> bool:
     return new()
 
 
-def _count(values: Any) -> int:
-    """Count the numbers in an array, or in nested tuples of arrays."""
-    return sum(map(_count, values)) if isinstance(values, tuple) else getattr(values, "size", 0)
+def _largest(values: Any) -> int:
+    """Return the size of an array, or of the largest one in nested tuples of arrays."""
+    if isinstance(values, tuple):
+        return max(map(_largest, values), default=0)
+    return getattr(values, "size", 0)
 
 
 def _native(result: Any) -> Any:

@@ -83,7 +83,7 @@ from cdsm.kernels.compiling import compiled
 def total(pair):
     return pair[0].sum() + pair[1].sum()
 
-for count in (100, 2**15):
+for count in (100, 2**15 + 1):
     total((np.ones(count), np.ones(100)))
     print(len(total.signatures))
 """
