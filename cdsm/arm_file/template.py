@@ -56,7 +56,7 @@ _COMMENTS = {
 _MORE = {
     "disk_radius": "outer radius of the disks; default 1.1 hole_radius",
     "cable_radius": "a ring for the cables of its own, on all disks",
-    "joint_limit": "both directions; default: until the disks touch",
+    "joint_limit": "both ways; default: disks of disk_radius, else hole_radius, touch",
     "friction": "coefficient in the holes",
     "hole_angles": "replaces cables_per_joint; or one list per joint",
 }

@@ -62,8 +62,8 @@ KINDS: Final[dict[str, Kind]] = {
     "capacity_margin": Kind("least payload in any direction", "N", ("N", 1.0), "most"),
     "tension_factor": Kind("least tension factor", "1", _ONE, "most"),
     "cable_clearance": Kind("least clearance between cables", "m", _MM, "most"),
-    "link_clearance": Kind("least clearance of links", "m", _MM, "most"),
-    "disk_clearance": Kind("least clearance of disks", "m", _MM, "most"),
+    "link_clearance": Kind("least clearance of cables from links", "m", _MM, "most"),
+    "disk_clearance": Kind("least clearance of cables from rims and other disks", "m", _MM, "most"),
     "workspace": Kind("volume around the tips held", "m3", ("dm³", 1e-3), "most"),
     "held": Kind("share of postures held", "1", ("%", 1e-2), "most"),
     "mass": Kind("mass of the links", "kg", ("kg", 1.0), "least"),
@@ -144,7 +144,7 @@ class Objective(Measure):
             the load, to first order; ``payload`` and ``capacity_margin`` are the largest force,
             besides the load, within the limits of the tensions, along u and in any direction; the
             ``workspace`` is the volume of the convex hull of the tips at all postures that are
-            held; the wires are as in :func:`~cdsm.wire_use`.
+            held; clearances and wires are as in :func:`~cdsm.clearance`, :func:`~cdsm.wire_use`.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` or ``"least"``; None: the usual one, e.g. the most stiffness, the least
             mass.

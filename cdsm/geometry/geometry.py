@@ -97,8 +97,8 @@ class Geometry(Description):
             link_mass: Mass of every link [kg].
             lead: Straight cable between each actuator and the base disk [m].
             friction: Friction coefficient μ of the cables [-], as in :class:`CableRoute`.
-            joint_limit: Largest angle about each axis in both directions [rad]. None: until the
-                disks touch, 2 atan(h/R), at most 80°; R is ``disk_radius`` if given.
+            joint_limit: Largest angle about each axis in both directions [rad]. None: until disks
+                of radius r touch, 2 atan(h/r), at most 80°; r is ``disk_radius``, or else R.
             disk_radius: Outer radius of the disks [m]; None: 1.1 times that of the farthest hole.
             cable_radius: Distance of the holes from the axis on all disks [m], for the cables of
                 each joint, e.g. on an inner ring; None: the ``hole_radius`` of each disk.

@@ -18,7 +18,7 @@ _MOST_CABLES = 64
 
 CablesPerJoint = Annotated[Integer, Field(ge=1, le=_MOST_CABLES)]
 
-_Angles = Annotated[Sequence[Number], Field(min_length=1, max_length=_MOST_CABLES)]
+_Angles = Annotated[Sequence[Number], Field(max_length=_MOST_CABLES)]
 
 
 def _of_all_or_each(value: object) -> str:
@@ -61,6 +61,11 @@ def uniform(
     if (cables_per_joint is None) == (hole_angles is None):
         given = "is missing" if hole_angles is None else "is given beside hole_angles"
         faults.append(f"cables_per_joint: {given}; give cables_per_joint or hole_angles")
+    elif hole_angles is not None and (empty := _without_angles(hole_angles)):
+        faults.append(
+            f"{empty}: has no angle; give one for each cable of a joint, at least one. Cables with "
+            "other paths replace these: give them in a file of cables (--cables CABLES.toml)"
+        )
     elif hole_angles is not None and isinstance(hole_angles[0], Sequence) and len(hole_angles) != n:
         faults.append(
             f"hole_angles: {len(hole_angles)} lists given for {n} joints; give one list of angles, "
@@ -102,3 +107,11 @@ def uniform(
         "links": tuple(links),
         "cables": spread_out(cables, keywords["spread"]),
     }
+
+
+def _without_angles(hole_angles: Sequence[float | Sequence[float]]) -> str:
+    """Return the lists of hole angles that are empty, by name; an empty text if none is."""
+    lists = [each for each in hole_angles if isinstance(each, Sequence)]
+    if not hole_angles or (lists and not any(lists)):
+        return "hole_angles"
+    return ", ".join(f"hole_angles[{k}]" for k, each in enumerate(lists, start=1) if not each)
