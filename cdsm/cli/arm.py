@@ -32,7 +32,7 @@ _Given = Annotated[
     typer.Option(
         "--tolerances",
         metavar="T.toml",
-        help="Tolerances, for the uncertainty of the stiffness; default: those in ARM.toml.",
+        help="Tolerances for the uncertainty of the stiffness; all those in ARM.toml are replaced.",
     ),
 ]
 
@@ -177,7 +177,10 @@ def check(
     load: LoadOptions,
     angles: Angles = "0",
     out: Annotated[
-        Path | None, out_option(metavar="FILE.html", help="Also write the report as a page.")
+        Path | None,
+        out_option(
+            endings=(".html", ".htm"), metavar="FILE.html", help="Also write the report as a page."
+        ),
     ] = None,
     tolerances: _Given = None,
     as_json: AsJson = False,

@@ -136,6 +136,8 @@ def cycle(
     """
     import numpy as np
 
+    from cdsm.support.format import without_rounding
+
     if not weight.given:
         raise misuse("--force", "give it or --mass: the largest load.")
     pose = arm.at(angles)
@@ -149,10 +151,11 @@ def cycle(
     write(out, history.write)
     write_picture(figure, history.plot)
     lost = float(history.dissipated[-len(factors) :].sum())
-    left = float(np.linalg.norm(history.displacement[-1]))
+    far = np.linalg.norm(history.displacement, axis=1)
+    left = float(far[-1])
     note = (
         f"the last cycle loses {1000.0 * lost:.4g} mJ; without load the tip is left "
-        f"{1e6 * left:.4g} µm from where it was"
+        f"{1e6 * without_rounding(far)[-1]:.4g} µm from where it was"
     )
     if not pose.arm.has_friction:
         note = "the holes have no friction, so there is no loop: give --friction, e.g. 0.1"

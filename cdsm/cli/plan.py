@@ -29,7 +29,9 @@ def plan(
     ],
     target: Annotated[
         float | None,
-        typer.Option(help="Wanted stiffness [N/mm]; PATH.csv can give it for every sample."),
+        typer.Option(
+            help="Wanted stiffness [N/mm]; PATH.csv can give it for every sample.", min=0.0
+        ),
     ] = None,
     angles: Annotated[str | None, options.ANGLES] = None,
     path: Annotated[

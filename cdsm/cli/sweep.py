@@ -210,7 +210,10 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
     rest: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.partition("=")
-        name, given = name.strip(), numbers("--grid", value.replace(":", " "))
+        name, given = (
+            name.strip(),
+            numbers("--grid", value.replace(":", " "), form="JOINT=LOW:HIGH:N"),
+        )
         unit = units.get(name, 1.0)  # the sweep refuses unknown names
         if name in (*angles, *rest):
             raise misuse("--grid", f"{name} is given twice.")

@@ -37,7 +37,7 @@ def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
             name, _, value = part.partition("=")
             if one_of("joint", name, arm.joint_names) in named:
                 raise misuse("--angles", f"{name} is given twice.")
-            named[name] = numbers("--angles", value, 1, "JOINT=DEG")[0]
+            named[name] = numbers("--angles", value, 1, f"an angle, as {name}=10")[0]
         return [named.get(name, 0.0) for name in arm.joint_names]
     given = numbers("--angles", text)
     given = given * arm.nv if len(given) == 1 else given
@@ -60,26 +60,28 @@ def axis(text: str) -> tuple[float, float, float] | None:
 
 def direction_of(text: str) -> Sequence[float]:
     """Return the direction (3,) of --direction: an axis, or three numbers."""
-    return axis(text) or numbers("--direction", text, 3, "an axis, or X,Y,Z")
+    return axis(text) or numbers("--direction", text, 3, "an axis such as -y, or X,Y,Z")
 
 
 def gravity_of(text: str) -> list[float] | str:
     """Return gravity (3,) [m/s²], or the name of the axis along which it is 9.81 m/s²."""
     word = text.strip()
-    return word if axis(word) else numbers("--gravity", text, 3, "an axis, or GX,GY,GZ")
+    return word if axis(word) else numbers("--gravity", text, 3, "an axis such as -y, or GX,GY,GZ")
 
 
-def numbers(option: str, text: str, count: int | None = None, form: str = "numbers") -> list[float]:
+def numbers(option: str, text: str, count: int | None = None, form: str = "N,N,...") -> list[float]:
     """Return the ``count`` numbers in the text of an option; None: any count.
 
     BadParameter otherwise; its message says that ``form`` is needed, such as ``FX,FY,FZ``.
     """
     from cdsm.support.format import plural
 
-    try:
-        values = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError as error:
-        raise misuse(option, f"{error}; give {form}, separated by commas.") from None
+    values = []
+    for word in text.replace(",", " ").split():
+        try:
+            values.append(float(word))
+        except ValueError:
+            raise misuse(option, f"{word!r} is no number; give {form}.") from None
     if count is not None and len(values) != count:
         counted = f"{plural(len(values), 'number')} given; give {count}: {form}."
         raise misuse(option, counted)

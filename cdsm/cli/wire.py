@@ -19,7 +19,7 @@ def fit(
     test: Annotated[Path, typer.Argument(metavar="TEST.csv", help="Tensile test to read.")],
     gauge_length: Annotated[
         float | None,
-        typer.Option(help="Length of the tested wire in mm; default: that of the file."),
+        typer.Option(help="Length of the tested wire in mm; default: that of the file.", min=0.0),
     ] = None,
     columns: Annotated[
         str | None,

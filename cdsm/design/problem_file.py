@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -16,6 +17,7 @@ from cdsm.design.variables import Variable
 from cdsm.errors import CdsmError, FileError, GeometryError, InvalidInput, counted
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import read_text
+from cdsm.support.format import plural
 from cdsm.support.records import Integer, Number, parse, read_toml, record
 from cdsm.sweeps.poses import GridPoses, PoseSet, RandomPoses
 from cdsm.tolerance import Tolerances
@@ -150,6 +152,7 @@ def _problem(file: _File, folder: Path) -> DesignProblem:
     if faults:
         raise GeometryError(faults)
     arm = Manipulator.read(folder / file.arm)
+    _check_angles(file.postures.angles, arm.joint_names)
     tolerances = None if file.tolerances is None else Tolerances.read(folder / file.tolerances)
     return DesignProblem(
         arm=arm,
@@ -183,6 +186,19 @@ def _postures(entry: _Postures) -> PoseSet | Any:
     if entry.random is not None:
         return RandomPoses(entry.random, entry.seed)
     return GridPoses(entry.grid) if entry.grid is not None else entry.angles
+
+
+def _check_angles(given: Any, joints: Sequence[str]) -> None:
+    """Check that each posture of a list has an angle for each joint; GeometryError otherwise."""
+    rows = given if isinstance(given, list) else []
+    faults = [
+        f"postures: angles[{i}] has {plural(len(row), 'number')}; give {len(joints)} [rad], one "
+        f"for each of {', '.join(joints)}"
+        for i, row in enumerate(rows, start=1)
+        if isinstance(row, list) and len(row) != len(joints)
+    ]
+    if faults:
+        raise GeometryError(faults)
 
 
 def _loads(given: Any) -> Any:

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from cdsm.plots.style import (
     BESIDE,
@@ -182,8 +183,9 @@ def plot_load_history(history: LoadHistory) -> Figure:
     for j, own in enumerate(np.vstack([np.full(last + 1, F), tensions]).T):
         label = {0: "at the motor", 1: "between", last: "at the end"}.get(j)
         shade = j / max(1, last)
-        color = VERMILLION if j == last else BLUE
-        right.plot(own, color=color, alpha=1.0 - 0.75 * shade * (j < last), label=label, lw=0.9)
+        color = VERMILLION if j == last else BLUE if j == 0 else str(0.4 + 0.4 * shade)
+        right.plot(own, color=color, label=label, lw=0.9, zorder=2.5 if j in (0, last) else 2.0)
+    right.xaxis.set_major_locator(MaxNLocator(integer=True))
     right.set(xlabel="number of the load", ylabel="tension of each segment [N]")
     legend(right, title=history.reference.arm.cables[cable].name, **BESIDE)
     lost = f"{1000.0 * history.dissipated.sum():.4g} mJ lost in all in {len(history.holes)} holes"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -148,7 +149,9 @@ def _slab(section: tuple[str, float, float]) -> Slice:
         )
     axis = XYZ.index(one_of("axis", section[0], XYZ))
     place, half = MM * scalar("section", section[1]), MM * scalar("section", section[2])
-    title = f"{section[0]} = {place:.3g} ± {half:.2g} mm".replace(" ", "\xa0")  # no line break
+    digits = 2 - math.floor(math.log10(half)) if half > 0.0 else 3  # a tenth of the last of half
+    title = f"{section[0]} = {round(place, digits) + 0.0:.3g} ± {half:.2g} mm"
+    title = title.replace(" ", "\xa0")  # no line break
     return Slice(title, axis, place, half, _others(axis))
 
 

@@ -18,7 +18,7 @@ from cdsm.statics.locked_motors import rounding
 from cdsm.statics.trust_region import FLAT
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.directions import unit_direction
-from cdsm.support.format import aligned, coordinates, plain
+from cdsm.support.format import aligned, coordinates, plain, without_rounding
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ class Equilibrium(ReadOnlyState):
                 for cable, F, F0 in numbers
             ]
         )
-        rows.append(f"tip moved by {coordinates(1000.0 * self.displacement)} mm")
+        rows.append(f"tip moved by {coordinates(without_rounding(1000.0 * self.displacement))} mm")
         rows += [
             f"{name} rests on its stop, which pushes with {self.reaction[i]:.4g} "
             f"{arm.torque_unit(i)}"

@@ -16,7 +16,7 @@ import cdsm
 from cdsm.friction.stuck import assemble_segments
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Friction, Stiffness
-from cdsm.support.format import plain
+from cdsm.support.format import plain, without_rounding
 from cdsm.support.tidy import data_frame, dataset, write_labelled
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -218,16 +218,17 @@ class LoadHistory(ReadOnlyState):
             f"{'sliding':>9}{'work [mJ]':>12}{'lost [mJ]':>12}"
         ]
         work = self.load_work + self.motor_work
+        moves, works = without_rounding(self.displacement), without_rounding(work)
         for k in range(count):
             if count > _SHOWN and _SHOWN // 2 <= k < count - _SHOWN // 2:
                 if k == _SHOWN // 2:
                     rows.append(f"{'…':>5}")
                 continue
             force = "".join(f"{f:>11.4g}" for f in self.wrenches[k, :3])
-            moved = "".join(f"{1000.0 * x:>10.4f}" for x in self.displacement[k])
+            moved = "".join(f"{1000.0 * x:>z10.4f}" for x in moves[k])
             rows.append(
                 f"{k + 1:>5}  {force}{moved}{np.count_nonzero(self.sliding[k]):>9}"
-                f"{1000.0 * work[k]:>12.4g}{1000.0 * self.dissipated[k]:>12.4g}"
+                f"{1000.0 * works[k]:>12.4g}{1000.0 * self.dissipated[k]:>12.4g}"
             )
         rows.append(
             f"{self.sliding.shape[1]} holes; in all {1000.0 * work.sum():.4g} mJ of work, "

@@ -20,7 +20,7 @@ from cdsm.statics.load_cycle import load_cycle
 from cdsm.statics.rest_search import equilibrium
 from cdsm.statics.weight_friction import WeightFriction
 from cdsm.support.directions import unit_direction
-from cdsm.support.format import MODEL, coordinates, plain
+from cdsm.support.format import MODEL, coordinates, plain, without_rounding
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import vector, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -198,9 +198,11 @@ class WeightTest(ReadOnlyState):
 
     def __str__(self) -> str:
         rows = [f"{'load [N]':>10}{'x [mm]':>12}{'y [mm]':>12}{'z [mm]':>12}"]
-        for load, moved in zip(self.loads, self.displacements, strict=True):
+        for load, moved in zip(self.loads, without_rounding(self.displacements), strict=True):
             rows.append(f"{load:>10.4g}" + "".join(f"{1000.0 * x:>12.4g}" for x in moved))
-        predicted = "".join(f"{1000.0 * x:>12.4g}" for x in self.linear.displacement)
+        predicted = "".join(
+            f"{1000.0 * x:>12.4g}" for x in without_rounding(self.linear.displacement)
+        )
         rows += [
             f"{'linear':>10}{predicted}",
             f"stiffness along the force: measured {self.stiffness / 1000.0:.4g} N/mm, "

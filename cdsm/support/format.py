@@ -41,6 +41,15 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     ]
 
 
+_ROUNDING = 1e-9  # a number of a table below this fraction of the largest is printed as zero
+
+
+def without_rounding(values: Array) -> Array:
+    """Return the numbers of a table with 0 in place of those that are rounding of the largest."""
+    size = abs(values)
+    return np.where(size > _ROUNDING * size.max(initial=0.0), values, 0.0)
+
+
 def plain(numbers: Mapping[str, Any]) -> dict[str, object]:
     """Turn arrays and tuples into lists, infinite numbers and NaN into None, as JSON needs them."""
     return {name: _plain(each) for name, each in numbers.items()}

@@ -161,6 +161,10 @@ def _run(
     todo = [block for block in every if _is_pending(specification, arrays["status"], block)]
     total, left = (sum(map(postures, some)) * task.cases for some in (every, todo))
     _log.info("sweep of %s: %d of %d entries to compute", task.arm.name, left, total)
+    if left < total:
+        _log.warning(
+            "sweep of %s resumes: %d of %d entries are kept", task.arm.name, total - left, total
+        )
     answers: Iterable[tuple[Block, BlockResult | None]]
     if client is None:
         answers = _side_by_side(specification, todo)

@@ -87,7 +87,7 @@ def test_new_takes_sizes_in_mm_and_degrees(tmp_path: Path) -> None:
         (("--universal", 3, "--hole-radius", 0), 1, "hole_radius: 0 m given"),
         (("--universal", 3, "--wire", "1x9-1.2mm"), 1, "did you mean '1x19-1.2mm'"),
         (("--universal", 3, "--gravity", "1,2"), 2, "give 3"),
-        (("--sections", "3,x"), 2, "could not convert"),
+        (("--sections", "3,x"), 2, "'x' is no number"),
         (("--sections", "3,0"), 1, "joints: input should be greater than or equal to 1"),
     ],
 )

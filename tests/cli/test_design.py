@@ -65,6 +65,10 @@ def test_the_example_writes_front_figures_and_the_files_of_an_arm(tmp_path: Path
         (("[postures]", "[postures]\nrandom = 3"), "one of random, grid and angles"),
         (("population", "populatoin"), "search.populatoin"),
         (("[[0.0, 0.0, -4.905]]", "[[0.0, 0.0]]"), "loads"),
+        (
+            ("[0.2, 0.0, 0.2, 0.0, 0.2, 0.0, 0.2, 0.0]", "[0.2, 0.0]"),
+            "angles[2] has 2 numbers; give 8 [rad], one for each of joint1_1",
+        ),
     ],
 )
 def test_faults_of_a_problem_are_named(tmp_path: Path, change: tuple[str, str], said: str) -> None:

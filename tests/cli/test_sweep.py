@@ -20,13 +20,18 @@ def arm() -> cdsm.Manipulator:
     return cdsm.Manipulator(described, cdsm.LinearElasticity(48e3), gravity=(0.0, -2.0, -9.0))
 
 
-def test_grid_is_what_the_api_computes(geometry: Path, tmp_path: Path) -> None:
+def test_grid_is_what_the_api_computes(
+    geometry: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     out, store = tmp_path / "s.nc", tmp_path / "s.zarr"
     grid = ("--grid", "joint1_1=-20:20:5, joint3_2 = 0:10:2,joint2_1=5")
     result = call("sweep", geometry, *grid, *ARM, "--resume", store, "--out", out)
     assert result.exit_code == 0, result.output
     assert "20 ok" in result.output
     assert str(out) in result.output
+    assert "resumes" not in caplog.text
+    assert call("sweep", geometry, *grid, *ARM, "--resume", store, "--out", out).exit_code == 0
+    assert "sweep of probe resumes: 20 of 20 entries are kept" in caplog.text
     poses = cdsm.GridPoses(
         {
             "joint1_1": np.deg2rad(np.linspace(-20.0, 20.0, 5)),
@@ -81,7 +86,7 @@ def test_map_draws_a_sweep(tmp_path: Path) -> None:
         (("--grid", "joint9=0:1:2"), 1, "no joint is called 'joint9'"),
         (("--grid", "joint1_1=0:1"), 2, "a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE"),
         (("--grid", "joint1_1=0:1:2.5"), 2, "a joint is JOINT=LOW:HIGH:N"),
-        (("--grid", "joint1_1=a"), 2, "could not convert"),
+        (("--grid", "joint1_1=a"), 2, "'a' is no number"),
         (("--grid", "joint1_1=3"), 1, "angles: is empty"),
         (("--path", "{folder}/absent.csv"), 1, "absent.csv: does not exist"),
         (("--path", "{folder}/names.csv"), 1, "has columns for neither of joint angles"),

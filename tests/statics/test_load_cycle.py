@@ -360,7 +360,10 @@ def test_history_is_labelled_and_printed() -> None:
     text = str(history).splitlines()
     assert len(text) == 1 + 24 + 1 + 1
     assert "lost in the holes" in text[-1]
+    assert not any(word.startswith("-0.0000") for line in text for word in line.split())
     figure = history.plot()
+    motor, between, *_, end = (line.get_color() for line in figure.axes[1].lines)
+    assert len({motor, between, end}) == 3
     assert figure.axes[0].get_xlabel() == "displacement along the force [mm]"
     moved, force = np.array(figure.axes[0].lines[0].get_data())
     assert (moved[0], force[0], force[-1]) == (0.0, 0.0, 5.0)

@@ -140,6 +140,8 @@ def test_three_dimensions_sections_and_statuses() -> None:
     order = [np.lexsort(each.T) for each in (shown, inside[:, [0, 2]])]
     np.testing.assert_allclose(shown[order[0]], inside[:, [0, 2]][order[1]], rtol=1e-12)
     assert section.axes[0].get_title() == "y\xa0=\xa010\xa0±\xa020\xa0mm"
+    section = plots.plot_map(found, "softest", section=("y", -4.95e-5, 0.02))
+    assert section.axes[0].get_title() == "y\xa0=\xa00\xa0±\xa020\xa0mm"
 
 
 @pytest.mark.parametrize("statistic", ["median", "min", "max"])
