@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity, tension_at
 from cdsm.elasticity.law import checked_law
-from cdsm.errors import CableError, CdsmError, InvalidInput
+from cdsm.errors import CableError, CdsmError, InvalidInput, named
+from cdsm.support.format import plural
 from cdsm.support.validation import (
     number_array,
     one_of,
@@ -228,6 +229,9 @@ class Cables(tuple[Cable, ...]):
     def position_controlled(self) -> NDArray[np.bool_]:
         """Whether the motor of each cable controls its length, not its tension (C,)."""
         return np.array([cable.control == "position" for cable in self])
+
+    def __repr__(self) -> str:
+        return f"<{plural(len(self), 'cable')}: {named(self.names)}>"
 
     @overload
     def __getitem__(self, which: SupportsIndex | str, /) -> Cable: ...

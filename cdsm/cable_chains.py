@@ -19,11 +19,12 @@ import numpy as np
 from cdsm.cable import Cable
 from cdsm.kernels.stiffness import single_length_hessian
 from cdsm.kernels.tree import Frames, Indices, Routing
+from cdsm.support.format import plural
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Chains:
     """Segments and holes of all cables of an arm; S segments, P holes, actuator side first.
 
@@ -46,6 +47,11 @@ class Chains:
     site: Indices
     friction: Array
     wrap: Array
+
+    def __repr__(self) -> str:
+        counts = (len(self.segments), "segment"), (len(self.start) - 1, "cable")
+        segments, cables = (plural(*each) for each in counts)
+        return f"<{segments} of {cables}, {plural(self.hole.size, 'hole')}>"
 
     @classmethod
     def of(cls, cables: Sequence[Cable]) -> Self:
@@ -101,6 +107,9 @@ class Segments(ReadOnlyState):
     wrap_jacobian: Array
     _routing: Routing
     _frames: Frames
+
+    def __repr__(self) -> str:
+        return repr(self.chains)
 
     @property
     def grip(self) -> Array:

@@ -10,6 +10,7 @@ from cdsm.errors.base import CdsmWarning as CdsmWarning
 from cdsm.errors.base import counted as counted
 from cdsm.errors.base import first_of as first_of
 from cdsm.errors.base import listed as listed
+from cdsm.errors.base import named as named
 from cdsm.errors.inputs import CableError as CableError
 from cdsm.errors.inputs import ClusterError as ClusterError
 from cdsm.errors.inputs import FileError as FileError

@@ -28,7 +28,7 @@ OneOrMore = float | Tolerance | Sequence[Tolerance]
 
 
 @final
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Tolerances:
     """Uncertainties of the dimensions of an arm and of the values measured on it.
 
@@ -103,6 +103,9 @@ class Tolerances:
     def given(self) -> Mapping[str, tuple[Tolerance, ...]]:
         """All tolerances that are not zero, by source."""
         return {name: parts for name in SOURCES if (parts := self.parts(name))}
+
+    def __repr__(self) -> str:
+        return f"Tolerances({', '.join(f'{name}={getattr(self, name)!r}' for name in self.given)})"
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Tolerances:

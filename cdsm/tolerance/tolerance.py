@@ -23,7 +23,7 @@ EVERY = "*"
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tolerance(ReadOnlyState):
     """Standard uncertainty of inputs of one kind, e.g. of the radius of every hole.
 
@@ -152,6 +152,14 @@ class Tolerance(ReadOnlyState):
             common = rho * float(values.sum()) ** 2 if rho else 0.0
             return (1.0 - rho) * float(values @ values) + common
         return max(float(values @ self.matrix(values.size) @ values), 0.0)
+
+    def __repr__(self) -> str:
+        given = [f"standard={self.standard!r}"]
+        for field in fields(self)[1:]:
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray) or value != field.default:
+                given.append(f"{field.name}={value!r}")
+        return f"Tolerance({', '.join(given)})"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Tolerance) and all(

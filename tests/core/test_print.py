@@ -2,8 +2,10 @@
 
 import numpy as np
 
+import cdsm
 from cdsm.support.format import coordinates, key
 from cdsm.support.markup import element, row
+from tests.support.arms import random_arm, random_posture
 
 
 def test_text_is_escaped_and_elements_are_not_escaped_again() -> None:
@@ -18,3 +20,26 @@ def test_coordinates_and_keys_name_what_they_hold() -> None:
     assert coordinates([-1e-9, 1.0, -0.004], "z.2f") == "(0.00, 1.00, 0.00)"
     assert key("margin", "N m/rad") == "margin_Nm_per_rad"
     assert key("margin", "N m/rad or N/m") == "margin_Nm_per_rad_or_N_per_m"
+
+
+def test_large_values_are_short() -> None:
+    pose = random_posture(random_arm(4, 3), 1)
+    segments = sum(len(cable.sites) - 1 + (cable.lead > 0.0) for cable in pose.arm.cables)
+    names, count = ", ".join(pose.arm.cables.names[:4]), len(pose.arm.cables)
+    assert repr(pose.arm.cables) == f"<{count} cables: {names}, …>"
+    assert repr(pose.arm.cables[:2]).startswith("(Cable(")  # a slice is a tuple
+    expected = f"<{segments} segments of {count} cables, {segments - count} holes>"
+    assert repr(pose.segments) == str(pose.segments.chains) == expected
+
+
+def test_tolerances_print_what_is_not_the_default() -> None:
+    assert repr(cdsm.Tolerances()) == "Tolerances()"
+    made = cdsm.Tolerances(
+        rigidity=0.05, lead=[cdsm.Tolerance.within(1e-3, "triangular", of="cable1_*")]
+    )
+    assert repr(made).startswith("Tolerances(rigidity=Tolerance(standard=0.05, correlation=1.0), ")
+    assert "lead=(Tolerance(standard=0.0004" in repr(made)
+    assert "distribution='triangular', of='cable1_*'" in repr(made)
+    assert eval(repr(made), vars(cdsm)) == made
+    varying = cdsm.Tolerance(np.array([0.1, 0.05]), tensions=np.array([10.0, 90.0]))
+    assert "standard=array([0.1 , 0.05]), tensions=array([10., 90.])" in repr(varying)
