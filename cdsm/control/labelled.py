@@ -124,10 +124,11 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
         ("frictionless stiffness error, mean and largest",
          f"{100.0 * n['stiffness_error_mean']:.3g}, "
          f"{100.0 * n['stiffness_error_largest']:.3g} %"),
-        ("tensions at the motors", f"{low:.4g} to {high:.4g} N"),
+        ("true tensions at the motors", f"{low:.4g} to {high:.4g} N"),
         ("least margin to buckling", f"{n['least_margin_Nm_per_rad']:.4g} "
          f"{run.plan.arm.stiffness_unit()}"),
-        ("saturated motors", _names_or_count(run.saturated_motors, run.tension.shape[1])),
+        ("motors clamped at a tension bound",
+         _names_or_count(run.saturated_motors, run.tension.shape[1])),
         ("rigidity of the wires, as estimated", f"{100.0 * n['estimated_rigidity']:.4g} %"),
         ("inside the proved band", _inside(run)),
     ]  # fmt: skip
