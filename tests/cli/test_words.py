@@ -282,7 +282,7 @@ def test_angles_by_name_are_those_in_order(geometry: Path) -> None:
     assert by_name == in_order
     for wrong, words in (
         ("joint1_1=1,joint1_1=2", "given twice"),
-        ("joint1_1=", "1: JOINT=DEG"),
+        ("joint1_1=", "1: an angle, as joint1_1=10"),
         ("joint1_1=1,2", "2"),
     ):
         assert words in said(call("stiffness", geometry, *STEEL, "--angles", wrong).stderr)
