@@ -162,8 +162,8 @@ def test_title_line_gives_the_gauge_length(title: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"columns": ("Weg", "Kraft")}, "no columns of displacement in the header"),
-        ({"columns": (3, 9)}, "no columns of force"),
+        ({"columns": ("Weg", "Kraft")}, "there is no column 'Weg' in the header ["),
+        ({"columns": (3, 9)}, "there is no column 9 in"),
         ({"columns": ("Weg",)}, "give two"),
         ({"units": "mm"}, "give two"),
         ({"units": ("mm", "kN")}, "the header has the force in N, but force_unit='kN'"),

@@ -101,7 +101,9 @@ def find_header(table: Table, wanted: Sequence[str | int] | None) -> tuple[Heade
 
     header = max(headers, key=rank)
     found = _candidates(header, wanted)
-    for kind, columns in zip(_BOTH, found, strict=True):
+    for kind, columns, asked in zip(_BOTH, found, wanted or (None, None), strict=True):
+        if not columns and asked is not None:
+            raise TensileTestError(f"there is no column {asked!r} in {header}; give one of these.")
         if len(columns) != 1:
             named = f": {' and '.join(map(str, columns))}" if columns else ""
             raise TensileTestError(
