@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -44,6 +45,8 @@ def file_option(*names: str, endings: Sequence[str] = (), **shown: Any) -> Any:
                     need("sweep", "netCDF4")
             except cdsm.CdsmError as error:
                 raise typer.BadParameter(str(error)) from None
+            if not os.access(path.resolve().parent, os.W_OK):
+                raise typer.BadParameter(f"{path}: the folder is read-only; choose another.")
         return path
 
     return typer.Option(*names, callback=checked, **shown)

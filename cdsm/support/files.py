@@ -98,12 +98,9 @@ def require_writable(path: Path) -> None:
 
 
 def require_folder(path: Path) -> None:
-    """Raise a FileError if the folder of a path to write does not exist or is read-only."""
-    folder = path.resolve().parent
-    if not folder.is_dir():
+    """Raise a FileError if the folder of a path to write does not exist."""
+    if not path.resolve().parent.is_dir():
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
-    if not os.access(folder, os.W_OK):
-        raise FileError(path, f"the folder {path.parent} is read-only; choose another.")
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
