@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 import cdsm
+from cdsm.cli.files import file_option, out_option
 from cdsm.cli.options import (
     Angles,
     ArmOptions,
@@ -18,8 +19,6 @@ from cdsm.cli.options import (
     LoadOptions,
     TensionOptions,
     directions,
-    file_option,
-    out_option,
 )
 from cdsm.cli.output import Json, answer, by_cable, write
 from cdsm.cli.values import direction_of, misuse

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson, out_folder
+from cdsm.cli.files import out_folder
+from cdsm.cli.options import AsJson
 from cdsm.cli.output import answer, console
 
 _RECORD = "designs.jsonl"

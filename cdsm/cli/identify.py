@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import cdsm
-from cdsm.cli.options import ArmOptions, AsJson, Picture
+from cdsm.cli.files import Picture
+from cdsm.cli.options import ArmOptions, AsJson
 from cdsm.cli.output import answer, write_picture
 from cdsm.cli.values import misuse
 

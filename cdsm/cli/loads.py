@@ -11,11 +11,11 @@ import typer
 import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
+from cdsm.cli.files import Picture, data_option
 from cdsm.cli.options import (
     Angles,
     ArmOptions,
     AsJson,
-    Picture,
     TensionOptions,
     WeightOptions,
     wrench_of,
@@ -121,12 +121,7 @@ def cycle(
     one_sided: Annotated[
         bool, typer.Option("--one-sided", help="Unload to zero; do not reverse the load.")
     ] = False,
-    out: Annotated[
-        Path | None,
-        options.out_option(
-            endings=(".nc", ".csv"), help="File to write: .nc (NetCDF) or .csv, SI units."
-        ),
-    ] = None,
+    out: Annotated[Path | None, data_option()] = None,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:

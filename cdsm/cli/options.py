@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -24,36 +22,6 @@ DEFAULT_SOLVER: Final = "daqp"
 
 _arm_option = partial(typer.Option, rich_help_panel="The arm")
 _tension_option = partial(typer.Option, rich_help_panel="Tensions and load")
-
-
-def file_option(*names: str, endings: Sequence[str] = (), **shown: Any) -> Any:
-    """Declare an option for a file to write; its path is checked before the command computes.
-
-    The path must end in one of ``endings``, if there are any. ``shown`` are help and metavar.
-    """
-
-    def checked(path: Path | None) -> Path | None:
-        if path is not None:
-            from cdsm.support.extras import need
-            from cdsm.support.files import as_path, require_writable
-
-            if endings and path.suffix.lower() not in endings:
-                raise typer.BadParameter(f"{path} ends in none of {', '.join(endings)}.")
-            try:
-                require_writable(as_path(path))
-                if path.suffix.lower() == ".nc":
-                    need("sweep", "netCDF4")
-            except cdsm.CdsmError as error:
-                raise typer.BadParameter(str(error)) from None
-            if not os.access(path.resolve().parent, os.W_OK):
-                raise typer.BadParameter(f"{path}: the folder is read-only; choose another.")
-        return path
-
-    return typer.Option(*names, callback=checked, **shown)
-
-
-out_option = partial(file_option, "--out", "-o")
-out_folder = partial(typer.Option, "--out", "-o")
 
 
 def _solvers() -> list[str]:
@@ -100,15 +68,6 @@ Wrench = Annotated[
 ]
 Solver = Annotated[
     str, _tension_option(help="Quadratic-programming solver.", autocompletion=_solvers)
-]
-PICTURES: Final = (".pdf", ".svg", ".png")
-Picture = Annotated[
-    Path | None,
-    file_option(
-        endings=PICTURES,
-        metavar="FILE.pdf|svg|png",
-        help="Figure to write: vectors, or 300 dpi.",
-    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print answer (SI) and errors as JSON.")]
 

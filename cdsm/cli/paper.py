@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson, out_folder
+from cdsm.cli.files import out_folder
+from cdsm.cli.options import AsJson
 
 
 def reproduce(

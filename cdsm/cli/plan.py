@@ -11,7 +11,8 @@ import typer
 import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
-from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension, Picture
+from cdsm.cli.files import Picture, file_option, out_option
+from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension
 from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import direction_of, misuse
 
@@ -48,14 +49,12 @@ def plan(
     max_tension: MaxTension = math.inf,
     out: Annotated[
         Path | None,
-        options.out_option(
-            metavar="FILE.csv", help="Table of tensions, lengths, stiffness to write."
-        ),
+        out_option(metavar="FILE.csv", help="Table of tensions, lengths, stiffness to write."),
     ] = None,
     figure: Picture = None,
     animation: Annotated[
         Path | None,
-        options.file_option(
+        file_option(
             endings=(".gif",),
             metavar="FILE.gif",
             help="Animation of the arm along --path to write.",

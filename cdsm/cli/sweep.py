@@ -12,6 +12,7 @@ import typer
 import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
+from cdsm.cli.files import data_option, picture_option
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions
 from cdsm.cli.output import Json, answer
 from cdsm.cli.values import joint_scales, misuse, numbers
@@ -106,12 +107,7 @@ class MeasureOptions:
 
 def sweep(
     arm: ArmOptions,
-    out: Annotated[
-        Path,
-        options.out_option(
-            endings=(".nc", ".csv"), help="File to write: .nc (NetCDF) or .csv, SI units."
-        ),
-    ],
+    out: Annotated[Path, data_option()],
     poses: PoseOptions,
     load: LoadOptions,
     measures: MeasureOptions,
@@ -159,12 +155,7 @@ def map_sweep(
     sweep: Annotated[
         Path, typer.Argument(metavar="SWEEP", help="Sweep to read: .nc, or a --resume folder.")
     ],
-    out: Annotated[
-        Path,
-        options.out_option(
-            endings=options.PICTURES, help="Picture to write.", metavar="FILE.pdf|svg|png"
-        ),
-    ],
+    out: Annotated[Path, picture_option("--out", "-o", help="Picture to write.")],
     quantity: Annotated[
         str,
         typer.Option(
@@ -210,10 +201,8 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
     rest: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.partition("=")
-        name, given = (
-            name.strip(),
-            numbers("--grid", value.replace(":", " "), form="JOINT=LOW:HIGH:N"),
-        )
+        name = name.strip()
+        given = numbers("--grid", value.replace(":", " "), form="JOINT=LOW:HIGH:N")
         unit = units.get(name, 1.0)  # the sweep refuses unknown names
         if name in (*angles, *rest):
             raise misuse("--grid", f"{name} is given twice.")

@@ -13,7 +13,8 @@ import typer
 import cdsm
 from cdsm.cli import options
 from cdsm.cli.conditions import Conditions
-from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension, Picture
+from cdsm.cli.files import Picture, file_option, out_option
+from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension
 from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import axis, misuse, numbers
 
@@ -131,7 +132,7 @@ def track(
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     out: Annotated[
         Path | None,
-        options.out_option(
+        out_option(
             endings=(".nc", ".csv"),
             metavar="RUN.nc|RUN.csv",
             help="Results over time to write; .nc has all.",
@@ -139,7 +140,7 @@ def track(
     ] = None,
     animate: Annotated[
         Path | None,
-        options.file_option(
+        file_option(
             endings=(".gif", ".csv"),
             metavar="RUN.gif|RUN.csv",
             help="Motion of the true arm to write: a GIF, or a table over time that `cdsm view "

@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson, Picture, file_option, out_option
+from cdsm.cli.files import Picture, file_option, out_option
+from cdsm.cli.options import AsJson
 from cdsm.cli.output import Json, answer, write, write_picture
 from cdsm.cli.values import misuse
 
