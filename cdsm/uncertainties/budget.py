@@ -23,6 +23,7 @@ from cdsm.uncertainties.inputs import inputs_of
 from cdsm.uncertainties.parts import Part, draw, standards, variance
 from cdsm.uncertainties.question import checked_question, chosen_tolerances
 from cdsm.uncertainties.readings import Question, Reading
+from cdsm.uncertainties.texts import shown, with_uncertainty
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -282,30 +283,3 @@ def checked_probability(probability: float) -> float:
     if not 0.0 < p < 1.0:
         raise InvalidInput("probability", f"{p:g} given; a number between 0 and 1 is needed.")
     return p
-
-
-def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
-    """Write ``value ± uncertainty``, the uncertainty with two digits, in a unit of SI ``size``."""
-    u, places = uncertainty / size, 4
-    if 0.0 < u < math.inf:
-        places = min(max(1 - math.floor(math.log10(u)), 0), 12)
-    return f"{value / size:.{places}f} ± {u:.{places}f}"
-
-
-_SHOWN = {
-    "rigidity": (1e-2, " %"),
-    "spring": (1e-2, " %"),
-    "joint_angle": (math.pi / 180.0, " deg"),
-    "hole_angle": (math.pi / 180.0, " deg"),
-    "tension": (1.0, " N"),
-    "link_mass": (1e-3, " g"),
-    "friction": (1.0, ""),
-}
-"""Size and name of the unit shown to the user for the inputs of a source; mm for all others."""
-
-
-def shown(source: str, standards: Array) -> str:
-    """Write the smallest and largest of ``standards`` (n,) in the unit of this ``source``."""
-    size, unit = _SHOWN.get(source, (1e-3, " mm"))
-    low, high = (f"{each / size:.3g}" for each in (standards.min(), standards.max()))
-    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"

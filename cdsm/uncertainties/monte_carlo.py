@@ -30,10 +30,10 @@ from cdsm.uncertainties.budget import (
     Uncertainty,
     checked_probability,
     uncertainty,
-    with_uncertainty,
 )
 from cdsm.uncertainties.question import chosen_tolerances
 from cdsm.uncertainties.readings import Reading
+from cdsm.uncertainties.texts import with_uncertainty
 
 if TYPE_CHECKING:
     import xarray
