@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -170,27 +171,24 @@ class TrackingRun(ReadOnlyState):
         if self.outcome != "completed":
             word = {"lost": "UNSTABLE", "no rest": "BUCKLES", "wire": "WIRE"}[self.outcome]
             said.append(f"{word} at {self.end:.4g} s: {self.reason}")
-        unstable = np.flatnonzero(~(self.margin > 0.0))
-        if unstable.size:
+        if unstable := np.flatnonzero(~(self.margin > 0.0)).tolist():
             said.append(
-                f"UNSTABLE AT REST at {unstable.size} of {len(self.time)} steps, from "
-                f"{self.time[unstable[0]]:.4g} s: without friction the arm would give way"
+                f"UNSTABLE AT REST {self._at(unstable)}: without friction the arm would give way"
             )
-        if self.refused:
-            first = min(self.refused)
+        if refused := sorted(self.refused):
+            said.append(f"NOT PLANNED {self._at(refused)}: {self.refused[refused[0]]}")
+        if short := np.flatnonzero(self.short).tolist():
             said.append(
-                f"NOT PLANNED at {len(self.refused)} of {len(self.time)} steps, from "
-                f"{self.time[first]:.4g} s: {self.refused[first]}"
-            )
-        if self.short.any():
-            said.append(
-                f"OUT OF REACH at {np.count_nonzero(self.short)} of {len(self.time)} steps, from "
-                f"{self.time[self.short.argmax()]:.4g} s: within the bounds no tensions were found "
-                "that give the target"
+                f"OUT OF REACH {self._at(short)}: within the bounds no tensions were found that "
+                "give the target"
             )
         if not self.inside.all():
             said.append(f"OUTSIDE ITS BAND at {np.count_nonzero(~self.inside)} steps")
         return tuple(said)
+
+    def _at(self, steps: Sequence[int]) -> str:
+        """Write how many steps these are, and the time of the first, which may have failed."""
+        return f"at {len(steps)} of {len(self.time)} steps, from {self.period * steps[0]:.4g} s"
 
     @property
     def end(self) -> float:
