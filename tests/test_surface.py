@@ -345,6 +345,12 @@ def test_notebooks_show_what_is_printed(name: str) -> None:
     assert shown.startswith(("<pre>", "<table>", "<section>"))
 
 
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_result_is_one_short_line_in_a_list(name: str) -> None:
+    shown = repr(RESULTS[name])
+    assert "\n" not in shown and len(shown) < 130, shown
+
+
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", RESULTS)
 def test_arrays_of_results_are_read_only(name: str, way: str) -> None:

@@ -51,6 +51,9 @@ class TipForce(ReadOnlyState):
     low: float
     high: float
 
+    def __repr__(self) -> str:
+        return f"<TipForce {self.low:.4g} to {self.high:.4g} N along {coordinates(self.direction)}>"
+
     def __str__(self) -> str:
         return (
             f"{self.low:.4g} to {self.high:.4g} N along {coordinates(self.direction)}, whatever "

@@ -65,6 +65,9 @@ class RestBand(ReadOnlyState):
     room: float
     proved: bool = True
 
+    def __repr__(self) -> str:
+        return f"<RestBand {1e3 * self.low:.4g} to {1e3 * self.high:.4g} mm>"
+
     def __str__(self) -> str:
         said = (
             f"at rest from {1e3 * self.low:.4g} to {1e3 * self.high:.4g} mm along "

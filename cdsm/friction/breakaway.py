@@ -67,6 +67,9 @@ class Breakaway(ReadOnlyState):
     site: int | None
     link: str | None
 
+    def __repr__(self) -> str:
+        return f"<Breakaway at {self.load:.4g} N along {coordinates(self.direction)}>"
+
     def __str__(self) -> str:
         said = f"breakaway along {coordinates(self.direction)}: {self.load:.4g} N"
         if self.cable is None:

@@ -35,6 +35,9 @@ class StiffnessGradient(ReadOnlyState):
     stiffness: Stiffness
     cable_stiffness: Array
 
+    def __repr__(self) -> str:
+        return f"<StiffnessGradient of {self.stiffness.posture.arm.name}>"
+
     @cached_property
     def joint(self) -> Array:
         """∂K_θ/∂F (C, nv, nv) [m/rad²]: one symmetric matrix per cable."""

@@ -107,6 +107,10 @@ class TensileFit(ReadOnlyState):
     start: float
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        low, high = self.elasticity.domain
+        return f"<TensileFit {self.method}, {low:.4g} to {high:.4g} N>"
+
     def __str__(self) -> str:
         low, high = self.elasticity.domain
         ends = self.elasticity.rigidity(self.tensions[[0, -1]])

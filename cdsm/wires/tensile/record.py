@@ -46,6 +46,9 @@ class TensileTest(ReadOnlyState):
     gauge_length: float
     source: str = ""
 
+    def __repr__(self) -> str:
+        return f"<TensileTest of {self.force.size} points>"
+
     def __post_init__(self) -> None:
         for name in ("displacement", "force"):
             array = number_array(name, getattr(self, name))
