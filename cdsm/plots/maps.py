@@ -124,7 +124,8 @@ def plot_map(
     cases = list(cases_of(dataset, quantity, poses, words))
     points = tips.values.reshape(-1, 3)
     known = np.isfinite(points).all(axis=1)
-    slices, cloud = slices_of(points[known], section, "distance" in dataset.coords)
+    path = "distance" in dataset.coords and poses == ["pose"]  # a joint may have this name
+    slices, cloud = slices_of(points[known], section, path)
     factor, unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))
     maps = [
         Map(

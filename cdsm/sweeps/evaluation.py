@@ -28,7 +28,7 @@ from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.arguments import Choice
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
-from cdsm.sweeps.status import LOST, SweepStatus
+from cdsm.sweeps.status import SweepStatus, exists
 
 BlockResult = dict[str, NDArray[Any]]
 """Outputs and ``status`` by name; the first axis is the posture, the next axes are the cases."""
@@ -131,12 +131,12 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
         threads=threads,
     )
     answer: BlockResult = {name: rows[name][::cases] for name in of_pose if name in rows}
-    exist = _exists("pose", status[::cases])
+    exist = exists("pose", status[::cases])
     wanted = [name for name in of_pose if name in MEASURED]
     for name, values in measured(task.arm, q[exist], wanted, task.diameter, threads).items():
         answer[name] = _spread(values, exist)
 
-    held = _exists("tension", status)
+    held = exists("tension", status)
     if of_tension:
         load, bend = task.breaking_load or math.nan, task.bend_diameter or math.nan
         F, bounds = rows["tension"][held], (task.arm, at[held], wrench[held], low[held], high[held])
@@ -214,7 +214,7 @@ def _finish(
     """
     if "wire_strain" in names:
         # friction may take a tension along a cable out of the domain of its law
-        held = _exists("tension", status)
+        held = exists("tension", status)
         strain = _spread(strains(arm, (tension * loss)[held]), held)
         status[held & np.isnan(strain).any(axis=1)] = SweepStatus.OUTSIDE_ELASTICITY
         rows["wire_strain"] = strain
@@ -271,13 +271,8 @@ def _rows(
             values = values[:, :3, :3]
         # a batch holds the pseudoinverse even where K_θ is singular; a sweep does not
         rows[name] = values.copy()
-        rows[name][~_exists(QUANTITIES[name].stage, status)] = np.nan
+        rows[name][~exists(QUANTITIES[name].stage, status)] = np.nan
     return rows, status
-
-
-def _exists(stage: str, status: Statuses) -> NDArray[np.bool_]:
-    """Return for each entry of ``status`` whether the quantities of a stage exist."""
-    return np.array([stage not in LOST[kind] for kind in sorted(LOST)])[status]
 
 
 def _spread(values: Array, place: NDArray[np.bool_]) -> Array:

@@ -62,11 +62,12 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
 
     Args:
         path: The ``.nc`` file of :func:`write_sweep`, or the folder given as ``store=``, even while
-            its sweep is running.
+            its sweep is running; or a Zarr folder that xarray wrote.
 
     Raises:
         MissingExtra: xarray, netCDF4 or zarr is needed and not installed.
-        FileError: The file does not exist, cannot be read, or is not a sweep.
+        FileError: The file does not exist, cannot be read, or is not a sweep; a file of the store
+            is missing, or damaged (then also when its numbers are read).
     """
     need("sweep", "xarray")
     path = as_path(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,6 +43,9 @@ _WORST = {
 
 _OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
 """Units of torque and joint stiffness: of revolute joints, and the same of prismatic joints."""
+
+_NAME = re.compile(r"[A-Za-z0-9_\x80-\U0010ffff]([^/\\\x00-\x1f\x7f]*[^/\\\x00-\x20\x7f])?")
+"""Names of variables that NetCDF and Zarr both take; a slash would divide a name into folders."""
 
 EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 """Initial value of ``status``; the initial value of all outputs is NaN."""
@@ -136,7 +140,6 @@ def _labels(task: SweepTask, poses: Poses) -> dict[str, Label]:
     arm, wrenches, lows, directions = task.arm, task.wrenches, task.minima, task.directions
     force, moment = wrenches.values[:, :3], wrenches.values[:, 3:]
     labels = {
-        **poses.labels,
         **task.laws.labels,
         **wrenches.labels,
         "force": wrenches.label(force, ("axis",), "force on the tip, base axes", "N"),
@@ -153,7 +156,8 @@ def _labels(task: SweepTask, poses: Poses) -> dict[str, Label]:
             directions.values, ("axis",), "unit vector of the direction, base axes", "1"
         )
     labels["gravity"] = label(("axis",), arm.gravity, "gravity, base axes", "m s-2")
-    used = own | {dim for dims, _, _ in labels.values() for dim in dims}
+    every = {**poses.labels, **labels}
+    used = own | {dim for dims, _, _ in every.values() for dim in dims}
     for dim, along, long_name in (
         ("axis", XYZ, "axis of the base frame"),
         ("axis_column", XYZ, "axis of the base frame, of the columns"),
@@ -163,4 +167,22 @@ def _labels(task: SweepTask, poses: Poses) -> dict[str, Label]:
     ):
         if dim in used:
             labels[dim] = label((dim,), np.array(along), long_name)
-    return labels
+    _require_own_names(poses, {*labels, *task.outputs, "status"})
+    return {**poses.labels, **labels}
+
+
+def _require_own_names(poses: Poses, taken: set[str]) -> None:
+    """Raise InvalidInput if a joint of a grid cannot give its name to a coordinate."""
+    for name in poses.labels:
+        if name in taken:
+            why = "is a name that the Dataset has already"
+        elif not _NAME.fullmatch(name):
+            why = "is no name of a variable in NetCDF and Zarr"
+        else:
+            continue
+        raise InvalidInput(
+            "angles",
+            f"each joint of the arm becomes a coordinate of the grid, but {name!r} {why}. Rename "
+            "this joint in the URDF, or sweep over a path or random postures, which have one "
+            "coordinate for all joints.",
+        )

@@ -5,6 +5,9 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cdsm.support.status import Status
 from cdsm.sweeps.quantities import STAGES
 
@@ -58,3 +61,8 @@ LOST: Final[dict[SweepStatus, tuple[str, ...]]] = {
     SweepStatus.PENDING: STAGES,
 }
 """Stages whose quantities are NaN, for each status."""
+
+
+def exists(stage: str, status: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Return for each entry of ``status`` whether the quantities of a stage exist."""
+    return np.array([stage not in LOST[kind] for kind in sorted(LOST)])[status]

@@ -18,14 +18,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core.indexing import (
+    CopyOnWriteArray,
+    IndexingSupport,
+    LazilyIndexedArray,
+    MemoryCachedArray,
+    explicit_indexing_adapter,
+)
 
 from cdsm.errors import FileError, StoreError, listed
 from cdsm.support.files import require_folder
 from cdsm.sweeps.description import changed_laws
+from cdsm.sweeps.quantities import QUANTITIES
 from cdsm.sweeps.specification import EMPTY, Specification
+from cdsm.sweeps.status import exists
 
 if TYPE_CHECKING:
     import xarray
+    from xarray.core.indexing import ExplicitIndexer
 
 _ORDER = "order"  # attribute with the names of all variables in order, since a folder has no order
 
@@ -54,30 +65,111 @@ def opened(
             raise FileError(path, f"cannot be locked: {error.strerror}.") from None
         if not made:
             _check(path, specification)
-        group = zarr.open_group(path, mode="r+", use_consolidated=False)
+        group: Any = zarr.open_group(path, mode="r+", use_consolidated=False)
+        if _ORDER not in group.attrs:
+            raise StoreError(path, "was written by xarray; give another path to store=.")
+        for _, computed in _gaps(path, group):
+            group["status"][computed] = EMPTY["status"]
         yield {name: group[name] for name in specification.variables}
     finally:
         os.close(folder)
 
 
 def read(path: Path) -> xarray.Dataset:
-    """Return the Dataset of a store; its numbers are read from disk when needed."""
+    """Return the Dataset of a store; its numbers are read from disk when needed.
+
+    A Dataset that xarray wrote to a Zarr folder is read completely.
+    """
+    import zarr
+
+    found = _dataset(path)
+    group = zarr.open_group(path, mode="r", use_consolidated=False)
+    gap = next(_gaps(path, group), None) if _ORDER in group.attrs else None
+    if gap is not None:
+        raise FileError(
+            gap[0],
+            "is missing, although the status says that this part of the sweep is computed. Run "
+            "the same sweep again: with store= it computes what is missing.",
+        )
+    return found
+
+
+def _dataset(path: Path) -> xarray.Dataset:
     import xarray
+    import zarr
 
     for described in (path / "zarr.json", *path.glob("*/zarr.json")):
         if described.exists() and not described.is_file():  # reading a pipe would wait forever
             raise FileError(path, f"is not a sweep's store: {described.name} is not a file.")
     try:
         found: xarray.Dataset = xarray.open_zarr(path, chunks=None, consolidated=False)
+        order = found.attrs.pop(_ORDER, None)
+        if order is None:
+            found.load()
     except Exception as error:  # zarr, its codecs and the file system may raise anything
         raise FileError(path, f"is not a sweep's store: {error}.") from None
-    order = [name for name in found.attrs.pop(_ORDER, ()) if name in found.variables]
-    for name in order:
+    if order is not None:
+        group: Any = zarr.open_group(path, mode="r", use_consolidated=False)
+        for name in found.variables.keys() - found.indexes.keys():
+            lazy: Any = LazilyIndexedArray(_OnDisk(path, group[name]))
+            once: Any = MemoryCachedArray(CopyOnWriteArray(lazy))  # type: ignore[no-untyped-call]
+            found[name] = found[name].dims, once, found[name].attrs
+    for name in found.variables:
         if found[name].dtype.kind in "OT":  # texts are objects or numpy's StringDType
             texts = np.array(found[name].values.tolist())
             found = found.assign_coords({name: (found[name].dims, texts, found[name].attrs)})
         found[name].encoding = {}  # a NetCDF file must not inherit the encoding of the store
-    return found[order]
+    return found if order is None else found[[name for name in order if name in found.variables]]
+
+
+class _OnDisk(BackendArray):
+    """Array of a store, read when needed; FileError if a file of it is damaged."""
+
+    def __init__(self, path: Path, array: Any) -> None:
+        self.path, self.array = path, array
+        self.shape, self.dtype = array.shape, array.dtype
+
+    def __getitem__(self, key: ExplicitIndexer) -> Any:
+        return explicit_indexing_adapter(key, self.shape, IndexingSupport.OUTER, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> Any:
+        try:
+            return self.array.oindex[key]
+        except Exception as error:  # zarr, its codecs and the file system may raise anything
+            raise _damage(self.path, self.array, error) from None
+
+
+def _damage(path: Path, array: Any, error: Exception) -> FileError:
+    """Return the error that names the first damaged file of an array of a store."""
+    for place in np.ndindex(array.cdata_shape):
+        try:
+            array.blocks[place]
+        except Exception as reason:  # as in _OnDisk
+            file = path / array.basename / array.metadata.encode_chunk_key(place)
+            remedy = "Delete this file, then run the same sweep again: store= keeps all else"
+            if array.basename not in (*QUANTITIES, "status"):
+                remedy = "Delete the store, and run the sweep again"
+            return FileError(file, f"is damaged ({reason}). {remedy}.")
+    return FileError(path, f"{array.basename} cannot be read: {error}.")
+
+
+def _gaps(path: Path, group: Any) -> Iterator[tuple[Path, tuple[slice, ...]]]:
+    """Yield each missing file of a computed block, and the part of ``status`` of this block."""
+    status = group["status"]
+    outputs = [group[name] for name in QUANTITIES if name in group]
+    for place in np.ndindex(status.cdata_shape):
+        block = tuple(slice(i * n, (i + 1) * n) for i, n in zip(place, status.chunks, strict=True))
+        at = dict(zip(status.metadata.dimension_names, place, strict=True))
+        try:
+            found = status[block]
+        except Exception as error:  # as in _OnDisk
+            raise _damage(path, status, error) from None
+        for array in outputs:
+            chunk = tuple(at.get(dim, 0) for dim in array.metadata.dimension_names)
+            file = path / array.basename / array.metadata.encode_chunk_key(chunk)
+            # a chunk of NaN alone has no file
+            if exists(QUANTITIES[array.basename].stage, found).any() and not file.exists():
+                yield file, block
 
 
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> bool:
@@ -126,7 +218,7 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
 
 def _check(path: Path, specification: Specification) -> None:
     """Raise a StoreError that lists the differences between a store and the specification."""
-    stored, wanted = read(path), specification.frame
+    stored, wanted = _dataset(path), specification.frame
     held, asked = {str(name) for name in stored.data_vars}, {*specification.variables}
     different = [f"outputs: {each} in the store alone" for each in sorted(held - asked)]
     different += [f"outputs: {each} not in the store" for each in sorted(asked - held)]

@@ -1,8 +1,10 @@
 """Sweeps say of every entry what the functions of the single posture say, under the right label."""
 
 import json
+import re
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -391,6 +393,44 @@ def test_bad_input_is_named(arguments: dict[str, Any], said: str) -> None:
 def test_bad_pose_sets_are_named(make: Callable[[], object], said: str) -> None:
     with pytest.raises(cdsm.InvalidInput, match=said):
         make()
+
+
+def renamed(joint: str) -> cdsm.Manipulator:
+    """The short arm from a URDF, in which joint2_1 has another name."""
+    arm = short_arm()
+    urdf = arm.urdf.replace('"joint2_1"', f'"{joint}"')
+    return cdsm.Manipulator.from_urdf(urdf, arm.cables, tip=arm.tip_link, gravity=arm.gravity)
+
+
+@pytest.mark.parametrize("swept", [True, False])
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        *((name, "is a name that the Dataset has already") for name in ("along", "tip_position")),
+        *((name, "is a name that the Dataset has already") for name in ("status", "direction")),
+        *((name, "is a name that the Dataset has already") for name in ("force", "axis")),
+        *((name, "is no name of a variable") for name in ("a/b", "a\\b", "(y)", ".y", "y\t")),
+    ],
+)
+def test_a_joint_whose_name_cannot_label_a_grid_is_refused(
+    name: str, why: str, swept: bool
+) -> None:
+    arm = renamed(name)
+    grid = cdsm.GridPoses({name if swept else "joint1_1": [0.0, 0.1]})
+    with pytest.raises(cdsm.InvalidInput, match=rf"{re.escape(repr(name))} {why}.* Rename this"):
+        cdsm.sweep(arm, grid, minimum=20.0)
+    assert bool((cdsm.sweep(arm, [[0.1] * 6], minimum=20.0).status == 0).all())
+
+
+@pytest.mark.parametrize("name", ["gelenk 1 (y)", "ü", "_1", "pose", "distance", "payload"])
+def test_a_joint_with_any_other_name_labels_a_grid(name: str, tmp_path: Path) -> None:
+    grid = cdsm.GridPoses({name: [0.0, 0.1]})
+    found = cdsm.sweep(renamed(name), grid, minimum=20.0, store=tmp_path / "s.zarr")
+    assert found[name].values.tolist() == [0.0, 0.1]
+    xr.testing.assert_identical(cdsm.sweep(renamed(name), grid, minimum=20.0), found)
+    path = cdsm.write_sweep(found, tmp_path / "s.nc")
+    xr.testing.assert_identical(cdsm.read_sweep(path), found)
+    cdsm.plots.plot_map(found)
 
 
 def test_missing_extra_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,10 +4,11 @@ import importlib
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -166,6 +167,70 @@ def test_a_block_is_done_only_when_its_status_is_there(tmp_path: Path, whole: xr
     (path / "margin/c/0/1/0/0/0").write_bytes((path / "margin/c/0/0/0/0/0").read_bytes())
     assert len(chunks) > 1
     xr.testing.assert_identical(kept(path), whole)
+
+
+def test_a_missing_file_of_a_computed_block_is_named_and_computed_again(
+    tmp_path: Path, whole: xr.Dataset, counted: list[int]
+) -> None:
+    path = tmp_path / "s.zarr"
+    kept(path)
+    del counted[:]
+    for name in ("margin/c/0/1/0/0/0", "tip_position/c/0/1/0", "along/c/1/0/0/0/0/0"):
+        (path / name).unlink()
+    with pytest.raises(cdsm.FileError, match=r"s\.zarr/tip_position/c/0/1/0: is missing, al"):
+        cdsm.read_sweep(path)
+    xr.testing.assert_identical(kept(path), whole)
+    assert counted == [2, 2]  # of six blocks
+    # beyond the limits only tips and margins of NaN exist, for which there are no files
+    assert bool((whole.status[2] == cdsm.SweepStatus.BEYOND_LIMITS).all())
+    assert not (path / "margin/c/2/0/0/0/0").exists()
+    xr.testing.assert_identical(cdsm.read_sweep(path), whole)
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [
+        ("margin/c/1/0/0/0/0", "Delete this file, then run the same sweep again"),
+        ("status/c/1/0/0/0/0", "Delete this file, then run the same sweep again"),
+        ("force/c/0/0", "Delete the store, and run the sweep again"),
+    ],
+)
+def test_a_damaged_file_is_named_with_what_to_delete(
+    name: str, remedy: str, tmp_path: Path, whole: xr.Dataset
+) -> None:
+    path = tmp_path / "s.zarr"
+    kept(path)
+    (path / name).write_bytes(b"damaged")
+    said = rf"s\.zarr/{name}: is damaged \(.+\)\. {remedy}"
+    with pytest.raises(cdsm.FileError, match=said):
+        cdsm.read_sweep(path).load()
+    with pytest.raises(cdsm.FileError, match=said):
+        cdsm.write_sweep(kept(path), tmp_path / "s.nc")
+    assert not (tmp_path / "s.nc").exists()
+    (path / name).unlink()
+    if "file" in remedy:
+        xr.testing.assert_identical(kept(path), whole)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_sweep_that_xarray_wrote_is_read_but_not_resumed(
+    version: Literal[2, 3], tmp_path: Path, whole: xr.Dataset
+) -> None:
+    path = tmp_path / "s.zarr"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the format of texts
+        whole.to_zarr(path, zarr_format=version)
+        xr.testing.assert_identical(cdsm.read_sweep(path), whole)
+        with pytest.raises(cdsm.StoreError, match="was written by xarray; give another path"):
+            kept(path)
+
+
+def test_a_sweep_from_a_store_can_be_changed_in_memory_alone(tmp_path: Path) -> None:
+    found = kept(tmp_path / "s.zarr")
+    before = found.margin.values.copy()
+    found.margin[0] = 7.0
+    assert bool((found.margin[0] == 7.0).all())
+    np.testing.assert_array_equal(cdsm.read_sweep(tmp_path / "s.zarr").margin, before)
 
 
 def test_blocks_of_lost_workers_are_computed_when_asked_again(
