@@ -54,12 +54,15 @@ def design(
 ) -> None:
     """Find the best designs of an arm; write the Pareto front, figures and the chosen arm.
 
+    The deflection is what the load adds after the motors are locked, to first order: with the
+    stiffness of the least tensions without the load.
     A stopped search resumes from the files in --out.
     """
     from cdsm.batch.inputs import checked_threads
     from cdsm.design.problem_file import read_problem
     from cdsm.design.refine import require_smooth
     from cdsm.support.files import make_folder, write_text
+    from cdsm.support.validation import whole_number
 
     file = read_problem(problem)
     folder = make_folder(out)
@@ -77,7 +80,9 @@ def design(
         jobs=processes,
         report=partial(_tell, task.objectives[0]),
     )
-    number = found.compromise if choose is None else choose
+    number = found.compromise
+    if choose is not None:
+        number = whole_number("--choose", choose, 0, len(found.front) - 1)
     every = found.evaluated.to_csv()
     if refine:
         found, number = cdsm.refine_design(task, found.design(number)), 0
@@ -94,7 +99,7 @@ def design(
     answer(
         as_json,
         lambda: {**found.to_dict(), **written},
-        found,
+        found._text(number),
         f"design {number} is written to {folder}: {names}",
     )
 

@@ -32,6 +32,7 @@ _PYTHON: Final = (
     ("by its slack_below()", "with --slack-below"),
     ("slack_below()", "--slack-below"),
     ("leave one, or use search_designs.", "leave one, or leave out --refine."),
+    ("; use search_designs.", "; leave out --refine."),
     ("`cdsm fit`, or cdsm.read_tensile_csv and cdsm.fit_tensile_test.", "`cdsm fit`."),
     (", or start from a guess= nearer to it.", "."),
 )

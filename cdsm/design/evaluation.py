@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike
 
 from cdsm.design.goals import KINDS
 from cdsm.design.problem import MISSED, DesignProblem
-from cdsm.design.quantities import Found, measure
+from cdsm.design.quantities import Found, measure, with_margin
 from cdsm.design.variables import UNITS
 from cdsm.errors import InvalidInput
 from cdsm.support.progress import progress_bar
 from cdsm.support.tables import csv_text
-from cdsm.support.validation import number_array, whole_number
+from cdsm.support.validation import instance, number_array, whole_number
 from cdsm.support.values import Array, Named, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ class Designs(ReadOnlyState, Named):
         problem: The problem.
         designs: The designs (D, n) [m, rad, N, -], a column for each of ``problem.variables``.
         values: Quantities (D, m) in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; a column for each
-            of ``problem.measures``. NaN where a quantity does not exist.
+            of ``problem.measures``, with its margin for ``problem.tolerances``. NaN where a
+            quantity does not exist.
         faults: Why the values of a design do not make an arm; empty if they do.
     """
 
@@ -86,14 +87,16 @@ class Designs(ReadOnlyState, Named):
         return csv_text(["design", *columns], ([i, *row] for i, row in rows))
 
     def _columns(self) -> dict[str, Sequence[Any]]:
-        """Return a column for each variable and quantity, headed by its unit."""
+        """Return a column for each variable and quantity, headed by its margin and unit."""
         rows = [self.problem.values(each) for each in self.designs]
         found: dict[str, Sequence[Any]] = {}
         for variable, column in zip(self.problem.variables, zip(*rows, strict=True), strict=True):
             unit = UNITS.get(variable.of)
             found[variable.name + (f" [{unit}]" if unit else "")] = column
         for each in self.problem.measures:
-            found[f"{each.key} [{KINDS[each.of].unit}]"] = self[each.key].tolist()
+            found[f"{with_margin(self.problem, each, each.key)} [{KINDS[each.of].unit}]"] = self[
+                each.key
+            ].tolist()
         return found
 
     def __len__(self) -> int:
@@ -135,6 +138,7 @@ def evaluate_designs(
     Raises:
         InvalidInput: A design is outside its ranges, or ``jobs`` is below 1.
     """
+    instance("problem", problem, DesignProblem)
     rows = number_array("designs", designs)
     if rows.ndim != 2:
         raise InvalidInput("designs", f"shape {rows.shape} given, (D, n) needed: a row each.")

@@ -45,6 +45,7 @@ class Kind(NamedTuple):
     shown: tuple[str, float]  # unit shown to the user, and its size in SI
     best: Literal["most", "least"]  # whether the largest or the smallest value is best
     directed: bool = False  # whether it has a direction
+    note: str = ""  # what a printed table says below it
 
 
 _ONE = ("", 1.0)
@@ -56,7 +57,14 @@ KINDS: Final[dict[str, Kind]] = {
     "softest": Kind("least stiffness in any direction", "N/m", _STIFF, "most"),
     "isotropy": Kind("least isotropy", "1", _ONE, "most"),
     "margin": Kind("least eigenvalue of K", "N m/rad", ("N m/rad", 1.0), "most"),
-    "deflection": Kind("largest deflection under the load", "m", _MM, "least"),
+    "deflection": Kind(
+        "largest first-order deflection under the load",
+        "m",
+        _MM,
+        "least",
+        note="deflection: by the load on locked motors, to first order, with the stiffness of the "
+        "least tensions without the load",
+    ),
     "motor_force": Kind("largest tension", "N", ("N", 1.0), "least"),
     "payload": Kind("least payload along", "N", ("N", 1.0), "most", directed=True),
     "capacity_margin": Kind("least payload in any direction", "N", ("N", 1.0), "most"),
@@ -75,7 +83,7 @@ KINDS: Final[dict[str, Kind]] = {
     "wire_safety": Kind("least breaking load over tension", "1", _ONE, "most"),
     "wire_life": Kind("least life margin of a wire", "1", _ONE, "most"),
 }
-"""Quantities of a design. Each is the worst value over all postures and loads."""
+"""Quantities of a design. Each is the worst value over all postures and loads that are held."""
 
 
 @dataclass(frozen=True)
@@ -140,11 +148,15 @@ class Objective(Measure):
             ``"cable_clearance"``, ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``,
             ``"held"``, ``"mass"``, ``"length"``, ``"cables"``, ``"joint_range"``,
             ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. The worst
-            value over all postures and loads counts. ``deflection`` is |C_vv f| for the force f of
-            the load, to first order; ``payload`` and ``capacity_margin`` are the largest force,
-            besides the load, within the limits of the tensions, along u and in any direction; the
-            ``workspace`` is the volume of the convex hull of the tips at all postures that are
-            held; clearances and wires are as in :func:`~cdsm.clearance`, :func:`~cdsm.wire_use`.
+            value over all postures and loads that are held counts. ``stiffness``, ``softest``,
+            ``isotropy`` and ``margin`` belong to the least tensions under the load.
+            ``deflection`` is |C_vv f| for the force f of the load, to first order; C_vv belongs to
+            the least tensions without the load, since the motors are locked before the load acts,
+            as in :func:`~cdsm.payload` and :func:`~cdsm.weight_test`; inf if the arm is not held
+            without the load. ``payload`` and ``capacity_margin`` are the largest force, besides the
+            load, within the limits of the tensions, along u and in any direction. The
+            ``workspace`` is the volume of the convex hull of the tips. Clearances and wires are as
+            in :func:`~cdsm.clearance`, :func:`~cdsm.wire_use`.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` or ``"least"``; None: the usual one, e.g. the most stiffness, the least
             mass.

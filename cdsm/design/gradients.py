@@ -23,6 +23,7 @@ from cdsm.design.quantities import balanced, has_margin, margin, quiet_arm
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array
+from cdsm.tension import Tension
 from cdsm.uncertainties.readings import Question
 
 SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "length")
@@ -66,17 +67,20 @@ def rows_and_gradients(
         value = sum(link.mass for link in links) if measure.of == "mass" else arm.geometry.length
         return np.array([value]), chain.of_links(f"link_{measure.of}")[None]
     values, slopes = [], []
-    for tension, loss in balanced(problem, design, arm):
-        posed, K = chain.at(tension, loss), stiffness(tension.posture, tension)
-        if not K.is_stable:
-            raise SingularStiffness("the arm is unstable here.", K.critical_direction)
+    unloaded = balanced(problem, design, arm, np.zeros_like(problem.loads))
+    for tension, loss in balanced(problem, design, arm, problem.loads):
+        force, K = tension.wrench[:3], _stable(tension)
+        if measure.of == "deflection":
+            tension, loss = next(unloaded)
+            K = _stable(tension)
+        posed = chain.at(tension, loss)
         if measure.of == "motor_force":  # the largest tension along each cable
             for c, weights in enumerate(np.eye(len(tension))):
                 F = float(tension.values[c])
                 values.append(loss[c] * F)
                 slopes.append(loss[c] * (posed.slopes({}, weights) + F * posed.grip[c]))
             continue
-        value, slope = _reading(K, measure, posed)
+        value, slope = _reading(K, measure, posed, force)
         values.append(value)
         slopes.append(slope)
     if not has_margin(problem, measure):
@@ -87,10 +91,19 @@ def rows_and_gradients(
     )
 
 
+def _stable(tension: Tension) -> Stiffness:
+    """Return the stiffness under the least tensions; SingularStiffness if the arm is unstable."""
+    K = stiffness(tension.posture, tension)
+    if not K.is_stable:
+        raise SingularStiffness("the arm is unstable here.", K.critical_direction)
+    return K
+
+
 def _margins(problem: DesignProblem, design: Array, measure: Measure) -> Array:
     """Compute the margin for tolerances of each row (R,) of :func:`rows_and_gradients`."""
     found = []
-    for tension, loss in balanced(problem, design, quiet_arm(problem, design)):
+    arm = quiet_arm(problem, design)
+    for tension, loss in balanced(problem, design, arm, problem.loads):
         cables = range(len(tension)) if measure.of == "motor_force" else (None,)
         found += [margin(problem, measure, tension, loss, c) for c in cables]
     return np.array(found)
@@ -112,10 +125,12 @@ def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> A
     return np.array(found).T
 
 
-def _reading(K: Stiffness, measure: Measure, posed: Posed) -> tuple[float, Array]:
-    """Return the quantity ``measure`` of a stiffness, and its derivatives by the variables (n,)."""
+def _reading(K: Stiffness, measure: Measure, posed: Posed, force: Array) -> tuple[float, Array]:
+    """Return the quantity ``measure`` of a stiffness, and its derivatives by the variables (n,).
+
+    ``force`` (3,) [N] is that of the load, for a deflection.
+    """
     if measure.of == "deflection":
-        force = K.wrench[:3]
         value, partial = _displacement(K, force)
     else:
         u = None if measure.direction is None else np.array(measure.direction)
@@ -130,8 +145,6 @@ def _displacement(K: Stiffness, force: Array) -> tuple[float, dict[str, Array]]:
     With unit vectors n of the displacement and f̂ of the force f, and c(u) = uᵀ C_vv u,
     |C_vv f| = |f| nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.
     """
-    if K.wrench[3:].any():
-        raise InvalidInput("deflection", "under a moment has no exact derivatives here.")
     size = float(np.linalg.norm(force))
     moved = K.compliance[:3, :3] @ force
     value = float(np.linalg.norm(moved))

@@ -8,8 +8,8 @@ import numpy as np
 
 from cdsm.design.evaluation import Designs
 from cdsm.design.goals import KINDS
-from cdsm.design.quantities import balanced, quiet_arm
-from cdsm.errors import CdsmError, InfeasibleDesign
+from cdsm.design.quantities import balanced, quiet_arm, with_margin
+from cdsm.errors import CdsmError, InfeasibleDesign, JointLimitError
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import plural
 
@@ -45,11 +45,17 @@ def explain(designs: Designs) -> NoReturn:
             names.append(constraint.key)
             is_now = "does not exist" if np.isnan(value) else constraint.shown(value)
             far = f", {100.0 * miss:.3g} % off" if np.isfinite(miss) else ""
-            said.append(f"{constraint.words} {is_now}, {constraint.asked} is asked{far}")
+            words = with_margin(problem, constraint, constraint.words)
+            said.append(f"{words} {is_now}, {constraint.asked} is asked{far}")
+    for objective in problem.objectives:
+        value = float(values[keys.index(objective.key)])
+        if not np.isfinite(value) and objective.key not in names:
+            names.append(objective.key)
+            said.append(f"{objective.words} is {objective.shown(value)}")
     raise InfeasibleDesign(
         f"none of {plural(len(designs), 'design')} meets all constraints. The nearest one "
-        f"({', '.join(chosen)}) misses: {'; '.join(said)}. Loosen what it misses, widen a "
-        "variable, or search longer.",
+        f"({', '.join(chosen)}) misses: {'; '.join(said).rstrip('.')}. Loosen what it misses, "
+        "widen a variable, or search longer.",
         tuple(names),
         tuple(row.tolist()),
     )
@@ -60,12 +66,13 @@ def _first_reason(designs: Designs, best: int) -> str:
     problem, row = designs.problem, designs.designs[best]
     held, loads = 0, len(problem.loads)
     try:
-        for tension, _ in balanced(problem, row, quiet_arm(problem, row)):
+        for tension, _ in balanced(problem, row, quiet_arm(problem, row), problem.loads):
             K = stiffness(tension.posture, tension)
             if not K.is_stable:
                 margin = f"{KINDS['margin'].words} {K.margin:.3g} N m/rad"
                 return f"posture {held // loads}: UNSTABLE, {margin}"
             held += 1
     except CdsmError as error:
-        return f"posture {held // loads}: {error}"
+        why = error.problem if isinstance(error, JointLimitError) else error
+        return f"posture {held // loads}: {why}"
     return "its tensions are at the edge"

@@ -47,18 +47,16 @@ choose(document.body.dataset.compromise);
 def page_of(found: DesignSearch) -> Document:
     """Return the page of a search in HTML; it needs no other file and no network."""
     arms, count = [], len(found.front)
-    chosen = np.linspace(0, count - 1, min(count, _SHOWN)).round()
-    shown = np.unique(np.append(chosen, found.compromise)).astype(int).tolist()
+    shown = found._spread(_SHOWN)
     for i, picture in zip(shown, _pictures(found, shown), strict=True):
         image = element("img", src=picture, alt=f"arm of design {i}")
         name = element("figcaption", f"design {i} at the first posture")
         arms.append(element("figure", image, name, class_="arm", data_design=str(i)))
-    head, *rows = found._table()
+    head, *rows = found._table(shown)
     lines = [element("tr", *(element("th", cell) for cell in head))]
     lines += [
         element("tr", *(element("td", cell) for cell in row), data_design=str(i))
-        for i, row in enumerate(rows)
-        if i in shown
+        for i, row in zip(shown, rows, strict=True)
     ]
     best = f"{len(shown)} of {count}" if len(shown) < count else f"{count}"
     title = f"{best} best of {len(found.evaluated)} designs of {found.problem.arm.name}"

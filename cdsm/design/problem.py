@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import final, get_args
 
@@ -21,8 +21,8 @@ from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import require
 from cdsm.support.format import plural
-from cdsm.support.validation import instance, number_array, scalar, sequence_of
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.validation import NO_WRENCH, instance, number_array, scalar, sequence_of
+from cdsm.support.values import Array, Given, ReadOnlyState, frozen
 from cdsm.sweeps.poses import PoseSet, poses_of
 from cdsm.tension import checked_bounds
 from cdsm.tolerance import Tolerances
@@ -48,7 +48,8 @@ class DesignProblem(ReadOnlyState):
         constraints: Limits of quantities.
         postures: Joint angles q (P, nv) [rad], or a pose set; its random postures lie within the
             joint limits of each design.
-        loads: Wrenches W (n, 6) at ``tool0``, base axes: force [N], then moment [N m].
+        loads: Wrenches W (n, 6), or one (6,), at ``tool0``, base axes: force [N], then moment
+            [N m]; default: no load.
         minimum: Lower bound of all tensions [N], unless it is a variable.
         maximum: Upper bound of all tensions [N].
         worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
@@ -58,8 +59,9 @@ class DesignProblem(ReadOnlyState):
         breaking_load: Breaking load of the wire [N], for ``wire_safety``.
         bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
         tolerances: Tolerances of every design; constraints on ``stiffness``, ``margin`` and
-            ``motor_force`` must then be met with a margin of ``coverage`` standard uncertainties.
-        coverage: Coverage factor: number of standard uncertainties in this margin [-].
+            ``motor_force`` must then be met with a margin of ``coverage`` standard uncertainties
+            u. A quantity with such a constraint holds its margin: stiffness − coverage · u.
+        coverage: Coverage factor: number of standard uncertainties in this margin [-], 0 or more.
 
     Raises:
         InvalidInput: An argument is invalid; two variables change the same thing; the arm was made
@@ -68,11 +70,11 @@ class DesignProblem(ReadOnlyState):
     """
 
     arm: Manipulator
-    variables: tuple[Variable, ...]
-    objectives: tuple[Objective, ...]
-    postures: PoseSet | Array
-    constraints: tuple[Constraint, ...] = ()
-    loads: Array = field(default_factory=lambda: np.zeros((1, 6)))
+    variables: Sequence[Variable]
+    objectives: Sequence[Objective]
+    postures: PoseSet | ArrayLike
+    constraints: Sequence[Constraint] = ()
+    loads: Given[ArrayLike, Array] = NO_WRENCH  # type: ignore[assignment]
     minimum: float = 10.0
     maximum: float = math.inf
     worst_friction: bool = False
@@ -121,13 +123,15 @@ class DesignProblem(ReadOnlyState):
             raise InvalidInput("loads", "deflection needs a force in every load.")
         if self.tolerances is not None:
             instance("tolerances", self.tolerances, Tolerances)
+        if scalar("coverage", self.coverage) < 0.0:
+            raise InvalidInput("coverage", f"{self.coverage:g} given; give 0 or more.")
         self.__dict__.update(
             variables=variables,
             objectives=objectives,
             constraints=constraints,
             loads=frozen(loads),
             postures=postures,
-            coverage=scalar("coverage", self.coverage),
+            coverage=float(self.coverage),
         )
 
     @cached_property

@@ -97,6 +97,10 @@ class ProblemFile(NamedTuple):
     population: int
     seed: int
 
+    def __repr__(self) -> str:
+        search = f"{plural(self.generations, 'generation')} of {plural(self.population, 'design')}"
+        return f"<ProblemFile: {str(self.problem).splitlines()[0]}, {search}>"
+
 
 def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
     """Read a design problem from a PROBLEM.toml; all in SI: m, rad, N, N/m, kg.

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cdsm.batch import evaluate
+from cdsm.batch import Batch, evaluate
 from cdsm.design.goals import KINDS, Measure
 from cdsm.design.problem import DesignProblem
 from cdsm.errors import CdsmError, CdsmWarning, GeometryError
@@ -63,14 +64,17 @@ def quiet_arm(problem: DesignProblem, design: Array) -> Manipulator:
 
 
 def balanced(
-    problem: DesignProblem, design: Array, arm: Manipulator
+    problem: DesignProblem, design: Array, arm: Manipulator, loads: Array
 ) -> Iterator[tuple[Tension, Array]]:
-    """Yield the least tensions at each posture and load, and exp(Σ μ φ) (C,) of the cables."""
+    """Yield the least tensions at each posture under each of ``loads`` (n, 6) [N, N m].
+
+    With them, exp(Σ μ φ) (C,) of the cables.
+    """
     bounds, worst = (problem.minimum_of(design), problem.maximum), problem.worst_friction
     for q in problem.postures_of(arm):
         pose = arm.at(q)
         loss = np.exp(grip(pose)) if worst else np.ones(len(arm.cables))
-        for load in problem.loads:
+        for load in loads:
             yield distribute_tension(pose, *bounds, load, worst_friction=worst), loss
 
 
@@ -87,23 +91,28 @@ class _Arm:
         self.low, self.high, held = narrowed_bounds(
             arm, problem.minimum_of(row), problem.maximum, self.loss
         )
-        self.found = evaluate(
-            arm,
+        self.found, stable = self._evaluated(self.loads)
+        self.held = held & stable
+        self.of_pose: dict[str, Array] = {}
+        wanted = {each.of for each in problem.measures} & {*CLEARANCES, "tension_factor"}
+        if wanted:
+            inside = self.held.reshape(len(q), -1).any(axis=1)
+            self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter, 1)
+
+    def _evaluated(self, loads: Array) -> tuple[Batch, NDArray[np.bool_]]:
+        """Evaluate the R postures under ``loads`` (R, 6), and whether each is stable."""
+        found = evaluate(
+            self.arm,
             self.q,
             None,
-            self.loads,
+            loads,
             ["tip", "tension", "margin", "compliance", "cable_lengths"],
             minimum=self.low,
             maximum=self.high,
             threads=1,
         )
-        known = np.isin(self.found.status, (Status.OK, Status.IMMOBILE))
-        self.held = held & known & (self.found["margin"] > 0.0)
-        self.of_pose: dict[str, Array] = {}
-        wanted = {each.of for each in problem.measures} & {*CLEARANCES, "tension_factor"}
-        if wanted:
-            inside = self.found.status[:: len(problem.loads)] != Status.BEYOND_LIMITS
-            self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter, 1)
+        known = np.isin(found.status, (Status.OK, Status.IMMOBILE))
+        return found, known & (found["margin"] > 0.0)
 
     def values(self) -> Array:
         return np.array([self._value(each) for each in self.problem.measures])
@@ -117,8 +126,10 @@ class _Arm:
             with np.errstate(divide="ignore"):
                 return np.asarray(1.0 / np.maximum(np.einsum("i,nij,j->n", u, C, u), 0.0))
         if each.of == "deflection":
-            moved = np.einsum("nij,nj->ni", C, self.loads[held, :3])
-            return np.asarray(np.linalg.norm(moved, axis=1))
+            unloaded, stable = self._evaluated(np.zeros_like(self.loads))
+            C = unloaded["compliance"][:, :3, :3]
+            moved = np.linalg.norm(np.einsum("nij,nj->ni", C, self.loads[:, :3]), axis=1)
+            return np.where(stable, moved, math.inf)[held]
         if each.of == "margin":
             return np.asarray(self.found["margin"][held])
         if each.of in ("softest", "isotropy"):
@@ -154,10 +165,10 @@ class _Arm:
             return float(arm.upper.min())
         if each.of == "workspace":
             return _volume(self.found["tip"][held][:, :3, 3])
-        if each.of in self.of_pose:
-            return float(self.of_pose[each.of].min(initial=math.inf))
         if not held.any():
             return math.nan
+        if each.of in self.of_pose:
+            return float(self.of_pose[each.of].min())
         if each.of == "wire_length":
             return float(self.found["cable_lengths"][held].max(axis=0).sum())
         rows = self.rows(each)
@@ -183,6 +194,13 @@ def has_margin(problem: DesignProblem, each: Measure) -> bool:
     """Whether a quantity has a margin: it has a constraint, and the problem has tolerances."""
     bounded = any(constraint.key == each.key for constraint in problem.constraints)
     return bounded and problem.tolerances is not None and each.of in _SURE
+
+
+def with_margin(problem: DesignProblem, each: Measure, words: str) -> str:
+    """Return ``words`` for a quantity with its margin, if it has one: ``stiffness - 2 u``."""
+    if not has_margin(problem, each):
+        return words
+    return f"{words} {'+' if _SURE[each.of][1] > 0.0 else '-'} {problem.coverage:g} u"
 
 
 def margin(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, final
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 
 import cdsm
 from cdsm.design.evaluation import Designs, evaluate_designs
+from cdsm.design.goals import KINDS
 from cdsm.design.problem import DesignProblem
+from cdsm.design.quantities import with_margin
 from cdsm.design.workshop import cable_table, hole_table
 from cdsm.interchange.mjcf import write_mjcf
 from cdsm.manipulator import Manipulator
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
     from distributed import Client
     from matplotlib.figure import Figure
 
-_PRINTED = 20  # number of designs that a printed table shows
+_PRINTED = 20  # number of designs, evenly spread over a front, that a printed table shows
 
 
 class DesignProgress(NamedTuple):
@@ -114,7 +117,10 @@ class DesignSearch(ReadOnlyState):
     def write_arm(self, folder: str | os.PathLike[str], number: int | None = None) -> list[Path]:
         """Write a design as ``arm.toml``, ``arm.urdf``, ``arm.xml`` and tables; return their paths.
 
-        ``holes.csv`` has each hole of each disk, ``cables.csv`` each cable with its lengths.
+        ``holes.csv`` has each hole of each disk. ``cables.csv`` has the lengths of each cable, lead
+        included: of the straight arm, the shortest and the longest within the joint limits (the
+        cut), and the stroke, which the motor winds between them. They are geometric lengths: the
+        stretch by the tension is not taken off, and what fixes both ends comes on top.
 
         Args:
             folder: The folder; it is made.
@@ -127,13 +133,12 @@ class DesignSearch(ReadOnlyState):
         """
         row = self.design(number)
         arm, into = self.problem.arm_of(row), make_folder(folder)
-        q = self.problem.postures_of(arm)
         return [
             arm.write(into / "arm.toml"),
             write_urdf(arm.geometry, into / "arm.urdf"),
             write_mjcf(arm, into / "arm.xml"),
             write_text(into / "holes.csv", hole_table(arm)),
-            write_text(into / "cables.csv", cable_table(arm, q)),
+            write_text(into / "cables.csv", cable_table(arm)),
         ]
 
     def measured(
@@ -207,22 +212,48 @@ class DesignSearch(ReadOnlyState):
         return f"<DesignSearch: {plural(len(self.front), 'design')} on the front>"
 
     def __str__(self) -> str:
-        feasible = int(self.evaluated.feasible.sum())
-        counted = plural(len(self.evaluated), "design")
-        more = f", {_PRINTED} shown" if len(self.front) > _PRINTED else ""
-        head = (
-            f"{counted}, {feasible} feasible, {len(self.front)} on the front{more}; * is the "
-            "compromise"
-        )
-        asked = [f"asked: {each.words} {each.asked}" for each in self.problem.constraints]
-        return "\n".join([head, *aligned(self._table()[: _PRINTED + 1]), *asked])
+        return self._text(self.compromise)
 
-    def _table(self) -> list[list[str]]:
-        """Return head and rows of the front in units shown to the user."""
+    def _text(self, chosen: int) -> str:
+        """Return the printed table, with design ``chosen`` of the front in it."""
+        problem, feasible = self.problem, int(self.evaluated.feasible.sum())
+        shown, count = self._spread(_PRINTED, chosen), len(self.front)
+        more = f", {len(shown)} shown" if len(shown) < count else ""
+        head = (
+            f"{plural(len(self.evaluated), 'design')}, {feasible} feasible, {count} on the front"
+            f"{more}; * is the compromise"
+        )
+        asked = [
+            f"asked: {with_margin(problem, each, each.words)} {each.asked}"
+            for each in problem.constraints
+        ]
+        notes = [KINDS[each.of].note for each in problem.measures if KINDS[each.of].note]
+        if problem.tolerances is not None and problem.constraints:
+            notes.append("u: standard uncertainty by the tolerances")
+        return "\n".join([head, *aligned(self._table(shown)), *asked, *notes])
+
+    def _spread(self, most: int, *also: int) -> list[int]:
+        """Return numbers of up to ``most`` designs spread over the front, and those of ``also``.
+
+        The compromise is always among them.
+        """
+        count = len(self.front)
+        even = np.linspace(0, count - 1, min(count, most)).round().astype(int)
+        return sorted({*even.tolist(), self.compromise, *also})
+
+    @property
+    def _labels(self) -> list[str]:
+        """Name and unit of each objective, for the axes of a figure."""
         problem = self.problem
-        head = ["design", *(v.name for v in problem.variables), *(m.key for m in problem.measures)]
-        rows = [head]
-        for i in range(len(self.front)):
+        words = [(with_margin(problem, x, x.words), x.unit[0]) for x in problem.objectives]
+        return [f"{name} [{unit}]" if unit else name for name, unit in words]
+
+    def _table(self, shown: Sequence[int]) -> list[list[str]]:
+        """Return head and rows of designs ``shown`` of the front, in units shown to the user."""
+        problem = self.problem
+        keys = [with_margin(problem, each, each.key) for each in problem.measures]
+        rows = [["design", *(variable.name for variable in problem.variables), *keys]]
+        for i in shown:
             row, values = problem.values(self.design(i)), self.values(i).values()
             chosen = (v.shown(x) for v, x in zip(problem.variables, row, strict=True))
             found = (m.shown(x) for m, x in zip(problem.measures, values, strict=True))

@@ -25,6 +25,9 @@ from cdsm.support.values import Array
 from cdsm.sweeps.description import attributes_of
 from cdsm.sweeps.poses import poses_of
 
+_MEANING = "deflection: without the load; all: held postures"
+"""What quantities mean: a record made when they meant something else belongs to another problem."""
+
 
 class Store:
     """Evaluated designs, found by the exact bits of their numbers.
@@ -54,7 +57,7 @@ class Store:
             if not self._path.exists():
                 self._path.write_text(head + "\n", encoding="utf-8")
             self._read(self._path.read_text(encoding="utf-8"), head)
-        except StoreError:
+        except (StoreError, FileError):
             raise
         except (OSError, ValueError) as error:
             raise FileError(self._path, f"cannot be used as a record: {error}.") from None
@@ -68,9 +71,16 @@ class Store:
                 "contains designs of another problem, of another seed or population, or no "
                 "designs. Give another place for the results, or search as that time.",
             )
-        for line in lines[:-1]:  # the last one is empty, or was cut off
-            entry: dict[str, Any] = json.loads(line)
-            row, values = (np.array([float.fromhex(x) for x in entry[k]]) for k in ("at", "is"))
+        for number, line in enumerate(lines[:-1], start=2):  # the last one is empty, or was cut off
+            try:
+                entry: dict[str, Any] = json.loads(line)
+                row, values = (np.array([float.fromhex(x) for x in entry[k]]) for k in ("at", "is"))
+            except (ValueError, KeyError, TypeError):
+                raise FileError(
+                    self._path,
+                    f"line {number} is no record of a design; delete it, and that design is "
+                    "computed again.",
+                ) from None
             self._found[row.tobytes()] = Found(values, entry.get("fault", ""))
         if lines[-1]:
             whole = "\n".join([first, *lines[:-1], ""])
@@ -111,6 +121,6 @@ def digest(problem: DesignProblem) -> str:
         repr(problem.arm.gravity.tolist()),
         poses.description,
     ]
-    data = "\n".join(parts).encode() + problem.postures_of(problem.arm).tobytes()
+    data = "\n".join([*parts, _MEANING]).encode() + problem.postures_of(problem.arm).tobytes()
     data += problem.loads.tobytes()
     return hashlib.sha256(data).hexdigest()

@@ -9,8 +9,10 @@ from typing import Final, Literal, NamedTuple, final, get_args
 
 from cdsm.errors import InvalidInput
 from cdsm.geometry import CableRoute, Geometry
+from cdsm.geometry.checks import WIDEST
 from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles
-from cdsm.support.validation import one_of, scalar, whole_number
+from cdsm.support.validation import one_of, quantity, scalar, whole_number
+from cdsm.support.warning import warn
 from cdsm.wires.catalogue import Wire, as_wire
 
 VariableName = Literal[
@@ -43,6 +45,8 @@ UNITS: Final = {
 }
 """SI unit of each variable that has one."""
 
+_WIDEST_ANGLE = 4.0 * math.pi  # a range of angles beyond this [rad] is probably in degrees
+
 
 @final
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class Variable:
     low: float | None = None
     high: float | None = None
     at: int | str | None = None
-    choices: tuple[Value, ...] = ()
+    choices: Sequence[Value] = ()
 
     def __post_init__(self) -> None:
         one_of("variable", self.of, get_args(VariableName))
@@ -91,12 +95,21 @@ class Variable:
         else:
             if self.low is None or self.high is None:
                 raise InvalidInput(self.of, "needs both low and high.")
-            low, high = (scalar(self.of, each) for each in (self.low, self.high))
+            kind = {"m": "length", "N": "tension"}.get(UNITS.get(self.of, ""))
+            low, high = (
+                scalar(self.of, each) if kind is None else quantity(self.of, each, kind, zero=True)
+                for each in (self.low, self.high)
+            )
             if not low < high:
                 raise InvalidInput(self.of, f"from {low:g} to {high:g} given; give low < high.")
             if self.of in WHOLE:
                 low, high = (_whole(self.of, each) for each in (low, high))
             self.__dict__.update(low=low, high=high)
+            if self.of in ("hole_radius", "disk_offset") and high > WIDEST:
+                warn(f"{self.of} up to {high:g} m: it looks as if it is in mm; give it in metres.")
+            if UNITS.get(self.of) == "rad" and max(-low, high) > _WIDEST_ANGLE:
+                most = max(-low, high)
+                warn(f"{self.of} up to {most:g} rad: it looks as if it is in degrees; give rad.")
         if self.of in _OF_CABLE and not isinstance(self.at, str):
             raise InvalidInput(self.of, f"needs at= the name of a cable, not {self.at!r}.")
         if self.of in _OF_JOINT and self.at is not None:
@@ -145,7 +158,7 @@ def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[
     GeometryError if the values make no arm.
     """
     wire: Wire | None = None
-    minimum = None
+    minimum, common = None, geometry.hole_radius
     joints, links, cables = [*geometry.joints], [*geometry.links], [*geometry.cables]
     # where cables end first: lead and phase belong to the cables of a joint
     pairs = sorted(zip(variables, values, strict=True), key=lambda pair: pair[0].of not in WHOLE)
@@ -176,13 +189,17 @@ def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[
                     mass = links[k - 1].mass * value / links[k - 1].length
                     links[k - 1] = replace(links[k - 1], length=value, mass=mass)
             case "hole_radius":
+                common = value if at is None else common
+                own = None if at is None else value
                 for k in where:
-                    joints[k - 1] = replace(joints[k - 1], hole_radius=value)
+                    joints[k - 1] = replace(joints[k - 1], hole_radius=own)
             case "disk_offset":
                 for k in where:
                     joints[k - 1] = replace(joints[k - 1], disk_offset=value)
     return Changed(
-        geometry.replace(joints=tuple(joints), links=tuple(links), cables=tuple(cables)),
+        geometry.replace(
+            joints=tuple(joints), links=tuple(links), cables=tuple(cables), hole_radius=common
+        ),
         wire,
         minimum,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -12,6 +13,7 @@ from cdsm.support.values import Array
 from cdsm.wires.catalogue import label
 
 _DIGITS = 4
+_INSIDE = 1e-6  # distance from a joint limit, over the range: there two disks touch, holes may meet
 
 
 def hole_table(arm: Manipulator) -> str:
@@ -35,24 +37,52 @@ def hole_table(arm: Manipulator) -> str:
     return csv_text([*head, "angle [deg]", "y [mm]", "z [mm]"], rows)
 
 
-def cable_table(arm: Manipulator, q: Array) -> str:
+def cable_table(arm: Manipulator) -> str:
     """Return a CSV with a row for each cable: wire, lead, and lengths in mm.
 
-    The length is that of the straight arm, lead included. The motor must wind the cable between its
-    shortest and longest length over the postures q (P, nv) [rad]. The cut is the longest length,
-    without an allowance for fixing the two ends.
+    All lengths include the lead. ``straight`` is that of the straight arm, ``shortest`` and ``cut``
+    are the extremes within the joint limits, ``stroke`` is what the motor winds between them. The
+    lengths are those between the ends without stretch. An allowance for fixing both ends comes on
+    top.
     """
     straight = arm.cable_lengths(np.clip(0.0, arm.lower, arm.upper))
-    inside = [row for row in q if not arm._model.beyond_limits(row).any()]
-    every = np.array([straight, *(arm.cable_lengths(row) for row in inside)])
-    shortest, longest = every.min(axis=0), every.max(axis=0)
     rows = []
     for c, cable in enumerate(arm.cables):
         joint = arm.geometry.cables[c].joint
-        lengths = (cable.lead, straight[c], shortest[c], longest[c], longest[c] - shortest[c])
+        shortest, longest = _extremes(arm, c)
+        lengths = (cable.lead, straight[c], shortest, longest, longest - shortest)
         rows.append([cable.name, joint, label(cable.elasticity), *(_mm(1e3 * x) for x in lengths)])
     head = ["cable", "ends after joint", "wire", "lead [mm]", "straight [mm]", "shortest [mm]"]
     return csv_text([*head, "cut [mm]", "stroke [mm]"], rows)
+
+
+def _extremes(arm: Manipulator, c: int) -> tuple[float, float]:
+    """Return the shortest and the longest length [m] of cable ``c`` within the joint limits.
+
+    A segment crosses at most one joint, so the length is a sum of a term for each joint. A search
+    along the length's gradient begins where each joint, alone, is best of its limits and zero.
+    """
+    from scipy.optimize import minimize  # slow to import
+
+    inset = _INSIDE * (arm.upper - arm.lower)
+    low, high = arm.lower + inset, arm.upper - inset
+    ends = np.array([low, np.clip(0.0, low, high), high])
+    blocks = np.split(np.arange(arm.nv), np.cumsum([len(x.axes) for x in arm.geometry.joints])[:-1])
+    found = []
+    for sign in (1.0, -1.0):
+        start = ends[1].copy()
+        for own in blocks:
+            tried = np.repeat(start[None], 3 ** len(own), axis=0)
+            tried[:, own] = [*itertools.product(*ends[:, own].T)]
+            start = min(tried, key=lambda q: sign * arm.cable_lengths(q)[c])
+
+        def length(q: Array, sign: float = sign) -> tuple[float, Array]:
+            pose = arm.at(q)
+            return sign * float(pose.cable_lengths[c]), sign * pose.length_jacobian[c]
+
+        bounds = [*zip(low, high, strict=True)]
+        found.append(sign * float(minimize(length, start, jac=True, bounds=bounds).fun))
+    return found[0], found[1]
 
 
 def _mm(value: float) -> str:

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 LONGEST = 30.0
 """If an arm is longer than this [m], its lengths are probably in millimetres."""
 
-_WIDEST = 1.0  # a hole radius or disk offset larger than this [m] is probably in millimetres
+WIDEST = 1.0
+"""A hole radius or disk offset larger than this [m] is probably in millimetres."""
 
 
 def farthest_holes(geometry: Description) -> list[float]:
@@ -79,8 +80,8 @@ def doubts_about(geometry: Description) -> list[str]:
     doubts = []
     sizes = [
         ("the arm", geometry.length, LONGEST),
-        ("hole_radius", max(geometry.hole_radii), _WIDEST),
-        ("disk_offset", max(joint.disk_offset for joint in geometry.joints), _WIDEST),
+        ("hole_radius", max(geometry.hole_radii), WIDEST),
+        ("disk_offset", max(joint.disk_offset for joint in geometry.joints), WIDEST),
     ]
     large = [f"{what} is {size:.4g} m" for what, size, most in sizes if size > most]
     if large:

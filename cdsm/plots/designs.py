@@ -39,17 +39,13 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
     """
     expect("found", found, "DesignSearch")
     objectives = found.problem.objectives
-    scales = [each.unit for each in objectives]
-    names = [
-        f"{each.words} [{unit}]" if unit else each.words
-        for each, (unit, _) in zip(objectives, scales, strict=True)
-    ]
+    scales, names = [each.unit[1] for each in objectives], found._labels
     if len(objectives) == 1:
         figure, axes = panels(ONE_COLUMN, 2.4, 1)
         panel = axes[0, 0]
         steps = [step for step in found.history if step.feasible]
         counts = [step.designs for step in steps]
-        best = [step.best / scales[0][1] for step in steps]
+        best = [step.best / scales[0] for step in steps]
         panel.plot(counts, best, color=BLUE, marker=".", markersize=3, linewidth=1.2)
         panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         panel.set(xlabel="designs evaluated", ylabel=names[0])
@@ -59,7 +55,7 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
     others = range(1, len(objectives))
     figure, axes = panels(ONE_COLUMN if len(others) == 1 else TWO_COLUMNS, 2.9, len(others))
     for panel, k in zip(axes.flat, others, strict=True):
-        x, y = (every[objectives[n].key] / scales[n][1] for n in (0, k))
+        x, y = (every[objectives[n].key] / scales[n] for n in (0, k))
         panel.plot(x[feasible], y[feasible], ".", color="0.7", markersize=3, label="feasible")
         panel.plot(x[found.front], y[found.front], ".-", color=BLUE, linewidth=0.8, label="front")
         for number in named:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,22 @@ def frozen(array: _AnyArray) -> _AnyArray:
     """Make an array read-only, and return this array (not a copy)."""
     array.setflags(write=False)
     return array
+
+
+_Given = TypeVar("_Given", contravariant=True)
+_Kept = TypeVar("_Kept", covariant=True)
+
+
+class Given(Protocol[_Given, _Kept]):
+    """Type of a field of a dataclass that takes one type, and that is read as another.
+
+    Type checkers read both types from these methods; nothing calls them. mypy does so only for a
+    field that has a default.
+    """
+
+    def __get__(self, owner: Any, kind: type) -> _Kept: ...
+
+    def __set__(self, owner: Any, value: _Given) -> None: ...
 
 
 class Printed:

@@ -130,7 +130,7 @@ class PathPoses(ReadOnlyState, PoseSet):
             is below 2 or above 2³⁰.
     """
 
-    waypoints: Array
+    waypoints: ArrayLike
     count: int | None = None
 
     def __post_init__(self) -> None:

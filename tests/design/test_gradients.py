@@ -90,6 +90,15 @@ def test_gradients_under_friction_and_tolerances(
     assert fine < 0.02 * coarse
 
 
+def test_a_deflection_under_a_load_with_a_moment_has_derivatives() -> None:
+    loads = (0.5, 0.0, -2.0, 0.0, 0.05, 0.02)
+    objectives = (cdsm.Objective("deflection"),)
+    task = problem(variables=CONTINUOUS, postures=BENT[3:], loads=loads, objectives=objectives)
+    coarse, fine = errors(task, AT, Measure("deflection"))
+    assert fine < 1e-6
+    assert fine < 0.02 * coarse
+
+
 def test_upper_bounds_that_friction_lowers_have_derivatives() -> None:
     arm = small_arm(cables_per_joint=5, friction=0.1)
     whole: dict[str, Any] = {"minimum": 10.0, "worst_friction": True, "postures": BENT[3:]}

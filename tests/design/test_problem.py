@@ -1,6 +1,8 @@
 """Problems, their evaluation, searches and refinements."""
 
+import itertools
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from cdsm.design.goals import Measure
 from cdsm.design.gradients import SMOOTH, rows_and_gradients
 from cdsm.design.quantities import measure
 from cdsm.design.store import digest
+from cdsm.design.workshop import cable_table
 from cdsm.support.values import Array
 
 pytest.importorskip("pymoo")
@@ -81,6 +84,8 @@ def test_quantities_are_those_of_single_postures(rough: bool) -> None:
     bounds, worst = (20.0, 400.0, task.loads[0]), {"worst_friction": rough}
     pulls = [cdsm.distribute_tension(p, *bounds, worst_friction=rough) for p in poses]
     Ks = [cdsm.stiffness(p, pull) for p, pull in zip(poses, pulls, strict=True)]
+    bare = [cdsm.distribute_tension(p, 20.0, 400.0, worst_friction=rough) for p in poses]
+    unloaded = [cdsm.stiffness(p, pull) for p, pull in zip(poses, bare, strict=True)]
     wire: dict[str, Any] = {"diameter": 1e-3, "breaking_load": 900.0, "bend_diameter": 4e-3}
     use = [cdsm.wire_use(pull, **wire, worst_friction=rough) for pull in pulls]
     clear = [cdsm.clearance(p, 1e-3) for p in poses]
@@ -90,7 +95,7 @@ def test_quantities_are_those_of_single_postures(rough: bool) -> None:
         "softest": min(1.0 / np.linalg.eigvalsh(K.compliance[:3, :3])[-1] for K in Ks),
         "isotropy": min(cdsm.isotropy(K) for K in Ks),
         "margin": min(K.margin for K in Ks),
-        "deflection": max(np.linalg.norm(K.compliance[:3, :3] @ force) for K in Ks),
+        "deflection": max(np.linalg.norm(K.compliance[:3, :3] @ force) for K in unloaded),
         "motor_force": max(each.largest.max() for each in use),
         "wire_strain": max(each.strain.max() for each in use),
         "wire_safety": min(each.safety.min() for each in use),
@@ -113,6 +118,74 @@ def test_quantities_are_those_of_single_postures(rough: bool) -> None:
     for key, value in expected.items():
         assert found[key][0] == pytest.approx(value, rel=1e-8), key
     assert found["workspace"][0] > 0.0
+
+
+def test_deflection_is_that_of_payload_and_of_a_small_weight_on_locked_motors() -> None:
+    row = [0.025, 2.0]
+    task = problem(
+        arm=cdsm.Manipulator(small_arm(friction=0.0).geometry, cdsm.presets.STRAND_1X19),
+        variables=problem().variables[:2],
+        objectives=(cdsm.Objective("deflection"),),
+    )
+
+    def deflection(force: float) -> float:
+        loaded = replace(task, loads=np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0]))
+        return float(cdsm.evaluate_designs(loaded, [row])["deflection"][0])
+
+    poses = [task.arm_of(row).at(q) for q in BENT]
+    largest = deflection(9.0)
+    allowed = [cdsm.payload(p, "-z", 20.0, 400.0, deflection=largest) for p in poses]
+    assert min(each.limits["deflection"] for each in allowed) == pytest.approx(9.0, rel=1e-9)
+    # first order: the error of a weight test falls with the weight
+    errors = []
+    for force in (0.2, 0.02):
+        tensions = [cdsm.distribute_tension(p, 20.0) for p in poses]
+        tests = [cdsm.weight_test(F.posture, F, (0.0, 0.0, -force)) for F in tensions]
+        sag = max(np.linalg.norm(test.displacements[-1]) for test in tests)
+        errors.append(abs(deflection(force) / sag - 1.0))
+    assert errors[0] < 5e-3
+    assert errors[1] < 0.11 * errors[0]
+
+
+def test_without_the_load_an_arm_that_is_not_held_has_no_finite_deflection() -> None:
+    task = problem(
+        variables=(cdsm.Variable("hole_radius", 0.014, 0.0151),),
+        objectives=(cdsm.Objective("deflection"),),
+        loads=(0.0, 0.0, 1.5, 0.0, 0.0, 0.0),  # it carries much of the arm
+        minimum=5.0,
+        maximum=12.0,
+        postures=np.zeros((1, 6)),
+    )
+    found = cdsm.evaluate_designs(task, [[0.015]])
+    assert (found["held"][0], found["deflection"][0]) == (1.0, np.inf)
+    with pytest.raises(cdsm.InfeasibleDesign, match="misses: largest first-order deflection") as e:
+        cdsm.search_designs(task, generations=1, population=4)
+    assert e.value.constraints == ("deflection",)
+
+
+def test_all_quantities_of_a_posture_count_the_postures_that_are_held() -> None:
+    arm = small_arm()
+    wide = np.vstack([np.zeros(6), arm.upper * np.array([1, 1, 1, 1, -1, 1])])
+    task = problem(
+        arm=arm,
+        objectives=(
+            cdsm.Objective("payload", "-z"),
+            cdsm.Objective("tension_factor"),
+            cdsm.Objective("cable_clearance"),
+        ),
+        constraints=(cdsm.Constraint("held", at_least=0.1),),
+        postures=wide,
+        loads=np.zeros(6),
+        minimum=10.0,
+    )
+    row = [[0.02, 2.0, 1.0]]
+    both = cdsm.evaluate_designs(task, row)
+    assert both["held"][0] == 0.5
+    first = cdsm.evaluate_designs(replace(task, postures=wide[:1]), row)
+    for key in {*first.keys()} - {"held"}:
+        assert both[key][0] == first[key][0], key
+    poses = [task.arm_of(row[0]).at(q) for q in wide]
+    assert cdsm.tension_factor(poses[0]) > cdsm.tension_factor(poses[1])
 
 
 def test_a_link_keeps_its_mass_per_length_and_joints_have_values_of_their_own() -> None:
@@ -190,9 +263,21 @@ def test_tolerances_take_a_margin() -> None:
     )
     u = cdsm.uncertainty(poses[worst], pulls[worst], tolerances, direction=(0.0, 0.0, 1.0))
     assert sure[key][0] == pytest.approx(plain[key][0] - 2.0 * u.standard_uncertainty, rel=1e-9)
+    assert f"{key} - 2 u [N/m]" in sure.to_csv()
+    assert f"{key} [N/m]" in plain.to_csv()
 
 
 # --- searches --------------------------------------------------------------------------------
+
+
+def test_a_broken_line_of_a_record_is_named(tmp_path: Path) -> None:
+    kept = tmp_path / "designs.jsonl"
+    cdsm.search_designs(problem(), generations=2, population=4, store=kept)
+    lines = kept.read_text().splitlines(keepends=True)
+    for broken in ("{at: 3}", '{"at": [1.0]}', "[]"):
+        kept.write_text("".join([*lines[:4], broken + "\n", *lines[5:]]))
+        with pytest.raises(cdsm.FileError, match=r"designs.jsonl: line 5 is no record"):
+            cdsm.search_designs(problem(), generations=2, population=4, store=kept)
 
 
 def test_a_front_has_the_bits_of_its_seed_however_it_is_computed(tmp_path: Path) -> None:
@@ -365,6 +450,7 @@ def test_problems_that_cannot_be_refined_say_why() -> None:
         ({"variables": (cdsm.Variable("hole_radius", 0.01, 0.02, at=9),)}, "hole_radius.at: 9"),
         ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead is named twice"),
         ({"loads": np.zeros((1, 5))}, "loads: shape"),
+        ({"coverage": -3.0}, "coverage: -3 given; give 0 or more"),
         ({"objectives": (cdsm.Objective("wire_safety"),)}, "breaking_load: is needed"),
         ({"objectives": (cdsm.Objective("wire_life"),)}, "bend_diameter: is needed"),
         (
@@ -387,6 +473,8 @@ def test_bad_problems_name_what_is_wrong(changes: dict[str, Any], said: str) -> 
     [
         (lambda: cdsm.Variable("hole_radius", 0.03, 0.02), "give low < high"),
         (lambda: cdsm.Variable("hole_radius", 0.03), "needs both"),
+        (lambda: cdsm.Variable("hole_radius", -0.03, 0.03), r"-0.03 m given; 0, or 1e-06 to"),
+        (lambda: cdsm.Variable("minimum", -5.0, 5.0), "cables only pull"),
         (lambda: cdsm.Variable("wire", 1.0, 2.0), "needs low and high, or|has no range"),
         (lambda: cdsm.Variable("end", 1, 3), "name of a cable"),
         (lambda: cdsm.Variable("minimum", 1.0, 3.0, at=1), "one value for the arm"),
@@ -399,6 +487,24 @@ def test_bad_problems_name_what_is_wrong(changes: dict[str, Any], said: str) -> 
 def test_bad_parts_name_what_is_wrong(make: Any, said: str) -> None:
     with pytest.raises(cdsm.CdsmError, match=said):
         make()
+
+
+@pytest.mark.parametrize(
+    ("of", "low", "high", "said"),
+    [("hole_radius", 20.0, 30.0, "30 m: it looks as if it is in mm"),
+     ("phase", -360.0, 0.0, "360 rad: it looks as if it is in degrees")],
+)  # fmt: skip
+def test_ranges_in_other_units_are_doubted(of: Any, low: float, high: float, said: str) -> None:
+    with pytest.warns(cdsm.CdsmWarning, match=said):
+        cdsm.Variable(of, low, high)
+
+
+def test_a_posture_beyond_the_limits_is_named_without_remedies_that_a_search_lacks() -> None:
+    beyond = problem(postures=np.vstack([BENT, np.full(6, 2.0)]))
+    with pytest.raises(cdsm.InfeasibleDesign, match=r"posture 4: joint1_1") as caught:
+        cdsm.search_designs(beyond, generations=1, population=4)
+    assert "check_limits" not in str(caught.value)
+    assert ".." not in str(caught.value)
 
 
 def test_the_digest_of_a_problem_tells_problems_apart() -> None:
@@ -422,6 +528,7 @@ def test_files_for_the_workshop(tmp_path: Path) -> None:
         "arm.toml", "arm.urdf", "arm.xml", "holes.csv", "cables.csv",
     ]  # fmt: skip
     assert cdsm.Manipulator.read(paths[0]) == arm
+    assert arm.geometry.hole_radius == found.design()[0]
     # the pretension is that of the problem: every command that reads the arm keeps it
     assert {(cable.minimum, cable.maximum) for cable in arm.cables} == {(20.0, 400.0)}
     page = found.to_html()
@@ -438,6 +545,40 @@ def test_files_for_the_workshop(tmp_path: Path) -> None:
     assert [float(row[4]) for row in cables[1:]] == pytest.approx(lengths.tolist(), abs=1e-4)
     for row in cables[1:]:
         assert float(row[5]) <= float(row[4]) <= float(row[6])
+
+
+def test_a_printed_table_has_designs_of_the_whole_front(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = problem(
+        variables=(cdsm.Variable("link_length", 0.05, 0.1),),
+        objectives=(cdsm.Objective("mass"), cdsm.Objective("length")),
+    )
+    found = cdsm.search_designs(task, generations=2, population=16)
+    monkeypatch.setattr("cdsm.design.result._PRINTED", 3)
+    last, chosen = len(found.front) - 1, len(found.front) - 2
+    numbers = [line.split()[0] for line in found._text(chosen).splitlines()[2:]]
+    assert {"0", f"{found.compromise}*", f"{chosen}", f"{last}"} <= {*numbers}
+    assert len(numbers) < len(found.front)
+    assert f"{len(numbers)} shown" in found._text(chosen)
+
+
+def test_a_cable_is_cut_for_all_postures_within_the_joint_limits() -> None:
+    arm = small_arm()
+    straight = arm.cable_lengths(np.zeros(arm.nv))
+    # a segment crosses one joint, so a grid over each joint gives all lengths
+    low, high = straight.copy(), straight.copy()
+    sides = [np.linspace(-end, end, 41) for end in 0.999 * arm.upper[:2]]
+    for joint in range(3):
+        q = np.zeros((41**2, arm.nv))
+        q[:, 2 * joint : 2 * joint + 2] = [*itertools.product(*sides)]
+        lengths = cdsm.evaluate(arm, q, minimum=10.0, outputs=["cable_lengths"])["cable_lengths"]
+        low, high = low + (lengths - straight).min(axis=0), high + (lengths - straight).max(axis=0)
+    rows = [line.split(",")[5:] for line in cable_table(arm).splitlines()[1:]]
+    shortest, cut, stroke = np.array(rows, dtype=np.float64).T * 1e-3
+    np.testing.assert_allclose(stroke, cut - shortest, atol=1e-7)
+    assert (shortest <= low + 1e-7).all()
+    assert (cut >= high - 1e-7).all()
+    np.testing.assert_allclose(shortest, low, atol=2e-4)  # the grid ends before the limits
+    np.testing.assert_allclose(cut, high, atol=2e-4)
 
 
 def test_axes_count_designs_and_cables_in_whole_numbers() -> None:
