@@ -348,7 +348,8 @@ def test_notebooks_show_what_is_printed(name: str) -> None:
 @pytest.mark.parametrize("name", RESULTS)
 def test_a_result_is_one_short_line_in_a_list(name: str) -> None:
     shown = repr(RESULTS[name])
-    assert "\n" not in shown and len(shown) < 130, shown
+    assert "\n" not in shown, shown
+    assert len(shown) < 130, shown
 
 
 @pytest.mark.parametrize("way", WAYS)
