@@ -43,7 +43,9 @@ def urdf(
     geometry: Annotated[
         Path, typer.Argument(metavar="ARM.toml", help="File with the geometry of the arm.")
     ],
-    out: Annotated[Path, out_option(metavar="FILE.urdf", help="URDF file to write.")],
+    out: Annotated[
+        Path, out_option(endings=(".urdf",), metavar="FILE.urdf", help="URDF file to write.")
+    ],
     as_json: AsJson = False,
 ) -> None:
     """Write the URDF of an arm, checked by reading it back with two parsers."""
@@ -206,10 +208,15 @@ def export(
     load: LoadOptions,
     out: Annotated[
         Path | None,
-        out_option(metavar="FILE.xml", help="MuJoCo model to write, its cables under tension."),
+        out_option(
+            endings=(".xml",),
+            metavar="FILE.xml",
+            help="MuJoCo model to write, its cables under tension.",
+        ),
     ] = None,
     cables_out: Annotated[
-        Path | None, file_option(metavar="FILE.toml", help="File to write the cables to.")
+        Path | None,
+        file_option(endings=(".toml",), metavar="FILE.toml", help="File to write the cables to."),
     ] = None,
     angles: Angles = "0",
     actuators: Annotated[

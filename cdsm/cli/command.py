@@ -11,6 +11,7 @@ from typing import Any
 
 import typer.core
 
+from cdsm.cli.files import require_apart
 from cdsm.cli.output import misuse_reported, reported
 from cdsm.cli.words import newer
 
@@ -19,10 +20,12 @@ class Command(typer.core.TyperCommand):
     """Command of typer that also takes older option names; --json makes errors of usage JSON."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Replace older names of options in ``args``, then parse them."""
+        """Replace older names of options in ``args``, then parse and check them."""
         known = [newer(str(self.name), word) for word in args]
         with misuse_reported("--json" in known):
-            return super().parse_args(ctx, known)
+            rest = super().parse_args(ctx, known)
+            require_apart(ctx)
+            return rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help page of ``ctx``; a unit such as [deg] is not taken for markup."""

@@ -12,6 +12,7 @@ import cdsm
 from cdsm.cli.files import out_folder
 from cdsm.cli.options import AsJson
 from cdsm.cli.output import answer, console
+from cdsm.cli.values import misuse
 
 _RECORD = "designs.jsonl"
 
@@ -65,6 +66,8 @@ def design(
     from cdsm.support.validation import whole_number
 
     file = read_problem(problem)
+    if (out / "arm.toml").exists() and not (out / _RECORD).exists():
+        raise misuse("--out", f"{out} has an arm.toml that no search wrote; give another folder.")
     folder = make_folder(out)
     task = file.problem
     if refine:

@@ -1,9 +1,10 @@
-"""Declare options for files to write, which are checked before a command computes."""
+"""Declare files to write, which are checked before a command computes."""
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,21 +12,32 @@ from typing import Annotated, Any
 import typer
 
 import cdsm
+from cdsm.cli.values import misuse
+
+_WRITTEN = "cdsm.cli.files"
+"""Key of the files to write, by the name of their parameter, in the context of a command."""
 
 
-def file_option(*names: str, endings: Sequence[str] = (), **shown: Any) -> Any:
+def file_option(
+    *names: str,
+    endings: Sequence[str],
+    declare: Callable[..., Any] = typer.Option,
+    **shown: Any,
+) -> Any:
     """Declare an option for a file to write; its path is checked before the command computes.
 
-    The path must end in one of ``endings``, if there are any. ``shown`` are help and metavar.
+    The path must end in one of ``endings``. ``shown`` are help and metavar.
     """
 
-    def checked(path: Path | None) -> Path | None:
+    def checked(
+        context: typer.Context, parameter: typer.CallbackParam, path: Path | None
+    ) -> Path | None:
         if path is not None:
             from cdsm.support.extras import need
             from cdsm.support.files import as_path, require_writable
 
-            if endings and path.suffix.lower() not in endings:
-                raise typer.BadParameter(f"{path} ends in none of {', '.join(endings)}.")
+            if path.suffix.lower() not in endings:
+                raise typer.BadParameter(f"{path} does not end in {' or '.join(endings)}.")
             try:
                 require_writable(as_path(path))
                 if path.suffix.lower() == ".nc":
@@ -34,9 +46,29 @@ def file_option(*names: str, endings: Sequence[str] = (), **shown: Any) -> Any:
                 raise typer.BadParameter(str(error)) from None
             if not os.access(path.resolve().parent, os.W_OK):
                 raise typer.BadParameter(f"{path}: the folder is read-only; choose another.")
+            context.meta.setdefault(_WRITTEN, {})[parameter.name] = path
         return path
 
-    return typer.Option(*names, callback=checked, **shown)
+    return declare(*names, callback=checked, **shown)
+
+
+def require_apart(context: typer.Context) -> None:
+    """Refuse a file to write that the command also reads, or also writes by another option."""
+    names = {
+        each.name: each.opts[0] if each.opts[0].startswith("-") else str(each.metavar)
+        for each in context.command.params
+    }
+    for name, path in context.meta.get(_WRITTEN, {}).items():
+        for other, given in context.params.items():
+            if other != name and isinstance(given, (str, Path)) and _alike(path, Path(given)):
+                raise misuse(names[name], f"{path} is also {names[other]}; give another file.")
+
+
+def _alike(a: Path, b: Path) -> bool:
+    """Return whether two paths are of one file, which may not exist yet."""
+    with contextlib.suppress(OSError, ValueError):
+        return a.resolve() == b.resolve() or a.samefile(b)
+    return False
 
 
 out_option = partial(file_option, "--out", "-o")

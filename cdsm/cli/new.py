@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 import cdsm
+from cdsm.cli.files import file_option
 from cdsm.cli.options import AsJson
 from cdsm.cli.output import Json, answer
 from cdsm.cli.values import gravity_of, misuse, numbers
@@ -18,7 +19,12 @@ _size = {"rich_help_panel": "Its sizes"}
 
 
 def new(
-    arm: Annotated[Path, typer.Argument(metavar="ARM.toml", help="File to write.")],
+    arm: Annotated[
+        Path,
+        file_option(
+            endings=(".toml",), declare=typer.Argument, metavar="ARM.toml", help="File to write."
+        ),
+    ],
     universal: Annotated[
         int | None, typer.Option(metavar="N", help="N universal joints.", **_kind)
     ] = None,

@@ -49,7 +49,11 @@ def plan(
     max_tension: MaxTension = math.inf,
     out: Annotated[
         Path | None,
-        out_option(metavar="FILE.csv", help="Table of tensions, lengths, stiffness to write."),
+        out_option(
+            endings=(".csv",),
+            metavar="FILE.csv",
+            help="Table of tensions, lengths, stiffness to write.",
+        ),
     ] = None,
     figure: Picture = None,
     animation: Annotated[

@@ -41,10 +41,17 @@ def fit(
     method: Annotated[str, typer.Option(help="Fit: monotone, or polynomial as in the paper.")] = (
         "monotone"
     ),
-    out: Annotated[Path | None, out_option(help="Law of rigidity to write, as TOML.")] = None,
+    out: Annotated[
+        Path | None,
+        out_option(endings=(".toml",), metavar="WIRE.toml", help="Law of rigidity to write."),
+    ] = None,
     tolerances: Annotated[
         Path | None,
-        file_option(metavar="T.toml", help="Tolerances to write: the 95 % band of the rigidity."),
+        file_option(
+            endings=(".toml",),
+            metavar="T.toml",
+            help="Tolerances to write: the 95 % band of the rigidity.",
+        ),
     ] = None,
     figure: Picture = None,
     as_json: AsJson = False,

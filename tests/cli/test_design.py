@@ -108,6 +108,14 @@ def test_an_infeasible_problem_ends_with_3_and_says_what_it_misses(tmp_path: Pat
     assert "at most 0.001 mm is asked" in output
 
 
+def test_an_arm_that_no_search_wrote_is_not_overwritten(tmp_path: Path) -> None:
+    path = written(tmp_path, (EXAMPLES / "design.toml").read_text())
+    code, output = run(str(path), "--out", str(tmp_path))
+    assert code == 2
+    assert "that no search wrote" in " ".join(output.replace("│", " ").split())
+    assert {each.name for each in tmp_path.iterdir()} == {"arm.toml", "problem.toml"}
+
+
 REFINED = """
 arm = "arm.toml"
 loads = [[0.0, 0.0, -2.0]]

@@ -11,6 +11,7 @@ from tests.cli.test_commands import SHORT, call
 
 _FILES = [
     ("urdf", "--out", ".urdf"),
+    ("new", None, ".toml"),
     ("check", "--out", ".html"),
     ("weigh", "--figure", ".png"),
     ("cycle", "--out", ".nc"),
@@ -29,7 +30,6 @@ _FILES = [
     ("export", "--out", ".xml"),
     ("export", "--cables-out", ".toml"),
 ]
-_ANY_ENDING = (".urdf", ".toml", ".xml")
 
 
 def _refused(*arguments: object) -> str:
@@ -39,16 +39,16 @@ def _refused(*arguments: object) -> str:
     return " ".join(result.stderr.replace("│", " ").split())
 
 
-def _said(command: str, option: str, path: object) -> str:
+def _said(command: str, option: str | None, path: object) -> str:
     """Return the error of a file to write; no input exists, so nothing has been computed."""
-    said = _refused(command, "absent", option, path)
-    assert option in said
+    said = _refused(command, *(["absent", option] if option else []), path)
+    assert option is None or option in said
     return said
 
 
 @pytest.mark.parametrize(("command", "option", "ending"), _FILES)
 def test_a_file_that_cannot_be_written_is_refused_before_the_work(
-    command: str, option: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, option: str | None, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path(f"folder{ending}").mkdir()
@@ -56,10 +56,55 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(
         command, option, f"absent/a{ending}"
     )
     assert "is not a regular file" in _said(command, option, f"folder{ending}")
-    if not (ending in _ANY_ENDING or (command, option) == ("plan", "--out")):
-        assert "a.txt ends in none of" in _said(command, option, "a.txt")
+    assert "a.txt does not end in ." in _said(command, option, "a.txt")
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert "is read-only; choose another" in _said(command, option, f"a{ending}")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option", "same"),
+    [
+        (("export", "a.toml", "--cables-out", "a.toml"), "--cables-out", "ARM"),
+        (("export", "a.toml", "--cables-out", "../{here}/a.toml"), "--cables-out", "ARM"),
+        (("export", "a.toml", "--cables-out", "link.toml"), "--cables-out", "ARM"),
+        (
+            ("export", "a.urdf", "--cables", "b.toml", "--tip", "t", "--cables-out", "b.toml"),
+            "--cables-out",
+            "--cables",
+        ),
+        (
+            ("export", "a.toml", "--wire", "b.toml", "--cables-out", "b.toml"),
+            "--cables-out",
+            "--wire",
+        ),
+        (
+            ("fit", "t.csv", "--out", "new.toml", "--tolerances", "new.toml"),
+            "--out",
+            "--tolerances",
+        ),
+        (
+            ("plan", "a.toml", "--path", "t.csv", "--direction", "z", "--out", "t.csv"),
+            "--out",
+            "--path",
+        ),
+    ],
+)
+def test_a_file_that_is_read_or_written_twice_is_refused(
+    arguments: tuple[str, ...],
+    option: str,
+    same: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nothing is computed: the files that are read are empty, and stay so."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.toml", "b.toml", "a.urdf", "t.csv"):
+        Path(name).touch()
+    Path("link.toml").symlink_to("a.toml")
+    said = _refused(*(each.format(here=tmp_path.name) for each in arguments))
+    assert f"{option}: " in said
+    assert f" is also {same}; give another file." in said
+    assert not any(path.stat().st_size for path in tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ def assert_refused(answers: list[dict[str, Any]], reason: str) -> None:
 
 
 OLD_FILES = {
-    *(f"wanted{suffix}" for suffix in (".xml", ".nc", ".csv", ".png")),
+    *(f"wanted{suffix}" for suffix in (".xml", ".urdf", ".toml", ".nc", ".csv", ".png")),
     *("fig5.png", "reproduction.md", "reproduction.json"),
 }
 

@@ -65,9 +65,9 @@ def commands(folder: Path, path: Path) -> dict[str, list[object]]:
     cdsm.write_sweep(cdsm.sweep(ARM, POSES, minimum=20.0), swept)
     angles, picture = "5", path.with_suffix(".png")
     return {
-        "cdsm urdf": ["urdf", arm, "-o", path],
+        "cdsm urdf": ["urdf", arm, "-o", path.with_suffix(".urdf")],
         "cdsm export": ["export", arm, "--mjcf", path, "--angles", angles],
-        "cdsm fit": ["fit", test, "--gauge-length", 500, "-o", path],
+        "cdsm fit": ["fit", test, "--gauge-length", 500, "-o", path.with_suffix(".toml")],
         "cdsm fit --figure": ["fit", test, "--gauge-length", 500, "--figure", picture],
         "cdsm sweep": ["sweep", arm, "--random", 9, "--out", path.with_suffix(".nc")],
         "cdsm map": ["map", swept, "-o", picture],
@@ -146,7 +146,7 @@ def refused(fault: str, folder: Path) -> list[dict[str, Any]]:
 
     mount = ["mount", "-t", "tmpfs", "-o", f"size={ENOUGH}", "tmpfs", disk]
     subprocess.run(list(map(str, mount)), check=True)
-    for suffix in (".xml", ".nc", ".csv", ".png"):
+    for suffix in (".xml", ".urdf", ".toml", ".nc", ".csv", ".png"):
         wanted.with_suffix(suffix).write_bytes(OLD)
     for name in ("fig5.png", "reproduction.md", "reproduction.json"):
         (disk / name).write_bytes(OLD)
