@@ -7,6 +7,7 @@ guard against overflow or denormal numbers.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple, TypeVar
 
@@ -208,16 +209,18 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
     return int(value)
 
 
+_NO_LETTER = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\uffff]")
+"""Control characters, line breaks, lone surrogates and other codes that XML cannot hold."""
+
+
 def text(name: str, value: object) -> str:
-    """Return a nonempty text that can be encoded in files, or raise :class:`InvalidInput`."""
-    if not isinstance(value, str) or not value:
-        raise InvalidInput(name, f"{value!r} given; a name is needed, a text that is not empty.")
-    try:
-        value.encode()
-    except UnicodeEncodeError as error:
-        raise InvalidInput(
-            name, f"{value!r} given; character {error.start + 1} is a lone surrogate, not text."
-        ) from None
+    """Return a text that files can hold and people can read, or raise :class:`InvalidInput`."""
+    if not isinstance(value, str) or not value.strip():
+        raise InvalidInput(name, f"{value!r} given; a name is needed, a text that is not blank.")
+    wrong = _NO_LETTER.search(value)
+    if wrong is not None:
+        at = wrong.start() + 1
+        raise InvalidInput(name, f"{value!r} given; character {at} cannot be printed.")
     return value
 
 
