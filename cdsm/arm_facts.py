@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections import Counter
 from collections.abc import Sequence
@@ -17,16 +18,20 @@ from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, InvalidInput
-from cdsm.geometry import Geometry
+from cdsm.geometry import LONGEST, Geometry, doubts_about_units
 from cdsm.rigid_body import RigidBody
 from cdsm.support.directions import Direction, gravity_vector
 from cdsm.support.format import JointUnits, plural
 from cdsm.support.validation import instance, one_of, sequence_of
 from cdsm.support.values import Array, Printed
+from cdsm.support.warning import warn
 from cdsm.tolerance import Tolerances
 
 CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
 """One or more cables, or the path of their file."""
+
+_FARTHEST = 5.0
+"""A lead or site farther than this [m], and than ten arms, is probably in millimetres."""
 
 ANOTHER_ARM = (
     "another arm; distribute it for this one. with_cables, with_friction, with_gravity and "
@@ -166,10 +171,13 @@ class ArmFacts(Printed):
         original_length: OriginalLength,
         joint_names: Sequence[str] | None = None,
         tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
+        *,
+        told: Sequence[str] = (),
     ) -> None:
         """Check the arguments of :class:`Manipulator`, and set all attributes from them.
 
-        ``urdf`` is a text that has been checked. ``tip`` is the link whose frame is the tip.
+        ``urdf`` is a text that has been checked. ``tip`` is the link whose frame is the tip. Doubts
+        about units are warnings, but those that were ``told`` before.
         """
         self._cables = cables = _checked_cables(cables)
         self._gravity = gravity_vector("gravity", gravity)
@@ -180,6 +188,25 @@ class ArmFacts(Printed):
         self._parts = ArmParts(
             geometry, urdf, cables, tip, g, original_length, body.joint_names, tolerances
         )
+        for doubt in self._unit_doubts:
+            if doubt not in told:
+                warn(f"{self.name}: {doubt}")
+
+    @cached_property
+    def _unit_doubts(self) -> list[str]:
+        """Doubts about the unit of lengths of the robot and of its cables."""
+        length = self._model.body.length
+        # without lengths between the joints, the frame of the robot may be as long as any arm
+        most = max(_FARTHEST, 10.0 * length) if length > 0.0 else LONGEST
+        sizes = [(f"the lead of {each.name}", each.lead, most) for each in self._cables]
+        sizes += [
+            (f"a site of {each.name}", math.hypot(*site.position), most)
+            for each in self._cables
+            for site in each.sites
+        ]
+        # a geometry warns of its own length
+        largest = max(sizes, key=lambda size: size[1])
+        return doubts_about_units(0.0 if self.is_serpentine else length, [largest])
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, type(self)) and self._parts == other._parts
@@ -237,7 +264,7 @@ class ArmFacts(Printed):
 
     def _replace(self, **changes: Any) -> Self:
         arm = type(self).__new__(type(self))
-        arm._build(*self._parts._replace(**changes))
+        arm._build(*self._parts._replace(**changes), told=self._unit_doubts)
         return arm
 
 

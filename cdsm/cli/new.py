@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,10 @@ _kind = {"rich_help_panel": "The kind of arm: one of them"}
 _size = {"rich_help_panel": "Its sizes"}
 
 
+_KEY = r"^(?:lead|twist)(?=: )|\b(?:link_length|base_length|disk_offset|hole_radius|link_mass)\b"
+"""A key of a geometry in its faults; ``lead`` may also be a word."""
+
+
 def new(
     arm: Annotated[
         Path,
@@ -26,10 +31,10 @@ def new(
         ),
     ],
     universal: Annotated[
-        int | None, typer.Option(metavar="N", help="N universal joints.", **_kind)
+        int | None, typer.Option(metavar="N", help="N universal joints.", min=1, **_kind)
     ] = None,
     hinged: Annotated[
-        int | None, typer.Option(metavar="N", help="N hinges; see --twist.", **_kind)
+        int | None, typer.Option(metavar="N", help="N hinges; see --twist.", min=1, **_kind)
     ] = None,
     sections: Annotated[
         str | None,
@@ -47,7 +52,8 @@ def new(
         ),
     ] = None,
     cables_per_joint: Annotated[
-        int | None, typer.Option(help="Default 3; for hinges 2, an antagonistic pair.", **_size)
+        int | None,
+        typer.Option(help="Default 3; for hinges 2, an antagonistic pair.", min=1, **_size),
     ] = None,
     link_length: Annotated[float, typer.Option(help="Length of every link [mm].", **_size)] = 60.0,
     base_length: Annotated[
@@ -117,10 +123,20 @@ def new(
         if i:  # between the holes of all sections, wherever those are
             sizes["phase"] = math.tau / max(math.lcm(*counts), 1) / each * i / len(counts)
         parts.append((kind, sizes))
-    built = [getattr(cdsm.Geometry, kind)(**sizes) for kind, sizes in parts]
-    geometry = cdsm.Geometry.sections(built)
+    try:
+        built = [getattr(cdsm.Geometry, kind)(**sizes) for kind, sizes in parts]
+        geometry = cdsm.Geometry.sections(built)
+    except cdsm.GeometryError as error:
+        raise misuse("sizes", f"{_in_options(error)}. Options take mm and degrees.") from None
     whole = cdsm.Manipulator(geometry, as_wire(law), gravity=gravity_of(gravity))
     text = template(arm.name, law, tuple(whole.gravity.tolist()), parts)
     written = write_text(arm, text)
     facts: Json = {"name": geometry.name, "length_m": geometry.length, "written": [str(written)]}
     answer(as_json, lambda: facts, whole, f"written: {written}; try cdsm check {written}")
+
+
+def _in_options(error: cdsm.GeometryError) -> str:
+    """Return the faults of a geometry, with options in place of its keys."""
+    return "; ".join(
+        re.sub(_KEY, lambda key: f"--{key[0].replace('_', '-')}", fault) for fault in error.faults
+    )

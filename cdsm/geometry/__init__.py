@@ -4,6 +4,7 @@ All units are SI (m, rad, kg). The straight arm lies along x, and all lengths ar
 """
 
 from cdsm.geometry.checks import LONGEST as LONGEST
+from cdsm.geometry.checks import doubts_about_units as doubts_about_units
 from cdsm.geometry.geometry import Geometry as Geometry
 from cdsm.geometry.parts import MAXIMUM_JOINTS as MAXIMUM_JOINTS
 from cdsm.geometry.parts import UNIVERSAL_AXES as UNIVERSAL_AXES

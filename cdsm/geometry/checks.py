@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from cdsm.errors import first_of
@@ -15,6 +16,8 @@ LONGEST = 30.0
 
 WIDEST = 1.0
 """A hole radius or disk offset larger than this [m] is probably in millimetres."""
+
+_SHORTEST = 1e-3  # an arm shorter than this [m] was probably given in metres where mm are taken
 
 
 def farthest_holes(geometry: Description) -> list[float]:
@@ -75,17 +78,30 @@ def _short_links(geometry: Description) -> list[str]:
     return [f"disk_offset: too large: {names}; lower disk_offset, or lengthen the links"]
 
 
+def doubts_about_units(length: float, sizes: Iterable[tuple[str, float, float]] = ()) -> list[str]:
+    """Return a doubt about the unit of lengths, as text in a list, if there is one.
+
+    ``length`` is that of the arm, ``sizes`` are words, a size, and its largest plausible value [m].
+    """
+    if 0.0 < length < _SHORTEST:
+        return [
+            f"the arm is {length:.4g} m long: it looks as if lengths are in another unit; give "
+            "them in metres, or in mm as options of the command line."
+        ]
+    every = [("the arm", length, LONGEST), *sizes]
+    large = [f"{what} is {size:.4g} m" for what, size, most in every if size > most]
+    if not large:
+        return []
+    return [f"{', '.join(large)}: it looks as if lengths are in mm; give them in metres."]
+
+
 def doubts_about(geometry: Description) -> list[str]:
     """Return doubts as texts, e.g. lengths that look like millimetres, or shared holes."""
-    doubts = []
     sizes = [
-        ("the arm", geometry.length, LONGEST),
         ("hole_radius", max(geometry.hole_radii), WIDEST),
         ("disk_offset", max(joint.disk_offset for joint in geometry.joints), WIDEST),
     ]
-    large = [f"{what} is {size:.4g} m" for what, size, most in sizes if size > most]
-    if large:
-        doubts.append(f"{', '.join(large)}: it looks as if lengths are in mm; give them in metres.")
+    doubts = doubts_about_units(geometry.length, sizes)
     names = geometry.cable_names
     groups = [
         " and ".join(names[c] for c in each) for each in sharing(geometry.cables, geometry.disks)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.geometry import LONGEST
+from cdsm.geometry import doubts_about_units
 
 if TYPE_CHECKING:
     from cdsm.report.report import Report
@@ -70,9 +70,7 @@ def faults(report: Report) -> Iterator[str]:
 
 def notes(report: Report) -> Iterator[str]:
     """Yield notes for a user of the stiffness of ``report``; they do not mean that it is wrong."""
-    length = report.stiffness.posture.arm.length
-    if length > LONGEST:
-        yield f"the arm is {length:.4g} m long: it looks as if its lengths are in mm; give metres."
+    yield from doubts_about_units(report.stiffness.posture.arm.length)
     yield from report.stiffness.posture.remarks
     yield from _of_tensions(report)
     yield from _of_ranks(report)

@@ -37,7 +37,7 @@ class Range(NamedTuple):
 RANGES: Final = {
     "force": Range("N", 1e-9, 1e9),
     "friction": Range("", 1e-6, 2.0),
-    "gravity": Range("m/s²", 1e-6, 1e4),
+    "gravity": Range("m/s²", 1e-6, 1e3),
     "length": Range("m", 1e-6, 1e4),
     "mass": Range("kg", 1e-9, 1e6),
     "rigidity": Range("N", 1e-6, 1e12),

@@ -82,13 +82,14 @@ def test_new_takes_sizes_in_mm_and_degrees(tmp_path: Path) -> None:
         ((), 2, "give one of --universal, --hinged and --sections"),
         (("--universal", 3, "--hinged", 2), 2, "give one of --universal, --hinged and --sections"),
         (("--universal", 3, "--twist", 30), 2, "goes with --hinged only"),
-        (("--universal", 0), 1, "joints: input should be greater than or equal to 1"),
-        (("--universal", 3, "--disk-offset", 40), 1, "disk_offset: too large"),
-        (("--universal", 3, "--hole-radius", 0), 1, "hole_radius: 0 m given"),
+        (("--universal", 0), 2, "'--universal': Input should be greater than or equal to 1"),
+        (("--universal", 3, "--disk-offset", 40), 2, "--disk-offset: too large"),
+        (("--universal", 3, "--link-length", 0.06), 2, "Options take mm and degrees."),
+        (("--universal", 3, "--hole-radius", 0), 2, "--hole-radius: 0 m given"),
         (("--universal", 3, "--wire", "1x9-1.2mm"), 1, "did you mean '1x19-1.2mm'"),
         (("--universal", 3, "--gravity", "1,2"), 2, "give 3"),
         (("--sections", "3,x"), 2, "'x' is no number"),
-        (("--sections", "3,0"), 1, "joints: input should be greater than or equal to 1"),
+        (("--sections", "3,0"), 2, "joints: input should be greater than or equal to 1"),
     ],
 )
 def test_bad_options_are_named_and_write_nothing(

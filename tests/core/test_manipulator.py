@@ -1,6 +1,7 @@
 """Manipulator: joint limits, and sites that meet."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from tests.support.arms import (
 )
 
 ARM = random_arm(1, 3)
+_ROOT = Path(__file__).parents[2]
 
 
 def test_angles_beyond_their_limits_are_an_error_with_data() -> None:
@@ -80,3 +82,52 @@ def test_sites_that_meet_at_a_posture_are_named_there() -> None:
     with pytest.raises(cdsm.CableError, match=r"coincide at q = \[1\.57.*Move a site") as caught:
         arm.at([math.pi / 2.0, 0.0])
     assert caught.value.cable == "loop"
+
+
+_RAIL = """<robot name="rail"><link name="floor"/><link name="car"/><link name="hand"/>
+<joint name="way" type="prismatic"><parent link="floor"/><child link="car"/><axis xyz="1 0 0"/>
+<limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+<joint name="grip" type="revolute"><parent link="car"/><child link="hand"/><axis xyz="0 0 1"/>
+<origin xyz="{x} 0 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+
+def _rail(x: float = 0.1, site: float = 0.01, lead: float = 0.2) -> None:
+    """Build an arm of length ``x`` [m] with a cable through ``site``, behind ``lead`` [m]."""
+    sites = cdsm.Site("floor", (0.0, 0.02, 0.0)), cdsm.Site("hand", (site, 0.01, 0.0))
+    cable = cdsm.Cable(name="pull", sites=sites, elasticity=STEEL, lead=lead)
+    arm = cdsm.Manipulator.from_urdf(_RAIL.format(x=x), [cable], tip="hand")
+    arm.with_gravity("y").with_friction(0.1)  # which say nothing again
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"x": 100.0}, "rail: the arm is 100 m: it looks as if lengths are in mm"),
+        ({"x": 1e-4}, "rail: the arm is 0.0001 m long: it looks as if lengths are in another unit"),
+        ({"site": 10.0}, "rail: a site of pull is 10 m: it looks as if lengths are in mm"),
+        ({"lead": 50.0}, "rail: the lead of pull is 50 m: it looks as if lengths are in mm"),
+    ],
+)
+def test_lengths_in_another_unit_are_doubted_once(given: dict[str, float], said: str) -> None:
+    with pytest.warns(cdsm.CdsmWarning) as told:
+        _rail(**given)
+    (warning,) = told
+    assert said in str(warning.message)
+
+
+@pytest.mark.filterwarnings("error:.*looks as if:cdsm.CdsmWarning")
+@pytest.mark.parametrize(
+    "path",
+    [*_ROOT.glob("urdf/*.toml"), *_ROOT.glob("examples/a*.toml")],
+    ids=lambda path: path.stem,
+)
+def test_lengths_of_arms_that_people_know_are_not_doubted(path: Path) -> None:
+    cdsm.Manipulator.read(path, STEEL)
+
+
+@pytest.mark.filterwarnings("error:.*looks as if:cdsm.CdsmWarning")
+def test_long_leads_frames_and_small_arms_are_not_doubted() -> None:
+    _rail(lead=4.0)
+    _rail(x=0.0, site=20.0)  # a large frame whose joints meet in one point
+    _rail(x=8.0, lead=60.0)
+    _rail(x=0.002)

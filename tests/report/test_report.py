@@ -697,6 +697,4 @@ def test_arm_written_in_millimetres_is_noticed() -> None:
         arms.STEEL,
     )
     report = cdsm.stiffness(arm.at([0.1]), np.full(2, 50.0)).report()
-    assert [
-        note for note in report.notes if "60 m long: it looks as if its lengths are in mm" in note
-    ]
+    assert [note for note in report.notes if "60 m: it looks as if lengths are in mm" in note]

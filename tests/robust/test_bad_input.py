@@ -588,8 +588,8 @@ def test_later_changes_to_the_callers_arrays_change_nothing() -> None:
 
 OUT_OF_RANGE: dict[str, tuple[Callable[[], object], str]] = {
     "gravity": (
-        lambda: cdsm.Manipulator(GEOMETRY, STEEL, gravity=(1e5, 0.0, 0.0)),
-        r"gravity: entry \[0\] is 100000; finite numbers up to 10000 m/s²",
+        lambda: cdsm.Manipulator(GEOMETRY, STEEL, gravity=(0.0, 0.0, -9810.0)),
+        r"gravity: entry \[2\] is -9810; finite numbers up to 1000 m/s²",
     ),
     "angles": (lambda: ARM.at(np.full(6, 1e300), check_limits=False), r"q: .* up to 1e\+15"),
     "wrench": (lambda: cdsm.stiffness(POSE, np.ones(C), np.full(6, 1e10)), r"wrench: .* 1e\+09 N"),

@@ -111,7 +111,9 @@ def test_a_lone_surrogate_is_no_name(what: str) -> None:
     assert repr(SURROGATE) in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["a\0", "a\a", "a\n", "a\x85", "a\u2028", "a\uffff", " ", "\u00a0"])
+@pytest.mark.parametrize(
+    "name", ["a\0", "a\a", "a\n", "a\x85", "a\u2028", "a\uffff", " ", "\u00a0"]
+)
 def test_a_name_is_printed_in_one_line(name: str) -> None:
     said = "a text that is not blank" if name.isspace() else "character 2 cannot be printed"
     with pytest.raises(cdsm.CableError, match=said) as caught:
