@@ -99,7 +99,7 @@ class Batch(ReadOnlyState, Named):
         return to_dataset(self.arm, self.q, self.status, values, self.direction)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table in SI, a row for each posture; MissingExtra without xarray."""
+        """Return :meth:`to_xarray` as a table, a row per posture; MissingExtra without xarray."""
         return tidy(self.to_xarray())
 
     def __len__(self) -> int:

@@ -1,4 +1,4 @@
-"""Identify the parameters of an arm from measured stiffnesses and loops, by least squares."""
+"""Identify the parameters of an arm from measured stiffnesses and load loops, by least squares."""
 
 from __future__ import annotations
 

@@ -144,7 +144,7 @@ def gravity_torque(
 
 @inner
 def set_gravity_stiffness(parent: Indices, carried: Array, gravity: Array, width: Width) -> None:
-    """Fill ∂g/∂θ (nv, nv, W) for i ≤ j only, from ``carried`` of :func:`gravity_torque`."""
+    """Fill ``gravity`` (nv, nv, W), i ≤ j, with ∂g/∂θ; ``carried``: see :func:`gravity_torque`."""
     for j in range(parent.shape[0] - 1, 0, -1):
         last = np.uint64(j)
         i = last

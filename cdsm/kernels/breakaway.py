@@ -74,7 +74,7 @@ def set_breakaway(
     width: int,
     out: Array,
 ) -> None:
-    """Fill the breakaway loads (b, D) [N] of b postures in D directions e.
+    """Fill ``out`` with the breakaway loads (b, D) [N] of b postures in D directions e.
 
     Args:
         tree: Joints of the arm.
@@ -84,7 +84,7 @@ def set_breakaway(
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N].
         wire: EA (1 + ε) (b, C) or (1, C) [N]; (0, C) if it follows from ``wires``.
-        motion: θ̇ of the stuck arm in B blocks of W postures (B, nv, D, W) [rad/N].
+        motion: ∂θ/∂load of the stuck arm in B blocks of W postures (B, nv, D, W) [rad/N].
         width: W, the number of postures in a block.
         out: The loads; inf where no hole ever slides, 0 where no cable sticks.
     """

@@ -82,7 +82,7 @@ def distribute(
     tension: Array,
     width: Width,
 ) -> None:
-    """Fill the tensions (C, W) with a guess of the least ones, and verify it.
+    """Fill ``tension`` (C, W) with a guess of the least tensions, and verify it.
 
     The guess is the optimum where ``certificate.certified`` is 1 and ``guess.failed`` is −1. J is
     J_L (C, nv, W), with moment arms of rounding set to zero; b is the torque to balance (nv, W);

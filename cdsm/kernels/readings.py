@@ -61,7 +61,7 @@ def set_margins(K: Array, margin: Array, width: Width) -> None:
 
 @inner
 def _set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
-    """Fill the symmetric part (nv, nv, W) of K."""
+    """Fill ``symmetric`` (nv, nv, W) with the symmetric part of K."""
     for i in upwards(0, K.shape[0]):
         for j in upwards(0, K.shape[0]):
             for w in lanes(width):

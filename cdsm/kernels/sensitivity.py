@@ -184,7 +184,7 @@ def single_gradient(
     bent: float,
     turned: float,
 ) -> tuple[float, Array, Array, Array, Array, Array, Array, Array, Array]:
-    """Compute Ψ of one posture, and its derivatives while z, v, p and W are constant.
+    """Compute Ψ of one posture, and its derivatives while z, v, p and W = (f, m) are constant.
 
         Ψ = Σ_c (F_c L̈_c + k_c L̇_c² + p_c L̇_c) + v·ẋ_tip
             − a (Σ_b m_b γ·ẍ_b + f·ẍ_tip + m·ω̇_tip) − b (Σ_b m_b γ·ẋ_b + f·ẋ_tip + m·ω_tip)
@@ -192,8 +192,9 @@ def single_gradient(
     With a = 1 and p = b = 0 it is zᵀ K_θ z + v·ẋ_tip. With F = k = v = a = 0, b = 1 and p the
     tensions, it is zᵀ (J_Lᵀ F + g − J_Xᵀ W), the work of the residual of Eq. 13 on the motion z.
 
-    ``first`` (C+1,) is the first site of each cable, ``z`` (nv,) the joint motion, ``velocity`` v
-    (3,), ``stiffness`` k (C,), ``slope`` ∂k/∂L (C,), ``pull`` p (C,), ``bent`` a and ``turned`` b.
+    Dots are derivatives along θ̇ = z, θ̈ = 0; γ is gravity. ``first`` (C+1,) is the first site of
+    each cable, ``velocity`` v (3,), ``stiffness`` k (C,), ``slope`` ∂k/∂L (C,), ``pull`` p (C,),
+    ``bent`` a and ``turned`` b.
 
     Returns:
         Ψ, and its derivatives with respect to q (nv,), the sites in the frames of their joints (P,

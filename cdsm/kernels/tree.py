@@ -147,7 +147,7 @@ def forward_kinematics(
     frames: Frames,
     width: Width,
 ) -> None:
-    """Fill the rotations of the joints (nv+1, 3, 3, W) and the frames at joint angles q (nv, W).
+    """Fill ``rotation`` of the joints (nv+1, 3, 3, W) and ``frames`` at joint angles q (nv, W).
 
     A turning joint has the rotation R_parent (A + B cos q + C sin q); see :attr:`Tree.turn`. A
     sliding joint moves its origin by q along its slide. ``trigonometry`` (2, W) is scratch.

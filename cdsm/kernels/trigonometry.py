@@ -31,7 +31,7 @@ _S6, _C6 = 1.58969099521155010221e-10, -1.13596475577881948265e-11
 
 @inner
 def set_cosine_sine(angle: Array, cosine: Array, sine: Array, width: Width) -> None:
-    """Fill the cosines and sines of angles, (W,) each."""
+    """Fill ``cosine`` and ``sine`` of ``angle`` [rad], (W,) each."""
     for w in lanes(width):
         # the angle is that many right angles, and x + tail
         turns = (angle[w] * _INVERSE + _TO_WHOLE) - _TO_WHOLE

@@ -123,7 +123,7 @@ def search(program: Program, start: Evaluation) -> ConstraintValues:
 
 
 def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
-    """Yield tensions (C,) [N] moved across the kinks at which ``F`` is: all, then one at a time."""
+    """Yield F (C,) [N] moved across the kinks at which it lies: all at once, then one by one."""
     at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
     for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
         beyond = F.copy()

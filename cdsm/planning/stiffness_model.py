@@ -151,7 +151,7 @@ class Evaluation:
 
 
 class Constraint(NamedTuple):
-    """Values Σ_ab E_j,ab X_ab [-] (j = 1 … n) of one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
+    """Sums Σ_ab E_j,ab X_ab [-] (j ≤ n), to constrain, of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
 
     rows: Array  # R (r, nv) [m/rad]
     weights: Array  # E (n, r, r) [m/N]

@@ -147,9 +147,9 @@ class Neighbourhood:
         return self.work(places, np.zeros(3))
 
     def work(self, places: Array, moment: Array | None = None) -> Array:
-        """Compute the same parts of U (P, 3) [N m] with the work of a moment, exact to first order.
+        """Compute the active, gravity and load part of U (P, 3) [N m], with a moment at the tip.
 
-        ``moment`` (3,) [N m] acts at the tip; None: the moment of the wrench.
+        The work of ``moment`` (3,) [N m] is exact to first order. None: the moment of the wrench.
         """
         moment = self._wrench[3:] if moment is None else moment
         pose, arm = self._pose, self._pose.arm

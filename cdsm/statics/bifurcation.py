@@ -72,7 +72,7 @@ class Bifurcation(ReadOnlyState):
         return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the tip displacements [m] at each lower bound [N]; MissingExtra without pandas."""
+        """Return tip displacements [m] at each least tension [N]; MissingExtra without pandas."""
         columns = dict(zip(("x [m]", "y [m]", "z [m]"), self.displacements.T, strict=True))
         return data_frame(columns, "minimum [N]", self.bounds)
 

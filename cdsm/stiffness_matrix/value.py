@@ -40,8 +40,8 @@ class Stiffness(CartesianReadings):
         posture: The posture.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
-        cable_stiffness: Diagonal of K_L (C,) [N/m], of whole cables without friction; 0 for
-            force-controlled cables.
+        cable_stiffness: Diagonal of K_L (C,) [N/m], also with friction that of whole cables that
+            slide freely; 0 for force-controlled cables.
         active: H_L·F (nv, nv) [N m/rad]; also called geometric.
         passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic. With friction it
             is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the segments j of length l_j and tension T_j; it is not

@@ -5,8 +5,8 @@ and which passes through the nearest root. ρ is the sum of its half-axes, divid
 of the interval. The error of a Gauss rule on the interval falls by ρ² per node. So the panels
 follow from the roots. On a part of a panel the rule is even more accurate.
 
-scipy's quad takes about 300 times as long (tests/benchmarks/test_equilibrium_speed.py). Bisection
-until rules of 12 and 24 nodes agree needs no roots. But near a root, the rounding of p keeps the
+scipy's quad takes about 300 times as long (tests/benchmarks/test_equilibrium_speed.py). Bisection,
+until rules of 12 and 24 nodes agree, needs no roots. But near a root, the rounding of p keeps the
 two rules apart: roots at 50 ± 1e-4 i N give more than 1e5 panels, and only 76 with this method.
 """
 
