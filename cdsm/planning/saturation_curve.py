@@ -113,6 +113,12 @@ class Saturation(ReadOnlyState):
                 if math.isinf(self.bound)
                 else f"above {self.bound:.4g} N it pays less than {part}",
             ]
+        here, most = self.stiffness.along(self.direction), self.curve[:, 1].max()
+        if not math.isinf(self.bound) and here < most / 2.0:
+            lines.append(
+                f"yet it is {here / 1e3:.4g} N/mm there, and {most / 1e3:.4g} N/mm at "
+                f"{self.stiffest:.4g} N: give a minimum above this short rise"
+            )
         if self.curve[0, 0] < self.stiffest < self.end:
             lines.append(f"above {self.stiffest:.4g} N tension makes the arm softer")
         lines.append(f"looked at up to {self.end:.4g} N, {_ENDS[self.limit]} ({MODEL})")

@@ -124,6 +124,25 @@ def test_beyond_saturation_tension_pays_less_than_the_fraction() -> None:
     np.testing.assert_array_equal(found.stiffness.tension, found.tension.values)
 
 
+def test_short_rise_where_the_arm_becomes_stable_is_told() -> None:
+    geometry = cdsm.Geometry.universal(
+        joints=4,
+        cables_per_joint=3,
+        link_length=0.06,
+        base_length=0.03,
+        disk_offset=0.012,
+        hole_radius=0.025,
+        link_mass=0.12,
+        lead=0.3,
+    )
+    arm = cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
+    pose = arm.at([0.17, 0.09, 0.17, 0.09, -0.14, 0.0, -0.14, 0.0])
+    found = cdsm.saturation(pose, "z")
+    assert found.stiffness.along("z") < 0.01 * found.curve[:, 1].max()
+    assert "give a minimum above this short rise" in str(found)
+    assert "short rise" not in str(cdsm.saturation(pose, "z", minimum=10.0))
+
+
 # --- closed form ----------------------------------------------------------------------------
 
 
