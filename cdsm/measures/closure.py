@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cdsm.kernels.principal import principal_stiffness
-from cdsm.measures.program import tension_ratio
+from cdsm.measures.program import tension_factor_of
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import instance
@@ -17,7 +17,7 @@ def tension_factor(pose: Posture) -> float:
     (2009), use the ratio of one solution, so their factor may be smaller. Raises SolverError if the
     linear program fails.
     """
-    return tension_ratio(instance("pose", pose, Posture).length_jacobian)
+    return tension_factor_of(instance("pose", pose, Posture).length_jacobian)
 
 
 def has_wrench_closure(pose: Posture) -> bool:

@@ -20,6 +20,7 @@ from cdsm.measures.simplex import single_largest
 from cdsm.posture import Posture
 from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least
 from cdsm.support.values import Array
+from cdsm.tension import tension_ratio
 
 
 class Loads(NamedTuple):
@@ -77,25 +78,6 @@ class Loads(NamedTuple):
         return float(along @ x), x
 
 
-def tension_ratio(J: Array) -> float:
-    """Compute the largest min(F)/max(F) [-] of F ≥ 0 with J_Lᵀ F = 0; 0 without wrench closure."""
-    count, nv = J.shape
-    lever = abs(J).max()
-    if lever == 0.0 or np.linalg.matrix_rank(J) < nv:
-        return 0.0
-    found = least(
-        np.concatenate([np.zeros(count), [-1.0]]),
-        A_eq=np.hstack([J.T / lever, np.zeros((nv, 1))]),
-        b_eq=np.zeros(nv),
-        A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]),
-        b_ub=np.zeros(count),
-        bounds=(0.0, 1.0),
-    )
-    if found.status != OPTIMAL:
-        raise SolverError("highs", f"finds no tension factor: {found.message}")
-    ratio = float(found.x[-1])
-    return ratio if ratio > CLOSED else 0.0
-
-
-CLOSED = 1e-9
-"""Smaller ratios of tensions are rounding of the linear program and count as no closure."""
+def tension_factor_of(J: Array) -> float:
+    """Compute the tension factor [-] of J_L (C, nv); see :func:`cdsm.tension_factor`."""
+    return tension_ratio(J) if np.linalg.matrix_rank(J) == J.shape[1] else 0.0

@@ -19,7 +19,7 @@ from cdsm.measures.clearance import KINDS, clearances
 from cdsm.measures.forces import directions_of
 from cdsm.measures.hull import hull_of
 from cdsm.measures.payload import largest_force
-from cdsm.measures.program import Loads, tension_ratio
+from cdsm.measures.program import Loads, tension_factor_of
 from cdsm.measures.simplex import payload_rows
 from cdsm.support.validation import flag, quantity
 from cdsm.support.values import Array
@@ -78,7 +78,7 @@ def measured(
         found |= clearances(arm, q, diameter, threads=threads)
     if "tension_factor" in names:
         J = evaluate(arm, q, outputs=("length_jacobian",), threads=threads)["length_jacobian"]
-        found["tension_factor"] = np.array([tension_ratio(each) for each in J])
+        found["tension_factor"] = np.array([tension_factor_of(each) for each in J])
     return {name: found[name] for name in names}
 
 

@@ -9,7 +9,6 @@ from functools import partial
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from scipy.optimize import linprog
 
 from cdsm.cable import Cable, Control
 from cdsm.errors import CdsmError, ElasticityRangeError, SingularStiffness
@@ -130,23 +129,6 @@ def ranks(K: Stiffness) -> tuple[Rank, Rank, Rank]:
     rows = np.repeat([1.0 / pose.arm.length, 1.0], 3)
     tip = pose.jacobian * rows[:, None] * unit
     return Rank.of(tip), Rank.of(tip[:3]), Rank.of(pose.length_jacobian.T * unit[:, None])
-
-
-def closure(K: Stiffness) -> float:
-    """Compute the largest min(n)/max(n) [-] of tensions n ≥ 0 with J_Lᵀ n = 0; 0 if none exist."""
-    A = (K.posture.length_jacobian * joint_unit(K.posture.arm)).T
-    A = A / (abs(A).max() or 1.0)
-    count = A.shape[1]
-    found = linprog(  # variables: n, then the smallest entry of n
-        np.append(np.zeros(count), -1.0),
-        A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]),
-        b_ub=np.zeros(count),
-        A_eq=np.hstack([A, np.zeros((len(A), 1))]),
-        b_eq=np.zeros(len(A)),
-        bounds=(0.0, 1.0),
-    )
-    value = float(found.x[-1]) if found.status == 0 else 0.0
-    return value if value > RANK else 0.0
 
 
 def balance_error(K: Stiffness) -> tuple[float, str, float]:

@@ -17,6 +17,7 @@ from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
 from cdsm.support.format import JointUnits, key, plain
 from cdsm.support.values import Array, ReadOnlyState
+from cdsm.tension import tension_ratio
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
@@ -182,7 +183,7 @@ def report_on(K: Stiffness) -> Report:
         jacobian_rank=tip,
         translation_rank=translation,
         cable_rank=cables,
-        closure=facts.closure(K),
+        closure=tension_ratio(K.posture.length_jacobian * joint_unit(K.posture.arm)),
         readings=readings,
         sticking=facts.sticking(K, readings),
     )
