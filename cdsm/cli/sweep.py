@@ -26,6 +26,11 @@ if TYPE_CHECKING:
 
 _POSES = "--grid, --path, --random"
 
+_SOLVER_FAILED = (
+    "solver_failed: tensions exist, but the solver finds none; `cdsm stiffness` says why at such a "
+    "posture, and takes another --solver"
+)
+
 
 def _quantities() -> list[str]:
     return list(QUANTITIES)
@@ -189,7 +194,7 @@ def map_sweep(
         place, half = numbers("--section", slab_in_mm, 2, "AXIS=PLACE:HALF, in mm")
         slab = (normal.strip(), place / 1000.0, half / 1000.0)
     figure = cdsm.plots.plot_map(dataset, quantity, section=slab, statistic=statistic, bins=bins)
-    _answer(as_json, dataset, cdsm.plots.save_figure(figure, out))
+    _answer(as_json, dataset, cdsm.plots.save_figure(figure, out), mapped=quantity)
 
 
 def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
@@ -208,6 +213,8 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
             raise misuse("--grid", f"{name} is given twice.")
         if len(given) == 1:
             rest[name] = unit * given[0]
+        elif len(given) == 3 and given[2] == 1.0 and given[0] != given[1]:
+            raise misuse("--grid", f"{part!r} asks for 1 angle; give more, or {name}=ANGLE.")
         elif len(given) == 3 and given[2] >= 1.0 and given[2].is_integer():
             angles[name] = unit * np.linspace(given[0], given[1], int(given[2]))
         else:
@@ -216,9 +223,13 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
 
 
 def _answer(
-    as_json: bool, dataset: xarray.Dataset, written: Path, conditions: Conditions | None = None
+    as_json: bool,
+    dataset: xarray.Dataset,
+    written: Path,
+    conditions: Conditions | None = None,
+    mapped: str | None = None,
 ) -> None:
-    """Print which file was written, and warn of unstable entries.
+    """Print which file was written; warn of unstable entries, and of a map without a value.
 
     ``conditions`` are given for a new sweep; then they and the counts of all statuses are printed.
     """
@@ -231,8 +242,11 @@ def _answer(
     if conditions is not None:
         listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
         lines.insert(0, f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {listed}")
+        lines += [_SOLVER_FAILED] if counts.get("solver_failed") else []
     facts: Json = {"entries": counts, "written": [str(written)]}
     first = () if conditions is None else (conditions,)
     unstable = counts.get("unstable", 0)
     warnings = [f"UNSTABLE at {unstable} of {status.size} entries"] if unstable else []
+    if mapped is not None and bool(dataset[mapped].isnull().all()):
+        warnings.append(f"{mapped} exists at none of {status.size} entries")
     answer(as_json, lambda: facts, *first, "\n".join(lines), warnings=warnings)

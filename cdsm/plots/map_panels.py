@@ -25,7 +25,7 @@ _FLAT = 1e-9
 
 _SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
 _THIN = 0.15  # least ratio of the sides of a map
-_ROOM = 0.05  # margin around the tips, divided by their largest extent
+_ROOM = 0.05  # margin around the tips, divided by their largest extent; at least 1 mm
 
 
 class Slice(NamedTuple):
@@ -57,7 +57,7 @@ class Map(NamedTuple):
         if not len(self.points):
             return np.array([[-1.0, 1.0], [-1.0, 1.0]])
         low, high = self.points.min(axis=0), self.points.max(axis=0)
-        room = _ROOM * max(float((high - low).max()), 1.0)
+        room = max(_ROOM * float((high - low).max()), 1.0)
         wide = np.maximum(high - low, _THIN * (high - low).max())  # a line of tips needs some room
         middle = (low + high) / 2.0
         return np.array([middle - wide / 2.0 - room, middle + wide / 2.0 + room]).T

@@ -51,6 +51,9 @@ _UNITS: Final = {
 
 _WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
 
+_EQUAL = 1e-9
+"""Values are one if they differ by less than this fraction; their scale is 5 % to either side."""
+
 _MIDDLE = (0.05, 0.95)
 """A value is an outlier if it is further outside these quantiles than they are apart."""
 
@@ -104,14 +107,18 @@ def plot_map(
         bins: Number of cells along the longest side of a map.
 
     Raises:
-        InvalidInput: ``dataset`` is not a sweep or has too many panels, ``quantity`` has more than
-            one number per entry, ``section`` is invalid or contains no tip, or ``bins`` is not a
-            whole number from 2 to 500.
+        InvalidInput: ``dataset`` is not a sweep or has too many panels, ``quantity`` is the status
+            or has more than one number per entry, ``section`` is invalid or contains no tip, or
+            ``bins`` is not a whole number from 2 to 500.
         UnknownName: The sweep has no such quantity or no tip positions, or the axis or the
             statistic is unknown.
         MissingExtra: xarray is not installed.
     """
     check_sweep(dataset)
+    if quantity == "status":
+        raise InvalidInput(
+            "quantity", "status given; a map of any other quantity marks each status at its tips."
+        )
     remedy = "tip_position and the quantity must be among outputs= of the sweep."
     for name in (quantity, "tip_position"):
         one_of("quantity", name, [str(each) for each in dataset.data_vars], remedy)
@@ -147,32 +154,38 @@ def plot_map(
     every = np.concatenate([each.values for each in maps])
     colors, extend = _colors(every)
     shown = statistic or ("median" if cloud else None)
-    columns = len(slices) if cloud else 2 if len(maps) == 4 else min(len(maps), 3)
-    rows = -(-len(maps) // columns)
+    beside = 2 if cloud and len(cases) > 3 else 1  # cases in a row
+    columns = beside * len(slices) if cloud else 2 if len(maps) == 4 else min(len(maps), 3)
+    rows = -(-len(cases) // beside) if cloud else -(-len(maps) // columns)
     ratio = max(np.ptp(each.limits[1]) / np.ptp(each.limits[0]) for each in maps)
     height = min((TWO_COLUMNS - 1.3) / columns * ratio, _TALLEST)
     titled = max(height / ratio, _NARROWEST)
     width = max(height / ratio, _NARROWEST + 0.4)
     size = 1.3 + width * columns + 0.5, 0.9 + (0.45 + height) * rows
     figure, grid = panels(*size, columns, rows)
-    for axes, each in itertools.zip_longest(grid.flat, maps):
+    order = grid.reshape(rows, beside, -1).swapaxes(0, 1).ravel()  # the first cases on the left
+    for axes, each in itertools.zip_longest(order, maps):
         if each is None:
             axes.set_axis_off()
             continue
         _draw(axes, each, colors, words, shown, bins)
         caption(axes, textwrap.fill(each.title, round(16 * titled)))
         axes.locator_params("x", nbins=min(TICKS, round(2.4 * height / ratio)))
+    title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
     name = dataset[quantity].long_name.split(",")[0]
-    bar = figure.colorbar(colors, ax=grid, extend=extend)
-    sign = "; below 0: unstable" if quantity == "margin" else ""
-    of = f"{shown} of a cell: " if shown else ""
-    bar.set_label(textwrap.fill(f"{of}{name} [{unit}]{sign}", 45), fontsize=TEXT)
-    if isinstance(colors.norm, LogNorm):
-        plain_log_ticks(bar.ax.yaxis)
-    bar.ax.tick_params(which="both", labelsize=SMALL)
-    # of a cloud, the slices show a part of the entries
-    _legend(figure, cases if cloud else maps, maps, words)
-    heading(figure, f"{dataset.attrs['title']}, {dataset.attrs['poses']}")
+    if np.isnan(every).all():
+        title += f": {name} exists at none of these tips"
+    else:
+        bar = figure.colorbar(colors, ax=grid, extend=extend)
+        sign = "; below 0: unstable" if quantity == "margin" else ""
+        of = f"{shown} of a cell: " if shown else ""
+        bar.set_label(textwrap.fill(f"{of}{name} [{unit}]{sign}", 45), fontsize=TEXT)
+        if isinstance(colors.norm, LogNorm):
+            plain_log_ticks(bar.ax.yaxis)
+        bar.ax.tick_params(which="both", labelsize=SMALL)
+    # slices show a part of the entries, and some entries have no tip
+    _legend(figure, cases if section is None else maps, maps, words)
+    heading(figure, title)
     return figure
 
 
@@ -194,7 +207,9 @@ def _colors(values: Array) -> tuple[ScalarMappable, str]:
         low, high, name = -max(-low, high), max(-low, high), "PuOr"
     cmap = colormaps[name].with_extremes(under=BLACK, over=VERMILLION)
     extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[below, above]
-    return ScalarMappable(scale(low, max(high, low + 1e-12 * abs(low))), cmap), extend
+    if high - low <= _EQUAL * abs(high):
+        low, high = low - 0.05 * abs(low), high + 0.05 * abs(high)
+    return ScalarMappable(scale(low, high), cmap), extend
 
 
 def _draw(

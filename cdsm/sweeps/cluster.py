@@ -26,12 +26,14 @@ _GO_ON = "What a store holds is kept: run the same again with store= to go on fr
 
 
 def checked_client(client: object) -> None:
-    """Check that an object is a synchronous dask client."""
+    """Check that an object is a synchronous dask client, and open."""
     need("dask", "distributed")
     from distributed import Client
 
     if not isinstance(client, Client) or client.asynchronous:
         raise InvalidInput("client", f"{client!r} given; a synchronous dask Client is needed.")
+    if client.status in ("closing", "closed"):
+        raise ClusterError(f"the client is {client.status}; give one that is open.")
 
 
 def on_cluster(

@@ -106,7 +106,7 @@ def sweep(
         FileError: The store cannot be created, read or written.
         StoreError: The store has another sweep, a user-defined law has changed, or another run is
             writing to the store.
-        ClusterError: The scheduler is gone, or a worker cannot compute.
+        ClusterError: The client is closed, the scheduler is gone, or a worker cannot compute.
     """
     need("sweep", "xarray", *(["zarr"] if store is not None else []))
     flag("progress", progress)

@@ -86,6 +86,7 @@ def test_map_draws_a_sweep(tmp_path: Path) -> None:
         (("--grid", "joint9=0:1:2"), 1, "no joint is called 'joint9'"),
         (("--grid", "joint1_1=0:1"), 2, "a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE"),
         (("--grid", "joint1_1=0:1:2.5"), 2, "a joint is JOINT=LOW:HIGH:N"),
+        (("--grid", "joint1_1=-20:20:1"), 2, "asks for 1 angle; give more, or joint1_1=ANGLE"),
         (("--grid", "joint1_1=a"), 2, "'a' is no number"),
         (("--grid", "joint1_1=3"), 1, "angles: is empty"),
         (("--path", "{folder}/absent.csv"), 1, "absent.csv: does not exist"),
@@ -126,6 +127,31 @@ def test_options_that_say_nothing_are_refused(
     result = call("sweep", geometry, "--out", tmp_path / "s.nc", *arguments)
     assert result.exit_code == 2
     assert said in " ".join(result.stderr.replace("│", " ").split())
+
+
+def test_a_sweep_says_what_to_do_where_the_solver_failed(
+    geometry: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = ("sweep", geometry, "--grid", "joint1_1=5:5:1", *ARM, "--out", tmp_path / "s.nc")
+    assert "--solver" not in call(*given).output
+    found = cdsm.read_sweep(tmp_path / "s.nc")
+    found.status[0, 0] = cdsm.SweepStatus.SOLVER_FAILED
+    monkeypatch.setattr(cdsm, "sweep", lambda *_, **__: found)
+    result = call(*given)
+    assert result.exit_code == 0
+    assert "1 ok, 1 solver_failed" in result.output
+    assert "`cdsm stiffness` says why at such a posture, and takes another --solver" in (
+        " ".join(result.output.split())
+    )
+
+
+def test_a_map_without_a_value_is_a_warning(tmp_path: Path) -> None:
+    found = cdsm.sweep(short_arm(), cdsm.RandomPoses(64), minimum=20.0, maximum=20.0)
+    cdsm.write_sweep(found, tmp_path / "s.nc")
+    result = call("map", tmp_path / "s.nc", "--out", tmp_path / "s.png")
+    assert result.exit_code == 3
+    assert "softest exists at none of 64 entries" in result.output
+    assert (tmp_path / "s.png").exists()
 
 
 def test_map_of_no_sweep_is_one_message(tmp_path: Path) -> None:

@@ -105,3 +105,13 @@ def test_a_cluster_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None
         monkeypatch.setattr(run, "_write", lambda *_: workers.close())
         with pytest.raises(cdsm.ClusterError, match="run the same again with store= to go on"):
             cdsm.sweep(short_arm(), POSES, minimum=20.0, chunk=1, client=client)
+
+
+def test_a_closed_client_is_told() -> None:
+    with (
+        LocalCluster(n_workers=1, processes=False, dashboard_address=":0") as workers,
+        Client(workers) as client,
+    ):
+        pass
+    with pytest.raises(cdsm.ClusterError, match="the client is closed; give one that is open"):
+        cdsm.sweep(short_arm(), POSES, minimum=20.0, client=client)

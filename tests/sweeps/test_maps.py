@@ -190,9 +190,54 @@ def test_maps_are_as_high_as_what_they_show(planar: xr.Dataset) -> None:
         assert np.ptp(limits) < max(way, 0.15 * np.ptp(tips, axis=0).max()) + 25.0
 
 
+def test_a_map_without_a_value_has_no_colour_bar_and_says_so() -> None:
+    found = cdsm.sweep(short_arm(), PLANAR, minimum=20.0, maximum=20.0)
+    assert bool((found.status == cdsm.SweepStatus.INFEASIBLE).all())
+    figure = plots.plot_map(found, "softest")
+    assert len(figure.axes) == 1  # no bar
+    said = figure._suptitle.get_text()  # type: ignore[attr-defined]
+    assert "stiffness in the softest direction exists at none" in " ".join(said.split())
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["infeasible: 100 %"]
+
+
+def test_a_single_value_has_plain_numbers_and_what_has_no_tip_is_counted() -> None:
+    grid = cdsm.GridPoses({"joint1_1": [-3.0, -2.0, 0.0, 2.0, 3.0]})
+    found = cdsm.sweep(short_arm(), grid, minimum=20.0)
+    figure = plots.plot_map(found, "softest")
+    (colors,) = drawn(figure)
+    (value,) = np.asarray(colors.get_array())
+    assert value == 1e-3 * found.softest[2]
+    assert colors.norm.vmin == pytest.approx(0.95 * value, rel=1e-12)
+    assert colors.norm.vmax == pytest.approx(1.05 * value, rel=1e-12)
+    panel, bar = figure.axes
+    for axis in (panel.xaxis, panel.yaxis, bar.yaxis):
+        assert axis.get_offset_text().get_text() == ""
+    low, high = panel.get_xlim()
+    assert high - low == pytest.approx(2.0)  # mm
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["beyond limits: 80 %"]
+
+
+def test_many_cases_of_a_cloud_are_in_two_columns_of_slices() -> None:
+    found = cdsm.sweep(short_arm(), cdsm.RandomPoses(64), minimum=[20.0, 40.0])
+    figure = plots.plot_map(found, "along")
+    figure.draw_without_rendering()
+    places = {}
+    for axes in figure.axes[:18]:
+        spec: Any = axes.get_subplotspec()
+        places[spec.rowspan.start, spec.colspan.start] = " ".join(axes.get_title().split()).split(
+            ", "
+        )
+    for (row, column), (bound, direction, part) in places.items():
+        assert bound == f"minimum {20 * (1 + column // 3)} N"
+        assert direction == f"direction {'xyz'[row]}"
+        assert part[0] == "yzx"[column % 3]
+    assert figure.get_figheight() < 1.2 * figure.get_figwidth()
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        ({"quantity": "status"}, "quantity: status given; a map of any other quantity marks"),
         ({"quantity": "softness"}, "no quantity is called 'softness'"),
         ({"quantity": "tip_position"}, "tip_position has the dimensions"),
         ({"section": ("w", 0.0, 0.1)}, "no axis is called 'w'"),
