@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from cdsm.statics.weight_test import WeightTest
 
 _ROOM = 0.08  # margin above and below all values, as a fraction of their range
+_SEEN = 2e-3  # a narrower range, relative to the axis, cannot be seen
 
 
 def plot_weight_test(test: WeightTest) -> Figure:
@@ -76,14 +77,15 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
     low, high = critical.examined
     shown = high if math.isinf(critical.minimum) or not critical.stable else 2.0 * critical.minimum
     # if no tension can be raised by itself, only one bound is examined: a point
-    axes.set_xlim(low, min(shown, high) if high > low else low + 1.0)
+    right = min(shown, high) if high > low else low + 1.0
+    axes.set_xlim(low, right)
     margins = np.array([0.0, *critical.margins[critical.bounds <= shown]])
     room = _ROOM * np.ptp(margins)
     axes.set_ylim(margins.min() - room, margins.max() + room)
     edges = [low, *np.ravel(critical.stable), high]
     label = "unstable"
     for start, end in zip(edges[::2], edges[1::2], strict=True):
-        if end > start:
+        if min(end, right) - start > _SEEN * (right - low):
             axes.axvspan(start, end, color=VERMILLION, alpha=0.15, linewidth=0.0, label=label)
             label = "_"
     if math.isfinite(critical.minimum) and critical.stable:
