@@ -68,8 +68,8 @@ class Store:
         if first != head:
             raise StoreError(
                 self._path,
-                "contains designs of another problem, of another seed or population, or no "
-                "designs. Give another place for the results, or search as that time.",
+                "contains designs of another problem, of another seed or population, of an older "
+                "cdsm, or no designs. Give another place for the results, or search as that time.",
             )
         for number, line in enumerate(lines[:-1], start=2):  # the last one is empty, or was cut off
             try:

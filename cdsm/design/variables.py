@@ -9,7 +9,7 @@ from typing import Final, Literal, NamedTuple, final, get_args
 
 from cdsm.errors import InvalidInput
 from cdsm.geometry import CableRoute, Geometry
-from cdsm.geometry.checks import WIDEST
+from cdsm.geometry.checks import WIDEST, doubts_about_units
 from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles
 from cdsm.support.validation import one_of, quantity, scalar, whole_number
 from cdsm.support.warning import warn
@@ -105,8 +105,9 @@ class Variable:
             if self.of in WHOLE:
                 low, high = (_whole(self.of, each) for each in (low, high))
             self.__dict__.update(low=low, high=high)
-            if self.of in ("hole_radius", "disk_offset") and high > WIDEST:
-                warn(f"{self.of} up to {high:g} m: it looks as if it is in mm; give it in metres.")
+            if self.of in ("hole_radius", "disk_offset"):
+                for doubt in doubts_about_units(0.0, [(self.of, high, WIDEST)]):
+                    warn(doubt)
             if UNITS.get(self.of) == "rad" and max(-low, high) > _WIDEST_ANGLE:
                 most = max(-low, high)
                 warn(f"{self.of} up to {most:g} rad: it looks as if it is in degrees; give rad.")

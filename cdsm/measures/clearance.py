@@ -93,7 +93,7 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
         InvalidInput: ``diameter`` is negative or not a length.
     """
     arm = instance("pose", pose, Posture).arm
-    d = quantity("diameter", diameter, "length", zero=True)
+    d = quantity("diameter", diameter, "diameter", zero=True)
     found, nearest = _rows(arm, pose.q[None], 1)
     shape = _shape(arm)
     cables, links, disks = (found[0] - d * np.array([1.0, 0.5, 0.5])).tolist()
@@ -126,7 +126,7 @@ def clearances(
     numbers.
     """
     angles = postures(instance("arm", arm, Manipulator), q)
-    d = quantity("diameter", diameter, "length", zero=True)
+    d = quantity("diameter", diameter, "diameter", zero=True)
     found, _ = _rows(arm, angles, checked_threads(threads))
     return {kind: found[:, i] - d * (1.0 if i == 0 else 0.5) for i, kind in enumerate(KINDS)}
 

@@ -49,7 +49,7 @@ def require(
             f"{arm.name} has no friction in its holes; leave it out, or give them a coefficient: "
             "friction = in ARM.toml, --friction, Manipulator.with_friction.",
         )
-    quantity("diameter", diameter, "length", zero=True)
+    quantity("diameter", diameter, "diameter", zero=True)
     if breaking_load is not None:
         quantity("breaking_load", breaking_load, "force")
     if bend_diameter is not None:

@@ -101,7 +101,7 @@ def wire_use(
         ElasticityRangeError: A tension is outside the domain of the law of its cable.
     """
     instance("tension", tension, Tension)
-    d = quantity("diameter", diameter, "length")
+    d = quantity("diameter", diameter, "diameter")
     D = quantity("bend_diameter", bend_diameter, "length")
     limit = quantity("breaking_load", breaking_load, "force")
     S = quantity("strength", strength, "stiffness")

@@ -35,6 +35,7 @@ class Range(NamedTuple):
 
 
 RANGES: Final = {
+    "diameter": Range("m", 1e-6, 0.5),
     "force": Range("N", 1e-9, 1e9),
     "friction": Range("", 1e-6, 2.0),
     "gravity": Range("m/s²", 1e-6, 1e3),
@@ -49,7 +50,8 @@ RANGES: Final = {
 }
 """Range of each quantity: generous, from a hair of rubber to the cables of a bridge.
 
-No machine has a friction coefficient above 2 or a wrap of more than two turns.
+No machine has a friction coefficient above 2 or a wrap of more than two turns, and no arm has a
+cable of half a metre: its diameter was given in millimetres.
 """
 
 WRENCH: Final = "force [N], then moment [N m], base axes"

@@ -450,6 +450,7 @@ def test_problems_that_cannot_be_refined_say_why() -> None:
         ({"variables": (cdsm.Variable("hole_radius", 0.01, 0.02, at=9),)}, "hole_radius.at: 9"),
         ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead is named twice"),
         ({"loads": np.zeros((1, 5))}, "loads: shape"),
+        ({"diameter": 1.2}, "diameter: 1.2 m given; 0, or 1e-06 to 0.5 m"),
         ({"coverage": -3.0}, "coverage: -3 given; give 0 or more"),
         ({"objectives": (cdsm.Objective("wire_safety"),)}, "breaking_load: is needed"),
         ({"objectives": (cdsm.Objective("wire_life"),)}, "bend_diameter: is needed"),
@@ -491,7 +492,7 @@ def test_bad_parts_name_what_is_wrong(make: Any, said: str) -> None:
 
 @pytest.mark.parametrize(
     ("of", "low", "high", "said"),
-    [("hole_radius", 20.0, 30.0, "30 m: it looks as if it is in mm"),
+    [("hole_radius", 20.0, 30.0, "hole_radius is 30 m: it looks as if lengths are in mm"),
      ("phase", -360.0, 0.0, "360 rad: it looks as if it is in degrees")],
 )  # fmt: skip
 def test_ranges_in_other_units_are_doubted(of: Any, low: float, high: float, said: str) -> None:
