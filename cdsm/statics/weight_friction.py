@@ -45,13 +45,15 @@ class WeightFriction(ReadOnlyState):
     Attributes:
         breakaway: Load in the direction of the weight below which no cable slides, and the hole
             that slides first.
-        frictionless: Tangent stiffness along the weight without friction [N/m].
+        frictionless: Tangent stiffness along the weight without friction, before the weight [N/m].
+        frictionless_secant: Weight divided by tip displacement along it, without friction [N/m].
         history: The states while the weight is applied in steps; entry 0 is the arm without the
             weight.
     """
 
     breakaway: Breakaway
     frictionless: float
+    frictionless_secant: float
     history: LoadHistory
 
     @property
@@ -66,8 +68,9 @@ class WeightFriction(ReadOnlyState):
 
     @cached_property
     def sliding_load(self) -> float:
-        """Weight [N] from which the arm slides: its tangent is within 25 % of the frictionless one.
+        """Weight [N] at which the arm slides: its tangent is at most 1.25 times the frictionless.
 
+        The frictionless tangent is :attr:`frictionless`, before the weight. The load is
         0 without friction; inf if the arm does not slide up to 100 times the breakaway load, or if
         no equilibrium is found before.
         """
@@ -121,8 +124,8 @@ class WeightFriction(ReadOnlyState):
     def dither_cycles(self) -> int:
         """Number of dither cycles; doubling it changes the stiffness by at most 1 %.
 
-        The stiffness then is near the frictionless one, but shaking along the load does not move
-        all cables. 0 without friction, and where ``dithered`` is NaN.
+        The stiffness then is near :attr:`frictionless_secant`, but shaking along the load does not
+        move all cables. 0 without friction, and where ``dithered`` is NaN.
         """
         return self._dither[0]
 
@@ -153,8 +156,8 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def _deviation(self) -> float:
-        """Deviation of the dithered stiffness from the frictionless one [%]."""
-        return 100.0 * (self.dithered / self.frictionless - 1.0)
+        """Deviation of the dithered stiffness from the frictionless one of the same weight [%]."""
+        return 100.0 * (self.dithered / self.frictionless_secant - 1.0)
 
     @property
     def weight(self) -> float:
@@ -173,6 +176,7 @@ class WeightFriction(ReadOnlyState):
             "stuck_stiffness_N_per_m": self.stuck,
             "sliding_from_N": self.sliding_load,
             "frictionless_stiffness_N_per_m": self.frictionless,
+            "frictionless_secant_stiffness_N_per_m": self.frictionless_secant,
             "secant_stiffness_N_per_m": self.secant,
             "sliding_holes": self.sliding_holes,
             "holes": self.history.sliding.shape[1],
@@ -196,8 +200,9 @@ class WeightFriction(ReadOnlyState):
             rows.append("no weight was found from which the arm slides")
         else:
             rows.append(
-                f"from {self.sliding_load:.4g} N on they slide: a weight added there measures the "
-                f"frictionless {frictionless:.4g} N/mm within {100.0 * (SLIDING - 1.0):.0f} %"
+                f"at {self.sliding_load:.4g} N they slide: the tangent there is at most "
+                f"{100.0 * (SLIDING - 1.0):.0f} % above the frictionless {frictionless:.4g} N/mm "
+                "before the weight"
             )
         rows.append(
             f"this weight, {self.weight:.4g} N, measures {self.secant / 1000.0:.4g} N/mm; "
@@ -208,7 +213,8 @@ class WeightFriction(ReadOnlyState):
                 f"so take the difference of two weights above {self.sliding_load:.3g} N; or shake "
                 f"the load by ±{self.sliding_load:.3g} N, fading in "
                 f"{plural(self.dither_cycles, 'cycle')}: then this weight measures "
-                f"{self.dithered / 1000.0:.4g} N/mm, {self._deviation:+.0f} % off the frictionless"
-                "; more cycles change it by less than 1 %"
+                f"{self.dithered / 1000.0:.4g} N/mm, {self._deviation:+.0f} % off the frictionless "
+                f"{self.frictionless_secant / 1000.0:.4g} N/mm of the same weight; twice the "
+                "cycles change it by at most 1 %"
             )
         return "\n".join(rows)

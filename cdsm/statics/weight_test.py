@@ -277,6 +277,7 @@ def _with_friction(test: WeightTest, tension: Tension | ArrayLike) -> WeightTest
     friction = WeightFriction(
         breakaway=breakaway(before.reference, before.reference_tension, test.force, before.wrench),
         frictionless=test.linear.stiffness,
+        frictionless_secant=test.stiffness,
         history=load_cycle(before.reference, tension, path),
     )
     return replace(test, friction=friction)

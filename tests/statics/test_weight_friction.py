@@ -5,6 +5,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
+from tests.support.arms import readme_geometry
 
 
 def prototype(mu: float) -> tuple[cdsm.Posture, cdsm.Tension]:
@@ -56,11 +57,28 @@ def test_one_line_says_how_to_measure() -> None:
     pose, pull = prototype(0.1)
     text = str(cdsm.weight_test(pose, pull, [0.0, 0.0, 2.0]))
     assert "below 0.7063 N all cables stick: a weight measures 257.6 N/mm" in text
-    assert "a weight added there measures the frictionless 36.23 N/mm within 25 %" in text
+    assert "the tangent there is at most 25 % above the frictionless 36.23 N/mm" in text
     assert "take the difference of two weights above" in text
     told = cdsm.weight_test(pose, pull, [0.0, 0.0, 2.0]).to_dict()["friction"]
     assert isinstance(told, dict)
     assert told["stuck_below_N"] == pytest.approx(0.7063, rel=1e-3)
+
+
+def test_a_shaken_weight_is_compared_with_the_same_weight_without_friction() -> None:
+    # strands at low tension stiffen: the secant of 5 N is 60 % above the tangent before it
+    geometry = readme_geometry(lead=0.3)
+    arm = cdsm.Manipulator(geometry, presets.STRAND_1X19)
+    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
+    loose = cdsm.distribute_tension(pose, 5.0)
+    same = cdsm.weight_test(pose, loose, [0.0, 0.0, -5.0])
+    held = cdsm.weight_test(arm.with_friction(0.05).at(pose.q), loose.values, [0.0, 0.0, -5.0])
+    assert held.friction is not None
+    assert same.stiffness > 1.5 * same.linear.stiffness
+    assert held.friction.frictionless_secant == pytest.approx(same.stiffness, rel=1e-9)
+    off = 100.0 * (held.friction.dithered / same.stiffness - 1.0)
+    assert abs(off) < 5.0
+    said = f"{off:+.0f} % off the frictionless {same.stiffness / 1e3:.4g} N/mm of the same weight"
+    assert said in str(held)
 
 
 def test_straight_arm_holds_no_cable() -> None:
