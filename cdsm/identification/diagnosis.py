@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import chdtrc
 
-from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE
+from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE, other_minimum
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.result import Identification
 from cdsm.support.values import Array
@@ -111,6 +112,26 @@ def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str
         f"It lies beyond the edge of the model: {failure}" if failure else "Give another start."
     )
     return [
-        f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
-        f"{problem.describe(point)}. {reason}"
+        f"no optimum within the bounds, so no intervals: χ² would still fall by about {fall:.3g} "
+        f"on the way from {problem.describe(point)}. {reason}"
+    ]
+
+
+def ambiguous(
+    problem: LeastSquares, best: Array, result: Identification, starts: Sequence[Array]
+) -> list[str]:
+    """Return a warning if a search from one of ``starts`` finds a minimum that fits as well.
+
+    It is outside the 95 % intervals of ``result``, whose optimum is ``best``, although its χ² is so
+    low that they should contain it. Points (P,) are in the unit cube of ``problem``.
+    """
+    intervals = np.array(list(result.confidence().values()))
+    other = other_minimum(problem, best, intervals, result._rise(0.95, scaled=False), starts)
+    if other is None:
+        return []
+    higher = problem.cost(other) - problem.cost(best)
+    return [
+        f"several optima, so no intervals: χ² is only {higher:.3g} higher at "
+        f"{problem.describe(other)}. Measure at other postures, directions or tensions, or narrow "
+        "the bounds to the values that are possible."
     ]

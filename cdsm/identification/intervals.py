@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, NamedTuple, final
 
 import numpy as np
@@ -39,6 +40,8 @@ _NEAR, _REFINEMENTS = 0.25, 4
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8)
 """ftol, xtol and gtol of the fit at a knot. The cubic between knots is not more exact."""
+
+_SEARCHED = 50  # largest number of evaluations of such a fit, without those of the differences
 
 
 class LowerOptimumError(Exception):
@@ -99,6 +102,31 @@ def _crossing(u: Array, height: Array, slope: Array, rise: float) -> float:
     return float(u[0] + width * brentq(cubic, 0.0, 1.0, xtol=1e-12))
 
 
+def other_minimum(
+    problem: LeastSquares, best: Array, intervals: Array, rise: float, starts: Sequence[Array]
+) -> Array | None:
+    """Search for another minimum of χ², within ``rise`` of the least χ² and outside ``intervals``.
+
+    Such a point refutes the intervals (P, 2) of all parameters: they are those of one valley of
+    several. The search begins at those of ``starts`` that are outside the intervals. Points are in
+    the unit cube. Raises LowerOptimumError if χ² is lower there than at ``best``.
+    """
+
+    def outside(point: Array) -> bool:
+        low, high = intervals.T
+        values = problem.box.parameters(point)
+        return bool(((values < low) | (values > high)).any())
+
+    for start in sorted(filter(outside, starts), key=problem.cost):
+        end = problem.search(start, method="trf", tolerances=_TOLERANCES, most=_SEARCHED)
+        higher = problem.cost(end) - problem.cost(best)
+        if higher < -NEGLIGIBLE:
+            raise LowerOptimumError(end)
+        if higher <= rise and outside(end):
+            return end
+    return None
+
+
 class _Knot(NamedTuple):
     """Point on a profile, with derivatives with respect to u, the fixed parameter in 0…1."""
 
@@ -121,12 +149,17 @@ class Profiler:
     exact: Sequence[float]  # values of Δχ² where the profile must be exact, rising
     far: float  # largest Δχ² of the profile, above all values in ``exact``
 
-    def profile(self) -> Profile:
-        """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ²."""
+    def profile(self) -> tuple[Profile, list[Array]]:
+        """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ².
+
+        Also return points (P,) in the unit cube, at most one on each side, at which the profile
+        falls again beyond the first of ``exact``: another minimum of χ² may be near.
+        """
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
         box = Box(self.problem.box.bounds[[self.i]])
         u = np.array([knot.point[self.i] for knot in knots])
+        falls = [*self._falls(down, -1), *self._falls(up, 1)]
         return Profile(
             values=frozen(box.parameters(u)),
             rise=frozen(np.array([knot.rise for knot in knots])),
@@ -134,7 +167,16 @@ class Profiler:
             best=len(down) - 1,
             ends=(first, last),
             bounds=frozen(box.bounds[0]),
-        )
+        ), falls
+
+    def _falls(self, knots: list[_Knot], side: Side) -> list[Array]:
+        """Return the lowest point on one ``side`` at which Δχ² falls again, if there is one."""
+        falling = [
+            knot
+            for before, knot in pairwise(knots)
+            if before.rise > self.exact[0] and (knot.rise < before.rise or side * knot.slope < 0.0)
+        ]
+        return [min(falling, key=lambda knot: knot.rise).point] if falling else []
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
         """Compute the knots on one side, from the optimum outward; also return why they end."""
@@ -196,7 +238,7 @@ class Profiler:
                 # dogbox alone may zigzag along a curved valley
                 for method in METHODS:
                     point = problem.search(
-                        point, method=method, tolerances=_TOLERANCES, most=50, over=others
+                        point, method=method, tolerances=_TOLERANCES, most=_SEARCHED, over=others
                     )
                 beside = problem.jacobian(point, others)
             along = problem.jacobian(point, [self.i])[:, 0]

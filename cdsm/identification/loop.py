@@ -12,7 +12,7 @@ from cdsm.identification.measurement import Measurement, checked_conditions
 from cdsm.manipulator import Manipulator
 from cdsm.statics.loading_path import LoadingPath
 from cdsm.support.directions import Axis, unit_direction
-from cdsm.support.validation import SMALLEST, instance, number_array, scalar
+from cdsm.support.validation import SMALLEST, instance, number_array, scalar, whole_number
 from cdsm.support.values import Array
 from cdsm.tension import distribute_tension
 
@@ -108,17 +108,23 @@ class WeightLoop:
     def _unit(self) -> Array:
         return unit_direction("direction", self.direction)
 
-    def simulated(self, arm: Manipulator, random: np.random.Generator | None = None) -> WeightLoop:
+    def simulated(
+        self, arm: Manipulator, random: np.random.Generator | int | None = None
+    ) -> WeightLoop:
         """Return the same loop with the readings (n,) that an arm gives, along the direction.
 
         Args:
             arm: The arm, with friction in its holes.
-            random: Source of the errors of readings, forces and tensions. None: without errors.
+            random: Source of the errors of readings, forces and tensions, or the seed of one. None:
+                without errors.
 
         Raises:
+            InvalidInput: ``random`` is neither, or ``arm`` is no arm.
             CdsmError: The arm has no equilibrium under the forces; see :func:`~cdsm.load_cycle`.
         """
         instance("arm", arm, Manipulator)
+        if not isinstance(random, np.random.Generator | None):
+            random = np.random.default_rng(whole_number("random", random, 0))
         pose, wrench = arm.at(self.angles), np.array(self.wrench)
         if self.tension is None:
             assert self.minimum is not None

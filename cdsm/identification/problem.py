@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
-from cdsm.identification.least_squares import NoModelError, no_model
+from cdsm.identification.least_squares import LeastSquares, NoModelError, no_model
 from cdsm.identification.loop import WeightLoop, Weights, measured
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
@@ -268,6 +268,12 @@ class Model:
             test = weight_test(pose, K.tension, force, wrench=K.wrench)
         self._last_rest[measurement] = test.loaded[-1].pose.q
         return test.stiffness
+
+
+def problem_of(model: Model, bounds: Mapping[str, tuple[float, float]]) -> LeastSquares:
+    """Return the least-squares problem of ``model`` within ``bounds`` (low, high) by name."""
+    beside = model.residuals_beside if model.loops else None
+    return LeastSquares(model.residuals, model.count, bounds, beside)
 
 
 def _call_model(

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_LINEAR = 1.5  # an interval is printed as not linear if it is so many times wider or narrower
+
+
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Identification(ReadOnlyState):
@@ -43,7 +46,8 @@ class Identification(ReadOnlyState):
         jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …], r in standard deviations.
         arm: Arm with these values.
         warnings: One sentence for each reason not to trust the result; empty if there is none.
-        profiles: One :class:`Profile` of χ² for each parameter; None if it is not determined.
+        profiles: One :class:`Profile` of χ² for each parameter; None if it is not determined, or if
+            :attr:`warnings` say why there are no intervals.
     """
 
     names: tuple[str, ...]
@@ -120,6 +124,11 @@ class Identification(ReadOnlyState):
         is -inf or inf if Δχ² stays below q² up to the bound of the parameter, or as far as the
         model exists. Then the measurements set no limit, and :attr:`warnings` report it at 95 %.
 
+        No parameter has a limit if the fit is no optimum, or if a search found another minimum of
+        χ², outside the 95 % intervals, that fits as well; :attr:`warnings` say so. Searches go
+        where a profile falls again, and several start if no start is given. A valley that none
+        of them reaches stays unknown.
+
         Measured in 500 simulated experiments with loops (5 µm, 0.05 N): the 95 % intervals of
         friction, EA, springs, two hole radii and a disk offset, identified together, hold the true
         values in 94 to 96 %.
@@ -182,9 +191,24 @@ class Identification(ReadOnlyState):
         columns = ("value", "std", "95 % from", "to", "low", "high")
         intervals = list(self.confidence().values())
         numbers = np.column_stack([self.values, self.std, intervals, self.bounds])
-        lines = [_row("parameter [own unit]", *columns), *map(_row, self.names, *numbers.T), ""]
-        lines += [*self._stiffness_rows(), *self._loop_rows(), "", self._verdict]
+        lines = [_row("parameter [own unit]", *columns), *map(_row, self.names, *numbers.T)]
+        lines += [
+            *self._nonlinear_rows(),
+            "",
+            *self._stiffness_rows(),
+            *self._loop_rows(),
+            "",
+            self._verdict,
+        ]
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
+
+    def _nonlinear_rows(self) -> list[str]:
+        """Return a line that names the parameters whose interval is not that of their std."""
+        low, high = np.array(list(self.confidence().values())).T
+        ratio = (high - low) / (2.0 * math.sqrt(self._rise(0.95, scaled=False)) * self.std)
+        chosen = np.isfinite(ratio) & ((ratio > _LINEAR) | (ratio < 1.0 / _LINEAR))
+        names = ", ".join(name for name, bent in zip(self.names, chosen, strict=True) if bent)
+        return [f"(not linear: trust the interval, not the std, of {names})"] if names else []
 
     def _stiffness_rows(self) -> list[str]:
         chosen = [k for k, each in enumerate(self._rows) if isinstance(each, Measurement)]

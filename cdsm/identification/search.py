@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, UnknownName
-from cdsm.identification.diagnosis import unfinished, warnings_of
-from cdsm.identification.intervals import LowerOptimumError, Profiler
+from cdsm.identification.diagnosis import ambiguous, unfinished, warnings_of
+from cdsm.identification.intervals import LowerOptimumError, Profile, Profiler
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.loop import WeightLoop
 from cdsm.identification.measurement import Measurement
-from cdsm.identification.problem import Model, UserFaultError
+from cdsm.identification.problem import Model, UserFaultError, problem_of
 from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
+from cdsm.support.format import plural
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.validation import scalar, vector
 from cdsm.support.values import Array, frozen
@@ -105,8 +106,9 @@ def identify(
     if count < len(bounds):
         raise InvalidInput(
             "measurements",
-            f"{count} given for {len(bounds)} parameters, {', '.join(bounds)}; give at "
-            "least as many, or free fewer parameters. A loop counts its readings minus one, "
+            f"{plural(count, 'independent reading')} given for "
+            f"{plural(len(bounds), 'parameter')}, {', '.join(bounds)}; give at least as many, or "
+            "free fewer parameters. A stiffness counts as one, a loop as its readings minus one, "
             "since its offset is unknown.",
         )
     check_call("model_of", model_of, 0, tuple(bounds))
@@ -116,26 +118,22 @@ def identify(
     problem = problem_of(model, bounds)
     try:
         with progress_allowed(progress):
-            starts = _starts(problem, start)
+            starts, others = _starts(problem, start), list[Array]()
             for _ in range(_REWEIGHINGS if model.inexact_loads else 0):
                 model = model.weighted(problem.parameters(starts[0]))
                 problem = problem_of(model, bounds)
-                starts = [_optimum(problem, starts)]
-            best = _optimum(problem, starts)
+                best, *ends = _optima(problem, starts)
+                starts, others = [best], others + ends
+            best, *ends = _optima(problem, starts)
             while True:
                 try:
-                    return _result(model, problem, best)
+                    return _result(model, problem, best, others + ends)
                 except LowerOptimumError as lower:  # a profile found a lower minimum
                     _log.info("a profile found a lower minimum; the search goes on from there")
-                    best = min(_optimum(problem, [lower.point]), lower.point, key=problem.cost)
+                    found = _optima(problem, [lower.point])[0]
+                    best = min(found, lower.point, key=problem.cost)
     except UserFaultError as fault:
         raise fault.args[0] from fault.__cause__
-
-
-def problem_of(model: Model, bounds: Mapping[str, tuple[float, float]]) -> LeastSquares:
-    """Return the least-squares problem of ``model`` within ``bounds`` (low, high) by name."""
-    beside = model.residuals_beside if model.loops else None
-    return LeastSquares(model.residuals, model.count, bounds, beside)
 
 
 def _checked_measurements(
@@ -251,22 +249,26 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
     return values
 
 
-def _optimum(problem: LeastSquares, starts: Sequence[Array]) -> Array:
+def _optima(problem: LeastSquares, starts: Sequence[Array]) -> list[Array]:
+    """Search from each of ``starts``; return the ends, the best one first and more exact."""
     coarse, fine = (_OF_LOOPS, _OF_LOOPS) if problem.followed else (_COARSE, _FINE)
     found = [
         problem.search(point, method="trf", tolerances=coarse, most=_EVALUATIONS)
         for point in track(starts, "searching the parameters")
     ]
     _log.info("χ² at the ends of the searches: %s", [f"{problem.cost(x):.6g}" for x in found])
-    best = min(found, key=problem.cost)
-    finer = problem.search(best, method="dogbox", tolerances=fine, most=_EVALUATIONS, central=True)
-    best = min(finer, best, key=problem.cost)
+    first, *others = sorted(found, key=problem.cost)
+    finer = problem.search(first, method="dogbox", tolerances=fine, most=_EVALUATIONS, central=True)
+    best = min(finer, first, key=problem.cost)
     # rounding may leave an optimum beside its bound
     on_bound = np.where(best < _ON_BOUND, 0.0, np.where(best > 1.0 - _ON_BOUND, 1.0, best))
-    return on_bound if math.isfinite(problem.cost(on_bound)) else best
+    return [on_bound if math.isfinite(problem.cost(on_bound)) else best, *others]
 
 
-def _result(model: Model, problem: LeastSquares, best: Array) -> Identification:
+def _result(
+    model: Model, problem: LeastSquares, best: Array, ends: Sequence[Array]
+) -> Identification:
+    """Compute the result at the optimum ``best``; other searches have ended at ``ends``."""
     values = problem.parameters(best)
     arm, predicted = model.predict(values)
     jacobian = problem.jacobian(best, central=True)
@@ -283,13 +285,16 @@ def _result(model: Model, problem: LeastSquares, best: Array) -> Identification:
         profiles=(),
     )
     follow = [j for j in range(best.size) if j not in result._determination.dependent]
-    profiles = tuple(
-        Profiler(
-            problem, best, jacobian, i, [j for j in follow if j != i], *result._goals
-        ).profile()
-        if math.isfinite(result.std[i])
-        else None
-        for i in track(range(best.size), "finding the confidence of the parameters")
-    )
-    result = replace(result, profiles=profiles)
-    return replace(result, warnings=(*warnings_of(result), *unfinished(problem, best, jacobian)))
+    profiles, starts = list[Profile | None](), list(ends)
+    for i in track(range(best.size), "finding the confidence of the parameters"):
+        profile = None
+        if math.isfinite(result.std[i]):
+            others = [j for j in follow if j != i]
+            profile, falls = Profiler(problem, best, jacobian, i, others, *result._goals).profile()
+            starts += falls
+        profiles.append(profile)
+    result = replace(result, profiles=tuple(profiles))
+    refuted = unfinished(problem, best, jacobian) + ambiguous(problem, best, result, starts)
+    if refuted:
+        result = replace(result, profiles=(None,) * best.size)
+    return replace(result, warnings=(*warnings_of(result), *refuted))

@@ -8,8 +8,7 @@ import pytest
 
 import cdsm
 from cdsm.identification.design import Criterion, Design
-from cdsm.identification.problem import Model
-from cdsm.identification.search import problem_of
+from cdsm.identification.problem import Model, problem_of
 from tests.identification.test_loops import FREE, TRUE, hinge
 
 ASKED: Any = {

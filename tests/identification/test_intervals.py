@@ -142,6 +142,17 @@ def test_interval_that_the_model_ends_is_open_and_says_why() -> None:
     assert "no such wire is sold" in said
 
 
+def test_interval_that_is_not_that_of_the_std_is_said_once() -> None:
+    # the interval of the reciprocal is asymmetric: 1/(ρ − 1.96σ) − 1/(ρ + 1.96σ) is 3 times wider
+    measured = readings(0.3)
+    (rigidity, _), covariance, _ = line(measured)
+    spread = 0.8 * rigidity / norm.ppf(0.975) / math.sqrt(covariance[0, 0])
+    noisy = [replace(each, std=spread * each.std) for each in measured]
+    said = "(not linear: trust the interval, not the std, of softness)"
+    assert str(identify(hinge, noisy, BOUNDS)).count(said) == 1
+    assert "not linear" not in str(identify(hinge, readings(0.05), BOUNDS))
+
+
 def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
     measured = readings(0.1)
     (rigidity, _), _, _ = line(measured)
@@ -188,6 +199,25 @@ def test_profile_that_leads_to_a_deeper_valley_moves_the_optimum_there() -> None
     assert low == -math.inf
     assert high > 4.6
     assert rise(high) == pytest.approx(norm.ppf(0.975) ** 2, rel=3e-2)
+
+
+@pytest.mark.parametrize("start", [{"x": -1.0}, None])
+def test_second_valley_that_fits_as_well_leaves_no_interval(start: dict[str, float] | None) -> None:
+    measured = readings(0.1)
+    best, covariance, _ = line(measured)
+    root = np.linalg.cholesky(covariance)
+
+    def valleys(x: float) -> cdsm.Manipulator:
+        """Δχ² is 0 at −1.6 and 0.8 near 4.4, on a ridge of 25.5 between."""
+        away = 2.5 + 2.5 * np.sin(x), 0.15 * (x + np.pi / 2.0)
+        rigidity, gravity = best + root @ away
+        return hinge(1.0 / rigidity, gravity)
+
+    found = identify(valleys, measured, {"x": (-6.0, 8.0)}, start=start)
+    assert found.parameters["x"] == pytest.approx(-np.pi / 2.0, abs=1e-3)
+    assert found.confidence()["x"] == (-math.inf, math.inf)
+    (said,) = found.warnings
+    assert "several optima, so no intervals: χ² is only 0.815 higher at x = 4.35" in said
 
 
 def test_level_beyond_the_profiles_is_refused() -> None:

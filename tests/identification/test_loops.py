@@ -13,8 +13,7 @@ from scipy.stats import binom
 
 import cdsm
 from cdsm.identification import Measurement, WeightLoop, identify
-from cdsm.identification.problem import Model
-from cdsm.identification.search import problem_of
+from cdsm.identification.problem import Model, problem_of
 from tests.support.coverage import Experiment
 
 TRUE = {"friction": 0.1, "rigidity": 48e3}
@@ -249,15 +248,25 @@ def test_bad_loops_name_the_offender_and_the_remedy(
         assert part in str(caught.value)
 
 
+def test_a_loop_is_simulated_from_a_generator_or_its_seed() -> None:
+    drawn = PLANNED[0].simulated(hinge(), np.random.default_rng(3))
+    assert PLANNED[0].simulated(hinge(), 3) == drawn != PLANNED[0].simulated(hinge())
+    for bad in (-1, 0.5, "3"):
+        with pytest.raises(cdsm.InvalidInput, match="random"):
+            PLANNED[0].simulated(hinge(), bad)  # type: ignore[arg-type]
+
+
 def test_bad_experiments_name_the_offender_and_the_remedy() -> None:
     with pytest.raises(cdsm.InvalidInput, match=r"measurements\[0\]: at 0.45 has no readings"):
         identify(hinge, PLANNED, FREE)
-    with pytest.raises(cdsm.InvalidInput, match="0 given for 2 parameters"):
+    with pytest.raises(cdsm.InvalidInput, match="0 independent readings given for 2 parameters"):
         identify(hinge, [], FREE)
     with pytest.raises(cdsm.InvalidInput, match="WeightLoop is needed"):
         identify(hinge, ["loop"], FREE)  # type: ignore[list-item]
     one = replace(PLANNED[0], forces=(0.0, 5.0)).simulated(hinge())
-    with pytest.raises(cdsm.InvalidInput, match="1 given for 2 parameters, friction, rigidity"):
+    with pytest.raises(
+        cdsm.InvalidInput, match="1 independent reading given for 2 parameters, friction"
+    ):
         identify(hinge, [one], FREE)
     with pytest.raises(cdsm.UnknownName, match="viscosity"):
         identify(hinge, measured(0), {"viscosity": (0.0, 1.0)})

@@ -327,6 +327,8 @@ def test_a_model_that_ends_before_the_optimum_is_said() -> None:
     assert 0.29 < found.parameters["lead"] <= 0.3
     sentence = next(each for each in found.warnings if "no optimum within the bounds" in each)
     assert "the tube is not that long" in sentence
+    assert "so no intervals" in sentence
+    assert found.confidence()["lead"] == (-math.inf, math.inf)
 
 
 def test_the_search_steps_back_from_where_tensions_leave_the_domain_or_the_arm_buckles() -> None:
@@ -475,12 +477,16 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], tuple[str, ..
     "no measurements": (
         lambda: identify(prototype, [], FREE),
         cdsm.InvalidInput,
-        ("measurements: 0 given for 3", "hole_radius, drive, lead", "free fewer"),
+        (
+            "measurements: 0 independent readings given for 3",
+            "hole_radius, drive, lead",
+            "free fewer",
+        ),
     ),
     "two for three": (
         lambda: identify(prototype, EXACT[:2], FREE),
         cdsm.InvalidInput,
-        ("measurements: 2 given for 3", "at least as many"),
+        ("measurements: 2 independent readings given for 3", "at least as many"),
     ),
     "measurements of another kind": (
         lambda: identify(prototype, [1.0, 2.0], ONE),  # type: ignore[list-item]

@@ -14,8 +14,7 @@ import numpy as np
 import cdsm
 from cdsm.identification import WeightLoop
 from cdsm.identification.least_squares import LeastSquares
-from cdsm.identification.problem import Model
-from cdsm.identification.search import problem_of
+from cdsm.identification.problem import Model, problem_of
 from cdsm.support.values import Array
 
 _LIMIT = 1.959964**2
