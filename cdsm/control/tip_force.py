@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput, SolverError
 from cdsm.posture import Posture
 from cdsm.support.directions import Direction, unit_direction
-from cdsm.support.format import coordinates
+from cdsm.support.format import coordinates, without_rounding
 from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, proved_largest
 from cdsm.support.validation import instance, quantity, vector
 from cdsm.support.values import Array, ReadOnlyState
@@ -52,13 +52,15 @@ class TipForce(ReadOnlyState):
     high: float
 
     def __repr__(self) -> str:
-        return f"<TipForce {self.low:.4g} to {self.high:.4g} N along {coordinates(self.direction)}>"
+        return f"<TipForce {self._ends}>"
 
     def __str__(self) -> str:
-        return (
-            f"{self.low:.4g} to {self.high:.4g} N along {coordinates(self.direction)}, whatever "
-            "friction holds"
-        )
+        return f"{self._ends}, whatever friction holds"
+
+    @property
+    def _ends(self) -> str:
+        *_, low, high = without_rounding(np.array([*self.tension, self.low, self.high]))
+        return f"{low:.4g} to {high:.4g} N along {coordinates(self.direction)}"
 
 
 def tip_force(
