@@ -50,6 +50,9 @@ class PoseSet(ABC):
 class GridPoses(PoseSet):
     """Grid of all combinations of angles of named joints; each joint name becomes a dimension.
 
+    Every joint of the arm names a coordinate of the Dataset. A sweep refuses joints whose names the
+    Dataset has already, or NetCDF and Zarr do not take, such as ``along`` or ``a/b``.
+
     Args:
         angles: Angles [rad] of each joint of the grid, by joint name: (n,) or one number.
         rest: Angles [rad] of joints that do not move, by joint name; 0 for all joints not named.

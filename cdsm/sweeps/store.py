@@ -157,18 +157,18 @@ def _gaps(path: Path, group: Any) -> Iterator[tuple[Path, tuple[slice, ...]]]:
     """Yield each missing file of a computed block, and the part of ``status`` of this block."""
     status = group["status"]
     outputs = [group[name] for name in QUANTITIES if name in group]
+    try:
+        codes = status[...]
+    except Exception as error:  # as in _OnDisk
+        raise _damage(path, status, error) from None
     for place in np.ndindex(status.cdata_shape):
         block = tuple(slice(i * n, (i + 1) * n) for i, n in zip(place, status.chunks, strict=True))
         at = dict(zip(status.metadata.dimension_names, place, strict=True))
-        try:
-            found = status[block]
-        except Exception as error:  # as in _OnDisk
-            raise _damage(path, status, error) from None
         for array in outputs:
             chunk = tuple(at.get(dim, 0) for dim in array.metadata.dimension_names)
             file = path / array.basename / array.metadata.encode_chunk_key(chunk)
             # a chunk of NaN alone has no file
-            if exists(QUANTITIES[array.basename].stage, found).any() and not file.exists():
+            if not file.exists() and exists(QUANTITIES[array.basename].stage, codes[block]).any():
                 yield file, block
 
 
