@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.elasticity.answers import rigidity_of, strain_of
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.kernels.stiffness import single_cable_stiffness
 from cdsm.kernels.wires import AT_ONCE, CURVE, POLYNOMIAL, Wires, single_rigidity
-from cdsm.support.validation import LARGEST, RANGES
 from cdsm.support.values import Array, frozen
 from cdsm.wires.continuity import find_jump
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -161,8 +161,8 @@ class CableLaws:
         if isinstance(law, LinearElasticity):
             rigidity = law.rigidity(tension)
             return rigidity + tension if self._unstrained else rigidity
-        rigidity = _checked_rigidity(law, tension)
-        return rigidity * (1.0 + _checked_strain(law, tension)) if self._unstrained else rigidity
+        rigidity = rigidity_of(law, tension)
+        return rigidity * (1.0 + strain_of(law, tension)) if self._unstrained else rigidity
 
     def original_lengths(self, lengths: Array, tension: Array) -> Array:
         """Compute l_0 (C,) [m] of cables of length L (C,) [m] under tension F (C,) [N].
@@ -177,7 +177,7 @@ class CableLaws:
             wire[held] -= self.series[held] * (F - self.rest[held])
             if self._unstrained:
                 try:
-                    wire[held] /= 1.0 + _checked_strain(law, F)
+                    wire[held] /= 1.0 + strain_of(law, F)
                 except ElasticityRangeError as error:
                     raise self.naming(error, held) from None
         return frozen(wire)
@@ -204,7 +204,7 @@ class CableLaws:
                 slopes = np.asarray(law.rigidity_slope(both))
                 R = self.stretched_rigidity(law, F)
                 if self._unstrained:  # (EA (1 + ε))′ = EA′ (1 + ε) + 1
-                    slopes = slopes * (1.0 + _checked_strain(law, both)) + 1.0
+                    slopes = slopes * (1.0 + strain_of(law, both)) + 1.0
             except ElasticityRangeError as error:
                 raise self.naming(error, held) from None
             if slopes.shape != (2, F.size) or not np.isfinite(slopes).all():
@@ -262,33 +262,6 @@ def _joined(tables: list[Array]) -> Array:
     """Join tables of coefficients side by side, with rows of zeros up to a multiple of AT_ONCE."""
     rows = AT_ONCE * -(-max(map(len, tables)) // AT_ONCE)
     return np.hstack([np.pad(each, ((0, rows - len(each)), (0, 0))) for each in tables])
-
-
-def _checked_rigidity(law: Elasticity, tension: Array) -> Array:
-    """Return EA(F) [N] in the shape of F [N]; InvalidInput if the law gives no valid EA."""
-    rigidity = np.asarray(law.rigidity(tension))
-    _, least, most = RANGES["rigidity"]
-    usable = rigidity.dtype.kind in "iuf" and (rigidity >= least) & (rigidity <= most)  # not NaN
-    if rigidity.shape != tension.shape or np.count_nonzero(usable) < tension.size:
-        raise InvalidInput(
-            "elasticity",
-            f"{law!r} gives the rigidity {rigidity} N at tensions {tension} N; one positive "
-            "number for each is needed.",
-        )
-    return rigidity
-
-
-def _checked_strain(law: Elasticity, tension: Array) -> Array:
-    """Return ε(F) [-] in the shape of F [N]; InvalidInput if the law gives no valid ε."""
-    strain = np.asarray(law.strain(tension))
-    usable = strain.dtype.kind in "iuf" and (strain > -1.0) & (strain <= LARGEST)  # not NaN
-    if strain.shape != tension.shape or np.count_nonzero(usable) < tension.size:
-        raise InvalidInput(
-            "elasticity",
-            f"{law!r} gives the strain {strain} at tensions {tension} N; one number for each, "
-            "zero at the low end of its domain and rising, is needed.",
-        )
-    return strain
 
 
 def _key(law: Elasticity) -> object:

@@ -210,7 +210,8 @@ class WeightFriction(ReadOnlyState):
         )
         if math.isfinite(self.dithered):
             rows.append(
-                f"so take the difference of two weights above {self.sliding_load:.3g} N; or shake "
+                f"so take the difference of two weights above {self.sliding_load:.3g} N, and "
+                "compare it with theirs without friction; or shake "
                 f"the load by ±{self.sliding_load:.3g} N, fading in "
                 f"{plural(self.dither_cycles, 'cycle')}: then this weight measures "
                 f"{self.dithered / 1000.0:.4g} N/mm, {self._deviation:+.0f} % off the frictionless "

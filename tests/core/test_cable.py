@@ -9,7 +9,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.cable_laws import _checked_rigidity
+from cdsm.elasticity.answers import rigidity_of
 from cdsm.support.validation import RANGES
 from tests.support.arms import random_arm, random_posture, random_wrench
 from tests.support.locked import original_length
@@ -94,7 +94,7 @@ def test_ends_of_ranges_are_allowed_and_what_is_beyond_them_is_named() -> None:
 @pytest.mark.parametrize("rigidity", RANGES["rigidity"][1:])
 def test_smallest_and_largest_rigidity_of_ones_own_are_usable(rigidity: float) -> None:
     law, tension = cdsm.LinearElasticity(rigidity), np.array([1.0, 2.0])
-    np.testing.assert_array_equal(_checked_rigidity(law, tension), rigidity)
+    np.testing.assert_array_equal(rigidity_of(law, tension), rigidity)
 
 
 def test_series_limits() -> None:

@@ -47,6 +47,17 @@ def test_own_elasticity_need_not_be_hashable() -> None:
     np.testing.assert_allclose(stiff.cable_stiffness, 1050.0 / l0)
 
 
+def test_error_of_an_own_elasticity_names_it() -> None:
+    def fails(tension: Any) -> Any:
+        raise ValueError("boom")
+
+    arm = cdsm.Manipulator(GEOMETRY, Own(fails))
+    said = r"elasticity: <.*Own object.* fails at tensions \[50\..*ValueError\('boom'\)"
+    with pytest.raises(cdsm.InvalidInput, match=said) as caught:
+        cdsm.stiffness(arm.at(np.zeros(arm.nv)), np.full(len(arm.cables), 50.0))
+    assert isinstance(caught.value.__cause__, ValueError)
+
+
 @pytest.mark.parametrize(
     "answer",
     [
