@@ -34,8 +34,8 @@ FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
 """Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
 
 3 is the exit code of every answer with a warning (the arm is unstable, has left its reference, some
-samples cannot be planned, the report is not trustworthy), and of errors that say what the arm
-cannot do.
+samples cannot be planned, no entry of a sweep is ok, the report is not trustworthy), and of errors
+that say what the arm cannot do.
 """
 
 _LIST = re.compile(r"(?<=\[)\n[^][{}\"]*\n\s*(?=\])")

@@ -15,7 +15,7 @@ from cdsm.cli.conditions import Conditions
 from cdsm.cli.files import data_option, picture_option
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions
 from cdsm.cli.output import Json, answer
-from cdsm.cli.values import joint_scales, misuse, numbers
+from cdsm.cli.values import by_joint, joint_scales, misuse, numbers
 from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
 
 if TYPE_CHECKING:
@@ -135,7 +135,10 @@ def sweep(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compute the stiffness over a grid, a path or random postures, under one or more bounds."""
+    """Compute the stiffness over a grid, a path or random postures, under one or more bounds.
+
+    Exit code 0; 3 if no entry is ok: each posture, under each bound, has a status in the file.
+    """
     robot = arm.read()
     wanted = poses.read(robot)
     low = numbers("--min-tension", min_tension)
@@ -185,7 +188,10 @@ def map_sweep(
     bins: Annotated[int, typer.Option(help="Cells along the longest side of a map.")] = 40,
     as_json: AsJson = False,
 ) -> None:
-    """Plot the reachable workspace, coloured by a quantity of a sweep."""
+    """Plot the reachable workspace, coloured by a quantity of a sweep.
+
+    Exit code 0; 3 if the quantity exists at no entry. The map marks the statuses of the others.
+    """
     dataset = cdsm.read_sweep(sweep)
     slab = None
     if section is not None:
@@ -204,21 +210,17 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
     units = dict(zip(arm.joint_names, joint_scales(arm), strict=True))
     angles: dict[str, Array] = {}
     rest: dict[str, float] = {}
-    for part in text.split(","):
-        name, _, value = part.partition("=")
-        name = name.strip()
-        given = numbers("--grid", value.replace(":", " "), form="JOINT=LOW:HIGH:N")
-        unit = units.get(name, 1.0)  # the sweep refuses unknown names
-        if name in (*angles, *rest):
-            raise misuse("--grid", f"{name} is given twice.")
+    form = "JOINT=LOW:HIGH:N or JOINT=ANGLE"
+    for name, value in by_joint("--grid", text, arm, form).items():
+        given, unit = numbers("--grid", value.replace(":", " "), form=form), units[name]
         if len(given) == 1:
             rest[name] = unit * given[0]
         elif len(given) == 3 and given[2] == 1.0 and given[0] != given[1]:
-            raise misuse("--grid", f"{part!r} asks for 1 angle; give more, or {name}=ANGLE.")
+            raise misuse("--grid", f"{name}={value} asks for 1 angle; give more, or {name}=ANGLE.")
         elif len(given) == 3 and given[2] >= 1.0 and given[2].is_integer():
             angles[name] = unit * np.linspace(given[0], given[1], int(given[2]))
         else:
-            raise misuse("--grid", f"{part!r} given; a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE.")
+            raise misuse("--grid", f"{name}={value} given; {form} is needed.")
     return cdsm.GridPoses(angles, rest)
 
 
@@ -229,7 +231,7 @@ def _answer(
     conditions: Conditions | None = None,
     mapped: str | None = None,
 ) -> None:
-    """Print which file was written; warn of unstable entries, and of a map without a value.
+    """Print which file was written; warn if no entry is ok, or has the ``mapped`` quantity.
 
     ``conditions`` are given for a new sweep; then they and the counts of all statuses are printed.
     """
@@ -238,15 +240,15 @@ def _answer(
     status = dataset["status"].values
     words = status_names(dataset)
     counts = {word: int((status == value).sum()) for value, word in words.items()}
-    lines = [f"written: {written}"]
+    facts: Json = {"entries": counts, "written": [str(written)]}
+    lines, warnings = [f"written: {written}"], []
     if conditions is not None:
         listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
         lines.insert(0, f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {listed}")
         lines += [_SOLVER_FAILED] if counts.get("solver_failed") else []
-    facts: Json = {"entries": counts, "written": [str(written)]}
-    first = () if conditions is None else (conditions,)
-    unstable = counts.get("unstable", 0)
-    warnings = [f"UNSTABLE at {unstable} of {status.size} entries"] if unstable else []
+        if not counts["ok"]:
+            warnings.append(f"NONE of {status.size} entries is ok: {listed}")
     if mapped is not None and bool(dataset[mapped].isnull().all()):
         warnings.append(f"{mapped} exists at none of {status.size} entries")
+    first = () if conditions is None else (conditions,)
     answer(as_json, lambda: facts, *first, "\n".join(lines), warnings=warnings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -29,15 +30,11 @@ def joint_scales(arm: cdsm.Manipulator) -> Array:
 
 def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
     """Return the joint coordinates of --angles (nv,) [degrees, or mm where a joint slides]."""
-    from cdsm.support.validation import one_of
-
     if "=" in text:
-        named: dict[str, float] = {}
-        for part in text.replace(",", " ").split():
-            name, _, value = part.partition("=")
-            if one_of("joint", name, arm.joint_names) in named:
-                raise misuse("--angles", f"{name} is given twice.")
-            named[name] = numbers("--angles", value, 1, f"an angle, as {name}=10")[0]
+        named = {
+            name: numbers("--angles", value, 1, f"an angle, as {name}=10")[0]
+            for name, value in by_joint("--angles", text, arm, "JOINT=DEG,...").items()
+        }
         return [named.get(name, 0.0) for name in arm.joint_names]
     given = numbers("--angles", text)
     given = given * arm.nv if len(given) == 1 else given
@@ -49,6 +46,33 @@ def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
             f"as {arm.joint_names[-1]}=10.",
         )
     return given
+
+
+def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:
+    """Return the text after ``JOINT=`` in an option, by joint; commas or spaces stand between.
+
+    Names may have spaces, commas and ``=``. BadParameter says that ``form`` is needed; UnknownName
+    if there is no such joint.
+    """
+    from cdsm.support.validation import one_of
+
+    names = "|".join(re.escape(name) for name in sorted(arm.joint_names, key=len, reverse=True))
+    found = list(re.finditer(rf"(?:^|[,\s])\s*({names})\s*=", text))
+    ends = [each.start() for each in found] + [len(text)]
+    values: dict[str, str] = {}
+    texts = [text[each.end() : end] for each, end in zip(found, ends[1:], strict=True)]
+    for value in (text[: ends[0]], *texts):
+        unknown, equals, _ = value.rpartition("=")
+        if equals:
+            words = unknown.split("," if "," in unknown else None)
+            one_of("joint", words[-1].strip() if words else "", arm.joint_names)
+    if ends[0]:
+        raise misuse(option, f"{text[: ends[0]]!r} given; {form} is needed.")
+    for each, value in zip(found, texts, strict=True):
+        if each[1] in values:
+            raise misuse(option, f"{each[1]} is given twice.")
+        values[each[1]] = value.strip(", ")
+    return values
 
 
 def axis(text: str) -> tuple[float, float, float] | None:

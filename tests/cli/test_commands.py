@@ -528,6 +528,21 @@ def test_robot_that_slides_is_asked_for_and_told_in_millimetres(
     assert "20 N are missing, most of it (20 N) at way" in pulled.stderr
 
 
+def test_joints_may_have_any_name(rail: tuple[object, ...], tmp_path: Path) -> None:
+    file, *cables = rail
+    odd = tmp_path / "odd.urdf"
+    odd.write_text(Path(str(file)).read_text().replace('name="way"', 'name="a, way (x)= 1"'))
+    name, out = "a, way (x)= 1", tmp_path / "s.nc"
+    told = json.loads(call("stiffness", odd, *cables, "--angles", f"{name}=20", "--json").stdout)
+    assert told["ways_m"] == {name: 0.02}
+    swept = call("sweep", odd, *cables, "--grid", f" {name} = 10:20:2", "--out", out)
+    assert swept.exit_code == 0, swept.output
+    np.testing.assert_allclose(cdsm.read_sweep(out)[name], [0.01, 0.02], rtol=1e-15)
+    for wrong in (f"{name}=20,way=3", f"{name}=20 way=3", "way=3"):
+        wrongly = call("stiffness", odd, *cables, "--angles", wrong)
+        assert "no joint is called 'way'" in wrongly.stderr
+
+
 def test_sweep_along_a_slide(rail: tuple[object, ...], tmp_path: Path) -> None:
     out, path = tmp_path / "s.nc", tmp_path / "path.csv"
     names = "along,margin,gravity_torque"

@@ -79,13 +79,41 @@ def test_map_draws_a_sweep(tmp_path: Path) -> None:
         assert out.read_bytes().startswith(b"\x89PNG")
 
 
+SOFT = ("--rigidity", 48e3, "--spring", 0.2)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "more", "code", "said"),
+    [
+        ("2,100", (*SOFT[:-1], 1.0), 0, "1 ok, 1 unstable"),
+        ("50,100", SOFT, 3, "NONE of 2 entries is ok: 2 unstable"),
+        (
+            "20,20.5",
+            ("--rigidity", 48e3, "--max-tension", 21),
+            3,
+            "NONE of 2 entries is ok: 2 infeasible",
+        ),
+    ],
+)
+def test_a_sweep_exits_with_3_if_no_entry_is_ok(
+    bounds: str, more: tuple[object, ...], code: int, said: str, geometry: Path, tmp_path: Path
+) -> None:
+    asked = ("sweep", geometry, "--grid", "joint1_1=5:5:1", "--min-tension", bounds, *more)
+    told = call(*asked, "--out", tmp_path / "s.nc")
+    assert told.exit_code == code, told.output
+    assert said in told.stdout
+    if code == 0:  # a map that shows a posture
+        assert call("map", tmp_path / "s.nc", "--out", tmp_path / "s.png").exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
         (("--random", "0"), 2, "--random"),
         (("--grid", "joint9=0:1:2"), 1, "no joint is called 'joint9'"),
-        (("--grid", "joint1_1=0:1"), 2, "a joint is JOINT=LOW:HIGH:N or JOINT=ANGLE"),
-        (("--grid", "joint1_1=0:1:2.5"), 2, "a joint is JOINT=LOW:HIGH:N"),
+        (("--grid", "joint1_1=0:1"), 2, "JOINT=LOW:HIGH:N or JOINT=ANGLE is needed"),
+        (("--grid", "joint1_1=0:1:2.5"), 2, "joint1_1=0:1:2.5 given"),
+        (("--grid", "joint1_1"), 2, "'joint1_1' given; JOINT=LOW:HIGH:N or"),
         (("--grid", "joint1_1=-20:20:1"), 2, "asks for 1 angle; give more, or joint1_1=ANGLE"),
         (("--grid", "joint1_1=a"), 2, "'a' is no number"),
         (("--grid", "joint1_1=3"), 1, "angles: is empty"),
