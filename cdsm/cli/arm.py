@@ -195,10 +195,12 @@ def check(
     pose = arm.at(angles)
     tension = tensions.distribute(pose, load.at_tip(pose.arm))
     report = cdsm.stiffness(pose, tension).report()
-    write(out, lambda file: write_text(file, report.to_html()))
+    conditions = tensions.conditions(pose)
+    about = f"{arm.arm}\n{conditions}\ncdsm {cdsm.__version__}"
+    write(out, lambda file: write_text(file, report.to_html(about)))
     warnings = () if report.trustworthy else ("NOT to be trusted: the report says why.",)
     tables, sure = _uncertainty(tension, tolerances)
-    parts = [tensions.conditions(pose), report, *tables]
+    parts = [conditions, report, *tables]
     answer(as_json, lambda: report.to_dict() | sure, *parts, warnings=warnings)
 
 

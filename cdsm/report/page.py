@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 _WIDTH = 100
+_LISTED = 4  # number of joints that a report lists
 
 _STYLE = """
 body{font:15px/1.45 system-ui,sans-serif;max-width:62em;margin:2em auto;padding:0 1em;color:#1b1b1b}
@@ -53,10 +54,11 @@ def _wrapped(text: str, first: str) -> str:
     return textwrap.fill(text, _WIDTH, initial_indent=first, subsequent_indent="  ")
 
 
-def to_fragment(report: Report) -> str:
-    """Return the report as an HTML element, for another page."""
+def to_fragment(report: Report, about: str = "") -> str:
+    """Return the report as an HTML element, for another page; ``about`` stands under its title."""
     parts = [
         element("h1", _title(report)),
+        *(element("p", line) for line in about.splitlines()),
         element("p", _verdict(report), class_="good" if report.trustworthy else "bad"),
     ]
     remarks = [element("li", remark, class_="fault") for remark in report.faults]
@@ -73,13 +75,13 @@ def to_fragment(report: Report) -> str:
     return str(element("section", *parts))
 
 
-def to_document(report: Report) -> str:
-    """Return the report as a self-contained HTML file."""
+def to_document(report: Report, about: str = "") -> str:
+    """Return the report as a self-contained HTML file; ``about`` stands under its title."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"{element('title', _title(report))}\n<style>\n{_STYLE}\n</style>\n</head>\n"
-        f"<body>\n{to_fragment(report)}\n</body>\n</html>\n"
+        f"<body>\n{to_fragment(report, about)}\n</body>\n</html>\n"
     )
 
 
@@ -158,8 +160,11 @@ def _stability(report: Report) -> Section:
     K = report.stiffness
     names = K.posture.arm.joint_names
     motion = report.critical_direction
-    order = np.argsort(-abs(motion), kind="stable")[:4]
-    rows = [("softest joint motion", "share"), *((names[i], f"{motion[i]:+.3f}") for i in order)]
+    order = np.argsort(-abs(motion), kind="stable")[:_LISTED]
+    head = "softest joint motion"
+    if len(names) > _LISTED:
+        head += f", most of {len(names)} joints"
+    rows = [(head, "share"), *((names[i], f"{motion[i]:+.3f}") for i in order)]
     state = "stable" if K.is_stable else "UNSTABLE"
     sentence = (
         f"Smallest eigenvalue of the symmetric part of K_θ: {K.margin:.4g} "

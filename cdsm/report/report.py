@@ -152,9 +152,13 @@ class Report(ReadOnlyState):
         }
         return plain(numbers)
 
-    def to_html(self) -> str:
-        """Return the report as a self-contained HTML file."""
-        return to_document(self)
+    def to_html(self, about: str = "") -> str:
+        """Return the report as a self-contained HTML file.
+
+        Args:
+            about: Lines under its title, such as the file of the arm and what was assumed.
+        """
+        return to_document(self, about)
 
     def __repr__(self) -> str:
         state = "trustworthy" if self.trustworthy else "NOT TO BE TRUSTED"

@@ -109,7 +109,12 @@ def test_check_tells_the_report_of_the_api_and_writes_it_as_a_page(
     }
     assert told.pop("warnings") == []
     assert told == report.to_dict()
-    assert page.read_text(encoding="utf-8") == report.to_html()
+    written = page.read_text(encoding="utf-8")
+    told_first = call(*options).stdout.splitlines()[:3]  # wire, gravity, tension; arm; posture
+    about = "\n".join([str(geometry), *told_first, f"cdsm {cdsm.__version__}"])
+    assert written == report.to_html(about)
+    assert "<p>with wire 1x19-1.2mm; gravity 0, 0, -9.81 m/s²; least tension 40 N; " in written
+    assert "softest joint motion, most of 6 joints" in written
     assert [path.name for path in tmp_path.iterdir() if "report" in path.name] == ["report.html"]
     assert str(report) in call(*options).output
 
