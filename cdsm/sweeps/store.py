@@ -182,8 +182,8 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
 
     require_folder(path)  # zarr would create it
     aside = path.with_name(f".{path.name}-{secrets.token_hex(4)}")
+    frame = specification.frame
     try:
-        frame = specification.frame
         labels = frame.assign_attrs({_ORDER: [*frame.coords, *specification.variables]})
         for name, label in frame.coords.items():
             if label.dtype.kind == "U":  # the format has no texts of fixed width

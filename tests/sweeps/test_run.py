@@ -413,12 +413,15 @@ def renamed(joint: str) -> cdsm.Manipulator:
     ],
 )
 def test_a_joint_whose_name_cannot_label_a_grid_is_refused(
-    name: str, why: str, swept: bool
+    name: str, why: str, swept: bool, tmp_path: Path
 ) -> None:
     arm = renamed(name)
     grid = cdsm.GridPoses({name if swept else "joint1_1": [0.0, 0.1]})
-    with pytest.raises(cdsm.InvalidInput, match=rf"{re.escape(repr(name))} {why}.* Rename this"):
-        cdsm.sweep(arm, grid, minimum=20.0)
+    said = rf"^angles: each joint .* {re.escape(repr(name))} {why}.* Rename this"
+    for store in (None, tmp_path / "s.zarr"):
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            cdsm.sweep(arm, grid, minimum=20.0, store=store)
+    assert not list(tmp_path.iterdir())
     assert bool((cdsm.sweep(arm, [[0.1] * 6], minimum=20.0).status == 0).all())
 
 
