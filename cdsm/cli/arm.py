@@ -49,6 +49,8 @@ def urdf(
     as_json: AsJson = False,
 ) -> None:
     """Write the URDF of an arm, checked by reading it back with two parsers."""
+    if geometry.suffix.lower() == ".urdf":
+        raise misuse("ARM.toml", f"{geometry} is a URDF already.")
     arm = cdsm.Geometry.read(geometry)
     path = cdsm.write_urdf(arm, out)
     numbers: Json = {"name": arm.name, "length_m": arm.length, "written": [str(path)]}

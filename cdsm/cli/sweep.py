@@ -217,10 +217,14 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
             rest[name] = unit * given[0]
         elif len(given) == 3 and given[2] == 1.0 and given[0] != given[1]:
             raise misuse("--grid", f"{name}={value} asks for 1 angle; give more, or {name}=ANGLE.")
+        elif len(given) == 3 and given[2] > 1.0 and given[0] == given[1]:
+            raise misuse("--grid", f"{name}={value} asks for one angle; give {name}=ANGLE.")
         elif len(given) == 3 and given[2] >= 1.0 and given[2].is_integer():
             angles[name] = unit * np.linspace(given[0], given[1], int(given[2]))
         else:
             raise misuse("--grid", f"{name}={value} given; {form} is needed.")
+    if not angles:
+        raise misuse("--grid", "has no joint with several angles, JOINT=LOW:HIGH:N.")
     return cdsm.GridPoses(angles, rest)
 
 

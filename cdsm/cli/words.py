@@ -7,10 +7,10 @@ from typing import Final
 
 # fmt: off
 _ALIKE: Final = (
-    "bands", "count", "damping", "damping_ratio", "delay", "direction", "encoder", "felt", "force",
-    "force_std", "gauge_length", "gravity", "host", "largest_force", "largest_tension", "payload",
-    "payload_from", "period", "port", "rate", "section", "seed", "solver", "steps", "target",
-    "tension_bias", "tension_noise", "tension_std", "wire", "wrench",
+    "bands", "bins", "count", "damping", "damping_ratio", "delay", "direction", "encoder", "felt",
+    "force", "force_std", "gauge_length", "gravity", "host", "largest_force", "largest_tension",
+    "payload", "payload_from", "period", "port", "rate", "section", "seed", "solver", "steps",
+    "target", "tension_bias", "tension_noise", "tension_std", "wire", "wrench",
 )
 # fmt: on
 """Arguments of the library whose options have the same name."""
@@ -20,6 +20,7 @@ _OPTIONS: Final = {name: f"--{name.replace('_', '-')}" for name in _ALIKE} | {
     "maximum": "--max-tension",
     "minimum": "--min-tension",
     "outputs": "--quantities",
+    "q": "--angles",
     "store": "--resume",
 }
 """Option in place of each argument of the library that a message may name."""

@@ -108,8 +108,10 @@ def named_columns(
     """Return index and unit of each column of a table, by name.
 
     A table may have columns beside the ``known`` ones. ``refuse`` raises an error if a name is
-    given twice, or if it looks like a misspelt known name.
+    given twice, or if it looks like a misspelt known name; or if semicolons separate the columns.
     """
+    if len(table.header) == 1 and ";" in table.header[0]:
+        refuse("has its columns separated by semicolons; separate them by commas")
     found: dict[str, tuple[int, str]] = {}
     for at, cell in enumerate(table.header):
         name, unit = name_and_unit(cell)

@@ -271,6 +271,7 @@ def test_plan_follows_a_path_as_the_api_does(kind: str, geometry: Path, tmp_path
     [
         ("x [mm],y [mm],z [mm]\n", "holds no path"),
         ("x [mm],y [mm]\n1,2\n", "has no column z; call it z [mm] or z [m]"),
+        ("x [mm];y [mm];z [mm]\n1;2;3\n", "separated by semicolons; separate them by commas"),
         ("x,y [mm],z [mm]\n1,2,3\n", "the column x has no unit that is known"),
         ("x [mm],y [in],z [mm]\n1,2,3\n", "the column y has no unit that is known"),
         ("a,b\n1,2\n", "has columns for neither of joint angles (joint1_1 [deg], …)"),
@@ -405,6 +406,15 @@ def test_failure_is_one_message_and_exit_code_1(
     assert result.stderr.startswith("error: ")
     assert said in result.stderr
     assert "Traceback" not in result.output
+
+
+def test_names_in_messages_are_those_of_options(geometry: Path, tmp_path: Path) -> None:
+    assert "--angles: entry [0] is nan" in call("stiffness", geometry, "--angles", "nan").stderr
+    robot = tmp_path / "arm.urdf"
+    assert call("urdf", geometry, "-o", robot).exit_code == 0
+    again = call("urdf", robot, "-o", tmp_path / "b.urdf")
+    assert again.exit_code == 2
+    assert "is a URDF already" in " ".join(again.stderr.replace("│", " ").split())
 
 
 @pytest.mark.parametrize(("angles", "said"), [("ten", "ten"), ("1,2", "2 given")])
