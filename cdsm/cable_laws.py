@@ -54,7 +54,7 @@ class CableLaws:
         held = [c for c, cable in enumerate(self._cables) if cable.control == "position"]
         by_law: dict[object, list[int]] = {}
         for c in held:
-            by_law.setdefault(_key(self._cables[c].elasticity), []).append(c)
+            by_law.setdefault(key(self._cables[c].elasticity), []).append(c)
         # usually all cables have one law, and a slice is faster than indices
         count = len(self._cables)
         self.held = [
@@ -264,7 +264,7 @@ def _joined(tables: list[Array]) -> Array:
     return np.hstack([np.pad(each, ((0, rows - len(each)), (0, 0))) for each in tables])
 
 
-def _key(law: Elasticity) -> object:
+def key(law: Elasticity) -> object:
     """Return a key that is equal for equal laws; a user-defined law may not be hashable."""
     try:
         hash(law)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
+from cdsm.cable_laws import key
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.kernels.chain_problem import chain_tangent, solve_chains
 from cdsm.kernels.tree import Indices
@@ -17,7 +18,13 @@ _ITERATIONS = 60
 """Largest number of Newton steps. Arms with linear laws need one, with strands 3 to 6."""
 
 _UNDAMPED = 20
-"""Number of full Newton steps; later steps are halved, since kinks of a law may make them cycle."""
+"""Number of full Newton steps; later steps are shortened: at kinks of a law full ones may cycle."""
+
+_HALVINGS = 5
+"""Number of bisections that find the length of a shortened Newton step."""
+
+_SLACK = 1e-6
+"""Tension [N] that stands for zero in a shortened Newton step."""
 
 _CONVERGED = 1e-9
 """Relative change of the tensions that ends the iteration.
@@ -67,9 +74,9 @@ class ChainProblem:
         self._rest[first] = [cable.elasticity.rest for cable in cables]
         self._base, self._softness = np.ones(size), np.zeros(size)
         self._curved: list[tuple[Elasticity, Indices]] = []
-        by_law: dict[int, tuple[Elasticity, list[int]]] = {}
+        by_law: dict[object, tuple[Elasticity, list[int]]] = {}
         for c, cable in enumerate(cables):
-            by_law.setdefault(id(cable.elasticity), (cable.elasticity, []))[1].append(c)
+            by_law.setdefault(key(cable.elasticity), (cable.elasticity, []))[1].append(c)
         self.laws = list(by_law.values())
         for law, of in self.laws:
             segments = np.flatnonzero(np.isin(self._cable, of))
@@ -108,7 +115,7 @@ class ChainProblem:
             )
             if not self._curved or (abs(new - T) <= _CONVERGED * np.maximum(new, 1.0)).all():
                 break
-            T = new if attempt < _UNDAMPED else (T + new) / 2.0
+            T = new if attempt < _UNDAMPED else self._shortened(T, new, length, natural)
         stretch = base + softness * new
         wire = (length - self._spring * (new - self._rest)) / stretch
         compliance = (self._spring + wire * softness) / stretch
@@ -148,6 +155,20 @@ class ChainProblem:
             gradient,
             friction_gradient,
         )
+
+    def _shortened(self, T: Array, new: Array, length: Array, natural: Array) -> Array:
+        """Return tensions (S,) [N] between ``T`` and ``new``, near the least Σ D_j(ln T_j) there.
+
+        D_j is that of :mod:`cdsm.kernels.chain_problem`. The sum is convex on a line in ln T.
+        """
+        T = np.maximum(T, _SLACK)
+        step = np.log(np.maximum(new, _SLACK) / T)
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2.0
+            rise = (natural - self.natural(length, T * np.exp(middle * step))) @ step
+            low, high = (middle, high) if rise < 0.0 else (low, middle)
+        return np.asarray(T * np.exp(high * step))
 
     def stored(self, natural: Array, tension: Array) -> float:
         """Compute the stored energy [J] of segments and series springs.

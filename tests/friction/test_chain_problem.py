@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import clarabel
@@ -363,6 +364,23 @@ def test_newtons_method_ends_where_rounding_moves_the_tensions(
         )
         assert len(steps) <= 6
         T = near.tension
+
+
+@pytest.mark.parametrize("shorter", [0.9955, 0.99575, 0.996])
+def test_steep_table_leads_newtons_method_out_of_its_cycle(shorter: float) -> None:
+    """Halved steps stopped at 172 instead of 143 N for the second length."""
+    law = cdsm.TabulatedElasticity(
+        (0.0, 142.0, 144.0, 341.0, 345.0), (0.0, 6e-4, 1.8e-3, 7.6e-3, 10.2e-3)
+    )
+    site = cdsm.Site("link", (0.0, 0.0, 0.0))
+    cable = cdsm.Cable("cable", (site, replace(site, position=(0.03, 0.0, 0.0))), law)
+    F, length, one = np.array([277.0]), np.array([0.0307]), np.ones(1)
+    problem = ChainProblem((cable,), np.array([0, 1]), F, True)
+    natural = problem.natural(length, F)
+    found = problem.settle(shorter * length, natural, one, np.array([np.nan]), F).tension
+    stretch = 0.0307 * shorter / natural[0] - 1.0
+    expected = brentq(lambda T: float(law.strain(T)) - stretch, 0.0, 345.0, xtol=1e-12)
+    assert found[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_slack_cable_forgets_and_is_tightened_again() -> None:
