@@ -192,14 +192,8 @@ class Identification(ReadOnlyState):
         intervals = list(self.confidence().values())
         numbers = np.column_stack([self.values, self.std, intervals, self.bounds])
         lines = [_row("parameter [own unit]", *columns), *map(_row, self.names, *numbers.T)]
-        lines += [
-            *self._nonlinear_rows(),
-            "",
-            *self._stiffness_rows(),
-            *self._loop_rows(),
-            "",
-            self._verdict,
-        ]
+        lines += [*self._nonlinear_rows(), "", *self._stiffness_rows(), *self._loop_rows(), ""]
+        lines.append(self._verdict)
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
 
     def _nonlinear_rows(self) -> list[str]:

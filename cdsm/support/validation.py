@@ -125,9 +125,8 @@ def _first_of(array: Array, chosen: NDArray[np.bool_]) -> str:
 def instance(name: str, value: _Kind, kind: type[_Kind]) -> _Kind:
     """Return the value if it is an instance of ``kind``, else raise :class:`InvalidInput`."""
     if not isinstance(value, kind):
-        parts: dict[str, object] = getattr(
-            value, "_asdict", dict
-        )()  # a named tuple may hold what is needed
+        # a named tuple may hold what is needed
+        parts: dict[str, object] = getattr(value, "_asdict", dict)()
         its = "".join(f": its .{key}" for key, part in parts.items() if isinstance(part, kind))
         raise InvalidInput(name, f"{value!r} given; a {kind.__name__} is needed{its}.")
     return value
