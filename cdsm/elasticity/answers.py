@@ -8,6 +8,7 @@ import numpy as np
 
 from cdsm.elasticity.law import Elasticity
 from cdsm.errors import CdsmError, InvalidInput
+from cdsm.support.format import span
 from cdsm.support.validation import LARGEST, RANGES
 from cdsm.support.values import Array
 
@@ -47,5 +48,5 @@ def _answer(law: Elasticity, function: Callable[[Array], Array], tension: Array)
         raise
     except Exception as error:
         raise InvalidInput(
-            "elasticity", f"{law!r} fails at tensions {tension} N: {error!r}. Correct the law."
+            "elasticity", f"{law!r} fails at {span(tension)} N: {error!r}. Correct the law."
         ) from error

@@ -52,7 +52,7 @@ def test_error_of_an_own_elasticity_names_it() -> None:
         raise ValueError("boom")
 
     arm = cdsm.Manipulator(GEOMETRY, Own(fails))
-    said = r"elasticity: <.*Own object.* fails at tensions \[50\..*ValueError\('boom'\)"
+    said = r"elasticity: <.*Own object.* fails at 50 N.*ValueError\('boom'\)"
     with pytest.raises(cdsm.InvalidInput, match=said) as caught:
         cdsm.stiffness(arm.at(np.zeros(arm.nv)), np.full(len(arm.cables), 50.0))
     assert isinstance(caught.value.__cause__, ValueError)

@@ -50,12 +50,20 @@ class Faulty(Plain):
         raise ZeroDivisionError("so it is")
 
 
+class Unknown(Plain):
+    """A law that a worker cannot read."""
+
+    def __reduce__(self) -> Any:
+        return int, ("no law",)
+
+
 def test_what_fails_on_a_worker_is_told(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(
-        cdsm.ClusterError, match=r"a worker failed: ZeroDivisionError\('so it is'\)"
-    ):
+    with pytest.raises(cdsm.ClusterError, match="a worker failed: ValueError"):
+        cdsm.sweep(short_arm(Unknown(1e4)), POSES, minimum=20.0, client=client)
+    # as without a cluster
+    with pytest.raises(cdsm.InvalidInput, match=r"fails at .* N: ZeroDivisionError\('so it is'\)"):
         cdsm.sweep(short_arm(Faulty(1e4)), POSES, minimum=20.0, client=client)
-    with pytest.raises(cdsm.InvalidInput, match="gives the rigidity"):  # as without a cluster
+    with pytest.raises(cdsm.InvalidInput, match="gives the rigidity"):
         cdsm.sweep(short_arm(Plain(-1.0)), POSES, minimum=20.0, client=client)
     monkeypatch.setattr(cluster, "version", lambda _: "9.9")
     with pytest.raises(cdsm.ClusterError, match=r"a worker has cdsm .*, the client 9\.9"):
