@@ -11,7 +11,7 @@ import itertools
 import os
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,8 +68,9 @@ def opened(
         group: Any = zarr.open_group(path, mode="r+", use_consolidated=False)
         if _ORDER not in group.attrs:
             raise StoreError(path, "was written by xarray; give another path to store=.")
-        for _, computed in _gaps(path, group):
-            group["status"][computed] = EMPTY["status"]
+        if not made:
+            for _, computed in _gaps(path, group):
+                group["status"][computed] = EMPTY["status"]
         yield {name: group[name] for name in specification.variables}
     finally:
         os.close(folder)
@@ -110,16 +111,28 @@ def _dataset(path: Path) -> xarray.Dataset:
         raise FileError(path, f"is not a sweep's store: {error}.") from None
     if order is not None:
         group: Any = zarr.open_group(path, mode="r", use_consolidated=False)
-        for name in found.variables.keys() - found.indexes.keys():
-            lazy: Any = LazilyIndexedArray(_OnDisk(path, group[name]))
-            once: Any = MemoryCachedArray(CopyOnWriteArray(lazy))  # type: ignore[no-untyped-call]
-            found[name] = found[name].dims, once, found[name].attrs
+
+        def told(names: Iterable[Hashable]) -> dict[Hashable, Any]:
+            return {
+                name: (found[name].dims, _once(path, group[name]), found[name].attrs)
+                for name in names
+            }
+
+        found = found.assign(told(found.data_vars)).assign_coords(
+            told(found.coords.keys() - found.indexes.keys())
+        )
     for name in found.variables:
         if found[name].dtype.kind in "OT":  # texts are objects or numpy's StringDType
             texts = np.array(found[name].values.tolist())
             found = found.assign_coords({name: (found[name].dims, texts, found[name].attrs)})
         found[name].encoding = {}  # a NetCDF file must not inherit the encoding of the store
     return found if order is None else found[[name for name in order if name in found.variables]]
+
+
+def _once(path: Path, array: Any) -> Any:
+    """Return an array of a store as a lazy one that is read at most once."""
+    lazy: Any = LazilyIndexedArray(_OnDisk(path, array))
+    return MemoryCachedArray(CopyOnWriteArray(lazy))  # type: ignore[no-untyped-call]
 
 
 class _OnDisk(BackendArray):
