@@ -108,8 +108,8 @@ class Variable:
             if self.of in ("hole_radius", "disk_offset"):
                 for doubt in doubts_about_units(0.0, [(self.of, high, WIDEST)]):
                     warn(doubt)
-            if UNITS.get(self.of) == "rad" and max(-low, high) > _WIDEST_ANGLE:
-                most = max(-low, high)
+            most = max(-low, high)
+            if UNITS.get(self.of) == "rad" and most > _WIDEST_ANGLE:
                 warn(f"{self.of} up to {most:g} rad: it looks as if it is in degrees; give rad.")
         if self.of in _OF_CABLE and not isinstance(self.at, str):
             raise InvalidInput(self.of, f"needs at= the name of a cable, not {self.at!r}.")
