@@ -131,7 +131,7 @@ class ArmFacts(Printed):
 
     @property
     def joint_units(self) -> tuple[str, ...]:
-        """Unit of each joint's coordinate (nv,): rad, or m where the joint slides."""
+        """Unit of each joint's coordinate (nv,): rad, or m for a prismatic joint."""
         return JointUnits(self.slides).coordinates
 
     def torque_unit(self, joint: int | None = None) -> str:
@@ -139,17 +139,17 @@ class ArmFacts(Printed):
         return JointUnits(self.slides).torque(joint)
 
     def stiffness_unit(self) -> str:
-        """Return the unit of eigenvalues of K_θ: N m/rad, N/m if all joints slide, else both."""
+        """Return the unit of eigenvalues of K_θ: N m/rad, N/m (all joints prismatic), or both."""
         return JointUnits(self.slides).stiffness()
 
     @property
     def lower(self) -> Array:
-        """Lower joint limits (nv,) [rad]; [m] where a joint slides."""
+        """Lower joint limits (nv,) [rad]; [m] for prismatic joints."""
         return self._model.body.lower
 
     @property
     def upper(self) -> Array:
-        """Upper joint limits (nv,) [rad]; [m] where a joint slides."""
+        """Upper joint limits (nv,) [rad]; [m] for prismatic joints."""
         return self._model.body.upper
 
     def __repr__(self) -> str:
@@ -177,7 +177,8 @@ class ArmFacts(Printed):
         """Check the arguments of :class:`Manipulator`, and set all attributes from them.
 
         ``urdf`` is a text that has been checked. ``tip`` is the link whose frame is the tip. Doubts
-        about units are warnings, but those that were ``told`` before.
+        about units are issued as warnings, except those in ``told``, of which the user was already
+        warned.
         """
         self._cables = cables = _checked_cables(cables)
         self._gravity = gravity_vector("gravity", gravity)

@@ -70,7 +70,7 @@ class Cable:
     enough to contain it.
 
     The cable ends at its last site. All other sites are holes that it passes. Without a lead, the
-    first site is the actuator and no hole. The lead is parallel to x of the first site's link. For
+    first site is the actuator, not a hole. The lead is parallel to x of the first site's link. For
     a lead in another direction, give the position of the actuator as the first site.
 
     Attributes:
@@ -84,8 +84,8 @@ class Cable:
         maximum: Largest allowed tension [N]; every tension distribution respects it; inf: no limit.
 
     Raises:
-        CableError: An attribute is invalid, or a site that is no hole has friction; the error names
-            the cable and the fault.
+        CableError: An attribute is invalid, or a site that is not a hole has friction; the error
+            names the cable and the fault.
     """
 
     name: str
@@ -200,7 +200,7 @@ class Cable:
 
         Raises:
             InvalidInput: ``elongation`` is not numbers, or ``free_length`` is not positive.
-            ElasticityRangeError: For an elongation there is no tension in the domain.
+            ElasticityRangeError: No tension in the domain gives one of the elongations.
         """
         return tension_at(
             number_array("elongation", elongation),

@@ -113,12 +113,18 @@ class Segments(ReadOnlyState):
 
     @property
     def grip(self) -> Array:
-        """μ φ (P,) [-]: a cable sticks in a hole while its tensions there have a ratio < e^μφ."""
+        """Product μ φ of friction coefficient and wrap angle at each hole (P,) [-].
+
+        A cable sticks in a hole while the ratio of its two tensions there is below e^μφ.
+        """
         return self.chains.friction * self.wrap
 
     @property
     def ratio(self) -> Array:
-        """Largest ratio T_{j+1}/T_j (S,) [-] that the hole after segment j allows: e^μφ, else 1."""
+        """Largest ratio T_{j+1}/T_j (S,) [-] that the hole after segment j allows: e^μφ.
+
+        It is 1 for the last segment of a cable, which has no hole after it.
+        """
         found = np.ones(self.lengths.size)
         found[self.chains.hole] = np.exp(self.grip)
         return found

@@ -42,7 +42,8 @@ class CableLaws:
         series: 1/k_series of all cables (C,) [m/N].
         rest: Tension (C,) [N] at which wire strain and spring elongation are zero.
         constant: EA of linear laws (C,) [N]; 0 for other laws and force-controlled cables.
-        linear: 1 where EA (1 + ε) = EA + F (C,): a linear law with unstrained l_0; else 0.
+        linear: 1 for cables with a linear law and unstrained l_0, so that EA (1 + ε) = EA + F; else
+            0 (C,).
         nonlinear: The entries of ``held`` whose law is not linear; their EA is computed at each
             tension.
         without_kernel: The laws of ``nonlinear`` that no compiled kernel can evaluate.
@@ -123,7 +124,7 @@ class CableLaws:
         )
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return tension bounds ``low``, ``high`` (…, C) [N], narrowed to those of each cable."""
+        """Return the bounds ``low``, ``high`` (…, C) [N], narrowed by each cable's own bounds."""
         if not self._bounded:
             return low, high
         return frozen(np.maximum(low, self._least)), frozen(np.minimum(high, self._most))
@@ -139,7 +140,7 @@ class CableLaws:
         return frozen(k)
 
     def _rigidity(self, tension: Array) -> Array:
-        """Compute EA (1 + ε) (C,) [N] at F (C,); of linear laws only its constant part, EA."""
+        """Compute EA (1 + ε) (C,) [N] at F (C,); for linear laws only its constant part, EA."""
         if not self.without_kernel:
             arguments: tuple[Any, ...] = (self.constant, *self.wires[2:], tension)
             rigidity = single_rigidity(*arguments)
@@ -156,7 +157,7 @@ class CableLaws:
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
         """Compute EA (1 + ε) [N] of a law at ``tension``, in the shape of ``tension``.
 
-        If the arm takes the stretched length for l_0, as the paper does, it is EA.
+        If ``original_length`` of the arm is "stretched", as in the paper, it is EA.
         """
         if isinstance(law, LinearElasticity):
             rigidity = law.rigidity(tension)
@@ -224,7 +225,7 @@ class CableLaws:
     def naming(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """Return the error of a law, with names and indices of the cables outside its domain.
+        """Return ``error`` of a law again, with names and indices of the cables outside its domain.
 
         ``held`` selects the cables that have this law.
         """
@@ -234,7 +235,7 @@ class CableLaws:
 
 
 def kinks(law: Elasticity) -> tuple[float, ...]:
-    """Return the tensions [N], in rising order, at which dEA/dF of a law is discontinuous.
+    """Return the tensions [N], in ascending order, at which dEA/dF of a law is discontinuous.
 
     At a kink, ``rigidity_slope`` returns the slope below it. The weak kinks at the points of a
     tabulated law are not returned.
@@ -245,10 +246,10 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
 
 
 def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | None:
-    """Return a law without its slack branch, with the kind, edges and coefficients of its pieces.
+    """Return a law without its slack branch, the kind of its pieces, and their arrays.
 
-    The kind is POLYNOMIAL or CURVE. None if no kernel can evaluate the law, or if its polynomials
-    are not positive on its whole domain.
+    The kind is POLYNOMIAL or CURVE; the arrays are edges and coefficients. Returns None if no
+    kernel can evaluate the law, or if its polynomials are not positive on its whole domain.
     """
     inside = law.law if isinstance(law, SlackBelow) else law
     if isinstance(inside, TabulatedElasticity):

@@ -96,15 +96,15 @@ class Manipulator(ArmFacts):
     ) -> Manipulator:
         """Build an arm from a URDF and cables: a tree of revolute, prismatic and fixed joints.
 
-        Where a joint slides (prismatic), its coordinate is in m, its torque in N and its stiffness
-        in N/m.
+        For prismatic joints the coordinate is in m, the torque in N and the stiffness in N/m.
 
         Args:
             urdf: Path of the URDF file, or its text.
             cables: Cables of the arm, or the path of their file: see :func:`~cdsm.read_cables`.
             tip: Link whose frame is the tip; other docstrings call it ``tool0``.
-            joint_names: The moving joints in the order of q. None: Pinocchio's order, from the base
-                along each branch to its end, branches in the order of their joints' names.
+            joint_names: The moving joints in the order of q. None: Pinocchio's order: branch by
+                branch, each from the base to its end, with the branches sorted by the names of
+                their joints.
             gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s²
                 along it; (0, 0, 0) for none.
             check_inertia: Refuse moments of inertia that no rigid body can have. Stiffness does not
@@ -174,7 +174,9 @@ class Manipulator(ArmFacts):
         return write_text(path, arm_text(self._parts))
 
     def plot(self, q: ArrayLike | None = None) -> Figure:
-        """Plot the arm in mm at joint angles q (nv,) [rad]; None: 0, or the limit nearest to 0.
+        """Plot the arm in mm at joint angles q (nv,) [rad].
+
+        If q is None, each angle is 0, or the limit nearest to 0.
 
         Raises:
             InvalidInput: q is not (nv,) finite real numbers.

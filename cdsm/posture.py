@@ -197,7 +197,7 @@ class Posture(ReadOnlyState):
         return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))
 
     def _joint_stiffness(self, tension: Array, cable_stiffness: Array, wrench: Array) -> Array:
-        """Compute the active, passive and load terms, P and K_θ, (5, nv, nv) [N m/rad].
+        """Compute five matrices (5, nv, nv) [N m/rad]: active, passive and load term, P, and K_θ.
 
         P is the sum of the magnitudes of the four terms. Tensions (C,) [N], cable stiffnesses (C,)
         [N/m] and wrench (6,) are checked already.
@@ -226,10 +226,10 @@ class MomentArms(ReadOnlyState):
     A positive arm turns the joint to positive angles. ``arms["cable1_1", "joint1_1"]`` is one arm.
 
     Attributes:
-        values: The arms (C, nv) [m]; the force per tension [-] where a joint slides.
+        values: The arms (C, nv) [m]; the force per tension [-] for prismatic joints.
         cables: Names of the cables.
         joints: Names of the joints.
-        slides: Whether each joint slides (nv,).
+        slides: Whether each joint is prismatic (nv,).
     """
 
     values: Array
@@ -238,7 +238,7 @@ class MomentArms(ReadOnlyState):
     slides: NDArray[np.bool_]
 
     def __getitem__(self, names: tuple[str, str]) -> float:
-        """Return the moment arm of a cable about a joint [m], or [-] where the joint slides.
+        """Return the moment arm of a cable about a joint [m], or [-] for a prismatic joint.
 
         Raises InvalidInput if there are not two names, UnknownName for an unknown name.
         """
@@ -265,7 +265,7 @@ class MomentArms(ReadOnlyState):
         return found
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table in SI, a row for each cable; MissingExtra without pandas."""
+        """Return a table in SI, a row for each cable; needs pandas (MissingExtra)."""
         units = np.where(self.slides, "-", "m").tolist()
         names = [f"{joint} [{unit}]" for joint, unit in zip(self.joints, units, strict=True)]
         return data_frame(dict(zip(names, self.values.T, strict=True)), "cable", self.cables)

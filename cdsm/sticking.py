@@ -46,7 +46,7 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
     """Compute ∂T/∂θ (S, nv) [N/rad] of the segments at checked tensions T (S,) [N].
 
     ``sliding`` marks the holes (P,) in which the cable slides: there the larger tension is exp(μ φ)
-    times the smaller. In holes in which it cannot stick, see :func:`holding`, it always slides.
+    times the smaller. A cable always slides in holes in which it cannot stick; see :func:`holding`.
     ElasticityRangeError if a tension is outside the domain of its law.
     """
     model, segments = pose.arm._model, pose.segments

@@ -1,4 +1,4 @@
-"""Records of arrays that the fused kernel takes: the arm, the postures, the wanted quantities."""
+"""Arguments of the kernel ``evaluate_rows``: arrays of the arm, the postures, the outputs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdsm.support.values import Array, frozen
 
 
 class Arm(NamedTuple):
-    """Arrays of an arm with nv joint coordinates and C cables, as the fused kernel takes them."""
+    """Arrays of an arm with nv joint coordinates and C cables, as ``evaluate_rows`` takes them."""
 
     tree: Tree  # joints
     routing: Routing  # cables
@@ -29,7 +29,10 @@ class Arm(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Inputs of b postures: an array has 1 row if they have it in common, 0 if it is not given."""
+    """Inputs of b postures.
+
+    An array has 1 row if all postures have the same values, and no row if the values are not given.
+    """
 
     q: Array  # joint angles (b, nv) [rad]
     wrench: Array  # W (b, 6)
@@ -40,7 +43,7 @@ class Rows(NamedTuple):
     wire: Array  # as ``rigidity``, but of the laws ``Arm.wires``
 
     def take(self, rows: slice | Indices) -> Rows:
-        """Return some of the rows."""
+        """Return these rows; an array with one row for all postures stays as it is."""
         return Rows(*(frozen(each[rows]) if len(each) > 1 else each for each in self))
 
 
@@ -55,9 +58,9 @@ class Asked(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Arrays that the kernel fills and the readings need, of B blocks of W postures.
+    """Arrays that the kernel fills, and from which readings such as ``along`` are computed.
 
-    B is 0 for arrays that no requested reading needs.
+    They are for B blocks of W postures. B is 0 for an array that no requested reading needs.
     """
 
     joint: Array  # K_θ (B, nv, nv, W)

@@ -60,11 +60,11 @@ class Tensions(ReadOnlyState):
         return cdsm.plots.plot_tensions(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return tensions and status as a labelled Dataset in SI; MissingExtra without xarray."""
+        """Return tensions and status as a labelled Dataset in SI; needs xarray (MissingExtra)."""
         return to_dataset(self.arm, self.q, self.status, {"tension": self.values})
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table in SI, a row for each posture; MissingExtra without xarray."""
+        """Return a table in SI, a row for each posture; needs xarray (MissingExtra)."""
         return tidy(self.to_xarray())
 
     def __len__(self) -> int:

@@ -43,11 +43,11 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 class Batch(ReadOnlyState, Named):
     """Quantities at B postures: ``batch["joint"]`` is K_θ (B, nv, nv); ``len(batch)`` is B.
 
-    ``"joint" in batch``, ``list(batch)`` and ``dict(batch)`` are of :attr:`outputs`.
+    The keys are :attr:`outputs`, also in ``"joint" in batch``, ``list(batch)`` and ``dict(batch)``.
     Names, shapes and units are those of :class:`~cdsm.Posture` and :class:`~cdsm.Stiffness`, with
-    the posture as first axis. A quantity that does not exist is NaN; :attr:`status` says why.
-    A batch has no ``plot``, since its rows have no order: plot :meth:`to_pandas`, or draw a
-    :func:`~cdsm.sweep` with :func:`cdsm.plots.plot_map`.
+    the posture as first axis. A quantity that does not exist is NaN; :attr:`status` says why. A
+    batch has no ``plot``, since its rows have no order. Plot the table of :meth:`to_pandas`, or
+    compute a :func:`~cdsm.sweep` and plot it with :func:`cdsm.plots.plot_map`.
 
     Attributes:
         arm: The arm.
@@ -94,12 +94,12 @@ class Batch(ReadOnlyState, Named):
         return frozen(self.status == layout.OK)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the quantities as a labelled Dataset in SI; MissingExtra without xarray."""
+        """Return the quantities as a labelled Dataset in SI; needs xarray (MissingExtra)."""
         values = dict(zip(self.outputs, self.values, strict=True))
         return to_dataset(self.arm, self.q, self.status, values, self.direction)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return :meth:`to_xarray` as a table, a row per posture; MissingExtra without xarray."""
+        """Return :meth:`to_xarray` as a table, a row per posture; needs xarray (MissingExtra)."""
         return tidy(self.to_xarray())
 
     def __len__(self) -> int:
@@ -147,10 +147,10 @@ def evaluate(
             ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``. Of a stiffness:
             ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
             ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
-            ``"along"``, ``"pseudoinverse"``. While cables stick in their holes, see
-            :func:`~cdsm.stuck_stiffness`: ``"stuck_joint"``, ``"stuck_along"``,
+            ``"along"``, ``"pseudoinverse"``. Of an arm whose cables stick in their holes
+            (:func:`~cdsm.stuck_stiffness`): ``"stuck_joint"``, ``"stuck_along"``,
             ``"stuck_compliance"``, and ``"breakaway"`` [N], the load at which the first cable
-            slides, to first order (:attr:`Breakaway.first_order`). Also ``"tension"``.
+            slides, to first order (:attr:`Breakaway.first_order`). The tensions: ``"tension"``.
         direction: u of ``"along"``, ``"stuck_along"`` and ``"breakaway"``: an axis such as ``"z"``,
             or (3,), any length; or several (D, 3), then these outputs are (B, D).
         minimum: Lower bounds [N] for :func:`distribute_tensions`, which then finds the tensions.

@@ -49,8 +49,9 @@ class Evaluator:
 
     ``tension`` is F (C,) or (B, C) [N]. ``bounds`` are the lower and the upper bounds of
     distributed tensions, (C,) or (B, C) [N]. If neither is given, no output depends on tensions.
-    The private methods take the inputs of b postures as ``rows``, fill their status ``found`` (b,)
-    and outputs ``out`` (b, n) in place, and name quantities by their numbers, ``wanted``.
+    The private methods take the inputs of b postures as ``rows``, and the wanted quantities by
+    their numbers, ``wanted``. They fill the status ``found`` (b,) and the outputs ``out`` (b, n) in
+    place.
 
     Attributes:
         values: The outputs in the order of ``names``, filled by :meth:`run`.
@@ -169,7 +170,7 @@ class Evaluator:
         out: Array,
         balance: Balance | None = None,
     ) -> None:
-        """Fill status and output of some postures; if they have bounds, guess their tensions."""
+        """Fill status and outputs of the postures ``rows``; with bounds, guess their tensions."""
         balance = balance or self._empty_balance(0)
         read, (nv, width) = wanted > layout.STUCK_JOINT, (self._arm.nv, self._block)
         stuck = np.isin(wanted, STUCK)
@@ -223,7 +224,7 @@ class Evaluator:
         found: Codes,
         out: Array,
     ) -> None:
-        """Fill the readings ``names``: without, and with sticking cables; update the status."""
+        """Fill the readings ``names`` of frictionless and of stuck arms; update the status."""
         status = np.full(len(kept.jacobian) * self._block, UNREAD)
         status[: found.size][found == OK] = READ
         for kind, quantities in enumerate(names):

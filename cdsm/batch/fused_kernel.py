@@ -75,14 +75,16 @@ def evaluate_rows(
         given: The postures and their loads.
         asked: The requested quantities.
         width: W, the number of postures in a block.
-        kept: Filled for the readings.
-        balance: Moment arms and torques of the balance (b, …), filled for UNDECIDED postures, and
-            tensions, filled for POSTPONED ones; no rows if no tensions are distributed.
+        kept: Arrays to fill, from which the readings are computed.
+        balance: Moment arms and torques of the balance (b, …), to fill for UNDECIDED postures, and
+            tensions, to fill for POSTPONED postures. They have no rows if no tensions are
+            distributed.
         out: The requested quantities in one row per posture; NaN where they do not exist.
-        status: On entry OK, or why no tensions were found; on return the status of the posture.
-            UNDECIDED: the guess found neither the tensions nor a proof that there are none.
-            POSTPONED: it found the tensions, but of less than two thirds of the block; quantities
-            that depend on tensions are computed later, in a block of such postures.
+        status: On entry OK, or the reason why no tensions were found; on return the status of each
+            posture. UNDECIDED: the guess gave neither the tensions nor a proof that there are none.
+            POSTPONED: the guess gave the tensions, but for less than two thirds of the block.
+            Quantities that depend on tensions are then computed later, in a block of postponed
+            postures.
     """
     tree, routing, masses, holes, blocks = arm.tree, arm.routing, arm.masses, arm.holes, arm.blocks
     start, stored, joint, stuck = asked.start, asked.stored, kept.joint, kept.stuck
@@ -237,7 +239,7 @@ def evaluate_rows(
 
 @inlined
 def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
-    """Set ``known`` to number + 1 where the code is OK: quantities 0 to ``number`` are computed."""
+    """Where the code is OK, record in ``known`` that quantities 0 to ``number`` are computed."""
     for w in lanes(width):
         if code[w] == OK:
             known[w] = number + 1
@@ -245,7 +247,7 @@ def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
 
 @inlined
 def _note_outside(code: Indices, rigidity: Array, width: Width) -> None:
-    """Replace the code OK where a rigidity is negative: outside the domain of its law."""
+    """Replace the code OK by OUTSIDE_ELASTICITY where a rigidity is negative."""
     for w in lanes(width):
         if code[w] == OK and _is_negative(rigidity, w):
             code[w] = OUTSIDE_ELASTICITY

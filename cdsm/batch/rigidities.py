@@ -12,9 +12,9 @@ from cdsm.support.values import Array, frozen
 
 
 def rigidities(laws: CableLaws, tension: Array, usable: Flags) -> Array:
-    """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N] of usable postures (b,).
+    """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N]; ``usable`` (b,) marks valid rows.
 
-    It is 0 under force control and in postures that are not usable, and −1 outside the domain.
+    It is 0 for force-controlled cables and in all other rows, and −1 outside the domain of a law.
     """
     if not usable.any():  # a user-defined law may fail on empty arrays
         return frozen(np.zeros_like(tension))

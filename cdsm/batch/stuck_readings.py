@@ -1,4 +1,4 @@
-"""Read off an arm whose cables stick: tip stiffness, and the load at which the first one slides."""
+"""Readings of an arm whose cables stick: tip stiffness, load at which the first cable slides."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def read_stuck(
 ) -> dict[str, Array]:
     """Compute readings of the stuck arm at the postures ``rows`` under tensions F (b, C) [N].
 
-    ``names`` are those of the wanted readings, ``kept`` the arrays from which they follow.
+    ``names`` are the names of the wanted readings, which are computed from the arrays ``kept``.
     ``directions`` (D, 3) are unit vectors. ``status`` (B, W) is READ or UNREAD; it becomes SINGULAR
     where K_θ is singular. The posture is the last axis of all results.
     """

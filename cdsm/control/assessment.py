@@ -1,10 +1,10 @@
-"""Compute the true stiffness and the proved band of a state of a plant; hang a weight on it.
+"""Compute true stiffness and proved band of a plant in a given state; hang a weight on the plant.
 
-An arm with friction has many stiffnesses. Here *the* stiffness of a state is the frictionless K_θ
-at the equilibrium without friction, with the same wire in every cable and the same load. A weight
-hung on the arm measures this stiffness if the load is shaken before and after
-(:func:`hung_weight`). Without shaking, small weights measure the stuck arm, which is several times
-stiffer.
+With friction, the measured stiffness depends on the size and on the history of the load. Here the
+true stiffness of a state is the frictionless K_θ at the equilibrium that the arm would have without
+friction, with the same wire in every cable and the same load. A weight hung on the arm measures
+this stiffness if the load is shaken before and after (:func:`hung_weight`). Without shaking, small
+weights measure the stuck arm, which is several times stiffer.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _DISPLACED: Final = 1e-3  # displacement that the weight causes, over the length
 
 
 class Assessment(NamedTuple):
-    """True stiffness and band of one state of a plant; NaN where there is none."""
+    """True stiffness and band of one state of a plant; NaN for values that do not exist."""
 
     tip: Array  # tip (3,) [m] at the equilibrium without friction
     stiffness: list[float]  # stiffness along each direction (D,) [N/m] there
@@ -44,7 +44,10 @@ class Assessment(NamedTuple):
 
 
 def assess(state: PlantState, wrench: Array, directions: Array, *, banded: bool) -> Assessment:
-    """Assess a state under ``wrench`` (6,) along ``directions`` (D, 3); its band if ``banded``."""
+    """Compute the true stiffness of a state under ``wrench`` (6,), and its band if ``banded``.
+
+    The stiffness is along each of ``directions`` (D, 3), the band along the first.
+    """
     nan = math.nan
     try:
         K = frictionless_stiffness(state, wrench)

@@ -6,11 +6,11 @@ A cable with the wire l_0 and the tension F at its motor has the length
 
 with the length l_j and the tension ρ_j F of segment j, the strain ε of the law, the tension F_rest
 at which the series spring is at rest, and the rigidity factor s: the actual rigidity of all wires
-over that of their laws. There are more cables than joints. So their lengths give the angles and s:
-the rigidity is calibrated while the arm moves. s follows from all steps (recursive least squares),
-the angles from one step.
+divided by that of their laws. There are more cables than joints. So their lengths give the angles
+and s: the rigidity is calibrated while the arm moves. s follows from all steps (recursive least
+squares), the angles from one step.
 
-ρ_j is the tension of segment j over that at the motor; friction makes it differ from 1. The
+ρ_j is the tension of segment j divided by that at the motor; friction makes it differ from 1. The
 estimate contains the length of wire in each segment. At each step wire slides through the holes
 according to the friction law.
 """
@@ -125,7 +125,8 @@ class Observer:
     ) -> Estimate:
         """Return the estimate at a new posture, after the wire has slid through the holes.
 
-        ``F`` (C,) [N] are tensions at the motors; ``softness`` and ``variance`` are new too.
+        ``F`` (C,) [N] are the tensions at the motors. ``softness`` and ``variance`` go into the new
+        estimate.
         """
         segments = pose.segments
         chains, near = segments.chains, before.shares * F[segments.chains.cable]

@@ -57,9 +57,9 @@ def felt_stiffness(
     """Move the tip along ±u (3,) with the motors; return the measured stiffness [N/m].
 
     ``state`` does not change, since the plant moves a copy. The tip moves by 0.5 % of the arm's
-    length. It moves less if a tension would otherwise cover more than half of the way to its bound
-    in ``bounds`` (lower, upper). ``observer`` updates ``estimate`` with readings, whose noise comes
-    from ``random``. NaN if no equilibrium is found, if the estimated arm is unstable, or if a
+    length. It moves less if a tension would otherwise cover more than half of the distance to one
+    of its ``bounds`` (lower, upper). ``observer`` updates ``estimate`` with readings, whose noise
+    comes from ``random``. NaN if no equilibrium is found, if the estimated arm is unstable, or if a
     tension is at its bound.
     """
     wire, F = observer.sensors.read([state.true], random)

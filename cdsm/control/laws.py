@@ -30,7 +30,7 @@ class Reference(NamedTuple):
     """Reference values of one step of control.
 
     Attributes:
-        angles: Joint angles (nv,) [rad]; [m] where a joint slides.
+        angles: Joint angles (nv,) [rad]; [m] for prismatic joints.
         tension: F (C,) [N].
         wire: l_0 paid out at these angles and tensions (C,) [m].
         stiffness: k of each cable (C,) [N/m]; 0 for force-controlled cables.
@@ -107,9 +107,9 @@ def limited(moment: Moment, wire: Array) -> Command:
 
 
 def checked_command(command: object, moment: Moment, names: Sequence[str]) -> Command:
-    """Return what a law has computed; InvalidInput if the motors ``names`` (C,) cannot follow it.
+    """Return the ``command`` of a law; InvalidInput if the motors ``names`` (C,) cannot follow it.
 
-    The wire of each must be positive, and its tension within the bounds.
+    Each commanded length of wire must be positive, and each tension within the bounds.
     """
     if not isinstance(command, Command):
         raise InvalidInput(
@@ -136,11 +136,11 @@ def feedforward(moment: Moment) -> Command:
 
 
 def tension_control(moment: Moment) -> Command:
-    """Control the tensions of all cables to those of the plan: PI, plus the planned step of l_0.
+    """Control all cable tensions to the planned ones: PI control, plus the planned change of l_0.
 
-    Each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the error e = F planned − F measured. P and
-    I are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length, so
-    an arm without springs in its joints drifts slowly from its posture.
+    In each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the error e = F planned − F measured. P
+    and I are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length,
+    so an arm without springs in its joints drifts slowly from its posture.
     """
     return limited(moment, _regulated(moment))
 
@@ -148,8 +148,8 @@ def tension_control(moment: Moment) -> Command:
 def mixed(moment: Moment) -> Command:
     """Control the tension of some cables, and pay out the wire of the plan for all others.
 
-    The arm of the paper has one cable of each kind in each pair. The clamps need a load cell at
-    every cable.
+    In the paper's arm, each pair has one cable of each kind. Every cable needs a load cell, since
+    the clamps follow from the measured tensions.
     """
     return limited(moment, np.where(moment.forced, _regulated(moment), moment.reference.wire))
 

@@ -108,7 +108,10 @@ class SlowPlant:
         return self.load(state, Load(wrench, np.zeros(self.arm.nv), motors))
 
     def load(self, state: SlowState, load: Load) -> SlowState:
-        """Return the state that follows ``state`` under another load, which sets the motors too."""
+        """Return the state that follows ``state`` when the load and the motors change to ``load``.
+
+        The change is slow. ``load`` contains the wrench and the motor commands.
+        """
         return state._replace(state=state.loading.carry(state.state, load, "the step")[0])
 
 

@@ -37,11 +37,12 @@ Outcome = Literal["completed", "lost", "no rest", "wire"]
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class TrackingRun(ReadOnlyState):
-    """Closed loop along a path, step by step; made by :func:`track`.
+    """Result of :func:`track`: a closed loop along a path, step by step.
 
-    n steps, C cables, D wanted directions. With friction, *the* stiffness of a state is that at the
-    equilibrium without friction, with the same wire and load. :meth:`hung_weight` measures it,
-    since it shakes the load. NaN if there is no such equilibrium.
+    There are n steps, C cables and D wanted directions. With friction, the true stiffness of a
+    state is the frictionless stiffness at the equilibrium that the arm would have without friction,
+    with the same wire and load. It is NaN if there is no such equilibrium. :meth:`hung_weight`
+    measures this stiffness, since it shakes the load.
 
     Attributes:
         plan: The plan that was followed.
@@ -50,7 +51,7 @@ class TrackingRun(ReadOnlyState):
         period: Time between two steps [s].
         goals: Planned tip positions (n, 3) [m].
         target: Wanted stiffness (n, D) [N/m].
-        angles: True joint angles (n, nv) [rad]; [m] where a joint slides.
+        angles: True joint angles (n, nv) [rad]; [m] for prismatic joints.
         estimated_angles: Angles that the controller estimated before each step (n, nv) [rad].
         tips: True tip positions (n, 3) [m].
         wanted_tension: References of the tensions at the motors (n, C) [N].
@@ -70,14 +71,16 @@ class TrackingRun(ReadOnlyState):
             direction (n,) [m].
         wrench: Load (n, 6): force [N], then moment [N m].
         estimated_force: Force at the tip that the controller estimated (n, 3) [N].
-        rigidity: Rigidity of the wires over that of their laws, as estimated (n,) [-].
-        short: Whether the outer loop found no tensions within the bounds that give the target (n,).
-        refused: Reasons why the outer loop could not plan and kept its previous tensions, by step.
+        rigidity: Estimated rigidity of the wires, divided by the rigidity of their laws (n,) [-].
+        short: Whether the outer loop failed to find tensions within the bounds that give the target
+            (n,).
+        refused: The reason, by number of the step, if the outer loop could not plan tensions and
+            kept the previous ones.
         outcome: ``"completed"``; ``"lost"``: the tip left its path or the plant diverged, since the
             loop is unstable; ``"no rest"``: the arm buckled; ``"wire"``: a tension left the domain
             of its law.
         reason: What stopped the loop, in words; or empty.
-        states: States of the plant, which :meth:`hung_weight` loads further.
+        states: State of the plant after each step; :meth:`hung_weight` starts from one of them.
     """
 
     plan: PathPlan
@@ -155,7 +158,8 @@ class TrackingRun(ReadOnlyState):
             direction: Number of the direction.
 
         Raises:
-            InvalidInput: There is no such step or direction, or the plant is no :class:`SlowPlant`.
+            InvalidInput: There is no such step or direction, or the plant is not a
+                :class:`SlowPlant`.
         """
         count, D = len(self.time), len(self.directions)
         k = whole_number("step", step, -count, count - 1) % count
@@ -187,7 +191,7 @@ class TrackingRun(ReadOnlyState):
         return tuple(said)
 
     def _at(self, steps: Sequence[int]) -> str:
-        """Write how many steps these are, and the time of the first, which may have failed."""
+        """Return text such as ``at 3 of 40 steps, from 0.2 s`` for these numbers of steps."""
         return f"at {len(steps)} of {len(self.time)} steps, from {self.period * steps[0]:.4g} s"
 
     @property
@@ -196,11 +200,11 @@ class TrackingRun(ReadOnlyState):
         return float(self.time[-1]) if len(self.time) else 0.0
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return a labelled Dataset over time, in SI units; MissingExtra without xarray."""
+        """Return a labelled Dataset over time, in SI units; needs xarray (MissingExtra)."""
         return labelled(self)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return angles, tip, tensions and stiffness over time; MissingExtra without pandas."""
+        """Return angles, tip, tensions and stiffness over time; needs pandas (MissingExtra)."""
         return table(self)
 
     def write(self, path: str | os.PathLike[str]) -> Path:

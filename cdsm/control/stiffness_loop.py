@@ -31,9 +31,10 @@ class Replanned(NamedTuple):
 
 @dataclass(eq=False)
 class StiffnessLoop:
-    """Planner of the next tensions: the nearest to the previous ones with the target stiffness.
+    """Planner of tensions: the nearest to the previous ones that give the target stiffness.
 
-    If the rate does not allow these tensions, the next ones miss the target as little as it allows.
+    If the rate does not allow these tensions, it plans those that come nearest to the target within
+    the rate.
     """
 
     arm: Manipulator  # the arm of the controller
@@ -53,7 +54,8 @@ class StiffnessLoop:
         """Plan the tensions of the next step.
 
         Args:
-            wanted: The reference of the plan at this step; its angles do not change.
+            wanted: The reference of the plan at this step. Tension, wire and stiffness are
+                replaced, the angles are kept.
             target: Stiffness [N/m], () or (n,).
             estimate: Estimated posture, load, wire and friction.
             before: Mean tensions of the previous step (C,) [N].

@@ -57,18 +57,19 @@ def track(
     felt: int = 0,
     seed: int = 0,
 ) -> TrackingRun:
-    """Follow a planned path in closed loop, against a plant that may differ from the plan's arm.
+    """Follow a planned path in closed loop, with a plant that may differ from the plan's arm.
 
     At each step the sensors are read, the posture and the rigidity of the wires are estimated, a
-    motor law commands the motors, and the plant follows. Laws: ``"feedforward"`` pays out the wire
-    of the plan; ``"tension"`` controls all tensions; ``"mixed"`` those of some cables, and pays out
-    the wire of the others; ``"stiffness"`` is the mixed law in an outer loop, which plans the
-    tensions again at the estimated posture. No law commands a tension outside the bounds.
+    motor law commands the motors, and the plant follows. ``"feedforward"`` pays out the wire of the
+    plan. ``"tension"`` controls all tensions. ``"mixed"`` controls the tensions of some cables, and
+    pays out the planned wire of the others. ``"stiffness"`` is the mixed law inside an outer loop,
+    which plans the tensions again at the estimated posture. No law commands a tension outside the
+    bounds.
 
     The plan's arm, with its friction, is the model of the controller. The loop starts at rest at
     the first sample with the planned tensions. An unstable loop, an arm that buckles and a target
-    that cannot be planned or reached are answers: ``outcome``, ``reason`` and ``warnings`` of the
-    result.
+    that cannot be planned or reached raise no error: ``outcome``, ``reason`` and ``warnings`` of
+    the result report them.
 
     Args:
         plan: A complete plan along one or more directions.
@@ -85,8 +86,8 @@ def track(
         replan: Whether the outer loop runs; default: for ``"stiffness"`` only.
         tension_controlled: Names of the cables whose tension a mixed law controls. Default: C − nv
             cables, chosen so that the lengths of the others determine the posture best.
-        bands: A proved band is computed every ``bands`` steps, in some 20 ms; 0: never. An arm
-            without friction has no band.
+        bands: A proved band is computed every ``bands`` steps, which takes about 20 ms; 0: never.
+            An arm without friction has no band.
         felt: The stiffness is measured with the motors every ``felt`` steps
             (:mod:`cdsm.control.felt`); 0: never. A copy of the arm is moved, so that the run stays
             the same.

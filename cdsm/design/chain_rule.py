@@ -50,7 +50,10 @@ class Chain:
         self._moved = still.moved(self.inputs.displaced(by_variable))
 
     def at(self, tension: Tension, loss: Array) -> Posed:
-        """Return the chain rule at the posture of ``tension``; ``loss`` (C,) is exp(Σ μ φ) [-]."""
+        """Return the chain rule at the posture of ``tension``.
+
+        ``loss`` (C,) [-] is exp(Σ μ φ) of each cable, or 1 without ``worst_friction``.
+        """
         pose = tension.posture
         turned, grip = pose.q[:, None] * self._limits, np.zeros_like(self._bound)
         if self._rough:

@@ -38,9 +38,9 @@ class Designs(ReadOnlyState, Named):
         problem: The problem.
         designs: The designs (D, n) [m, rad, N, -], a column for each of ``problem.variables``.
         values: Quantities (D, m) in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; a column for each
-            of ``problem.measures``, with its margin for ``problem.tolerances``. NaN where a
-            quantity does not exist.
-        faults: Why the values of a design do not make an arm; empty if they do.
+            of ``problem.measures``. A constrained quantity includes its margin for
+            ``problem.tolerances``. NaN if a quantity does not exist.
+        faults: The reason why no arm can be built from each design; empty if it can be built.
     """
 
     problem: DesignProblem
@@ -67,8 +67,8 @@ class Designs(ReadOnlyState, Named):
     def violations(self) -> Array:
         """Relative violation of each constraint (D, 1 + constraints) [-]; 0 if it is met.
 
-        A violation is relative to the limit. Column 0 is the share of postures and loads that are
-        not held if all must be held; else it is 0.
+        A violation is relative to the limit. Column 0 is the fraction of all pairs of posture and
+        load that are not held. It is 0 if the problem does not require that all are held.
         """
         return violations(self.problem, self.values)
 
@@ -80,14 +80,15 @@ class Designs(ReadOnlyState, Named):
     def to_csv(self) -> str:
         """Return a table as CSV: a row for each design, with variables and all quantities in SI.
 
-        The last columns are 1 for a feasible design, and why a design does not make an arm.
+        The last columns are ``feasible``, 1 or 0, and ``fault``, the reason why no arm can be
+        built.
         """
         columns = self._columns() | {"feasible": self.feasible.astype(int), "fault": self.faults}
         rows = enumerate(zip(*columns.values(), strict=True))
         return csv_text(["design", *columns], ([i, *row] for i, row in rows))
 
     def _columns(self) -> dict[str, Sequence[Any]]:
-        """Return a column for each variable and quantity, headed by its margin and unit."""
+        """Return a column for each variable and quantity, by its heading: name, margin, unit."""
         rows = [self.problem.values(each) for each in self.designs]
         found: dict[str, Sequence[Any]] = {}
         for variable, column in zip(self.problem.variables, zip(*rows, strict=True), strict=True):

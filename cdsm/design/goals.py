@@ -38,7 +38,7 @@ MeasureName = Literal[
 
 
 class Kind(NamedTuple):
-    """How a quantity is named, compared and shown."""
+    """Properties of a kind of quantity: its name, its units, and which values are best."""
 
     words: str  # its name
     unit: str  # SI unit
@@ -147,23 +147,24 @@ class Objective(Measure):
             ``"motor_force"``, ``"payload"``, ``"capacity_margin"``, ``"tension_factor"``,
             ``"cable_clearance"``, ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``,
             ``"held"``, ``"mass"``, ``"length"``, ``"cables"``, ``"joint_range"``,
-            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. The worst
-            value over all postures and loads that are held counts. ``stiffness``, ``softest``,
-            ``isotropy`` and ``margin`` belong to the least tensions under the load.
-            ``deflection`` is |C_vv f| for the force f of the load, to first order; C_vv belongs to
-            the least tensions without the load, since the motors are locked before the load acts,
-            as in :func:`~cdsm.payload` and :func:`~cdsm.weight_test`; inf if the arm is not held
-            without the load. ``payload`` and ``capacity_margin`` are the largest force, besides the
-            load, within the limits of the tensions, along u and in any direction. The
-            ``workspace`` is the volume of the convex hull of the tips. Clearances and wires are as
-            in :func:`~cdsm.clearance`, :func:`~cdsm.wire_use`.
+            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. The value is
+            the worst one over all postures and loads that are held. ``stiffness``, ``softest``,
+            ``isotropy`` and ``margin`` are computed with the least tensions under the load.
+            ``deflection`` is |C_vv f| with the force f of the load, to first order. Its C_vv is
+            computed with the least tensions without the load, since the motors are locked before
+            the load acts, as in :func:`~cdsm.payload` and :func:`~cdsm.weight_test`; it is inf if
+            the arm is not held without the load. ``payload`` is the largest force along u that
+            tensions within the bounds balance in addition to the load; ``capacity_margin`` is the
+            largest force that they balance in every direction. The ``workspace`` is the volume of
+            the convex hull of the tips. Clearances are those of :func:`~cdsm.clearance`, quantities
+            of wires those of :func:`~cdsm.wire_use`.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
-        goal: ``"most"`` or ``"least"``; None: the usual one, e.g. the most stiffness, the least
-            mass.
+        goal: ``"most"`` to maximise, ``"least"`` to minimise; None: the usual one, e.g. the most
+            stiffness, the least mass.
 
     Raises:
         UnknownName: ``of`` or ``goal`` is unknown.
-        InvalidInput: ``direction`` is missing or has no meaning.
+        InvalidInput: ``direction`` is missing, or is given for a quantity without a direction.
     """
 
     goal: Literal["most", "least"] | None = None
@@ -193,7 +194,8 @@ class Constraint(Measure):
 
     Raises:
         UnknownName: ``of`` is unknown.
-        InvalidInput: No limit is given, or two; or ``direction`` is missing or has no meaning.
+        InvalidInput: No limit is given, or two; or ``direction`` is missing, or is given for a
+            quantity without a direction.
     """
 
     at_least: float | None = None
@@ -223,7 +225,7 @@ class Constraint(Measure):
 
     @property
     def asked(self) -> str:
-        """The limit, in words."""
+        """The limit as text, such as ``at most 5 mm``."""
         which = "at most" if self.at_least is None else "at least"
         return f"{which} {self.shown(self.limit)}"
 

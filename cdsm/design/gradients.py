@@ -1,9 +1,9 @@
 """Derivatives of the quantities of a design with respect to its continuous variables.
 
 The kernel of sensitivities gives the derivatives of a stiffness with respect to every hole, disk,
-link, lead and mass at constant tensions, and with respect to the tensions. The tensions depend on
-the design: they are the least that balance the arm. So the derivatives of the least tensions are
-added, and of their bounds, which friction narrows. These derivatives are exact.
+link, lead and mass at constant tensions, and with respect to the tensions. The least tensions
+depend on the design, and so do their bounds, which friction narrows. The derivatives of both are
+added. All these derivatives are exact.
 
 The margin for tolerances contains such derivatives, so its own derivatives are second derivatives.
 They are central differences of exact first derivatives, or one-sided ones at an end of a range; the
@@ -128,7 +128,7 @@ def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> A
 def _reading(K: Stiffness, measure: Measure, posed: Posed, force: Array) -> tuple[float, Array]:
     """Return the quantity ``measure`` of a stiffness, and its derivatives by the variables (n,).
 
-    ``force`` (3,) [N] is that of the load, for a deflection.
+    ``force`` (3,) [N] is the force of the load, which only the deflection needs.
     """
     if measure.of == "deflection":
         value, partial = _displacement(K, force)

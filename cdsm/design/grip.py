@@ -22,13 +22,14 @@ from cdsm.uncertainties.inputs import Inputs, Places, rotations
 
 
 def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> Array:
-    """Compute the derivatives (C, n) of Σ μ φ [-] over the holes of each cable.
+    """Compute the derivatives (C, n) of Σ μ φ [-] of each cable with respect to n variables.
 
     Args:
         pose: The posture.
         inputs: The inputs of its arm.
-        moved: Derivatives (n, …, 3) of all points in the frames of their joints.
-        turned: Derivatives (nv, n) of the joint angles.
+        moved: Derivatives (n, …, 3) of all points with respect to the variables, in the frames of
+            their joints.
+        turned: Derivatives (nv, n) of the joint angles with respect to the variables.
     """
     segments, first = pose.segments, inputs.first
     chains, site = segments.chains, segments._frames.site

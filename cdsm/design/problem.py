@@ -142,9 +142,9 @@ class DesignProblem(ReadOnlyState):
         return tuple(Measure(each.of, each.direction) for each in asked.values())
 
     def in_full(self) -> DesignProblem:
-        """Return the problem with all other quantities as objectives too.
+        """Return the problem with every other quantity added as an objective.
 
-        Quantities with a direction, or for which data are missing, are left out.
+        Left out are quantities that need a direction, or data that are missing.
         """
         full, asked = self, {each.of for each in self.measures}
         for of in get_args(MeasureName):
@@ -155,9 +155,9 @@ class DesignProblem(ReadOnlyState):
 
     @property
     def needs_all(self) -> bool:
-        """Whether a design is feasible only if tensions balance the arm at every posture.
+        """Whether a design is feasible only if all postures are held under all loads.
 
-        Not if the problem asks how many postures can be balanced: ``held``, ``workspace``.
+        It is False if an objective or a constraint is on ``held`` or ``workspace``.
         """
         asked = {each.of for each in (*self.objectives, *self.constraints)}
         return not asked & {"held", "workspace"}
@@ -207,7 +207,7 @@ class DesignProblem(ReadOnlyState):
 
         Raises:
             InvalidInput: As for :meth:`values`.
-            GeometryError: The values do not make an arm; the error lists every fault.
+            GeometryError: No valid arm has these values; the error lists every fault.
         """
         new = changed(self.arm.geometry, self.variables, self.values(design))
         old = self.arm.cables
@@ -286,9 +286,9 @@ class DesignProblem(ReadOnlyState):
 
 
 def _with_holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
-    """Return the sites of ``cable``, its holes with friction and wrap of the holes of ``other``.
+    """Return the sites of ``cable`` with the friction and the wrap of the holes of ``other``.
 
-    A hole that ``other`` does not pass has the friction of the nearest hole that it passes.
+    A hole that ``other`` does not pass gets the friction of the nearest hole that it passes.
     """
     sites, known = list(cable.sites), other._holes
     for i in cable._holes if known else ():

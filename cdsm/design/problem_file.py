@@ -103,22 +103,23 @@ class ProblemFile(NamedTuple):
 
 
 def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
-    """Read a design problem from a PROBLEM.toml; all in SI: m, rad, N, N/m, kg.
+    """Read a design problem from a PROBLEM.toml; all numbers are in SI: m, rad, N, N/m, kg.
 
-    ``arm`` is an ARM.toml, from the folder of the file. ``[postures]`` has ``random`` (a number,
-    and ``seed``), ``grid`` (angles [rad] by joint) or ``angles`` (a list of postures). ``loads`` is
-    a list of wrenches (6 numbers) or forces (3). ``[[variables]]``, ``[[objectives]]`` and
-    ``[[constraints]]`` have the attributes of :class:`Variable` (``joint`` or ``cable`` for
-    ``at``), :class:`Objective` and :class:`Constraint`. ``tolerances`` is a file of
+    ``arm`` is the path of an ARM.toml, relative to the folder of the file. ``[postures]`` has
+    ``random`` (a number, and ``seed``), ``grid`` (angles [rad] by joint) or ``angles`` (a list of
+    postures). ``loads`` is a list of wrenches (6 numbers) or forces (3). The keys of
+    ``[[variables]]`` are the attributes of :class:`Variable`, with ``joint`` or ``cable`` instead
+    of ``at``. The keys of ``[[objectives]]`` and ``[[constraints]]`` are the attributes of
+    :class:`Objective` and :class:`Constraint`. ``tolerances`` is the path of a file of
     :class:`Tolerances`. ``[search]`` has ``generations``, ``population`` and ``seed``. All other
-    keys are as for :class:`DesignProblem`.
+    keys are attributes of :class:`DesignProblem`.
 
     Args:
         path: The file; ``examples/design.toml`` is one with comments.
 
     Raises:
-        FileError: The file, or one that it names, cannot be read, or is no problem; lists every
-            fault.
+        FileError: The file, or one that it names, cannot be read, or does not describe a design
+            problem; lists every fault.
     """
     text = read_text(path)
     folder = Path(path).parent

@@ -40,7 +40,7 @@ _SURE: dict[str, tuple[Reading, float]] = {
 
 
 class Found(NamedTuple):
-    """Quantities (m,) of one design, and why it does not make an arm (empty if it does)."""
+    """Quantities (m,) of one design, and the reason why no arm can be built from it, or ``""``."""
 
     values: Array
     fault: str = ""
@@ -68,7 +68,7 @@ def balanced(
 ) -> Iterator[tuple[Tension, Array]]:
     """Yield the least tensions at each posture under each of ``loads`` (n, 6) [N, N m].
 
-    With them, exp(Σ μ φ) (C,) of the cables.
+    Each item also has exp(Σ μ φ) of the cables (C,), which is 1 without ``worst_friction``.
     """
     bounds, worst = (problem.minimum_of(design), problem.maximum), problem.worst_friction
     for q in problem.postures_of(arm):
@@ -100,7 +100,7 @@ class _Arm:
             self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter, 1)
 
     def _evaluated(self, loads: Array) -> tuple[Batch, NDArray[np.bool_]]:
-        """Evaluate the R postures under ``loads`` (R, 6), and whether each is stable."""
+        """Evaluate the R postures under ``loads`` (R, 6); also return which are stable."""
         found = evaluate(
             self.arm,
             self.q,
@@ -118,7 +118,7 @@ class _Arm:
         return np.array([self._value(each) for each in self.problem.measures])
 
     def rows(self, each: Measure) -> Array:
-        """Return a quantity that depends on tensions, at the R postures and loads that are held."""
+        """Return a quantity that depends on tensions, for each held posture and load."""
         held, problem = self.held, self.problem
         C = self.found["compliance"][held][:, :3, :3]
         if each.of == "stiffness":
@@ -176,10 +176,10 @@ class _Arm:
         return float(rows[worst]) + self._margin(each, worst)
 
     def _margin(self, each: Measure, worst: int) -> float:
-        """Return ± coverage · u, u the standard uncertainty of a quantity at its worst posture.
+        """Return the margin ± coverage · u of a quantity, or 0 if it has none.
 
-        It is 0 if the quantity has no margin. ``worst`` is the index of the posture and load in
-        :meth:`rows`.
+        u is the standard uncertainty at the worst posture and load, which have the index ``worst``
+        in :meth:`rows`.
         """
         if not has_margin(self.problem, each):
             return 0.0
@@ -191,7 +191,10 @@ class _Arm:
 
 
 def has_margin(problem: DesignProblem, each: Measure) -> bool:
-    """Whether a quantity has a margin: it has a constraint, and the problem has tolerances."""
+    """Whether a quantity has a margin for tolerances.
+
+    It has one if a constraint is on it, the problem has tolerances, and it is one of :data:`_SURE`.
+    """
     bounded = any(constraint.key == each.key for constraint in problem.constraints)
     return bounded and problem.tolerances is not None and each.of in _SURE
 

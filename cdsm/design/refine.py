@@ -33,15 +33,17 @@ def refine_design(
 ) -> DesignSearch:
     """Improve a design of continuous variables by SLSQP (Kraft, 1988), with exact derivatives.
 
-    The objective is the worst value over postures and loads, which has kinks. So SLSQP solves the
-    smooth problem min t with t ≥ the objective, and with each constraint, at every posture and
-    load. A step to a design that does not hold all postures is shortened. The result is a minimum
-    near the start; see :func:`search_designs` for the whole range.
+    The objective is the worst value over postures and loads, which has kinks. So SLSQP solves a
+    smooth problem: it minimises t, where t is at least the objective (negated if it is maximised)
+    at every posture and load, and each constraint is met at all of them. A step to a design that
+    does not hold all postures is shortened. The result is a minimum near the start; see
+    :func:`search_designs` for the whole range.
 
-    The derivatives are exact, also those of the bounds that ``worst_friction`` narrows; where a
-    cable goes straight through a hole, its wrap angle has a kink, and the mean of both sides is
-    taken. With ``tolerances``, each posture and load keeps its own margin, coverage · u; its
-    derivative is a central difference of u, which is computed from exact first derivatives.
+    The derivatives are exact, including those of the bounds that ``worst_friction`` narrows. If a
+    cable goes straight through a hole, its wrap angle has a kink; the mean of the derivatives on
+    both sides is then used. With ``tolerances``, each posture and load keeps its own margin,
+    coverage · u; its derivative is a central difference of u, which is computed from exact first
+    derivatives.
 
     Args:
         problem: The problem; its variables are continuous, it has one objective, and all quantities
@@ -110,9 +112,9 @@ class _PostureNotHeld(Exception):
 class _SmoothProblem:
     """The smooth problem: min t with all conditions c(y) + a t ≥ 0, at every posture and load.
 
-    y (n,) is the design, each variable over its range: 0 to 1. The first conditions are those of
-    the objective: t − objective, over ``scale``; a = 1. The others have a = 0: they are the
-    distances from the limits, over the limits.
+    y (n,) is the design, with each variable scaled to 0…1. The first conditions are those of the
+    objective, t − objective/``scale`` ≥ 0, with a = 1. The others are those of the constraints,
+    with a = 0: c is the distance of a quantity from its limit, divided by the limit.
 
     Attributes:
         visited: All designs (n,) for which the conditions were computed.

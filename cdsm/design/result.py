@@ -118,9 +118,10 @@ class DesignSearch(ReadOnlyState):
         """Write a design as ``arm.toml``, ``arm.urdf``, ``arm.xml`` and tables; return their paths.
 
         ``holes.csv`` has each hole of each disk. ``cables.csv`` has the lengths of each cable, lead
-        included: of the straight arm, the shortest and the longest within the joint limits (the
-        cut), and the stroke, which the motor winds between them. They are geometric lengths: the
-        stretch by the tension is not taken off, and what fixes both ends comes on top.
+        included: of the straight arm, and the shortest and the longest (the cut) within the joint
+        limits. The stroke is the difference of these two, which the motor winds. They are geometric
+        lengths: the stretch under tension is not subtracted, and the wire needed to fix both ends
+        is not included.
 
         Args:
             folder: The folder; it is made.
@@ -146,8 +147,8 @@ class DesignSearch(ReadOnlyState):
     ) -> Designs:
         """Evaluate the designs of the front in every quantity for which the problem has the data.
 
-        ``measured().to_csv()`` is the table of the front; ``evaluated.to_csv()`` that of all
-        designs, in the quantities of the problem.
+        ``measured().to_csv()`` is the table of the front, with all these quantities.
+        ``evaluated.to_csv()`` is the table of all designs, with the quantities of the problem only.
 
         Args:
             jobs: Number of processes, as for :func:`evaluate_designs`.
@@ -177,7 +178,7 @@ class DesignSearch(ReadOnlyState):
         )
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table of the front in SI, a row per design; MissingExtra without pandas."""
+        """Return a table of the front in SI, a row per design; needs pandas (MissingExtra)."""
         names = [str(i) for i in range(len(self.front))]
         return data_frame(self._front._columns(), "design", names)
 
@@ -195,7 +196,7 @@ class DesignSearch(ReadOnlyState):
     def plot(self) -> Figure:
         """Plot two or three objectives of all designs, with the front and :attr:`compromise`.
 
-        With one objective: its best value over the number of designs.
+        With one objective: its best value against the number of designs.
         """
         return cdsm.plots.plot_designs(self)
 
@@ -215,7 +216,7 @@ class DesignSearch(ReadOnlyState):
         return self._text(self.compromise)
 
     def _text(self, chosen: int) -> str:
-        """Return the printed table, with design ``chosen`` of the front in it."""
+        """Return the printed table of the front; it includes design ``chosen``."""
         problem, feasible = self.problem, int(self.evaluated.feasible.sum())
         shown, count = self._spread(_PRINTED, chosen), len(self.front)
         more = f", {len(shown)} shown" if len(shown) < count else ""
@@ -233,9 +234,9 @@ class DesignSearch(ReadOnlyState):
         return "\n".join([head, *aligned(self._table(shown)), *asked, *notes])
 
     def _spread(self, most: int, *also: int) -> list[int]:
-        """Return numbers of up to ``most`` designs spread over the front, and those of ``also``.
+        """Return the numbers of up to ``most`` designs spread over the front.
 
-        The compromise is always among them.
+        The compromise and the designs ``also`` are always among them.
         """
         count = len(self.front)
         even = np.linspace(0, count - 1, min(count, most)).round().astype(int)

@@ -54,12 +54,12 @@ class Variable:
     """Design variable: a quantity of an arm that a search may choose.
 
     Attributes:
-        of: ``"hole_radius"``, ``"disk_offset"``, ``"link_length"`` [m]: of one joint or of all.
-            A link keeps its mass per length. ``"lead"`` [m]: of the cables of one joint or of all.
-            ``"phase"`` [rad]: added to the hole angles of the cables of one joint or of all.
-            ``"hole_angle"`` [rad]: of one cable. ``"end"``: number of the joint at which a cable
-            ends: the routing. ``"cables_per_joint"``: number of evenly spaced cables of each joint.
-            ``"wire"``: of all cables. ``"minimum"`` [N]: lower bound of all tensions.
+        of: ``"hole_radius"``, ``"disk_offset"``, ``"link_length"`` [m]: of one joint or of all
+            joints; a link keeps its mass per length. ``"lead"`` [m]: of the cables of one joint or
+            of all joints. ``"phase"`` [rad]: angle added to the hole angles of these cables.
+            ``"hole_angle"`` [rad]: of one cable. ``"end"``: number of the joint at which one cable
+            ends. ``"cables_per_joint"``: number of evenly spaced cables of each joint. ``"wire"``:
+            wire of all cables. ``"minimum"`` [N]: lower bound of all tensions.
         low: Smallest value, in SI: [m], [rad] or [N]; None with ``choices``.
         high: Largest value, in SI: [m], [rad] or [N]; None with ``choices``.
         at: Number of the joint, or name of the cable, that is changed; None: all.
@@ -67,7 +67,8 @@ class Variable:
 
     Raises:
         UnknownName: ``of`` is unknown.
-        InvalidInput: The range is empty or not of numbers; ``at`` is missing or has no meaning.
+        InvalidInput: The range is empty or not of numbers; ``at`` is missing, or is given for a
+            variable that has one value for the arm.
     """
 
     of: VariableName
@@ -156,7 +157,7 @@ class Changed(NamedTuple):
 def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[Value]) -> Changed:
     """Return the parts of the arm in which ``variables`` have ``values`` [SI].
 
-    GeometryError if the values make no arm.
+    Raises GeometryError if no valid geometry has these values.
     """
     wire: Wire | None = None
     minimum, common = None, geometry.hole_radius
@@ -207,7 +208,7 @@ def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:
-    """Return ``count`` evenly spaced cables per joint, otherwise like the joint's first cable."""
+    """Return ``count`` evenly spaced cables per joint, else equal to the joint's first cable."""
     n = len(geometry.joints)
     if all(len(joint.axes) == 2 for joint in geometry.joints):
         angles = evenly_spaced(n, count)
@@ -222,10 +223,10 @@ def _even(geometry: Geometry, count: int) -> list[CableRoute]:
 
 
 def present(variable: Variable, geometry: Geometry, minimum: float) -> float:
-    """Return the present value of a variable in an arm [SI].
+    """Return the current value of a variable in an arm [SI].
 
-    ``minimum`` is the present lower bound of all tensions [N]. NaN if joints or cables have
-    different values, or for a wire.
+    ``minimum`` is the current lower bound of all tensions [N]. The result is NaN for a wire, or if
+    joints or cables have different values.
     """
     own = [
         [cable for cable in geometry.cables if cable.joint == k]

@@ -40,10 +40,10 @@ def hole_table(arm: Manipulator) -> str:
 def cable_table(arm: Manipulator) -> str:
     """Return a CSV with a row for each cable: wire, lead, and lengths in mm.
 
-    All lengths include the lead. ``straight`` is that of the straight arm, ``shortest`` and ``cut``
-    are the extremes within the joint limits, ``stroke`` is what the motor winds between them. The
-    lengths are those between the ends without stretch. An allowance for fixing both ends comes on
-    top.
+    All lengths include the lead. ``straight`` is the length in the straight arm, ``shortest`` and
+    ``cut`` are the shortest and the longest within the joint limits, and ``stroke``, which the
+    motor winds, is their difference. The lengths are without stretch, and without the wire needed
+    to fix both ends.
     """
     straight = arm.cable_lengths(np.clip(0.0, arm.lower, arm.upper))
     rows = []
@@ -59,8 +59,8 @@ def cable_table(arm: Manipulator) -> str:
 def _extremes(arm: Manipulator, c: int) -> tuple[float, float]:
     """Return the shortest and the longest length [m] of cable ``c`` within the joint limits.
 
-    A segment crosses at most one joint, so the length is a sum of a term for each joint. A search
-    along the length's gradient begins where each joint, alone, is best of its limits and zero.
+    A segment crosses at most one joint, so the length is a sum of a term for each joint. For each
+    joint alone, the best of its limits and zero is chosen; from there, a gradient search follows.
     """
     from scipy.optimize import minimize  # slow to import
 

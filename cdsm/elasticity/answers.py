@@ -37,10 +37,11 @@ def _answer(
     named: str,
     needed: str,
 ) -> Array:
-    """Return what ``function`` of a law gives at F [N], in its shape.
+    """Return what ``function`` of a law gives at ``tension`` F [N], checked.
 
-    InvalidInput if it raises its own error, or if a number is not within ``allowed``. The message
-    has the answer in the braces of ``named``, and what is ``needed``.
+    InvalidInput if ``function`` fails, or if its answer has another shape than F or a number
+    outside ``allowed``. ``named`` is the name of the answer in the message, which stands at its
+    braces; ``needed`` says what is needed.
     """
     try:
         answer = np.asarray(function(tension))

@@ -1,4 +1,4 @@
-"""Invert a rising function of the tension, such as the strain of a law."""
+"""Invert an increasing function of the tension, such as the strain of a law."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def tension_at(
     slope: Callable[[Array], Array],
     name: str,
 ) -> Array:
-    """Find the tensions F [N] at which a rising function stretch(F) has the wanted values.
+    """Find the tensions F [N] at which an increasing function stretch(F) has the wanted values.
 
     ``wanted`` is a strain [-] or an elongation [m] of any shape; the error calls it ``name``.
     ``stretch`` is zero or less at the low end of ``domain``, and ``slope`` is its derivative.

@@ -53,7 +53,7 @@ class Elasticity(ABC):
         return write_elasticity(self, path)
 
     def plot(self) -> Figure:
-        """Plot tangent and secant rigidity [kN] over the tension [N]."""
+        """Plot tangent and secant rigidity [kN] against the tension [N]."""
         return cdsm.plots.plot_elasticity(self)
 
     @property
@@ -135,7 +135,7 @@ class Elasticity(ABC):
 
         Raises:
             InvalidInput: ``strain`` is not numbers.
-            ElasticityRangeError: For a strain there is no tension in the domain.
+            ElasticityRangeError: No tension in the domain gives one of the strains.
         """
         wanted = number_array("strain", strain)
         return tension_at(
@@ -156,7 +156,7 @@ class Elasticity(ABC):
 
 
 def checked_law(law: object) -> Elasticity:
-    """Return the law of a cable; InvalidInput if it is no Elasticity, or its domain no Domain."""
+    """Return the law of a cable; InvalidInput if it or its domain has a wrong type."""
     if not isinstance(law, Elasticity):
         raise InvalidInput(
             "elasticity",

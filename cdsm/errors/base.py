@@ -18,7 +18,10 @@ def counted(faults: Sequence[str], most: int | None = None) -> str:
 
 
 def first_of(said: Sequence[str], most: int, what: str) -> str:
-    """Return the first ``most`` texts, and how many ``what`` follow: ``…; and 3 joints more``."""
+    """Return the first ``most`` texts and the number of the others: ``…; and 3 joints more``.
+
+    ``what`` is the noun, such as ``joints``.
+    """
     more = len(said) - most
     return "; ".join(said[:most]) + (f"; and {more} {what} more" if more > 0 else "")
 

@@ -149,8 +149,8 @@ class JointLimitError(CdsmError, ValueError):
     Attributes:
         problem: Text that names the first few angles beyond their limits.
         joints: Names of the joints beyond their limits.
-        angles: Angles of these joints [rad]; [m] where a joint slides.
-        limits: Limits (lower, upper) of these joints [rad]; [m] where a joint slides.
+        angles: Angles of these joints [rad]; [m] for prismatic joints.
+        limits: Limits (lower, upper) of these joints [rad]; [m] for prismatic joints.
     """
 
     def __init__(

@@ -44,12 +44,14 @@ class InfeasibleTension(CdsmError):
     """No cable tension within the bounds balances the arm at this posture.
 
     Attributes:
-        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] where a joint slides). The
-            tensions within the bounds are chosen so that the sum of its magnitudes is smallest.
+        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] for prismatic joints). It
+            is computed for the tensions within the bounds for which the sum of its magnitudes is
+            smallest.
         joint: Name of the joint with the largest missing torque.
-        relaxation: Widening of the bounds of all cables without a fixed tension that makes the
-            problem feasible [N]; inf if none does.
-        binding: Names of the cables at a bound with these tensions; fixed ones are left out.
+        relaxation: Least amount by which the bounds of all cables without a fixed tension must be
+            widened to make the problem feasible [N]; inf if this is not possible.
+        binding: Names of the cables without a fixed tension that are at a bound under these
+            tensions.
         fixed: Names of the cables with fixed tensions, if these make the problem infeasible; else
             empty.
     """
@@ -133,7 +135,7 @@ class EquilibriumError(CdsmError, ArithmeticError):
     """A loaded arm that has no equilibrium, or that buckles before the full load.
 
     Attributes:
-        residual: Torque residual at the last iterate (nv,) [N m]; [N] where a joint slides.
+        residual: Torque residual at the last iterate (nv,) [N m]; [N] for prismatic joints.
         load_factor: Largest fraction of the load [-] at which the arm was in equilibrium.
         joint: Name of the joint with the largest residual, or of the joint that buckles first.
     """
@@ -202,10 +204,10 @@ class InfeasibleDesign(CdsmError):
     """No design that a search tried meets all constraints of its problem.
 
     Attributes:
-        constraints: Names of the constraints that the nearest design violates; ``held``: at some
-            postures the arm cannot be balanced or is unstable.
-        design: The nearest design, one number for each variable; empty if no design gives a valid
-            arm.
+        constraints: Names of the constraints that the nearest design violates; the name ``held``
+            means that at some postures the arm cannot be balanced or is unstable.
+        design: The nearest design, the one with the smallest sum of violations, as one number for
+            each variable; empty if no design gives a valid arm.
     """
 
     def __init__(self, message: str, constraints: Sequence[str], design: Sequence[float]) -> None:

@@ -37,10 +37,10 @@ class RestBand(ReadOnlyState):
 
     The reference is the posture of ``stiffness``, with one tension in all segments of each cable.
     If ``proved``, ``low`` and ``high`` bound all states of rest in a neighbourhood of the
-    reference: ``room`` times the set of all states that are at rest to first order. The same is
-    true of ``tensions``, ``end_tensions`` and ``loads``, which raise SolverError or
-    ElasticityRangeError if they cannot be proved. A simulation may come near to these bounds, but
-    not beyond.
+    reference. This neighbourhood is the set of all states that are at rest to first order, scaled
+    by ``room``. The same is true of ``tensions``, ``end_tensions`` and ``loads``, which raise
+    SolverError or ElasticityRangeError if they cannot be proved. A simulation may come near to
+    these bounds, but never exceeds them.
 
     Attributes:
         stiffness: Frictionless K of the reference, with its posture, tensions and wrench.
@@ -52,7 +52,7 @@ class RestBand(ReadOnlyState):
             order [-]; 0 if no cable can stick at the reference: it is then the only state of rest.
         proved: Whether ``low`` and ``high`` are proved. False if no neighbourhood is large enough,
             because second-order terms are as large as the band. Then both hold to first order only,
-            and the tip may rest some percent beyond them. The paper's arm with a lead of 0.3 m is
+            and the tip may rest a few percent beyond them. The paper's arm with a lead of 0.3 m is
             proved while friction turns no joint by more than 0.7°: with Eq. 19 from 30 to 80 N at μ
             = 0.1 and from 15 to 120 N at μ = 0.05, and with EA = 48 kN up to μ = 0.3 at 50 N.
     """
@@ -78,7 +78,10 @@ class RestBand(ReadOnlyState):
 
     @cached_property
     def tensions(self) -> Array:
-        """Least and largest tension (S, 2) [N] of each segment at rest; some ms per segment."""
+        """Least and largest tension (S, 2) [N] of each segment at rest.
+
+        The computation takes a few milliseconds per segment.
+        """
         return self._tensions(range(len(self.stiffness.posture.segments.lengths)))
 
     @cached_property
@@ -128,7 +131,7 @@ def rest_band(
         wrench: W (6,), the load that acts now, as for :func:`~cdsm.stiffness`.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is no direction.
+        InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is not a direction.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
         SingularStiffness: K_θ is singular.
     """

@@ -1,8 +1,8 @@
 """Breakaway: the load at which the first cable of a stuck arm begins to slide in a hole.
 
-To first order it is the least of the loads W_i at which the cable begins to slide in hole i
-(:mod:`cdsm.sticking`). From there, Newton's method finds the load at which the loaded arm, with all
-its cables stuck, reaches the friction bound of a hole.
+W_i is the load at which, to first order, the cable begins to slide in hole i
+(:mod:`cdsm.sticking`). Newton's method starts at the smallest W_i. It finds the load at which the
+arm, with all its cables stuck, reaches the friction bound of a hole.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def breakaway(
 ) -> Breakaway:
     """Compute the force along a direction at which the first cable begins to slide in a hole.
 
-    All segments of a cable start with its tension, as after some shaking of the arm, and motors are
-    locked. A weight below this load measures :func:`stuck_stiffness`.
+    All segments of a cable start with its tension, as after shaking the arm, and motors are locked.
+    A weight below this load measures :func:`stuck_stiffness`.
 
     Args:
         pose: The posture.
@@ -96,7 +96,7 @@ def breakaway(
         wrench: As for :func:`~cdsm.stiffness`.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is no direction.
+        InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is not a direction.
         ElasticityRangeError: A tension leaves the domain of its cable's elasticity.
         SingularStiffness: The stuck arm is about to buckle.
         EquilibriumError: The stuck arm buckles below the load found.

@@ -56,7 +56,7 @@ class ChainProblem:
         cables: Cables of the arm.
         start: First segment of each cable; the last entry is the number of segments (C+1,).
         tension: F (C,) [N] at which the natural lengths are defined.
-        unstrained: Whether ε is the strain of the law; if not, it is the strain beyond that at
+        unstrained: Whether ε is the strain of the law. If not, ε is this strain minus the strain at
             ``tension``.
 
     Attributes:
@@ -95,8 +95,9 @@ class ChainProblem:
         """Solve for the tensions of segments of ``length`` l (S,) [m] with friction in their holes.
 
         ``natural`` (S,) [m] are the natural lengths before wire slips. ``ratio`` (S,) is exp(μ φ)
-        of the hole to the next segment, 1 if there is none. ``forced`` (C,) [N] is the tension of
-        force-controlled motors, NaN for others. The search starts at ``near`` (S,) [N].
+        of the hole between a segment and the next one, 1 for the last segment of a cable.
+        ``forced`` (C,) [N] is the tension of force-controlled motors, NaN for others. The search
+        starts at ``near`` (S,) [N].
         """
         T = near
         for attempt in range(_ITERATIONS):
@@ -157,7 +158,7 @@ class ChainProblem:
         )
 
     def _shortened(self, T: Array, new: Array, length: Array, natural: Array) -> Array:
-        """Return tensions (S,) [N] between ``T`` and ``new``, near the least Σ D_j(ln T_j) there.
+        """Return tensions (S,) [N] between ``T`` and ``new`` with about the least Σ D_j(ln T_j).
 
         D_j is that of :mod:`cdsm.kernels.chain_problem`. The sum is convex on a line in ln T.
         """

@@ -18,16 +18,17 @@ class Neighbourhood:
     """States near a reference: ``room`` times the set of all states at rest to first order.
 
     δ is the change of the joint angles, ΔT_j the change of tension of segment j, and g_j the
-    gradient of its length. In a cable of tension F, ΔT_j = F (y_j + ȳ), with ȳ the mean of ΔT_j/F,
-    weighted with the compliances of the segments. If the motor is locked, F ȳ = k Σ_j g_j·δ, with k
-    the stiffness of the whole cable. Equilibrium becomes K_θ δ = −Σ_j F y_j g_j with the
-    frictionless K_θ. From segment to segment, y changes by any amount within ±μ φ of the hole. A
-    linear function of y is therefore largest with +μ φ or −μ φ at each hole: a closed form.
+    gradient of its length. In a cable of tension F, ΔT_j = F (y_j + ȳ): ȳ is the mean of ΔT_j/F,
+    weighted with the compliances of the segments, and y_j is the deviation from ȳ. If the motor is
+    locked, F ȳ = k Σ_j g_j·δ, with k the stiffness of the whole cable. Equilibrium becomes K_θ δ =
+    −Σ_j F y_j g_j with the frictionless K_θ. From segment to segment, y changes by any amount
+    within ±μ φ of the hole. A linear function of y is therefore largest with +μ φ or −μ φ at each
+    hole: a closed form.
 
     Attributes:
         joints: Largest |δ| (nv,) [rad].
         tensions: Largest ΔT (S,) [N].
-        falls: Largest −ΔT (S,) [N]; no tension is negative.
+        falls: Largest −ΔT (S,) [N], at most F, since no tension is negative.
     """
 
     def __init__(self, K: Stiffness, room: float) -> None:
@@ -57,9 +58,9 @@ class Neighbourhood:
         self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
     def still(self, K: Stiffness) -> Self:
-        """Return the states at the joint angles of the reference ``K``; only tensions differ.
+        """Return the states with the joint angles of the reference ``K``; only tensions vary.
 
-        Over the holes of a cable, |ln T/F| ≤ Σ μ φ.
+        In each cable, |ln T/F| is at most Σ μ φ over its holes.
         """
         segments = K.posture.segments
         chains, grip = segments.chains, np.zeros(len(segments.lengths))

@@ -30,9 +30,9 @@ _ITERATIONS = 30  # steps of a fixed point that converges by a factor of ten or 
 class Remainders:
     """Bounds of the remainders of Taylor expansions in the neighbourhood |δ| ≤ ρ.
 
-    δ is the change of the joint angles. A prismatic joint counts as a rotation by ρ/r with the
-    lever r, which moves points as far. Each attribute bounds the difference between a quantity and
-    its expansion.
+    δ is the change of the joint angles. A motion ρ of a prismatic joint is treated as a rotation by
+    ρ/r about an axis at the distance r, which moves points as far. Each attribute bounds the
+    difference between a quantity and its expansion.
 
     Attributes:
         length: Length of each segment, expanded to second order (S,) [m].
@@ -114,8 +114,8 @@ class Bends:
 def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> tuple[float, Array]:
     """Bound the remainders of the tip displacement [m] and of the torques of weight and wrench.
 
-    Joint motions are ``within`` |δ| ≤ ρ (nv,); ``slides`` marks prismatic joints. The bounds of the
-    torques are (nv,) [N m].
+    ``within`` is ρ (nv,), the bound of the joint motions |δ|. ``slides`` marks prismatic joints.
+    The bounds of the torques are (nv,) [N m].
     """
     model, pose = K.posture.arm._model, K.posture
     masses, tree = model.masses, model.tree

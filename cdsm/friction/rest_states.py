@@ -18,7 +18,7 @@ contains all states of rest in the neighbourhood (outer correction):
 - Over a range |ΔT| ≤ ρ_T of tensions, 1/(1 + ε) falls, and lies between two parallel lines.
 - Products of δ and ΔT are at most those of ρ and ρ_T.
 
-The maximum that the solver returns is no proof. Its multipliers give one, by weak duality.
+The maximum that the solver returns is not a proof. Its multipliers give one, by weak duality.
 """
 
 from __future__ import annotations
@@ -164,10 +164,11 @@ class RestStates:
 def _locked(
     K: Stiffness, c: int, near: Neighbourhood, far: Remainders, H: Array, straight: Array
 ) -> tuple[Array, tuple[float, float]]:
-    """Return the equation of the locked motor of cable ``c``: b(F) Σ g·δ + Σ l b′ ΔT + slack = 0.
+    """Return the linear equation of the wire of cable ``c``, whose motor is locked.
 
-    It is a row (1, nv + S) for δ/ρ and ΔT/ρ_T, and the bounds of its slack. H (S, nv, nv) are the
-    Hessians of the lengths l, and ``straight`` (S,) the largest |g·δ|.
+    b(F) Σ g·δ + Σ l b′ ΔT + slack = 0 with b = 1/(1 + ε). It is a row (1, nv + S) for δ/ρ and
+    ΔT/ρ_T, and the bounds of its slack. H (S, nv, nv) are the Hessians of the lengths l, and
+    ``straight`` (S,) the largest |g·δ|.
     """
     pose, cable = K.posture, K.posture.arm.cables[c]
     segments, apart, nv = pose.segments, near.tensions, near.joints.size
@@ -228,7 +229,7 @@ def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tupl
 
 
 class _Wire(NamedTuple):
-    """Bounds of b = 1/(1 + ε) of a cable over its range of tensions: two parallel lines.
+    """Two parallel lines that bound b = 1/(1 + ε) of a cable over its range of tensions.
 
     b_F + slope ΔT + below ≤ b ≤ b_F + slope ΔT + above, and |b − b_F| ≤ change.
     """
@@ -245,7 +246,7 @@ class _Wire(NamedTuple):
     def of(cls, cable: Cable, F: float, fall: float, rise: float, unstrained: bool) -> _Wire:
         """Bound b for tensions of a locked cable from F − fall to F + rise [N].
 
-        If not ``unstrained``, ε is the strain beyond that under F.
+        If not ``unstrained``, ε is the strain minus the strain under F.
         """
         law = cable.elasticity
         strain = float(law.strain(F))

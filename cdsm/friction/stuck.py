@@ -31,7 +31,7 @@ def stuck_stiffness(
     semidefinite.
 
     Arguments and errors are those of :func:`~cdsm.stiffness`. All segments of a cable have its
-    tension, as after some shaking of the arm.
+    tension, as after shaking the arm.
     """
     F, W = checked_tension(pose, tension, wrench)
     T = F[pose.segments.chains.cable]

@@ -79,9 +79,10 @@ def _short_links(geometry: Description) -> list[str]:
 
 
 def doubts_about_units(length: float, sizes: Iterable[tuple[str, float, float]] = ()) -> list[str]:
-    """Return a doubt about the unit of lengths, as text in a list, if there is one.
+    """Return a doubt about the unit of lengths as a text in a list; the list may be empty.
 
-    ``length`` is that of the arm, ``sizes`` are words, a size, and its largest plausible value [m].
+    ``length`` is that of the arm [m]. Each of ``sizes`` is a description, a size and its largest
+    plausible value [m].
     """
     if 0.0 < length < _SHORTEST:
         return [

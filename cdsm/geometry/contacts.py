@@ -15,11 +15,12 @@ _TOUCHING = 1e-3  # a gap below this fraction of the radius counts as an overlap
 
 
 def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[str, str]]:
-    """Return the pairs of links whose bodies overlap; neighbours are left out.
+    """Return the pairs of links whose bodies overlap; neighbouring links are not checked.
 
     The body of a link is the cylinder from its first disk to its last, with the larger of their
-    radii; ``poses`` has the pose (4, 4) of each link. A point is projected onto both cylinders of a
-    pair in turn. As both are convex, the distance of its two last places converges to their gap.
+    radii; ``poses`` has the pose (4, 4) of each link. A point is projected alternately onto the two
+    cylinders of a pair. Both are convex, so the distance between the last two projections converges
+    to the gap between the cylinders.
     """
     links = list(poses)
     apart = [(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1]
@@ -47,7 +48,8 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
     """Return the points (n, 3) of n solid cylinders that are nearest to ``points`` (n, 3) [m].
 
-    A cylinder has the unit vector ``axis``, half its length ``half`` and its ``radius`` [m].
+    Each cylinder has its ``centre``, the unit vector ``axis``, ``half`` of its length and its
+    ``radius`` [m].
     """
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)

@@ -97,8 +97,9 @@ class Geometry(Description):
             link_mass: Mass of every link [kg].
             lead: Straight cable between each actuator and the base disk [m].
             friction: Friction coefficient μ of the cables [-], as in :class:`CableRoute`.
-            joint_limit: Largest angle about each axis in both directions [rad]. None: until disks
-                of radius r touch, 2 atan(h/r), at most 80°; r is ``disk_radius``, or else R.
+            joint_limit: Largest angle about each axis in both directions [rad]. None: the angle
+                2 atan(h/r) at which disks of radius r touch, at most 80°; r is ``disk_radius``, or
+                else R.
             disk_radius: Outer radius of the disks [m]; None: 1.1 times that of the farthest hole.
             cable_radius: Distance of the holes from the axis on all disks [m], for the cables of
                 each joint, e.g. on an inner ring; None: the ``hole_radius`` of each disk.
@@ -232,7 +233,7 @@ class Geometry(Description):
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
         """Build a geometry from TOML text: see :meth:`read`; ``source`` names its file in errors.
 
-        Raises GeometryError, which lists every fault, if the text is no TOML or no geometry.
+        Raises GeometryError, which lists every fault, if the text is not TOML or not a geometry.
         """
         instance("text", text, str)
         try:

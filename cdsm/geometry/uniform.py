@@ -48,7 +48,8 @@ def uniform(
     """Return the attributes of the Geometry of a uniform arm; GeometryError if one is invalid.
 
     ``axes`` has the axes of each joint, ``keywords`` are those of :meth:`Geometry.universal`.
-    ``usual_angles`` returns the hole angles of each joint for a number of cables per joint.
+    ``usual_angles`` is a function that returns the default hole angles of each joint for a number
+    of cables per joint.
     """
     cables_per_joint, hole_angles = keywords["cables_per_joint"], keywords["hole_angles"]
     sizes = {key: keywords[key] for key in _SIZES}
@@ -110,7 +111,7 @@ def uniform(
 
 
 def _without_angles(hole_angles: Sequence[float | Sequence[float]]) -> str:
-    """Return the lists of hole angles that are empty, by name; an empty text if none is."""
+    """Return the names of the empty lists of hole angles as text; empty if no list is empty."""
     lists = [each for each in hole_angles if isinstance(each, Sequence)]
     if not hole_angles or (lists and not any(lists)):
         return "hole_angles"

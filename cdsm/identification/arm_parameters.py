@@ -46,8 +46,8 @@ class ArmParameters:
     A parameter belongs to all joints or links (``"hole_radius"``), or to one, counted from the base
     (``"hole_radius@2"``). ``lead``, ``friction``, ``rigidity`` and ``spring`` with a number belong
     to the cables of that joint. ``friction`` is μ, ``rigidity`` a factor on the EA of the arm's
-    laws [-], ``spring`` the stiffness in series with each cable [N/m], the others are in SI. Names
-    with @ are given as ``parameters(**{"hole_radius@2": 0.025})``.
+    laws [-], ``spring`` the stiffness in series with each cable [N/m], the others are in SI. A call
+    passes names with @ in a dict: ``parameters(**{"hole_radius@2": 0.025})``.
 
     Attributes:
         arm: The arm; parameters that are not named keep their values.
@@ -102,7 +102,7 @@ class ArmParameters:
         """Build the arm with these values of parameters, in SI.
 
         Raises:
-            GeometryError: The values do not make an arm.
+            GeometryError: No valid arm has these values.
             UnknownName: A parameter is not among :attr:`names`.
             InvalidInput: A rigidity is not positive, or a value is not a number.
             CableError: A spring is not positive.

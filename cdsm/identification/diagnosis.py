@@ -90,10 +90,10 @@ def _open_ends(result: Identification, i: int) -> list[str]:
 
 
 def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str]:
-    """Return a warning if χ² can still fall from ``point``, where a search ended.
+    """Return a warning, in a list, if χ² can still fall from ``point``, where a search ended.
 
-    For example, the model may not exist beyond ``point`` (P,), which is in the unit cube of
-    ``problem``. ``jacobian`` (n, P) is ∂r/∂point there.
+    This happens, for example, if the model does not exist beyond ``point`` (P,), a point in the
+    unit cube of ``problem``. ``jacobian`` (n, P) is ∂r/∂point there.
     """
     r = problem.residuals(point)
     gradient = r @ jacobian
@@ -120,10 +120,11 @@ def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str
 def ambiguous(
     problem: LeastSquares, best: Array, result: Identification, starts: Sequence[Array]
 ) -> list[str]:
-    """Return a warning if a search from one of ``starts`` finds a minimum that fits as well.
+    """Return a warning, in a list, if a search from ``starts`` finds a minimum that fits as well.
 
-    It is outside the 95 % intervals of ``result``, whose optimum is ``best``, although its χ² is so
-    low that they should contain it. Points (P,) are in the unit cube of ``problem``.
+    This minimum is outside the 95 % intervals of ``result``, although its χ² is so low that they
+    should contain it. ``best`` is the optimum of ``result``. All points (P,) are in the unit cube
+    of ``problem``.
     """
     intervals = np.array(list(result.confidence().values()))
     other = other_minimum(problem, best, intervals, result._rise(0.95, scaled=False), starts)

@@ -1,4 +1,4 @@
-"""Plan of an experiment: which weight tests to make how often, and the expected uncertainties."""
+"""Plan of an experiment: which weight tests to make, how often, and the expected uncertainties."""
 
 from __future__ import annotations
 
@@ -76,12 +76,12 @@ class ExperimentPlan(ReadOnlyState):
 
     @cached_property
     def std(self) -> Array:
-        """Standard deviations to expect of the parameters (P,) [m, kg, …]; inf: undetermined."""
+        """Expected standard deviations of the parameters (P,) [m, kg, …]; inf: undetermined."""
         return self._std(self.counts)
 
     @cached_property
     def even_std(self) -> Array:
-        """Standard deviations of the parameters from ``even_tests`` (P,) [m, kg, N/m, …]."""
+        """Standard deviations of the parameters (P,) [m, kg, N/m, …] if ``even_tests`` are made."""
         return self._std(self.even)
 
     @property

@@ -57,7 +57,8 @@ class Profile(ReadOnlyState):
     """Profile of one parameter: least χ² with the parameter fixed, as a function of its value.
 
     Attributes:
-        values: Fixed values of the parameter (n,) [m, N/m, …], rising, in the unit of ``model_of``.
+        values: Fixed values of the parameter (n,) [m, N/m, …], ascending, in the unit of
+            ``model_of``.
         rise: Δχ² (n,) [-]: least χ² with the parameter fixed, minus the least χ² of all.
         slope: Derivative of Δχ² with respect to the value (n,) [1/m, m/N, …].
         best: Index of the optimum in ``values``.
@@ -107,9 +108,10 @@ def other_minimum(
 ) -> Array | None:
     """Search for another minimum of χ², within ``rise`` of the least χ² and outside ``intervals``.
 
-    Such a point refutes the intervals (P, 2) of all parameters: they are those of one valley of
-    several. The search begins at those of ``starts`` that are outside the intervals. Points are in
-    the unit cube. Raises LowerOptimumError if χ² is lower there than at ``best``.
+    Such a point refutes the intervals (P, 2) of all parameters, since they belong to one of several
+    minima. Searches begin at those of ``starts`` that are outside the intervals. Returns None if no
+    search finds such a minimum. Points are in the unit cube. Raises LowerOptimumError if χ² is
+    lower there than at ``best``.
     """
 
     def outside(point: Array) -> bool:
@@ -152,8 +154,8 @@ class Profiler:
     def profile(self) -> tuple[Profile, list[Array]]:
         """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ².
 
-        Also return points (P,) in the unit cube, at most one on each side, at which the profile
-        falls again beyond the first of ``exact``: another minimum of χ² may be near.
+        Also return points (P,) in the unit cube, at most one on each side. There Δχ² falls again
+        after it has exceeded the first value in ``exact``, so another minimum of χ² may be near.
         """
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]

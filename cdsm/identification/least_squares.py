@@ -89,9 +89,9 @@ class LeastSquares:
         residuals_of: Function from parameters by name to r (n,). May raise :class:`NoModelError`.
         count: Number n of residuals.
         bounds: (low, high) of each parameter.
-        beside: Function (here, moved) → r (n,) at the parameters ``moved``, to first order in their
-            distance from ``here``. Finite differences use it, since it is faster. None: they use
-            ``residuals_of``.
+        beside: Function (here, moved) that returns r (n,) at the parameters ``moved``, to first
+            order in their distance from the parameters ``here``. Finite differences use it, since
+            it is faster than ``residuals_of``. None: they use ``residuals_of``.
     """
 
     def __init__(

@@ -119,7 +119,7 @@ class WeightLoop:
                 without errors.
 
         Raises:
-            InvalidInput: ``random`` is neither, or ``arm`` is no arm.
+            InvalidInput: ``random`` is neither of these, or ``arm`` is not an arm.
             CdsmError: The arm has no equilibrium under the forces; see :func:`~cdsm.load_cycle`.
         """
         instance("arm", arm, Manipulator)
@@ -166,8 +166,8 @@ class Weights:
     ) -> None:
         """Compute the weights from the standard deviations that the loop gives.
 
-        ``by_forces`` (m, n) and ``by_tensions`` (m, C) are the derivatives of the readings. Without
-        them, errors of the forces and tensions do not count.
+        ``by_forces`` (m, n) and ``by_tensions`` (m, C) are the derivatives of the readings. If they
+        are not given, errors of the forces and tensions are ignored.
         """
         axes = len(loop.axes)
         covariance = loop.displacement_std**2 * np.eye(len(loop.forces) * axes)

@@ -43,17 +43,17 @@ def read_loops(
 
     - ``test``: name of the loop; its lines stand together, in the order of the forces.
     - The joints of the arm, ``joint1_1 [deg]``: angles before the first force; [rad], or [mm] or
-      [m] where a joint slides. Joints without a column are at 0.
+      [m] for prismatic joints. Joints without a column are at 0.
     - ``direction``: of the forces, an axis such as ``-z``.
     - ``force [N]``: along the direction, 0 where nothing hangs.
     - ``displacement [mm]`` along the direction, or ``x [mm]``, ``y [mm]`` and ``z [mm]``; [um] or
       [m]. Any offset. Without these columns the tests are planned, not yet made.
     - The cables of the arm, ``cable1_1 [N]``: their tensions before the first force; or
-      ``minimum [N]``, the lower bound from which they are distributed.
+      ``minimum [N]``, the lower bound with which they are distributed.
 
     A cell of a joint, a cable, ``direction`` or ``minimum`` may be empty after the first line of a
-    test. Lines that begin with # are ignored, and so are other columns; but a column whose name
-    looks like a misspelt one of these is an error.
+    test. Lines that begin with # are ignored. Columns with other names are ignored too, unless a
+    name looks like a misspelling of one of these names: that is an error.
 
     Args:
         path: The file.

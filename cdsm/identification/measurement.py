@@ -23,7 +23,8 @@ class Measurement:
     """Stiffness measured at the tip of a real arm, and the conditions of the measurement.
 
     Attributes:
-        value: Stiffness along the direction [N/m]: force over displacement of the tip along it.
+        value: Stiffness along the direction [N/m]: force divided by the displacement of the tip
+            along it.
         direction: Common direction of force and displacement: an axis such as ``"z"``, kept as its
             vector, or (3,) in base axes, any length. With a ``force`` the sign matters: ``"-z"``
             hangs a weight, ``"z"`` lifts the tip.

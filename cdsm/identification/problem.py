@@ -34,7 +34,8 @@ _STORED = 8  # sets of parameters whose paths are stored
 class UserFaultError(Exception):
     """A user-defined function has failed; its first argument is the :class:`InvalidInput` to raise.
 
-    It is no CdsmError, so a search does not take it for parameters without a model.
+    It is not a CdsmError, so that a search stops instead of treating these parameters as having no
+    model.
     """
 
 
@@ -105,8 +106,8 @@ class Model:
     def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
         """Compute the residuals (n,) for slightly changed parameters ``moved``, to first order.
 
-        Loops follow from their rest states at ``here``, without a search for equilibria: that is
-        ten times as fast.
+        The residuals of loops follow from their equilibria at ``here``, without another search for
+        equilibria, which is ten times as fast.
         """
         return self.weigh(self.predict(moved, here)[1])
 
@@ -116,7 +117,8 @@ class Model:
         """Build the arm of ``parameters``; predict each stiffness (1,) [N/m] or loop (m,) [m].
 
         The predicted displacements of a loop start from the tip of the arm without the forces. They
-        are exact, or to first order from the rest states at the parameters ``near``.
+        are exact; or, if ``near`` is given, computed to first order from the equilibria at the
+        parameters ``near``.
         """
         arm = self.arm(parameters)
         paths = self._paths_at(near) if near else self._paths_at(parameters, arm)
@@ -137,7 +139,7 @@ class Model:
         return arm, predicted
 
     def weigh(self, predicted: list[Array]) -> Array:
-        """Compute the residuals (n,), in standard deviations, of the result of :meth:`predict`."""
+        """Compute the residuals (n,) [-], in units of σ, from the result of :meth:`predict`."""
         rows = []
         for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
             if isinstance(each, WeightLoop):
@@ -217,8 +219,9 @@ class Model:
     def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
         """Compute the derivatives of the readings of ``loop``, whose equilibria are ``path``.
 
-        The first are with respect to the forces (m, n) [m/N], the others with respect to the
-        tensions (m, C) [m/N]. Those of exact forces or tensions have no columns.
+        The first array has the derivatives with respect to the forces (m, n) [m/N], the second
+        those with respect to the tensions (m, C) [m/N]. An array has no columns if its forces or
+        tensions are exact.
         """
         u, axes, pose = unit_direction("direction", loop.direction), loop.axes, path.start.pose
         by_forces = np.zeros((len(loop.forces) * len(axes), 0))

@@ -124,10 +124,10 @@ class Identification(ReadOnlyState):
         is -inf or inf if Δχ² stays below q² up to the bound of the parameter, or as far as the
         model exists. Then the measurements set no limit, and :attr:`warnings` report it at 95 %.
 
-        No parameter has a limit if the fit is no optimum, or if a search found another minimum of
-        χ², outside the 95 % intervals, that fits as well; :attr:`warnings` say so. Searches go
-        where a profile falls again, and several start if no start is given. A valley that none
-        of them reaches stays unknown.
+        No parameter has a limit if the fit is not an optimum, or if another minimum of χ² outside
+        the 95 % intervals fits as well; :attr:`warnings` say so. Searches for such a minimum start
+        where a profile falls again, and at several points if no start is given. A minimum that no
+        search reaches stays unknown.
 
         Measured in 500 simulated experiments with loops (5 µm, 0.05 N): the 95 % intervals of
         friction, EA, springs, two hole radii and a disk offset, identified together, hold the true
@@ -178,7 +178,7 @@ class Identification(ReadOnlyState):
         )
 
     def plot(self) -> Figure:
-        """Plot predicted over measured stiffness [N/mm], and residuals in standard deviations."""
+        """Plot predicted against measured stiffness [N/mm], and residuals in units of σ."""
         from cdsm.plots.measured import plot_identification  # matplotlib imports slowly
 
         return plot_identification(self, self._labels, self._verdict)
@@ -197,7 +197,7 @@ class Identification(ReadOnlyState):
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
 
     def _nonlinear_rows(self) -> list[str]:
-        """Return a line that names the parameters whose interval is not that of their std."""
+        """Return a line that names the parameters whose interval is not about ±1.96 std."""
         low, high = np.array(list(self.confidence().values())).T
         ratio = (high - low) / (2.0 * math.sqrt(self._rise(0.95, scaled=False)) * self.std)
         chosen = np.isfinite(ratio) & ((ratio > _LINEAR) | (ratio < 1.0 / _LINEAR))
@@ -281,7 +281,7 @@ class Identification(ReadOnlyState):
 
     @property
     def _goals(self) -> tuple[list[float], float]:
-        """Δχ² [-] at the limits of 95 % intervals, rising, and the largest Δχ² of the profiles."""
+        """Δχ² [-] at the limits of 95 % intervals (ascending), and the largest of the profiles."""
         exact, far = [self._rise(0.95, scaled=False)], self._rise(0.999, scaled=False)
         if self.freedom:
             exact.append(self._rise(0.95, scaled=True))

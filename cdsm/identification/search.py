@@ -57,16 +57,17 @@ def identify(
 
     With ``arm = model_of(**p)``, the prediction K_i(p) is ``stiffness(arm.at(angles), tension,
     wrench).along(direction)``. For a measurement with a ``force`` it is ``weight_test(
-    arm.at(angles), tension, force, wrench=wrench).stiffness``. The search turns back if the model
-    has no stable stiffness, buckles under the force, or a tension leaves the domain of a law.
+    arm.at(angles), tension, force, wrench=wrench).stiffness``. The search shortens a step to
+    parameters for which the arm is unstable, buckles under the force, or a tension leaves the
+    domain of a law.
 
     A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
     its width determines the friction. Errors of its forces and tensions count as errors of its
     readings, with their correlations. Derivatives of loops need no search for equilibria.
 
-    The search predicts all measurements some 50 P times, the profiles of
-    :meth:`Identification.confidence` some 20 P² times. A measurement with a force takes ten times
-    as long as one without; a loop takes some tens of milliseconds.
+    The search predicts all measurements about 50 P times, the profiles of
+    :meth:`Identification.confidence` about 20 P² times. A measurement with a force takes ten times
+    as long as one without; a loop takes tens of milliseconds.
 
     ::
 
@@ -85,7 +86,8 @@ def identify(
         measurements: Stiffnesses and loops. They have at least as many numbers as there are
             parameters; a loop of n forces has n − 1 per axis, since its offset is unknown.
         free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
-            they are positive and a factor of 100 or more apart, the logarithm is searched.
+            they are positive and a factor of 100 or more apart, the search uses the logarithm of
+            the parameter.
         start: First value of each parameter. If not given, several searches start from points
             spread over the bounds (always the same points), and the best result is returned.
         tension_of: Function ``tension_of(posture, measurement, **p)`` that returns the tensions

@@ -73,9 +73,9 @@ def to_mjcf(
 
     Bodies, joints, tendons and actuators have the names of links, joints and cables. The sites of a
     cable are ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. Links without a drawable
-    visual are sticks. Left out are leads (straight cables of constant length before the first
-    site), friction in the holes, and the wrench: give it to MuJoCo at run time (``xfrc_applied``
-    acts at the centre of mass of a link).
+    visual are sticks. The model has no leads (straight cables of constant length before the first
+    site), no friction in the holes, and no wrench. Apply the wrench in MuJoCo at run time;
+    ``xfrc_applied`` acts at the centre of mass of a link.
 
     A new ``mjData`` and the keyframe ``pose`` have the joint coordinates of the posture, which are
     those of cdsm. ``actuators`` is one of
@@ -95,7 +95,7 @@ def to_mjcf(
     mass get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs steps of microseconds.
 
     Damping: the cables damp with c = β k [N s/m]. A mode has the ratio ζ = β (J_L φ)ᵀ k (J_L φ)/2ω,
-    about β ω/2. β gives the least damped mode the ``damping_ratio``, mostly the lowest one; all
+    about β ω/2. β gives the least damped mode the ``damping_ratio``, usually the lowest one; all
     others settle as fast or faster. Modes with less than half of their ω² from the cables do not
     count and are damped less.
 
@@ -110,7 +110,7 @@ def to_mjcf(
         actuators: ``length``, ``tension`` or ``none``. Default: ``length``; without tensions
             ``none``.
         damping_ratio: ζ of the least damped mode [-]; 0.05 by default. It needs tensions.
-        damping: Damping of every joint instead [N m s/rad], [N s/m] where it slides. MuJoCo
+        damping: Damping of every joint instead [N m s/rad], [N s/m] for prismatic joints. MuJoCo
             integrates damping implicitly, so strong damping needs no smaller time step.
 
     Raises:
@@ -217,7 +217,7 @@ def _checked(name: str, value: float | None) -> float | None:
 
 
 def _missing(K: Stiffness) -> Iterator[str]:
-    """Yield lines on why the model leaves its posture: its load is left out, or no balance."""
+    """Yield a line if the model lacks a load, and one if the tensions do not balance the arm."""
     if K.wrench.any():
         load = f"{coordinates(K.wrench[:3])} N, {coordinates(K.wrench[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"

@@ -91,7 +91,10 @@ def _axis(joint: etree._Element) -> Array:
 
 
 def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Give a body its link's mass, or a tiny one if it moves without mass; return what it got."""
+    """Write the mass of a link, or a tiny one if it moves without mass, to its body.
+
+    Returns the mass that was written, in a list that is empty if there is none.
+    """
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
     if inertial is not None and mass > _SMALLEST:
@@ -158,7 +161,11 @@ def _sticks(
 
 
 def _placed(element: etree._Element, kind: str | None = None, start: float = 0.0) -> dict[str, str]:
-    """Return pos and quat of an origin; a joint, ``kind`` hinge or slide, is moved to ``start``."""
+    """Return ``pos`` and ``quat`` of the origin of an element.
+
+    If ``kind`` is ``hinge`` or ``slide``, the element is a joint; it is moved to the coordinate
+    ``start``.
+    """
     place, turn = _origin(element)
     if kind is not None and start:
         axis = _axis(element) / np.linalg.norm(_axis(element))

@@ -260,9 +260,10 @@ def _exchange(state: State, width: Width) -> None:
 def _finish(J: Array, b: Array, low: Array, high: Array, state: State, width: Width) -> None:
     """Fill F and y of ``state``: cables with a side get their bound, ``low`` or ``high``.
 
-    Free cables get the least tensions that balance the torque b (nv, W). If cable p is stuck, they
-    balance J_p alone, and y is the proof: J_p y < 0, and other free cables do no work. The torque
-    that rounding leaves is balanced twice more: the system squares the condition number of J_L.
+    Free cables get the least tensions that balance the torque b (nv, W). If the search ended
+    because cable p cannot reach its bound, they balance J_p alone, and y is the proof: J_p y < 0,
+    and other free cables do no work. The torque that rounding leaves is balanced twice more: the
+    system squares the condition number of J_L.
     """
     F, y, side, system, entering = state.F, state.y, state.side, state.free, state.chosen[0]
     sign, torque, nv = state.cables[0, 0], state.cables[1], np.uint64(y.shape[0])

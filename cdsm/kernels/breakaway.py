@@ -53,7 +53,7 @@ class Velocities(NamedTuple):
 
 
 class SlipRates(NamedTuple):
-    """Terms of the breakaway load of each hole, each in the row of the next hole that holds."""
+    """Terms of the breakaway load of each hole, stored in the row of the next hole that holds."""
 
     jump: Array  # |Ṫ′ − Ṫ|/F (P, W)
     turning: Array  # μ φ̇ (P, W)

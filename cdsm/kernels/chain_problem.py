@@ -82,7 +82,7 @@ def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
 
 @inner
 def _next(T: float, ratio: float, best: float) -> float:
-    """Return the tension [N] from T/ratio to T · ratio, as friction allows, nearest to ``best``.
+    """Return the tension [N] nearest to ``best`` that friction allows: T/ratio to T · ratio.
 
     T is the tension of the segment before, and ``ratio`` ρ of the hole between the two.
     """
@@ -97,7 +97,7 @@ def _slope(
 
     V_j and y*_i are those of the module's docstring. ``best`` (S,) has exp(y*_i) of the segments i
     after j [N]; ``last`` is the cable's last segment. The sum is over the segments up to the next
-    hole that sticks; rounding is judged by it.
+    hole that sticks; it is the size against which rounding errors are compared.
     """
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.natural[j])

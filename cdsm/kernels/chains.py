@@ -52,9 +52,9 @@ def _set_wraps(
     """Fill ``wrap`` (P,) with φ of every hole of one posture; add ∂φ/∂θ to ``gradient``.
 
     Segment s is between the sites 2 s and 2 s + 1; ``hole`` (P,) is the segment before each hole.
-    ``span`` (S, 3) are places in ``joint``: where the joints of a segment start, where those on the
-    path to its second site start, and where they end. ``own`` (P,) is a constant angle added to φ.
-    ``gradient`` is (P, nv), zero on entry.
+    ``span`` (S, 3) are indices into ``joint``: where the joints of a segment start, where those on
+    the path to its second site start, and where they end. ``own`` (P,) is a constant angle added to
+    φ. ``gradient`` is (P, nv), zero on entry.
     """
     u, v = before.direction.reshape(3), after.direction.reshape(3)
     normal, arm = np.empty(3), np.empty(3)

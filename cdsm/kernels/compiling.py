@@ -118,7 +118,7 @@ class CacheFile(IndexDataCacheFile):
 
 @cache
 def _sources(file: str) -> str:
-    """Return a digest of all sources beside a file, by which the cache notices every change."""
+    """Return a digest of all sources in the folder of a file; the cache compares it."""
     digest = hashlib.sha256()
     for path in sorted(Path(file).parent.glob("*.py")):
         digest.update(path.read_bytes())

@@ -113,7 +113,8 @@ def single_guess(
     """Guess the least tensions (C,) [N] of one posture, and say whether they are optimal.
 
     The first four arguments are the fields of :class:`Blocks`; the others are J_X, J_L, g, W, the
-    bounds, and the least moment arm that counts [m]. The bits are those of a block of postures.
+    bounds, and the least moment arm that counts [m]. The result has the same bits as in a block of
+    postures.
     """
     count, nv = length_jacobian.shape
     blocks = Blocks(row, row_start, cable, cable_start)
@@ -136,8 +137,8 @@ def search_tensions(
     """Solve for the tensions of r postures, whose guess is wrong.
 
     J is (r, C, nv) and b (r, nv); ``low`` and ``high`` are (r, C), or (1, C) for all postures: as
-    in :func:`distribute`. Fills the tensions (r, C) and the outcome (r,). Without an outcome
-    OPTIMAL, the tensions are meaningless.
+    in :func:`distribute`. Fills the tensions (r, C) and the outcome (r,). The tensions are valid
+    only if the outcome is OPTIMAL.
     """
     rows, count, nv = J.shape
     width = max(1, min(WIDTH, rows, _NUMBERS // (count * (count + nv))))

@@ -60,7 +60,7 @@ def _atan2(y: Any, x: Any) -> Any:
 
 
 def _max(*values: Any) -> Any:
-    """Return the largest value as Python does, also beside NaN and of zeros with a sign."""
+    """Return the largest value, with Python's rules for NaN and for zeros with a sign."""
     return reduce(lambda a, b: np.where(b > a, b, a), values)
 
 

@@ -141,7 +141,7 @@ def _set_derivatives(
     """Fill the rows of ``sums`` (3, W): the least ratio g of leading minors of T − x, and G and H.
 
     The matrix T has the diagonal d and the off-diagonal e, (n, W) each, and the eigenvalues λ. Each
-    g is a leading minor over the minor before it, G = Σ 1/(λ − x) and H = Σ 1/(λ − x)².
+    g is a leading minor divided by the minor before it, G = Σ 1/(λ − x) and H = Σ 1/(λ − x)².
     """
     least, G, H = sums[0], sums[1], sums[2]
     # inverse, slope and bend are 1/g, g′/g and g″/g of the row above

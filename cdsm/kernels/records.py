@@ -20,7 +20,8 @@ from cdsm.support.values import Array
 def fetch(rows: Array, first: int, block: Array, width: Width) -> None:
     """Copy W of ``rows`` (b, n), from row ``first`` on, to a block (n, W).
 
-    The last row is repeated at the end. Without rows, the block stays as it is.
+    If fewer than W rows are left, the last one is repeated. If there are no rows, the block is not
+    changed.
     """
     if rows.shape[0]:
         for i in upwards(0, rows.shape[1]):

@@ -4,10 +4,9 @@ The cables that end at a joint turn this joint and the joints before it, but no 
 J_Lᵀ is block triangular; a block is the axes of one joint (at most two) and the cables that end
 there. From the last joint to the first, one cable per axis is raised above its lower bound to
 balance the joint. From the first joint to the last, the multipliers follow from these cables: see
-:mod:`cdsm.kernels.serpentine_multipliers`.
-Mostly this guess is the optimum: with three cables for each universal joint, in all of 9000 random
-postures up to half the joint limits, and in three of four up to nine tenths. A guess takes 0.3 µs,
-a search by :mod:`cdsm.kernels.active_set` some 4 µs.
+:mod:`cdsm.kernels.serpentine_multipliers`. Mostly this guess is the optimum: with three cables for
+each universal joint, in all of 9000 random postures up to half the joint limits, and in three of
+four up to nine tenths. A guess takes 0.3 µs, a search by :mod:`cdsm.kernels.active_set` about 4 µs.
 """
 
 from __future__ import annotations
@@ -168,10 +167,10 @@ def guess_tensions(
 def _set_best(
     J: Array, low: Array, high: Array, own: Indices, i: Index, j: Index, guess: Guess, width: Width
 ) -> None:
-    """Find the two cables that give the missing torque about axes i and j at the least ‖F‖².
+    """Find the pair of cables that gives the missing torque about axes i and j at the least ‖F‖².
 
-    If i is j, it is one cable. ``own`` are the cables of the block, ``low`` and ``high`` the bounds
-    (C, W). The result is ``guess.best``.
+    If i is j, a single cable is found. ``own`` are the cables of the block, ``low`` and ``high``
+    the bounds (C, W). The result is stored in ``guess.best``.
     """
     lacking, best, pair = guess.lacking, guess.best, guess.pair
     for r in range(5):

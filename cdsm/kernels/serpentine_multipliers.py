@@ -60,11 +60,11 @@ def set_multipliers(
 def set_proof(
     blocks: Blocks, J: Array, guess: Guess, normal: Array, zero: Array, width: Width
 ) -> None:
-    """Fill y of ``guess`` with what mostly proves that no tensions balance the block that failed.
+    """Fill y of ``guess`` with a vector that usually proves that the failed block has no balance.
 
     In that block y is t + s n, with the missing torque t and n normal to t. For the chosen cables
-    of the blocks behind it, J_c y = 0. For all others J_c y ≤ 0 is wanted; s is the number nearest
-    to 0 with that. ``normal`` (nv, W) is scratch, ``zero`` (C, W) are zeros.
+    of the later blocks, J_c y = 0. A proof needs J_c y ≤ 0 for all other cables; s is the number
+    nearest to 0 that gives this. ``normal`` (nv, W) is scratch, ``zero`` (C, W) are zeros.
     """
     row, row_start, cable, cable_start = blocks
     y, failed, missing, chosen = guess.y, guess.failed, guess.missing, guess.chosen

@@ -177,10 +177,10 @@ def single_stiffness(
     wrench: Array,
     tip_joints: Indices,
 ) -> Array:
-    """Compute the active, passive and load terms, P, and K_θ of one posture, (5, nv, nv).
+    """Compute five matrices of one posture (5, nv, nv): active, passive and load term, P, and K_θ.
 
-    P is the sum of the magnitudes of the four terms. The arguments are the fields of
-    :class:`Routing` and :class:`Frames` that are needed, and arrays without the last axis.
+    P is the sum of the magnitudes of the four terms. ``segment`` and ``joint`` are fields of
+    :class:`Routing`, the next four are those of :class:`Frames`. No array has the axis of postures.
     """
     count, nv = length_jacobian.shape
     J, JX = length_jacobian.reshape(count, nv, 1), jacobian.reshape(6, nv, 1)

@@ -29,7 +29,7 @@ class Holes(NamedTuple):
 
     Attributes:
         first: Index of the first site of each cable, and P at the end (C+1,).
-        friction: μ of each site (P,) [-]; 0 where no hole is.
+        friction: μ of each site (P,) [-]; 0 if the site is not a hole.
         wrap: Constant angle added to the wrap angle at each site (P,) [rad].
         lead: Length of each lead (C,) [m].
         axis: Direction of each lead in the frame of the joint of its first site (C, 3).
@@ -200,7 +200,7 @@ def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> N
 
 @inner
 def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> None:
-    """Fill the stiffness k (W,) of sections that end at the present hole; 0 where it slides.
+    """Fill the stiffness k (W,) of sections that end at the current hole; 0 where it does not hold.
 
     ``wire`` is EA (1 + ε) (C, W) [N].
     """
@@ -211,7 +211,7 @@ def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> Non
 
 @inner
 def open_next_section(section: Sticking, width: Width) -> None:
-    """Where the present hole holds, start the next section, with no series spring and no motor."""
+    """Where the current hole holds, start the next section, without series spring and motor."""
     length, soft, locked, holds = section.length, section.soft, section.locked, section.holds
     for w in lanes(width):
         length[w] = 0.0 if holds[w] > 0.0 else length[w]
@@ -223,10 +223,10 @@ def open_next_section(section: Sticking, width: Width) -> None:
 def _add_square(
     wire: Array, c: Index, section: Sticking, low: Index, high: Index, passive: Array, width: Width
 ) -> None:
-    """Add k g gᵀ of the sections that end at the present hole to ``passive``; set their g to zero.
+    """Add k g gᵀ of the sections that end at the current hole to ``passive``; set their g to zero.
 
-    k is the stiffness of a section, and g the gradient of its length, which is zero but for joints
-    from ``low`` to ``high`` − 1. ``wire`` is EA (1 + ε) (C, W) [N].
+    k is the stiffness of a section, and g the gradient of its length. g is zero except for the
+    joints from ``low`` to ``high`` − 1. ``wire`` is EA (1 + ε) (C, W) [N].
     """
     g, k, product, holds = section.gradient, section.stiffness, section.product, section.holds
     set_stiffness(wire, c, section, width)

@@ -45,7 +45,7 @@ class Scaled(NamedTuple):
         low: Lower bounds divided by ``force`` (C,).
         high: Upper bounds divided by ``force`` (C,).
         arm: Largest moment arm [m], rounded up to a power of two, so that scaling is exact.
-        force: Largest of the lower bounds and of torque over moment arm [N], also rounded up.
+        force: Largest of the lower bounds and of torque divided by moment arm [N], also rounded up.
     """
 
     A: Array

@@ -23,9 +23,10 @@ class Tree(NamedTuple):
         turn: Matrices A, B and C of each joint, (nv+1, 3, 3, 3). The rotation of the joint's frame
             in its parent's frame is A + B cos q + C sin q (Rodrigues' formula).
         translation: Origin in the parent's frame, (nv+1, 3) [m].
-        axis: Unit axis of a turning joint in the parent's frame, (nv+1, 3); zero if it slides.
-        slide: Unit direction of a sliding joint in the parent's frame, (nv+1, 3), zero if it turns.
-            (0, 3) if no joint slides: this usual case then takes no time.
+        axis: Unit axis of a revolute joint in the parent's frame, (nv+1, 3); zero for a prismatic
+            joint.
+        slide: Unit direction of a prismatic joint in the parent's frame, (nv+1, 3); zero for a
+            revolute joint. (0, 3) if no joint is prismatic: this usual case then takes no time.
     """
 
     parent: Indices
@@ -92,9 +93,9 @@ class Frames(NamedTuple):
 
     Attributes:
         origin: A point on each joint axis, (nv+1, 3, W) [m].
-        axis: Unit direction of each joint axis, (nv+1, 3, W); zero if the joint slides.
-        slide: Unit direction of each sliding joint, (nv+1, 3, W), zero if it turns; (0, 3, W) if
-            none slides.
+        axis: Unit direction of each joint axis, (nv+1, 3, W); zero for a prismatic joint.
+        slide: Unit direction of each prismatic joint, (nv+1, 3, W), zero for a revolute joint; (0,
+            3, W) if no joint is prismatic.
         site: Positions of the cable sites, (P, 3, W) [m].
     """
 
@@ -149,8 +150,8 @@ def forward_kinematics(
 ) -> None:
     """Fill ``rotation`` of the joints (nv+1, 3, 3, W) and ``frames`` at joint angles q (nv, W).
 
-    A turning joint has the rotation R_parent (A + B cos q + C sin q); see :attr:`Tree.turn`. A
-    sliding joint moves its origin by q along its slide. ``trigonometry`` (2, W) is scratch.
+    A revolute joint has the rotation R_parent (A + B cos q + C sin q); see :attr:`Tree.turn`. A
+    prismatic joint moves its origin by q along its slide. ``trigonometry`` (2, W) is scratch.
     """
     parent, order, turn, translation, local_axis, local_slide = tree
     origin, axis, slide, site = frames

@@ -28,17 +28,19 @@ class Wires(NamedTuple):
     """Laws of all cables; the pieces of one law follow those of another.
 
     Attributes:
-        constant: Constant part of EA (1 + ε) of linear laws (C,) [N]; 0 for other laws, and where
-            the motor controls the force.
+        constant: Constant part of EA (1 + ε) of linear laws (C,) [N]; 0 for other laws and
+            force-controlled cables.
         linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
-        pieces: First and last piece of the law of each cable, and POLYNOMIAL or CURVE (C, 3); last
-            below first if the law is linear or a function of Python.
-        ends: Of each law (C, 6): least and largest tension; tension below which the wire is slack
-            and EA constant, −inf if there is none; least tension of the pieces, and EA there
-            [N]; 1 if the original length is the unstrained one, 0 if it is the stretched one.
+        pieces: First and last piece of the law of each cable, and its kind, POLYNOMIAL or CURVE (C,
+            3). If the law is linear or a function of Python, last is below first.
+        ends: Six numbers for each cable (C, 6): least and largest tension of its law [N]; end of
+            the slack branch, below which EA is constant, or −inf [N]; least tension of the pieces
+            [N]; EA at that tension [N]; 1 if the original length is the unstrained one, 0 if it is
+            the stretched one.
         edges: Start and end of each piece [N], and the strain at its start (3, P).
-        coefficients: Of the polynomial, lowest power first; or slope and rise of the chord, then a
-            and b of :class:`~cdsm.TabulatedElasticity`; (rows, P).
+        coefficients: A column for each piece (rows, P): coefficients of the polynomial, lowest
+            power first; or slope and rise of the chord, then a and b of
+            :class:`~cdsm.TabulatedElasticity`.
         nodes: Nodes and weights of the Gauss rule on (0, 1), (2, N).
     """
 
@@ -52,7 +54,7 @@ class Wires(NamedTuple):
 
 
 class WireScratch(NamedTuple):
-    """Scratch of one cable in W postures, (W,) each but the coefficients."""
+    """Scratch of one cable in W postures; each array is (W,), except the coefficients."""
 
     piece: Indices  # piece of the law at each tension
     x: Array  # the tension, or the least tension of the pieces if that is larger [N]
@@ -80,7 +82,7 @@ def set_rigidity(
     """Fill ``rigidity`` (C, W) [N] with EA (1 + ε) at tensions F (C, W) [N].
 
     It is −1 outside the domain of the law, and EA alone if the original length of a wire is the
-    stretched one. Laws that are functions of Python are left out: it is 0.
+    stretched one. It is 0 for laws that are functions of Python.
     """
     piece, x, begin, end, before, strain, _, value, coefficients = scratch
     for c in upwards(0, tension.shape[0]):

@@ -98,7 +98,7 @@ class _Search:
         self.iterations = 0
 
     def solve_from(self, start: Array) -> tuple[Array, float]:
-        """Search from joint angles ``start`` (nv,); return a solution and its ‖r‖.
+        """Search from joint angles ``start`` (nv,); return a solution and its residual norm ‖r‖.
 
         The solution is exact to rounding if Newton's method converges.
         """
@@ -164,9 +164,10 @@ class _Search:
     def _active_set(
         self, newton: _Newton, q: Array, at_limit: Limits
     ) -> tuple[Array | None, Limits]:
-        """Find the optimum by Newton's method with an active set of limits, at first ``at_limit``.
+        """Find the optimum by Newton's method, with joints at active limits fixed.
 
-        Returns the joint angles (None if it fails) and the active limits.
+        The active limits are ``at_limit`` at first. Returns the joint angles (None if it fails) and
+        the active limits.
         """
         at_limit = at_limit.copy()
         for _ in range(2 * q.size + 5):

@@ -86,8 +86,8 @@ class TipResidual(Residual):
     def curvature(self, q: Array, weight: Array) -> Array:
         """Compute the Hessian (nv, nv) of weight · r, exact where r = 0: ∂(J_Xᵀ W)/∂θ.
 
-        The force of the wrench W is the weights of the position over the arm length, its moment the
-        weights of the rotation.
+        The force of the wrench W is the weights of the position divided by the arm length, its
+        moment the weights of the rotation.
         """
         # at r = 0, ∂r/∂q is J_X up to the length
         wrench = np.zeros(6)

@@ -63,7 +63,7 @@ class ForcePolytope(ReadOnlyState):
 
     @property
     def worst_direction(self) -> Array:
-        """Unit direction (3,) in which the smallest force exceeds what the arm can balance."""
+        """Unit direction (3,) of the smallest force that the arm cannot balance."""
         return np.asarray(self.normals[int(self.offsets.argmin())])
 
     @property
@@ -175,8 +175,8 @@ def force_polytope(
 def directions_of(jacobian: Array, length: float) -> tuple[Array, Array]:
     """Return k unit directions in which the joints move the tip (3, k), and the others (3−k, 3).
 
-    The first are columns, the others rows. ``jacobian`` is J_X (6, nv); motions of the tip per
-    radian far below the ``length`` [m] of the arm count as zero.
+    The first are columns, the others rows. ``jacobian`` is J_X (6, nv). If the tip moves by far
+    less than the ``length`` [m] of the arm per radian, it is taken as immobile.
     """
     axes, size, _ = np.linalg.svd(jacobian[:3])
     moving = np.zeros(3, dtype=np.bool_)

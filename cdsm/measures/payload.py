@@ -92,8 +92,8 @@ def payload(
         f = max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum,
 
     also f |C_vv u| ≤ ``deflection``, and K_θ positive definite under all loads up to f u. K_θ is
-    that of the least tensions under each load. C_vv is the compliance without the force, since the
-    motors are locked before the force acts. The worst direction has the smallest f. It is
+    computed with the least tensions under each load. C_vv is the compliance without the force,
+    since the motors are locked before the force acts. The worst direction has the smallest f. It is
     the normal of the nearest facet of the :func:`force_polytope`, or the softest direction of C_vv.
     Loads that buckle the arm are then searched for in 26 directions, 16 loads in each.
 
@@ -101,8 +101,8 @@ def payload(
         pose: The posture, which stays fixed.
         direction: u: an axis such as ``"-z"``, or (3,), any length; None: the worst direction.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
-        maximum: Upper bound of the tensions [N], for all cables or (C,); for the worst direction
-            finite.
+        maximum: Upper bound of the tensions [N], for all cables or (C,); finite if the worst
+            direction is wanted.
         wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m].
         deflection: Largest allowed displacement of the tip [m]; inf for no limit.
         worst_friction: As for :func:`~cdsm.distribute_tension`, in the limit of the tensions.
@@ -155,7 +155,7 @@ def largest_force(loads: Loads) -> float:
 def _worst(
     polytope: ForcePolytope, compliance: Array, allowed: float
 ) -> tuple[Array, dict[str, float]]:
-    """Return the direction of least allowed force, and the largest forces there, by limit [N].
+    """Return the worst direction, and the largest force [N] along it that each limit allows.
 
     The limits are tension and deflection only. ``compliance`` is C_vv [m/N], and ``allowed`` the
     largest deflection [m].
@@ -187,7 +187,7 @@ def _until_unstable(
 
     The reason is ``"buckling"`` (K_θ is not positive definite) or ``"elasticity"`` (a least tension
     leaves the domain of its law). The force is inf if neither happens up to ``most`` [N]. With
-    ``worst``, it is the least force of u and 26 other directions.
+    ``worst``, u and 26 other directions are examined, and the least force is returned.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

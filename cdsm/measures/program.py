@@ -55,8 +55,9 @@ class Loads(NamedTuple):
     def largest(self, along: Array, *, positive: bool = False) -> tuple[float, Array] | None:
         """Compute the largest a·x, a = ``along`` (k,), over all balanced loads x, and one such x.
 
-        With ``positive`` only x ≥ 0 counts. The value is inf, and x is NaN, if a·x is unbounded.
-        Return None if no load is balanced; SolverError if the solver stops for another reason.
+        With ``positive``, only x ≥ 0 is allowed. The value is inf, and x is NaN, if a·x is
+        unbounded. Return None if no load is balanced; SolverError if the solver stops for another
+        reason.
         """
         count = self.low.size
         tensions, loads = self.lever[:count], self.lever[count:]

@@ -101,8 +101,8 @@ def narrowed_bounds(
     """Narrow the bounds so that every segment of a cable stays within the given ones.
 
     ``loss`` (B, C) are :func:`friction_losses`; bounds are given as (), (B,) or (B, C) [N]. Return
-    the lower and upper bounds (B, C) [N], and whether they are consistent at each posture (B,).
-    Other postures keep the given bounds.
+    the lower and upper bounds (B, C) [N], and whether they are consistent at each posture (B,). At
+    postures where they are not consistent, the given bounds are returned.
     """
     given = _each_bound(arm, minimum, maximum, loss.shape)
     low, high = given[0] * loss, given[1] / loss

@@ -1,7 +1,7 @@
 """Kernels of small linear programs: the simplex method with bounds (Dantzig, 1963), and its proof.
 
-Programs here have some ten equations and some twenty variables, so a dense inverse of the basis is
-fastest. A program takes tens of microseconds; a general solver takes a millisecond to begin.
+Programs here have about ten equations and about twenty variables, so a dense inverse of the basis
+is fastest. A program takes tens of microseconds; a general solver takes a millisecond to begin.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: 
     """Maximise cost · x with A x = b, low ≤ x ≤ high; return whether x is proved to be best.
 
     Fills ``x`` (n,). Returns False if no x is feasible, there is no largest value, or rounding is
-    too large; x is then meaningless. ``cost`` (n,) and A (m, n) are of order one.
+    too large; x is then not valid. ``cost`` (n,) and A (m, n) are of order one.
     """
     m, n = A.shape
     # artificial variables n + i take what is missing of equation i; the first phase removes them

@@ -1,4 +1,4 @@
-"""Curves of stiffness of the virtual prototype, over Young's modulus or tension.
+"""Curves of stiffness of the virtual prototype, as a function of Young's modulus or tension.
 
 Every number is computed in three ways ("readings"): ``pseudoinverse`` (K_R) from EA/L with the
 stretched length L, as in the paper; ``pseudoinverse`` from EA/l_0 with the original length l_0; and
@@ -60,13 +60,14 @@ class Curve:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StiffnessFigure(Figure):
-    """A figure of stiffness over Young's modulus or tension.
+    """A figure of stiffness as a function of Young's modulus or tension.
 
     Attributes:
         swept: ``"young_modulus"`` or ``"tension"``: the quantity on the horizontal axis.
         part: ``"active"`` or ``"passive"``: the term of K_θ that is shown beside the total.
-        curves: Curves from EA/L with the stretched length L, as in the paper.
-        original: The same curves from EA/l_0.
+        curves: Curves computed with the cable stiffness EA/L, L the stretched length, as in the
+            paper.
+        original: The same curves computed with EA/l_0, l_0 the original length.
         postures: Posture of each curve.
     """
 
@@ -100,7 +101,7 @@ class StiffnessFigure(Figure):
 
 
 class Pair(NamedTuple):
-    """The same curve from EA/L, with the stretched length (as in the paper), and from EA/l_0."""
+    """The same curve computed twice: from EA/L, L the stretched length, and from EA/l_0."""
 
     stretched: Curve
     original: Curve
@@ -154,12 +155,12 @@ def over_cases(
 
 
 def over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> Pair:
-    """Compute stiffness and its active part over lower bounds of tension ``minima`` (N,) [N]."""
+    """Compute stiffness and its active part at lower bounds of tension ``minima`` (N,) [N]."""
     return over_cases(label, q, [(law, minimum) for minimum in minima], minima, "active")
 
 
 def at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
-    """Compute the stiffness at a posture, with the least tensions not below ``minimum`` [N]."""
+    """Compute the stiffness at q (nv,) under the least tensions with this lower bound [N]."""
     pose = arm.at(q)
     return stiffness(pose, distribute_tension(pose, minimum))
 

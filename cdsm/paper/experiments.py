@@ -79,7 +79,7 @@ class ExperimentFigure(Figure):
 
 
 def figure_10() -> ExperimentFigure:
-    """Compute stiffness in x, y and z over tension with the 1×19 strand, beside Table II.
+    """Compute stiffness in x, y and z against tension with the 1×19 strand, and Table II.
 
     Three prototypes are shown. The first is fitted to Section V as printed. The second takes Table
     II with x and y exchanged in rows 2 to 4 (evidence:
@@ -100,7 +100,7 @@ def figure_10() -> ExperimentFigure:
 
 
 def figure_12() -> ExperimentFigure:
-    """Compute stiffness in y over tension, cables of constant stiffness, for 2 configurations."""
+    """Compute stiffness in y against tension for 2 configurations, at constant cable stiffness."""
     fit = identified(STEPS[1])
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], prototype.highest_hybrid_tension, _POINTS)
@@ -128,7 +128,7 @@ def figure_12() -> ExperimentFigure:
 
 
 def figure_13() -> ExperimentFigure:
-    """Compute stiffness in y over cable stiffness at constant tension, for 2 configurations."""
+    """Compute stiffness in y against cable stiffness for 2 configurations, at constant tension."""
     fit = identified(STEPS[1])
     prototype, tension = fit.prototype, fit.prototype.hybrid_tension
     springs = np.linspace(HYBRID, HYBRID * prototype.spring_ratio, _POINTS)
@@ -160,7 +160,7 @@ def figure_13() -> ExperimentFigure:
 
 
 def _over_tension(fit: PrototypeFit) -> list[Trace]:
-    """Compute stiffness in x, y and z over tension, beside the Table II of the fit."""
+    """Compute stiffness in x, y and z as a function of tension, with Table II as fitted."""
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS)
     curves = prototype.weigh(prototype.arm().at(prototype.configurations[0]), tensions)

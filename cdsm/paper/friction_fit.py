@@ -117,7 +117,7 @@ class RoughPrototype:
         return np.array([path.beside(pose, F, np.zeros(6))[0] for path, F in pairs])
 
     def table(self, tips: ArrayLike) -> Array:
-        """Compute Table II (5, 3) [N/m] from the tips (15, 3) [m]: weight over displacement."""
+        """Compute Table II (5, 3) [N/m] from the tips (15, 3) [m]: weight/displacement."""
         weights = np.tile(self.prototype.weights, (5, 1))
         moved = np.asarray(tips) - self.arm().at(POSTURE).tip[:3, 3]
         work = np.einsum("ni,ni->n", weights, moved)

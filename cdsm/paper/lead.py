@@ -30,7 +30,7 @@ MINIMA: Final = (100.0, 800.0)
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LeadFigure(Figure):
-    """Change of stiffness from a lower tension bound of 100 N to 800 N, over the leads.
+    """Change of stiffness if the lower tension bound rises from 100 N to 800 N, for each lead.
 
     Attributes:
         leads: Leads of all cables (N,) [m].
@@ -54,7 +54,7 @@ class LeadFigure(Figure):
 
 
 def figure_lead() -> LeadFigure:
-    """Compute the change of stiffness from a lower bound of 100 N to 800 N, over the lead."""
+    """Compute the change of stiffness from a lower bound of 100 N to 800 N, for each lead."""
     unstrained, stretched = (
         frozen(np.array([_changes(lead, length) for lead in LEADS.tolist()]))
         for length in ("unstrained", "stretched")

@@ -128,7 +128,7 @@ class PrototypeFit:
     """The prototype that explains the numbers best, with its residuals.
 
     Attributes:
-        step: Interpretation of Section V.
+        step: The interpretation of Section V that was fitted: its numbers and free parameters.
         prototype: Identified parameters.
         predicted: Numbers of Section V for the identified prototype.
         residuals: Residual [-] of each of ``step.numbers``: see :meth:`Predicted.residuals`.

@@ -44,7 +44,7 @@ _POINTS = 25
 
 
 def figure_3() -> StiffnessFigure:
-    """Compute stiffness and its passive part over Young's modulus, 160 to 320 GPa, for 2 bounds."""
+    """Compute stiffness and its passive part at Young's moduli of 160 to 320 GPa, for 2 bounds."""
     moduli = np.linspace(160e9, 320e9, _POINTS)
     laws = [LinearElasticity.of_wire(modulus, presets.STRAND_DIAMETER) for modulus in moduli]
     pairs = [
@@ -80,7 +80,7 @@ def figure_3() -> StiffnessFigure:
 
 
 def figure_4() -> StiffnessFigure:
-    """Compute stiffness and its active part over tension, with constant EA."""
+    """Compute stiffness and its active part as a function of tension, with constant EA."""
     minima = np.linspace(100.0, 800.0, _POINTS)
     strand, wire = (
         over_minimum(label, law, _TEN, minima)
@@ -109,7 +109,7 @@ def figure_4() -> StiffnessFigure:
 
 
 def figure_6() -> StiffnessFigure:
-    """Compute stiffness over tension in the pre-tensioning stage, with Eq. 19."""
+    """Compute stiffness as a function of tension in the pre-tensioning stage, with Eq. 19."""
     pair = over_minimum("Eq. 19", presets.STRAND_1X19, _TEN, np.linspace(15.0, 120.0, _POINTS))
     claim = pair.claim(
         _increment,
@@ -127,7 +127,7 @@ def figure_6() -> StiffnessFigure:
 
 
 def figure_7() -> StiffnessFigure:
-    """Compute stiffness over tension in the elastic stage, with constant EA."""
+    """Compute stiffness as a function of tension in the elastic stage, with constant EA."""
     highest = _highest_minimum(presets.virtual_prototype().at(_TEN))
     minima = np.linspace(120.0, highest, _POINTS)
     pair = over_minimum("EA = 48 kN", presets.ELASTIC_STAGE, _TEN, minima)
@@ -146,7 +146,7 @@ def figure_7() -> StiffnessFigure:
 
 
 def figure_8() -> StiffnessFigure:
-    """Compute stiffness over the whole range of tension, at three postures."""
+    """Compute stiffness as a function of the whole range of tension, at three postures."""
     arm = presets.virtual_prototype()
     pairs, claims = [], []
     for label, q in FIGURE_8_POSTURES.items():

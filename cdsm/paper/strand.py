@@ -23,7 +23,7 @@ GAUGE_LENGTH: Final = 0.5
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StrandFigure(Figure):
-    """Fig. 5: force over displacement, and rigidity over tension.
+    """Fig. 5: force as a function of displacement, and rigidity as a function of tension.
 
     Attributes:
         gauge_length: Length of the tested wire [m].

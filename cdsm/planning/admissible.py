@@ -66,7 +66,10 @@ class Admissible:
         return low, high
 
     def imbalance(self, F: Array) -> Array:
-        """Return rows · (least − F) (r,) [N] for tensions F (C,) [N]; zero if F balances."""
+        """Return the imbalance of tensions F (C,) [N]: ``rows`` · (``least`` − F) (r,) [N].
+
+        It is zero if F balances the arm.
+        """
         return np.asarray(self.rows @ (self.least.values - F))
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:

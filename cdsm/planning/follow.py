@@ -68,7 +68,7 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Return the tensions of ``region`` that the rate allows between a sample and ``other``."""
+        """Return the tensions of ``region`` that are within the rate from those of ``other``."""
         if region is None or other is None:
             return region
         return region.within(self.rate * abs(other.index - sample.index), other.F)
@@ -81,7 +81,7 @@ class Follower:
         return replace(sample, F=found[0]) if found and found[1] else None
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
-        """Plan a sample alone, as :meth:`Planner.least`; None if it cannot hit all targets."""
+        """Plan a sample alone, by :meth:`Planner.least`; None if it misses a target."""
         found = Planner(sample.model, sample.constraints, self.starts, self.seed).least()
         if found is None:
             return None

@@ -70,7 +70,11 @@ def half_way(
 
 
 def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
-    """Compute K_θ at the equilibrium near the mean posture, with l_0 ``unstrained`` (H,) [m]."""
+    """Compute K_θ at the equilibrium near the mean of two postures.
+
+    ``ends`` are the stiffnesses at both postures. ``unstrained`` (H,) [m] are the original lengths
+    l_0 of the H position-controlled cables.
+    """
     one, other = ends
     q = (one.posture.q + other.posture.q) / 2.0
     F = frozen((one.tension + other.tension) / 2.0)

@@ -68,9 +68,9 @@ def plan_path(
     before it: k·rate if they are k samples apart. If no tensions within this limit hit the target
     although others do, up to 50 earlier samples are planned again, backwards, so that they still
     hit their targets and lead to this sample. If this fails, the sample has the status ``"rate"``,
-    and the next sample may change the tensions by one rate more. So after a jump of the target, the
-    samples are not planned until the rate allows the new tensions. Give a ramp if the arm must
-    follow meanwhile.
+    and the next sample may change the tensions by one rate more. So after a jump of the target,
+    samples have this status until the rate allows the new tensions. If the arm must follow
+    meanwhile, give a ramp instead of a jump.
 
     The plan hits the targets at the samples. ``between`` of the result gives the stiffness half-way
     between two samples. Its misfit is of second order in the step between samples.

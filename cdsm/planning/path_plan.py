@@ -67,7 +67,7 @@ class PathPlan(ReadOnlyState):
         target: The target at every sample [N/m]: (S,), one per direction (S, n), or (S, 3, 3).
         rate: Largest change of a tension per step (C,) [N]; may be inf.
         planned: Numbers of the planned samples, from 0.
-        angles: Joint angles (P, nv) [rad]; [m] where a joint slides.
+        angles: Joint angles (P, nv) [rad]; [m] for prismatic joints.
         tensions: F (P, C) [N].
         achieved: ``stiffness.along`` or ``stiffness.cartesian``, (P,), (P, n) or (P, 3, 3) [N/m].
         stiffness: K_θ at each planned sample, with its posture and wrench.
@@ -122,7 +122,8 @@ class PathPlan(ReadOnlyState):
     def between(self) -> tuple[HalfWay, ...]:
         """Arm half-way between each two consecutive planned samples; motors move at constant speed.
 
-        Half the step gives a quarter of the misfit. The first use takes some milliseconds per pair.
+        Half the step gives a quarter of the misfit. The first use takes a few milliseconds per
+        pair.
         """
         pairs = list(zip(self.planned, self.planned[1:], strict=False))
         l_0, targets = self.unstrained_lengths, self.target
@@ -144,7 +145,7 @@ class PathPlan(ReadOnlyState):
         return frozen(np.array([K.posture.tip[:3, 3] for K in self.stiffness]).reshape(-1, 3))
 
     def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
-        """Plot wanted and reached stiffness [N/mm] and the tensions [N] over the samples.
+        """Plot wanted and reached stiffness [N/mm] and the tensions [N] against the samples.
 
         Args:
             animate: A ``.gif`` to write too, in which the arm follows the path.
@@ -187,7 +188,7 @@ class PathPlan(ReadOnlyState):
         return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the table of :meth:`write`, a row per sample; MissingExtra without pandas."""
+        """Return the table of :meth:`write`, a row per sample; needs pandas (MissingExtra)."""
         header, rows = path_table(self)
         columns = [[None if x == "" else x for x in column] for column in zip(*rows, strict=True)]
         table = dict(zip(header, columns, strict=True))
@@ -196,7 +197,7 @@ class PathPlan(ReadOnlyState):
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write one line per sample in SI units as CSV; return the path.
 
-        The columns are ``sample``, ``status``, joint angles [rad] ([m] where a joint slides),
+        The columns are ``sample``, ``status``, joint angles [rad] ([m] for prismatic joints),
         tensions [N], cable lengths [m], unstrained lengths [m] of position-controlled cables, tip
         [m], target and reached stiffness [N/m], and ``reason``. An infeasible sample has only its
         number, status, target and reason.

@@ -44,7 +44,11 @@ def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
 
 
 def _numbered(plan: PathPlan, count: int) -> list[str]:
-    """Return the suffixes of the columns of the targets: xx, xy …; 1, 2 …; or none for one."""
+    """Return the suffixes of the names of the target columns.
+
+    They are xx, xy … for ``cartesian``, and 1, 2 … for several directions. The suffix is empty for
+    one direction.
+    """
     if plan.direction is None:
         return [f" {a}{b}" for a in "xyz" for b in "xyz"]
     return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]

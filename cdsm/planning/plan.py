@@ -47,7 +47,7 @@ class StiffnessPlan(ReadOnlyState):
         target: The target [N/m]: a number, one per direction (n,), or (3, 3).
         achieved: ``stiffness.along`` () or (n,), or ``stiffness.cartesian`` (3, 3) [N/m].
         floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
-        efforts: ‖F‖ (S,) [N] at the end of each search that hit the target, rising. The first
+        efforts: ‖F‖ (S,) [N] at the end of each search that hit the target, ascending. The first
             belongs to ``tension``.
         iterations: Iterations of all searches.
         evaluations: Number of evaluations of K_θ.
@@ -145,10 +145,11 @@ def plan_stiffness(
     The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
     position-controlled cables, and that the smallest eigenvalue λ_min of K_θ (symmetric part) is
     not below ``margin``. The target of one direction is hit within 1e-6 of its value; otherwise an
-    error is raised. Several directions or ``cartesian`` are hit if possible. If not, the sum of
-    their squared relative misses is least, and ``reached`` is false.
+    error is raised. The targets of several directions or of ``cartesian`` are hit if possible. If
+    not, the tensions have the least sum of squared relative misses that was found, and ``reached``
+    is false.
 
-    The searches are local. With the laws of this library they mostly end at the same effort ‖F‖.
+    The searches are local. With the laws of this library they usually end at the same effort ‖F‖.
     With one user-defined law, the effort found was 3.6 % above the least. A ``spread`` above zero
     warns of this. A ``spread`` of zero does not exclude it. More ``starts`` help.
 

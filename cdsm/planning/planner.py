@@ -36,7 +36,7 @@ _AS_NEAR = 1e-8  # misses up to this count as zero: next to buckling a search ma
 class Planner:
     """Search, from several starts, for the tensions F of least ‖F‖ with constraints c(F) = 0.
 
-    ``efforts`` are ‖F‖ [N] at the end of each search that hit the target, rising.
+    ``efforts`` are ‖F‖ [N] at the end of each search that hit the target, ascending.
     """
 
     def __init__(
@@ -79,8 +79,8 @@ class Planner:
     def _within_range(self, u: Array, target: float) -> ConstraintValues:
         """Return the constraint values at the least tensions that hit ``target`` [N/m] along u.
 
-        Raises UnreachableStiffness if the target is beyond the range that searches find, or if no
-        search hits it.
+        Raises UnreachableStiffness if the target is outside the range of stiffness that searches
+        find, or if no search hits it.
         """
         softest, stiffest = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         low = 0.0 if softest.open else softest.value
@@ -108,7 +108,7 @@ class Planner:
         return found
 
     def _best(self, points: Iterable[Evaluation]) -> ConstraintValues | None:
-        """Search from all ``points``; return the end of least ‖F‖ that hits, None if all miss."""
+        """Search from all ``points``; return the hit of least ‖F‖, or None if all searches miss."""
         begin = list(points)
         near = [
             float(point.F.max())
@@ -154,7 +154,8 @@ class Planner:
     ) -> list[Evaluation]:
         """Find stable points that hit the target, on lines from ``hub`` to ``others``.
 
-        The point of least ‖F‖ is first. ``precision`` is their relative error on these lines.
+        The point of least ‖F‖ is first. ``precision`` is the relative error of their place on these
+        lines.
         """
         at_hub, guesses = self._miss(hub), []
         for other in others:

@@ -60,9 +60,9 @@ class StiffnessRange(ReadOnlyState):
         low_tension: Tensions that give ``low``.
         high_tension: Tensions that give ``high``.
         floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
-        low_found: Stiffness at the end of each search for ``low``, rising (S,) [N/m]. It shows how
-            many of the starts found ``low``.
-        high_found: Stiffness at the end of each search for ``high``, falling (S,) [N/m].
+        low_found: Stiffness at the end of each search for ``low``, ascending (S,) [N/m]. It shows
+            how many of the starts found ``low``.
+        high_found: Stiffness at the end of each search for ``high``, descending (S,) [N/m].
         iterations: Iterations of all searches.
         evaluations: Number of evaluations of K_θ.
     """
@@ -135,17 +135,17 @@ def stiffness_range(
     """Compute the smallest and largest ``along(u)`` that admissible tensions give (Eqs. 13, 20).
 
     The constraints on F are those of :func:`~cdsm.plan_stiffness`. With a rigidity that is constant
-    or levels off, ``along`` is a concave function of F, with one maximum and many minima in the
-    corners, so ``low`` is searched from many starts. With other laws ``high`` is, too.
-    ``high_found`` shows how often ``high`` was found. A larger number of starts includes those of a
-    smaller number. If tension can buckle the arm, the arm is softest just before it buckles, and
-    ``low`` depends on ``margin``.
+    or levels off, ``along`` is a concave function of F: it has one maximum, and many minima in the
+    corners of the set of admissible tensions. So the search for ``low`` needs many starts. With
+    other laws the search for ``high`` needs them too. ``high_found`` shows how often ``high`` was
+    found. A larger number of starts includes those of a smaller number. If tension can buckle the
+    arm, the arm is softest just before it buckles, and ``low`` depends on ``margin``.
 
-    From the softest corner, each cable in turn is moved to its other bound, until that finds no
-    softer one. Nothing proves that ``low`` is the smallest. With the default number of starts, it
-    was too high by up to 0.3 % in 47 of 48 random arms (Eq. 19 or constant rigidity, up to 20
-    cables), by 1.9 % in one that tension can buckle, and by up to 5.5 % with a user-defined law
-    whose rigidity has a hump.
+    From the softest corner found, one cable after the other is moved to its other bound, until no
+    softer corner is found. This does not prove that ``low`` is the smallest. With the default
+    number of starts, it was too high by up to 0.3 % in 47 of 48 random arms (Eq. 19 or constant
+    rigidity, up to 20 cables), by 1.9 % in one that tension can buckle, and by up to 5.5 % with a
+    user-defined law whose rigidity has a hump.
 
     Args:
         pose: The posture.

@@ -1,4 +1,4 @@
-"""Result of :func:`saturation`: stiffness over the lower bound of the least tensions."""
+"""Result of :func:`saturation`: stiffness as a function of the lower bound of the tensions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _ENDS: Final[dict[End, str]] = {
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Saturation(ReadOnlyState):
-    """Stiffness over the lower bound of the least tensions; made by :func:`saturation`.
+    """Stiffness as a function of the lower bound of the tensions; made by :func:`saturation`.
 
     Attributes:
         direction: u (3,), a unit direction in base axes.
@@ -71,7 +71,7 @@ class Saturation(ReadOnlyState):
         return float(self.curve[-1, 0])
 
     def plot(self) -> Figure:
-        """Plot stiffness [N/mm] and its gain [N/m per N] over the lower bound of tension [N]."""
+        """Plot stiffness [N/mm] and its gain [N/m per N] against the lower bound of tension [N]."""
         return cdsm.plots.plot_saturation(self)
 
     def to_dict(self) -> dict[str, object]:
@@ -94,7 +94,7 @@ class Saturation(ReadOnlyState):
         return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with a row for each lower bound [N]; MissingExtra without pandas."""
+        """Return a table with a row for each lower bound [N]; needs pandas (MissingExtra)."""
         columns = {"along [N/m]": self.curve[:, 1], "slope [1/m]": self.curve[:, 2]}
         return data_frame(columns, "minimum [N]", self.curve[:, 0])
 

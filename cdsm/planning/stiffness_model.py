@@ -81,7 +81,7 @@ class Evaluation:
         model: The model that evaluates K_θ.
         F: Tensions (C,) [N].
         K: K_θ (nv, nv) [N m/rad].
-        eigenvalues: Eigenvalues of its symmetric part, rising (nv,) [N m/rad].
+        eigenvalues: Eigenvalues of its symmetric part, ascending (nv,) [N m/rad].
         eigenvectors: Eigenvectors, the columns of (nv, nv).
     """
 
@@ -151,7 +151,7 @@ class Evaluation:
 
 
 class Constraint(NamedTuple):
-    """Sums Σ_ab E_j,ab X_ab [-] (j ≤ n), to constrain, of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
+    """Constrained sums Σ_ab E_j,ab X_ab [-], j ≤ n, of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
 
     rows: Array  # R (r, nv) [m/rad]
     weights: Array  # E (n, r, r) [m/N]

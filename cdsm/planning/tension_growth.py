@@ -138,7 +138,7 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
 
 
 def _kinks(at: StiffnessAt, places: Array) -> Array:
-    """Find the lower bounds [N], rising, within ``places`` at which the slope is discontinuous.
+    """Find the lower bounds [N], ascending, within ``places`` at which the slope is discontinuous.
 
     There a cable reaches or leaves a bound, or passes a kink of its rigidity. Between these lower
     bounds, the least tensions are linear in the bound.
@@ -167,14 +167,14 @@ def _least(K: Stiffness) -> Tension:
 
 
 def _active(K: Stiffness) -> Array:
-    """Return 1 for cables (C,) that rise with the lower bound, -1 at their maximum, 0 if free."""
+    """Return for each cable (C,): 1 at its lower bound, −1 at its upper bound, 0 between them."""
     least, tight = _least(K), OPTIMALITY * float(K.tension.max())
     rises = (K.tension - least.minimum <= tight).astype(np.float64)
     return np.where(least.maximum - K.tension <= tight, -1.0, rises)
 
 
 def _slope(K: Stiffness, u: Array) -> float:
-    """Compute d along/db [1/m]: cables at the bound b rise, the free ones balance them (Eq. 17)."""
+    """Compute d along/db [1/m]: cables at the bound b rise with b, free cables keep the balance."""
     A, active = K.posture.length_jacobian.T, _active(K)
     rate, free = np.maximum(active, 0.0), active == 0.0
     rate[free] = np.linalg.lstsq(A[:, free], -A[:, active > 0.0].sum(axis=1), rcond=None)[0]

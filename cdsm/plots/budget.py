@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def plot_uncertainty(budget: Uncertainty) -> Figure:
     """Plot the contribution of each source to the standard uncertainty, and their root sum square.
 
-    InvalidInput if ``budget`` is no result of :func:`~cdsm.uncertainty`.
+    InvalidInput if ``budget`` is not a result of :func:`~cdsm.uncertainty`.
     """
     expect("budget", budget, "Uncertainty")
     unit, size = budget.question.unit
@@ -41,7 +41,7 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
 
     The normal distribution results from first-order error propagation. Dashed: 95 % intervals.
 
-    InvalidInput if ``run`` is no result of :func:`~cdsm.monte_carlo`.
+    InvalidInput if ``run`` is not a result of :func:`~cdsm.monte_carlo`.
     """
     expect("run", run, "MonteCarlo")
     (unit, size), first = run.budget.question.unit, run.budget

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
     """Plot the objectives of all designs that meet the constraints, and their Pareto front.
 
-    With one objective: its best value over the number of designs.
+    With one objective: its best value against the number of designs.
 
     Args:
         found: The result of :func:`cdsm.search_designs` or :func:`cdsm.refine_design`.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def plot_force_polytope(polytope: ForcePolytope) -> Figure:
     """Plot the tip forces [N] that the cables can balance, and the worst direction.
 
-    InvalidInput if ``polytope`` is no result of :func:`~cdsm.force_polytope`, or has no surface:
+    InvalidInput if ``polytope`` is not a result of :func:`~cdsm.force_polytope`, or has no surface:
     the tip cannot move in some direction, or the cables balance forces in one plane only.
     """
     expect("polytope", polytope, "ForcePolytope")

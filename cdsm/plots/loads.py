@@ -39,9 +39,10 @@ _SEEN = 2e-3  # a narrower range, relative to the axis, cannot be seen
 
 
 def plot_weight_test(test: WeightTest) -> Figure:
-    """Plot load over tip displacement, nonlinear and linear, and tensions over load.
+    """Plot load against tip displacement, nonlinear and linear, and tensions against load.
 
-    Up to 24 cables are named. InvalidInput if ``test`` is no result of :func:`~cdsm.weight_test`.
+    Up to 24 cables are named. InvalidInput if ``test`` is not a result of
+    :func:`~cdsm.weight_test`.
     """
     expect("test", test, "WeightTest")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
@@ -65,9 +66,9 @@ def plot_weight_test(test: WeightTest) -> Figure:
 
 
 def plot_critical_tension(critical: CriticalTension) -> Figure:
-    """Plot the stability margin over the lower bound of all tensions, unstable ranges shaded.
+    """Plot the stability margin against the lower bound of all tensions, unstable ranges shaded.
 
-    InvalidInput if ``critical`` is no result of :func:`~cdsm.critical_tension`.
+    InvalidInput if ``critical`` is not a result of :func:`~cdsm.critical_tension`.
     """
     expect("critical", critical, "CriticalTension")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
@@ -106,9 +107,9 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
 
 
 def plot_critical_load(critical: CriticalLoad) -> Figure:
-    """Plot the stability margin over the factor of the load, up to the critical factor.
+    """Plot the stability margin against the factor of the load, up to the critical factor.
 
-    InvalidInput if ``critical`` is no result of :func:`~cdsm.critical_load`.
+    InvalidInput if ``critical`` is not a result of :func:`~cdsm.critical_load`.
     """
     expect("critical", critical, "CriticalLoad")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
@@ -131,9 +132,9 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
 
 
 def plot_bifurcation(found: Bifurcation) -> Figure:
-    """Plot how far a slight push moves the tip, over the lower bound of all tensions.
+    """Plot how far a slight push moves the tip, against the lower bound of all tensions.
 
-    InvalidInput if ``found`` is no result of :func:`~cdsm.bifurcation`.
+    InvalidInput if ``found`` is not a result of :func:`~cdsm.bifurcation`.
     """
     expect("found", found, "Bifurcation")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.4, 1)
@@ -156,11 +157,11 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
 
 
 def plot_load_history(history: LoadHistory) -> Figure:
-    """Plot the force over the displacement of the tip, and the tensions of one cable's segments.
+    """Plot the force against the displacement of the tip, and the tensions of one cable's segments.
 
     Both begin at the reference. Force and displacement are components along the largest force of
-    the history. If no load has a force, the displacement is plotted over the number of the load.
-    The cable is the one whose segments differ most in tension. InvalidInput if ``history`` is no
+    the history. If no load has a force, the displacement is plotted against the number of the load.
+    The cable is the one whose segments differ most in tension. InvalidInput if ``history`` is not a
     result of :func:`~cdsm.load_cycle`.
     """
     expect("history", history, "LoadHistory")

@@ -74,10 +74,11 @@ class Case(NamedTuple):
 def cases_of(
     dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
 ) -> Iterator[Case]:
-    """Yield the values of ``quantity`` for each case: each index of all dimensions but ``poses``.
+    """Yield the values of ``quantity`` for each case.
 
-    ``poses`` are the dimensions of the postures; ``words`` has the word of each status code.
-    Unstable entries become NaN, except in the margin.
+    A case is one combination of indices of all dimensions except ``poses``, the dimensions of the
+    postures. ``words`` has the word of each status code. Values of unstable entries become NaN,
+    except those of the margin.
     """
     status = dataset["status"]
     allowed = {*map(str, status.dims), "direction"}
@@ -123,7 +124,8 @@ def slices_of(
 ) -> tuple[list[Slice], bool]:
     """Return the slabs of tips (N, 3) [mm] to show, and whether they are slices of a cloud.
 
-    ``section`` has the lengths in [m]. The tips of a ``path`` are all seen along each axis.
+    ``section`` is an axis, a position [m] and a half thickness [m], or None. All tips of a ``path``
+    are shown three times, seen along each axis.
     """
     if section is not None:
         return [_slab(section)], False

@@ -90,10 +90,10 @@ def plot_map(
     Tips in a plane and sections are dots, or cells if a statistic is given. A cloud of tips is
     shown in three slices through its middle, as cells; a path is seen along each axis, as dots.
     Many postures may put the tip into one cell; the statistic determines which value it shows.
-    Entries without the quantity are marked by their status; in maps of cells, a mark in a cell with
-    a value is left out. Unstable entries are marked too, because their stiffness has no meaning,
-    except in a map of the margin. Outliers, far from the middle 90 % of the values, and infinite
-    values have a colour of their own, at the ends of the colour bar.
+    Entries without the quantity are marked by their status. In a map of cells, no mark is drawn in
+    a cell that has a value. Unstable entries are marked too, because their stiffness has no
+    meaning, except in a map of the margin. Outliers, far from the middle 90 % of the values, and
+    infinite values have a colour of their own, at the ends of the colour bar.
 
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
@@ -190,7 +190,7 @@ def plot_map(
 
 
 def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Return the colour scale of the values without outliers, and its ends that outliers exceed.
+    """Return the colour scale of the values without outliers, and at which ends outliers lie.
 
     The ends are ``"neither"``, ``"min"``, ``"max"`` or ``"both"``.
     """
@@ -260,7 +260,7 @@ def _draw(
 def _legend(
     figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
-    """Draw marker and word of each status, and its share of the entries ``counted``."""
+    """Draw the legend of the statuses: marker, word, and share of the entries ``counted``."""
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)
     handles = []

@@ -36,7 +36,7 @@ _MOST_LABELS = 30  # above this number of measurements the axis shows numbers, n
 
 
 def plot_tensile_fit(fit: TensileFit) -> Figure:
-    """Plot force over displacement with the fit, and the rigidity EA over tension.
+    """Plot force against displacement with the fit, and the rigidity EA against tension.
 
     The second panel also shows the stages of the wire, and the 95 % band of EA if the fit has one.
     """
@@ -127,7 +127,7 @@ def _plot_stiffnesses(axes: Any, fit: Identification, rows: Sequence[int]) -> No
 def _plot_loop(
     axes: Any, fit: Identification, loop: WeightLoop, rows: Sequence[int], colour: Any
 ) -> None:
-    """Plot ``loop``, whose rows in ``fit`` are given, relative to its first measured reading."""
+    """Plot ``loop`` relative to its first measured reading; ``rows`` are its rows in ``fit``."""
     u = np.array(loop.direction) / np.linalg.norm(loop.direction)
     along = loop.axes @ u
     read, model = (

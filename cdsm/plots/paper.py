@@ -1,4 +1,4 @@
-"""Plot the recomputed figures of the paper: stiffness over Young's modulus, tension and lead.
+"""Plot the recomputed figures of the paper: stiffness against Young's modulus, tension and lead.
 
 Columns are the directions x, y and z, or postures. Rows are the two readings of "the stiffness":
 the paper's K_R, and what a hung weight measures.
@@ -84,7 +84,7 @@ def _grid(
 
 
 def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings of Fig. 3 over Young's modulus; below, passive part minus total [%]."""
+    """Plot both readings of Fig. 3 against Young's modulus; below, passive part minus total [%]."""
     figure, grid = _grid(result, 5.4, 3)
     ratio, limit = (result.claims[k].paper or () for k in (0, 1))
     looks: tuple[dict[str, Any], ...] = (
@@ -122,7 +122,7 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_directions(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings of Fig. 6 over the tension, and the increment that the paper states."""
+    """Plot both readings of Fig. 6 against the tension, and the increment that the paper states."""
     figure, grid = _grid(result, 4.4, 2)
     increments = result.claims[0].paper or ()
     for row, (name, reading) in zip(grid, _READINGS.items(), strict=True):
@@ -147,7 +147,7 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
-    """Plot active part and change of stiffness over tension, in columns for x, y and z."""
+    """Plot active part and change of stiffness against tension, in columns for x, y and z."""
     figure, grid = _grid(result, 5.6, 3, sharey="row")
     first, stated = result.curves[0], result.claims[0].paper or ()
     for i in range(3):
@@ -178,7 +178,7 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_lead(result: paper.LeadFigure) -> Figure:
-    """Plot the change of stiffness over the lead: a panel per reading, a colour per direction."""
+    """Plot the change of stiffness against the lead: a panel per reading, a colour per axis."""
     figure, (pair,) = panels(TWO_COLUMNS, 3.4, 2, sharey=True)
     for axes, (name, reading) in zip(pair, _READINGS.items(), strict=True):
         for i, (axis, color) in enumerate(zip(XYZ, COLORS, strict=True)):
@@ -231,7 +231,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
 
 
 def _draw_curve(axes: Any, curve: paper.Curve, values: Array, **line: Any) -> None:
-    """Draw a stiffness (N,) [N/m] over the mean tension of ``curve``; bars: range of all cables."""
+    """Draw a stiffness (N,) [N/m] against the mean tension of ``curve``; bars: range of cables."""
     low, mean, high = curve.tension.T
     axes.plot(mean, N_PER_MM * values, **line)
     some = np.linspace(0, len(mean) - 1, _BARS).round().astype(int)

@@ -38,7 +38,7 @@ _STAGES: Final = (
 
 
 def plot_strand(result: paper.StrandFigure) -> Figure:
-    """Plot (a) force over displacement, (b) rigidity over tension, with the paper's stages."""
+    """Plot force against displacement (a), rigidity against tension (b), and the paper's stages."""
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.4, 2)
     left.plot(MM * result.displacement, result.tension, color=BLUE, label="Eq. 19, repaired")
     shade_stages(left, _STAGES, "y")

@@ -83,10 +83,10 @@ def plot_path(
 
 
 def plot_modes(modes: Modes) -> Figure:
-    """Plot an arm deflected by its lowest modes; of an unstable arm by those that grow fastest.
+    """Plot an arm deflected by its lowest modes, or by the fastest growing ones if it is unstable.
 
     Deflections are enlarged: the tip moves by at most 25 % of the length of the arm. InvalidInput
-    if ``modes`` is no result of :func:`~cdsm.modes`.
+    if ``modes`` is not a result of :func:`~cdsm.modes`.
     """
     expect("modes", modes, "Modes")
     pose = modes.stiffness.posture

@@ -1,4 +1,4 @@
-"""Plot the attainable stiffness of an arm, its saturation over tension, and plans along a path."""
+"""Plot attainable stiffness, saturation against tension, and plans along a path."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ this factor."""
 
 
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
-    """Plot the attainable stiffness [N/mm] over the direction, as a polar diagram.
+    """Plot the attainable stiffness [N/mm] against the direction, as a polar diagram.
 
     Each entry of ``ranges`` gives a curve of its largest stiffness. The area inside the smallest
     stiffness of the last entry is shaded. Both halves of the circle are equal, since ``along(-u)``
@@ -104,9 +104,9 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 
 
 def plot_saturation(found: Saturation) -> Figure:
-    """Plot stiffness, and its gain per newton of bound, over the lower bound of the tensions.
+    """Plot stiffness, and its gain per newton of bound, against the lower bound of the tensions.
 
-    InvalidInput if ``found`` is no result of :func:`~cdsm.saturation`.
+    InvalidInput if ``found`` is not a result of :func:`~cdsm.saturation`.
     """
     expect("found", found, "Saturation")
     bound, along, slope = found.curve.T
@@ -135,10 +135,10 @@ def plot_saturation(found: Saturation) -> Figure:
 
 
 def plot_path_plan(plan: PathPlan) -> Figure:
-    """Plot wanted and planned stiffness, and tensions, over the samples of a path.
+    """Plot wanted and planned stiffness, and tensions, against the samples of a path.
 
     Infeasible samples are shaded. Up to 24 cables have colours and names. InvalidInput if ``plan``
-    is no result of :func:`~cdsm.plan_path`, or its target is the Cartesian matrix.
+    is not a result of :func:`~cdsm.plan_path`, or its target is the Cartesian matrix.
     """
     expect("plan", plan, "PathPlan")
     if plan.direction is None:

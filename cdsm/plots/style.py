@@ -201,7 +201,7 @@ def equal_axes(axes: Any, zoom: float = 0.75) -> None:
 
 
 class _Picture(Axes3D):  # type: ignore[misc]
-    """3D axes whose bounding box is that of the drawing; notebooks crop a figure to it.
+    """3D axes that report the box around the drawing, to which notebooks crop a figure.
 
     The box of matplotlib is the whole square around the drawing.
     """

@@ -34,12 +34,13 @@ _HALF = 0.5
 
 
 def plot_tracking_run(run: TrackingRun) -> Figure:
-    """Plot a closed loop over time: tip error, stiffness, the tip in its band of rest, tensions.
+    """Plot a closed loop over time: tip error, stiffness, displacement of the tip, tensions.
 
-    The band is where friction lets the tip rest, along the first direction of the plan, counted
-    from the rest without friction.
+    The third panel shows the displacement of the tip from the equilibrium without friction, along
+    the first direction of the plan. The shaded band contains all displacements at which friction
+    lets the tip rest.
 
-    InvalidInput if ``run`` is no result of :func:`~cdsm.track`.
+    InvalidInput if ``run`` is not a result of :func:`~cdsm.track`.
     """
     expect("run", run, "TrackingRun")
     figure, axes = panels(TWO_COLUMNS, 6.4, 1, 4, sharex=True)

@@ -35,7 +35,7 @@ _ENDLESS: Final = 1000.0  # tension [N] up to which a law without a highest tens
 
 
 def plot_elasticity(law: Elasticity) -> Figure:
-    """Plot tangent and secant rigidity EA [kN] over the tension [N].
+    """Plot tangent and secant rigidity EA [kN] against the tension [N].
 
     A law without a highest tension is drawn up to 1000 N. InvalidInput if ``law`` is not an
     elasticity.
@@ -52,7 +52,7 @@ def plot_elasticity(law: Elasticity) -> Figure:
 
 
 def plot_cables(cables: Mapping[str, Cable] | Sequence[Cable], free_length: float) -> Figure:
-    """Plot the stiffness of cables [N/mm] over the tension [N], on a logarithmic scale.
+    """Plot the stiffness of cables [N/mm] against the tension [N], on a logarithmic scale.
 
     Args:
         cables: Cables, with labels if they come as a mapping.

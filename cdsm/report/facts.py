@@ -112,7 +112,7 @@ class Readings(ReadOnlyState):
 
     @property
     def spread(self) -> Array:
-        """Return largest over smallest finite stiffness per axis (3,) [-]; inf if signs differ."""
+        """Return largest/smallest finite stiffness per axis (3,) [-]; inf if signs differ."""
         spread = np.ones(3)
         rows = np.array([self.along, self.cartesian, self.pseudoinverse])
         for i, column in enumerate(rows.T):
@@ -134,7 +134,7 @@ def ranks(K: Stiffness) -> tuple[Rank, Rank, Rank]:
 def balance_error(K: Stiffness) -> tuple[float, str, float]:
     """Return the largest residual of Eq. 13 [N m], its joint, and residual / :func:`torque_size`.
 
-    The force at a joint that slides is multiplied by the arm's length.
+    The force at a prismatic joint is multiplied by the arm's length.
     """
     arm, whole = K.posture.arm, torque_size(K)
     left = abs(K.residual * joint_unit(arm))
@@ -170,7 +170,7 @@ def cable_states(K: Stiffness) -> tuple[CableState, ...]:
 
 
 def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
-    """Return the number that ``answer`` computes by the law of ``cable``; None on a CdsmError."""
+    """Return the number that ``answer()`` computes by the law of ``cable``; None on a CdsmError."""
     try:
         return float(evaluate_law(cable, answer))
     except CdsmError:

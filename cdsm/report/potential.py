@@ -72,7 +72,7 @@ class LockedCable(NamedTuple):
         return min(abs(F - edge) for edge in edges)
 
     def one_sided(self) -> list[str]:
-        """Return a message for each bound or kink of the law at the tension; mostly none."""
+        """Return a message for each bound or kink of the law at the tension; usually none."""
         F, name = self.tension, self.cable.name
         if F == 0.0:
             return [f"{name} is slack (0 N), and K_θ counts it as if it were taut"]
@@ -124,7 +124,7 @@ class Neighbourhood:
     Attributes:
         locked: The position-controlled cables. Slack cables without stiffness (at some equilibria)
             are left out: a small motion does not tension them.
-        unit: 1 rad for each joint that turns, the arm's length for each joint that slides (nv,).
+        unit: 1 rad for each revolute joint, the arm's length for each prismatic joint (nv,).
     """
 
     def __init__(self, K: Stiffness) -> None:
@@ -215,15 +215,15 @@ class Neighbourhood:
 
     @property
     def first_step(self) -> float:
-        """Return the first, largest step of differences; no cable segment loses half its length.
+        """Return the first, largest step of the differences, a joint displacement in :attr:`unit`.
 
-        It is a joint displacement in :attr:`unit`.
+        It is so small that no cable segment loses half its length.
         """
         return min(_FIRST, self._closing_motion / 4.0)
 
     @property
     def first_elastic_step(self) -> float:
-        """Return a step ≤ :attr:`first_step`; no tension reaches a bound or kink of its law."""
+        """Return a step ≤ :attr:`first_step` with which no tension reaches a bound or kink."""
         step = self.first_step
         for each in self.locked:
             rise = self._k[each.number] * self._arms[each.number]
@@ -252,7 +252,7 @@ class Neighbourhood:
         return np.asarray(_ULPS * (self._pose.cable_lengths + self._pose.arm.length))
 
     def kinematic_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`kinematic` (3,) [N m]; any ``step`` has the same."""
+        """Return the rounding error of :meth:`kinematic` (3,) [N m]; ``step`` has no effect."""
         pose, arm = self._pose, self._pose.arm
         far = arm.length + float(np.linalg.norm(pose.tip[:3, 3]))
         weight = float(arm._model.masses.mass.sum() * np.linalg.norm(arm.gravity)) * far
@@ -280,5 +280,5 @@ class Neighbourhood:
 
 
 def joint_unit(arm: Manipulator) -> Array:
-    """Return 1 rad for joints that turn, the arm's length [m] for joints that slide (nv,)."""
+    """Return 1 rad for revolute joints, the arm's length [m] for prismatic joints (nv,)."""
     return JointUnits(arm.slides).levers(arm.length)

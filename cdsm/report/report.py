@@ -31,10 +31,10 @@ class Report(ReadOnlyState):
     Attributes:
         stiffness: The stiffness to check.
         self_check: Comparison of K_θ and its terms with central differences at this posture.
-        residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a joint that
-            slides is multiplied by the arm's length.
+        residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a prismatic
+            joint is multiplied by the arm's length.
         residual_joint: Name of the joint with the largest residual.
-        imbalance: ``residual`` over the size of the torques that it sums [-].
+        imbalance: ``residual`` divided by the size of the torques that it sums [-].
         optimality: Optimality conditions of Eq. 17; None if the tensions were not distributed.
         cables: Tension, stiffness and domain of each cable.
         jacobian_rank: Rank and condition number of J_X.
@@ -89,7 +89,7 @@ class Report(ReadOnlyState):
 
     @property
     def margin(self) -> float:
-        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; [N/m] if joints slide."""
+        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; [N/m] if no joint turns."""
         return self.stiffness.margin
 
     @property

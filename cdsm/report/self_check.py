@@ -76,20 +76,20 @@ class Difference:
 class Agreement:
     """Comparison of one term of K_θ, the torque residual or the cable lengths with a second value.
 
-    Entries of joints that slide are multiplied by the arm's length, so that all have one unit.
+    Entries of prismatic joints are multiplied by the arm's length, so that all have one unit.
 
     Attributes:
         name: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"`` (the sum of these
             four terms), ``"torque"`` (the residual of Eq. 13) or ``"lengths"`` of the cables.
         unit: ``"N m/rad"``; for the torque ``"N m"``, for the lengths ``"m"``.
-        largest: Largest magnitude of an entry of the term; for the torque, of its summed parts; for
-            the lengths, the longest.
+        largest: Largest magnitude of an entry of the term; for the torque, of the torques that it
+            sums; for the lengths, the longest one.
         potential: Comparison with finite differences of the potential; None if there is none.
         torque: Comparison with finite differences of the torque, or None.
         verdict: ``"DIFFERS"``: a difference is larger than expected. ``"agrees"``: none is larger,
             and the expected error of a comparison is at most :data:`RESOLVED` of the largest entry.
             ``"not possible"``: the expected errors of all comparisons are larger.
-        reason: Why the check is not possible, or what differs; mostly empty.
+        reason: Why the check is not possible, or what differs; usually empty.
     """
 
     name: str
@@ -195,7 +195,10 @@ def _differentiated(
     noise: Noise,
     step: float,
 ) -> list[_Recomputed]:
-    """Differentiate each part that ``f`` of ``near`` computes; an error becomes its reason."""
+    """Differentiate each part that ``f``, a method of ``near``, computes.
+
+    If this fails, the text of the error is the reason in the result.
+    """
     try:
         values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:

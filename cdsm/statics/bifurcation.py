@@ -43,7 +43,7 @@ class Bifurcation(ReadOnlyState):
         critical: The critical tension, with its posture and wrench.
         push: The push (6,) in the direction in which buckling moves the tip: force [N], then moment
             [N m], which is zero.
-        bounds: Lower bounds of tension (n,) [N], rising.
+        bounds: Lower bounds of tension (n,) [N], ascending.
         rests: Equilibrium under the push at each bound.
     """
 
@@ -58,7 +58,7 @@ class Bifurcation(ReadOnlyState):
         return frozen(np.array([rest.displacement for rest in self.rests]))
 
     def plot(self) -> Figure:
-        """Plot the displacement of the tip [mm] over the lower bound of tension [N]."""
+        """Plot the displacement of the tip [mm] against the lower bound of tension [N]."""
         return cdsm.plots.plot_bifurcation(self)
 
     def to_dict(self) -> dict[str, object]:
@@ -72,7 +72,7 @@ class Bifurcation(ReadOnlyState):
         return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return tip displacements [m] at each least tension [N]; MissingExtra without pandas."""
+        """Return tip displacements [m] at each lower bound [N]; needs pandas (MissingExtra)."""
         columns = dict(zip(("x [m]", "y [m]", "z [m]"), self.displacements.T, strict=True))
         return data_frame(columns, "minimum [N]", self.bounds)
 

@@ -1,6 +1,6 @@
 """Buckling: tension or load makes the joint stiffness of a fixed posture singular.
 
-Cables stiffen an arm by their elasticity. Their tension mostly softens it (active part of Eq. 16).
+Cables stiffen an arm by their elasticity. Their tension usually softens it (active part of Eq. 16).
 With stiff cables the elasticity always wins. With soft springs or long leads (lead: the straight
 cable between its actuator and the base disk) there is a critical tension. Above it K_θ is not
 positive definite and the arm buckles under any load. This module keeps the posture fixed and takes

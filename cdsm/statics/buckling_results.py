@@ -69,7 +69,7 @@ class CriticalTension(ReadOnlyState):
         return () if self.stable else (self._verdict,)
 
     def plot(self) -> Figure:
-        """Plot the smallest joint stiffness [N m/rad] over the lower bound of tension [N]."""
+        """Plot the smallest joint stiffness [N m/rad] against the lower bound of tension [N]."""
         return cdsm.plots.plot_critical_tension(self)
 
     def to_dict(self) -> dict[str, object]:
@@ -131,7 +131,7 @@ class CriticalLoad(ReadOnlyState):
         return () if self.factor else (f"UNSTABLE without the load: {self}".partition("\n")[0],)
 
     def plot(self) -> Figure:
-        """Plot the smallest joint stiffness [N m/rad] over the factor of the load."""
+        """Plot the smallest joint stiffness [N m/rad] against the factor of the load."""
         return cdsm.plots.plot_critical_load(self)
 
     def to_dict(self) -> dict[str, object]:

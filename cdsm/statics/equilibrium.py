@@ -92,9 +92,10 @@ class Equilibrium(ReadOnlyState):
 
     @cached_property
     def compliance(self) -> Array:
-        """Tip motion per wrench (6, 6), from [m/N] to [rad/(N m)]; joints at stops are fixed.
+        """Compliance at the tip (6, 6): tip motion per wrench, with joints at stops fixed.
 
-        C = J_X K_θ⁻¹ J_Xᵀ over the joints without stop reaction.
+        C = J_X K_θ⁻¹ J_Xᵀ over the joints without stop reaction. Linear rows and columns are first,
+        in [m/N], [rad/N] and [rad/(N m)].
 
         Raises:
             SingularStiffness: K_θ of these joints is singular.

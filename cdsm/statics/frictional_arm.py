@@ -23,9 +23,9 @@ from cdsm.support.values import Array
 
 
 class Settled(NamedTuple):
-    """Arm at one posture, balanced or not, after its cables have slipped as far as friction allows.
+    """State of an arm at one posture, after its cables have slipped as far as friction demands.
 
-    It is a state of :func:`~cdsm.statics.trust_region.find_rest`.
+    The arm need not be balanced. It is a state of :func:`~cdsm.statics.trust_region.find_rest`.
     """
 
     pose: Posture
@@ -68,7 +68,10 @@ class FrictionalArm(NamedTuple):
         return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.q), 0.0))
 
     def settled(self, pose: Posture, near: Array) -> Chain:
-        """Compute the cables at a posture. The search for tensions starts at ``near`` (S,) [N]."""
+        """Compute tensions and slips of all cables at a posture.
+
+        The search for the tensions starts at ``near`` (S,) [N].
+        """
         lengths, ratio = pose.segments.lengths, pose.segments.ratio
         return self.problem.settle(lengths, self.natural, ratio, self.forced, near)
 

@@ -63,7 +63,7 @@ def load_cycle(
         accuracy: Largest error of the energy balance (work − stored energy − dissipation) of each
             step, relative to the work, from 1e-12 to 0.1. Steps are divided until the error is
             smaller. Tips and tensions depend on sub-steps only where a hole stops sliding within
-            one: with 1e-3, the tip may then be off by some 0.1 % of its displacement, and a
+            one: with 1e-3, the tip may then be off by about 0.1 % of its displacement, and a
             tension by 1 % of its change.
 
     Raises:

@@ -122,7 +122,7 @@ class LoadHistory(ReadOnlyState):
         return assemble_segments(self.pose(k), T, signs, frozen(W), friction)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the states as a labelled Dataset in SI units; MissingExtra without xarray."""
+        """Return the states as a labelled Dataset in SI units; needs xarray (MissingExtra)."""
         arm, chains = self.reference.arm, self.reference.segments.chains
         names = np.array(arm.cables.names)
         first = np.flatnonzero(np.diff(chains.cable, prepend=-1))
@@ -161,7 +161,7 @@ class LoadHistory(ReadOnlyState):
         return dataset(variables, labels, title=title).assign_coords(of_holes)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table in SI units with a row per load; MissingExtra without pandas."""
+        """Return a table in SI units with a row per load; needs pandas (MissingExtra)."""
         loads, moved = self.wrenches.T, self.displacement.T
         columns: dict[str, NDArray[Any]] = {
             **{f"force {axis} [N]": force for axis, force in zip("xyz", loads[:3], strict=True)},
@@ -202,7 +202,7 @@ class LoadHistory(ReadOnlyState):
         return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def plot(self) -> Figure:
-        """Plot force over tip displacement, and the tensions of the segments of one cable.
+        """Plot force against tip displacement, and the tensions of the segments of one cable.
 
         It is the cable whose segments differ most in tension.
         """

@@ -43,8 +43,8 @@ class _Rest(NamedTuple):
 class LoadingPath:
     """Equilibria ("rests") of an arm with friction during a series of loads.
 
-    Unless a search fails, only the loads decide where the rests are. So a small change of the arm
-    changes the tips smoothly.
+    Unless a search fails, the loads alone decide at which points between two loads a rest is
+    computed. So a small change of the arm changes the tips smoothly.
     """
 
     loading: SlowLoading
@@ -65,10 +65,10 @@ class LoadingPath:
     ) -> LoadingPath:
         """Load an arm that is balanced at a posture under ``wrench`` (6,) by forces (n, 3) [N].
 
-        ``tension`` is F (C,) [N] before the first force, ``parts`` the number of rests over the
-        range of the forces. ``near`` is the path of a similar arm under the same loads: searches
-        that start from its motions are up to twice as fast. Raises CdsmError if the posture is
-        beyond a joint limit, or no equilibrium was found on the way.
+        ``tension`` is F (C,) [N] before the first force. ``parts`` is the number of equilibria that
+        are computed over the range of the forces. ``near`` is the path of a similar arm under the
+        same loads: searches that use its joint motions are up to twice as fast. Raises CdsmError if
+        the posture is beyond a joint limit, or no equilibrium was found on the way.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = state = loading.begin(tension, wrench)
@@ -103,7 +103,10 @@ class LoadingPath:
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
 
     def motion(self, i: int, load: int, part: float) -> Array | None:
-        """Return the motion (nv,) [rad] that led to rest ``i`` at this load and part, or None."""
+        """Return the joint motion (nv,) [rad] that led to rest ``i``.
+
+        None if rest ``i`` is not at ``part`` of the way to load number ``load``.
+        """
         if i < len(self.rests) and self.rests[i][1:] == (load, part):
             return self.rests[i].state.motion
         return None

@@ -52,10 +52,11 @@ class LoadedArm:
     """Arm under a wrench W (6,), its motors locked at a reference posture with tensions F (C,) [N].
 
     A position-controlled cable keeps its original length l_0. Its elongation is its elongation at
-    the reference plus the change of its length. A force-controlled cable keeps its tension. Outside
-    the domain of its law a cable has the stiffness of the nearest bound, or is slack. Only states
-    during a search may be there; :meth:`require_domains` refuses a result. ``lengths`` are L (C,)
-    [m] at which the cables have the tensions F, by default the lengths at the reference.
+    the reference plus the change of its length. A force-controlled cable keeps its tension. During
+    a search, tensions may leave the domains of their laws: outside, a cable has the stiffness of
+    the nearest bound, or is slack. :meth:`require_domains` refuses a result outside. ``lengths``
+    (C,) [m] are the cable lengths L at which the tensions are F; by default they are the lengths at
+    the reference.
 
     Raises:
         ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the

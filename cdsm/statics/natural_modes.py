@@ -45,7 +45,7 @@ class Modes(ReadOnlyState):
     Attributes:
         stiffness: K_θ with its posture, tensions and wrench.
         mass: M (nv, nv) [kg m²].
-        frequencies: ω/2π (S,) [Hz], rising.
+        frequencies: ω/2π (S,) [Hz], ascending.
         shapes: φ of the modes that vibrate (nv, S) [rad/(√kg m)].
         growth_rates: √(−ω²) of the modes that grow (n,) [1/s], the fastest first. A deflection
             grows by a factor e in the time 1/rate.
@@ -158,7 +158,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
 
 def _stand_in_mass(pose: Posture) -> Array:
-    """Compute the part of M (nv, nv) of placeholder masses: crosses, and links without mass."""
+    """Compute the part of M (nv, nv) from placeholder masses: of crosses and massless links."""
     if not pose.arm.is_serpentine:
         return np.zeros((pose.arm.nv, pose.arm.nv))
     inertia, stand_ins = CROSS_INERTIA * np.eye(3), []
@@ -174,7 +174,7 @@ def _stand_in_mass(pose: Posture) -> Array:
 
 
 def motions(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
-    """Return ω² (nv,) [1/s²], rising, and φ (nv, nv) with φᵀMφ = 1, of ``stiffness`` and mass M.
+    """Return ω² (nv,) [1/s²], ascending, and φ (nv, nv) with φᵀMφ = 1, of ``stiffness`` and mass M.
 
     Raises SingularMass if M is not positive definite.
     """

@@ -181,7 +181,7 @@ def _trial(
 
 
 def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Return eigenvalues, rising, and eigenvectors of K (symmetric part), ``free`` joints only."""
+    """Return eigenvalues (ascending) and eigenvectors of K, symmetric part, of ``free`` joints."""
     K = stiffness[np.ix_(free, free)]
     values, vectors = np.linalg.eigh((K + K.T) / 2.0)
     return values, vectors

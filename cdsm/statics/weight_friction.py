@@ -68,11 +68,11 @@ class WeightFriction(ReadOnlyState):
 
     @cached_property
     def sliding_load(self) -> float:
-        """Weight [N] at which the arm slides: its tangent is at most 1.25 times the frictionless.
+        """Weight [N] at which the arm slides: its tangent stiffness is near the frictionless one.
 
-        The frictionless tangent is :attr:`frictionless`, before the weight. The load is
-        0 without friction; inf if the arm does not slide up to 100 times the breakaway load, or if
-        no equilibrium is found before.
+        The tangent is then at most 1.25 times :attr:`frictionless`. The load is 0 without friction.
+        It is inf if the arm does not slide up to 100 times the breakaway load, or if no equilibrium
+        is found before.
         """
         first, u = self.breakaway.load, self.breakaway.direction
         if not 0.0 < first < math.inf:
@@ -112,7 +112,7 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def dithered(self) -> float:
-        """Weight divided by displacement [N/m] after dither: a load of changing sign that fades.
+        """Weight divided by displacement [N/m] after dither, a load of alternating sign that fades.
 
         The amplitude falls linearly from :attr:`sliding_load` to zero in :attr:`dither_cycles`
         cycles. NaN if the arm does not slide, no equilibrium is found on the way, or 64 cycles are
@@ -124,8 +124,9 @@ class WeightFriction(ReadOnlyState):
     def dither_cycles(self) -> int:
         """Number of dither cycles; doubling it changes the stiffness by at most 1 %.
 
-        The stiffness then is near :attr:`frictionless_secant`, but shaking along the load does not
-        move all cables. 0 without friction, and where ``dithered`` is NaN.
+        The stiffness is then near :attr:`frictionless_secant`, but not equal, since shaking along
+        the load does not move all cables. The number is 0 without friction, or if ``dithered`` is
+        NaN.
         """
         return self._dither[0]
 

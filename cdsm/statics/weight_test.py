@@ -153,7 +153,7 @@ class WeightTest(ReadOnlyState):
         return frozen(np.array([each.tension for each in self.loaded]))
 
     def plot(self) -> Figure:
-        """Plot load [N] over tip displacement [mm], and the tension of each cable [N]."""
+        """Plot load [N] against tip displacement [mm], and the tension of each cable [N]."""
         return cdsm.plots.plot_weight_test(self)
 
     def to_dict(self) -> dict[str, object]:
@@ -184,7 +184,7 @@ class WeightTest(ReadOnlyState):
         return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return displacement [m] and tensions [N] at each load; MissingExtra without pandas."""
+        """Return displacement [m] and tensions [N] at each load; needs pandas (MissingExtra)."""
         names = [f"{name} tension [N]" for name in self.without.pose.arm.cables.names]
         moved = zip(("x [m]", "y [m]", "z [m]"), self.displacements.T, strict=True)
         columns = {**dict(moved), **dict(zip(names, self.tensions.T, strict=True))}

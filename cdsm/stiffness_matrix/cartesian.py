@@ -155,10 +155,10 @@ class CartesianReadings(ReadOnlyState):
     def _read(
         self, matrix: Array, name: str, directions: Array = _NO_DIRECTIONS
     ) -> tuple[int, dict[str, Array]]:
-        """Return status and values of the quantity ``name`` of ``matrix``: K_θ or one of its terms.
+        """Compute the quantity ``name`` of ``matrix``, which is K_θ or one of its terms.
 
-        The status is READ, SINGULAR or IMMOBILE of :mod:`cdsm.kernels.readings`. Quantities along
-        directions need the unit vectors ``directions`` (D, 3).
+        Returns the status READ, SINGULAR or IMMOBILE of :mod:`cdsm.kernels.readings`, and the
+        values by name. Quantities along directions need the unit vectors ``directions`` (D, 3).
         """
         status, JX = np.array([[readings.READ]]), self.posture.jacobian
         K, parts, JX = matrix[None, ..., None], self._parts[None, ..., None], JX[None, ..., None]

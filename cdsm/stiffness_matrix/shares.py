@@ -31,7 +31,7 @@ class Shares(ReadOnlyState, Named):
         stiffness: The stiffness from which they are computed.
         direction: The unit direction (3,), base axes.
         passive: Contribution of each cable's elasticity, (C,) [N/m].
-        active: Contribution of each cable's tension, (C,) [N/m]; mostly negative.
+        active: Contribution of each cable's tension, (C,) [N/m]; usually negative.
         gravity: Contribution of the weight of the links [N/m].
         load: Contribution of the wrench at the tip [N/m].
     """
@@ -81,7 +81,7 @@ class Shares(ReadOnlyState, Named):
         return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return both contributions of each cable [N/m] as a table; MissingExtra without pandas."""
+        """Return both contributions of each cable [N/m] as a table; needs pandas (MissingExtra)."""
         columns = {"passive [N/m]": self.passive, "active [N/m]": self.active}
         return data_frame(columns, "cable", self.stiffness.posture.arm.cables.names)
 

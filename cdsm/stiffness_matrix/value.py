@@ -40,8 +40,8 @@ class Stiffness(CartesianReadings):
         posture: The posture.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
-        cable_stiffness: Diagonal of K_L (C,) [N/m], also with friction that of whole cables that
-            slide freely; 0 for force-controlled cables.
+        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables. With friction
+            too, it is the stiffness of whole cables that slide freely.
         active: H_L·F (nv, nv) [N m/rad]; also called geometric.
         passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic. With friction it
             is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the segments j of length l_j and tension T_j; it is not
@@ -96,7 +96,7 @@ class Stiffness(CartesianReadings):
     def margin(self) -> float:
         """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; if negative, the arm buckles.
 
-        If an arm has sliding and turning joints, only its sign is independent of the unit of
+        If an arm has prismatic and revolute joints, only its sign is independent of the unit of
         length.
         """
         return read_margin(self.joint)
@@ -148,7 +148,7 @@ class Stiffness(CartesianReadings):
         They are stiffer wires, stiffer series springs, other lower bounds of the tensions, or other
         disk offsets. For each, the factor at which the smallest eigenvalue of K_θ is zero is found
         by bracketing. The posture and the wrench stay the same. Tensions of your own are not
-        distributed again: for them only wires and springs are tried. It takes some tenths of a
+        distributed again: for them only wires and springs are tried. It takes a few tenths of a
         second.
         """
         from cdsm.instability import find_remedies  # here, since a stable arm does not need it
@@ -166,7 +166,7 @@ class Stiffness(CartesianReadings):
         """Check this stiffness; return facts, warnings and a second derivation of K_θ.
 
         The second derivation uses central differences of the potential and the torque at this
-        posture. It takes some tenths of a second. Problems are not raised as errors; the report
+        posture. It takes a few tenths of a second. Problems are not raised as errors; the report
         lists them.
 
         Raises:
@@ -201,7 +201,7 @@ class Stiffness(CartesianReadings):
         return prints.numbers(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return K_θ, its terms, F and k as a labelled Dataset; MissingExtra without xarray."""
+        """Return K_θ, its terms, F and k as a labelled Dataset; needs xarray (MissingExtra)."""
         arm, square = self.posture.arm, ("joint", "joint_column")
         unit = arm.stiffness_unit()
         terms = {name: (square, getattr(self, name), unit) for name in get_args(Term)}

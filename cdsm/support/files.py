@@ -19,7 +19,7 @@ MAXIMUM_BYTES = 10_000_000
 def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> str:
     """Return the text of a file: UTF-8, or with ``any_encoding`` also UTF-16 or Windows-1252.
 
-    FileError if it is missing, no regular file, too large, not readable, or of another encoding.
+    FileError if it is missing, not a regular file, too large, not readable, or of another encoding.
     """
     path = as_path(path)
     try:
@@ -116,7 +116,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 def as_path(path: str | os.PathLike[str]) -> Path:
     """Return a path that the system can use; the file may or may not exist.
 
-    InvalidInput if it is no path; FileError if it is too long, no text, or not accessible.
+    InvalidInput if it is not a path; FileError if it is too long, not text, or not accessible.
     """
     try:
         found = Path(path)

@@ -21,7 +21,7 @@ def coordinates(values: Iterable[float], form: str = ".4g") -> str:
 
 
 def rounded(value: float, *, up: bool) -> str:
-    """Return a bound as text with four digits, rounded ``up`` or down so that it still holds."""
+    """Return a bound as text with four digits, rounded ``up`` or down so that it stays valid."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
     return f"{(math.ceil if up else math.floor)(value / step) * step:.4g}"
 
@@ -45,7 +45,7 @@ _ROUNDING = 1e-9  # a number of a table below this fraction of the largest is pr
 
 
 def without_rounding(values: Array) -> Array:
-    """Return the numbers of a table with 0 in place of those that are rounding of the largest."""
+    """Return the numbers of a table, with 0 for those that are rounding errors of the largest."""
     size = abs(values)
     return np.where(size > _ROUNDING * size.max(initial=0.0), values, 0.0)
 
@@ -97,13 +97,13 @@ def key(name: str, unit: str) -> str:
 
 
 class JointUnits(NamedTuple):
-    """Units of the joints of an arm; joints turn or slide."""
+    """Units of the joints of an arm; joints are revolute or prismatic."""
 
     slides: NDArray[np.bool_]  # whether each joint slides (nv,)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Return the SI unit of each joint coordinate: rad, or m where the joint slides."""
+        """Return the SI unit of each joint coordinate: rad, or m for a prismatic joint."""
         return tuple("m" if slides else "rad" for slides in self.slides)
 
     @property
@@ -116,15 +116,15 @@ class JointUnits(NamedTuple):
         return self.joined("N m", "N", joint)
 
     def stiffness(self) -> str:
-        """Return the unit of eigenvalues of K_θ: N m/rad, N/m if all joints slide, else both."""
+        """Return the unit of eigenvalues of K_θ: N m/rad, N/m (all joints prismatic), or both."""
         return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
-        """Return a unit for each joint (nv,): 1 rad, or ``length`` [m] if it slides."""
+        """Return a unit for each joint (nv,): 1 rad, or ``length`` [m] for a prismatic joint."""
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
-        """Return q (..., nv) by joint name: ``angles_rad``, and ``ways_m`` of joints that slide."""
+        """Return q (..., nv) by joint name: ``angles_rad``, and ``ways_m`` of prismatic joints."""
         found: dict[str, object] = {}
         for key_of, chosen in (("angles_rad", ~self.slides), ("ways_m", self.slides)):
             if chosen.any() or key_of == "angles_rad":

@@ -44,8 +44,9 @@ def progress_bar(
 ) -> Iterator[Callable[[int], None]]:
     """Show a bar called ``what``, and yield a function that advances it by a number of items.
 
-    ``done`` of all ``total`` items (None: unknown) are finished already; ``rate`` shows the new
-    ones per second. If the bar is not ``wanted``, bars inside it are not shown either.
+    ``done`` of the ``total`` items (None: unknown) are finished already. With ``rate``, the bar
+    also shows how many items it finishes per second. If the bar is not ``wanted``, bars inside it
+    are not shown either.
     """
     outermost = _outermost.get()
     token = _outermost.set(False)
@@ -59,9 +60,9 @@ def progress_bar(
 
 @contextmanager
 def progress_allowed(progress: bool) -> Iterator[None]:
-    """Hide all bars that are opened inside this context, unless ``progress``, an argument, is set.
+    """Hide all bars that are opened inside this context, unless ``progress`` is True.
 
-    InvalidInput if it is no bool.
+    InvalidInput if ``progress`` is not a bool.
     """
     token = _outermost.set(flag("progress", progress) and _outermost.get())
     try:

@@ -117,9 +117,9 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
-    """Wrap ``validated``, which pydantic checks: all its faults raise one GeometryError.
+    """Wrap ``validated``, which pydantic checks, so that all its faults raise one GeometryError.
 
-    ``kind`` is the record or function behind it, for the keywords in the messages.
+    ``kind`` is the record or function behind it, whose keywords the messages name.
     """
 
     @wraps(validated)

@@ -23,7 +23,7 @@ def rising_root(
     The search begins at ``guess`` and stays between ``lower`` and ``upper``; ``upper`` may be inf.
     Return the tensions, and the values of ``slope``, the derivative of stretch, there. All arrays
     have the same shape. Newton's method runs inside a shrinking bracket, so it converges for every
-    rising function. scipy's ``find_root`` and ``brentq`` take ten times as long.
+    increasing function. scipy's ``find_root`` and ``brentq`` take ten times as long.
     """
     first, last, previous = lower, upper, np.full(np.shape(wanted), math.inf)
     guess = np.minimum(np.maximum(guess, first), last)

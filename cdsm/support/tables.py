@@ -46,7 +46,10 @@ class Table(NamedTuple):
         return self.rows[0][1]
 
     def column(self, at: int, refuse: Callable[[str], NoReturn], first: int = 1) -> Array:
-        """Return the numbers of column ``at`` from row ``first`` on; ``refuse`` the others."""
+        """Return the numbers of column ``at`` from row ``first`` on.
+
+        If a cell is not a finite number, ``refuse`` is called, which raises an error.
+        """
         numbers = []
         for line, cells in self.rows[first:]:
             cell = cells[at] if at < len(cells) else ""
@@ -133,7 +136,8 @@ def column_in(
 ) -> tuple[int, float]:
     """Return the index of the column ``name`` of ``found``, and the factor to SI of its unit.
 
-    ``known`` has the factor of each allowed unit. ``refuse`` raises an error without such a column.
+    ``known`` has the factor of each allowed unit. If there is no such column, ``refuse`` is called,
+    which raises an error.
     """
     at, unit = found.get(name, (-1, ""))
     if unit not in known:

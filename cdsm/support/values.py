@@ -27,10 +27,10 @@ _Kept = TypeVar("_Kept", covariant=True)
 
 
 class Given(Protocol[_Given, _Kept]):
-    """Type of a field of a dataclass that takes one type, and that is read as another.
+    """Type of a dataclass field that accepts one type and is read as another.
 
-    Type checkers read both types from these methods; nothing calls them. mypy does so only for a
-    field that has a default.
+    Type checkers read both types from these methods, which nothing calls. mypy does so only if the
+    field has a default.
     """
 
     def __get__(self, owner: Any, kind: type) -> _Kept: ...
@@ -46,7 +46,7 @@ class Printed:
 
 
 class Named:
-    """Base class of values that are indexed by name: ``in`` and iteration are of the names."""
+    """Base class of values that are indexed by name; ``in`` and iteration use the names."""
 
     def keys(self) -> tuple[Any, ...]:
         """Return the names, in the order of the arrays."""

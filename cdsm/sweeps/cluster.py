@@ -42,8 +42,8 @@ def on_cluster(
     """Yield each block with its result as soon as a cluster has computed it; None if lost.
 
     If a worker dies, dask gives its blocks to other workers, at most ``allowed-failures`` times.
-    Then dask gives these blocks up, also those that only waited. Each of them is tried once more,
-    alone.
+    Then dask gives up these blocks, even those that were only waiting in the worker. Each of them
+    is computed once more, one after the other.
     """
     from distributed import as_completed
     from distributed.protocol.pickle import dumps  # pickles classes of a notebook by value

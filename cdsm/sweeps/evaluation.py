@@ -245,7 +245,8 @@ def _rows(
 ) -> tuple[Rows, Statuses]:
     """Compute the quantities ``names`` and the status of each row; NaN where one does not exist.
 
-    Rows that are not ``bounded`` get the status INFEASIBLE.
+    Rows that are False in ``bounded`` have no consistent bounds of tension; their status is
+    INFEASIBLE.
     """
     outputs = [_BATCH_NAMES.get(name, name) for name in names]
     found = batch.evaluate(

@@ -6,7 +6,7 @@ chosen:
     min ½‖F‖²   subject to   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
 
 First, :mod:`cdsm.kernels.serpentine_guess` guesses the tensions. If the guess meets the optimality
-conditions, as it mostly does, it is the solution. Otherwise a solver solves the dimensionless
+conditions, as it usually does, it is the solution. Otherwise a solver solves the dimensionless
 problem. If it finds no solution, :mod:`cdsm.tension.infeasibility` finds the reason.
 """
 
@@ -69,7 +69,7 @@ def distribute_tension(
 
     Raises:
         InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a number,
-            or a minimum is above its maximum, also because of ``worst_friction``.
+            or a minimum is above its maximum, possibly after ``worst_friction`` has narrowed them.
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
             missing torque. If wider bounds help, it says how far the bounds of cables without a
             fixed tension must widen.
@@ -167,7 +167,10 @@ def checked_bounds(
 
 
 def _ordered(minimum: object, maximum: object) -> bool:
-    """Return whether both are floats, 0 ≤ minimum ≤ maximum: the usual case, which must be fast."""
+    """Return whether both bounds are floats with 0 ≤ minimum ≤ maximum.
+
+    This is the usual case, which must be fast.
+    """
     if not isinstance(minimum, float) or not isinstance(maximum, float):
         return False
     return 0.0 <= minimum <= maximum and minimum < math.inf
@@ -180,7 +183,7 @@ def _named(cable: Cable, row: Sequence[int]) -> str:
 def _with_fixed(
     pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
 ) -> tuple[Array, Array]:
-    """Return the bounds ``low`` and ``high`` (C,) [N], both equal to ``fixed`` for fixed cables."""
+    """Return the bounds (C,) [N]; for cables in ``fixed``, both are the fixed tension."""
     if not isinstance(fixed, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     names = [cable.name for cable in pose.arm.cables]

@@ -95,10 +95,11 @@ def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
 
 @compiled
 def onto_bounds(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
-    """Return the point x (n,) with the entries at or outside a bound set exactly to the bound.
+    """Return x (n,), with entries at or beyond a bound set exactly to the bound.
 
-    Multipliers z (n,) mark active bounds: negative at low, positive at high. A solver misses them
-    by up to ``rounding``, and a tension just outside the domain of its law would be an error.
+    Multipliers z (n,) mark active bounds: negative at low, positive at high. A solver misses an
+    active bound by up to ``rounding``; the tension could then lie just outside the domain of its
+    law, which would be an error.
     """
     point = np.empty_like(x)
     for j in range(x.shape[0]):
@@ -130,9 +131,10 @@ def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str
 
 
 def _polished(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Return x, y and z that are exact if the bounds active at ``point`` are those of the optimum.
+    """Return x, y and z computed exactly from the bounds that are active at ``point``.
 
-    ``point`` is (x, y, z) as in :func:`_shortfall`, near the optimum.
+    They are the optimum if these bounds are active at the optimum. ``point`` is (x, y, z) as in
+    :func:`_shortfall`, near the optimum.
     """
     A, b, low, high, *_ = problem
     x, _, z = point

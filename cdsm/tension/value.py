@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 class Tension(ReadOnlyState, Named):
     """Cable tensions that balance an arm, with the data of their problem.
 
-    Indexed by the name of a cable [N]: ``tension["cable1_1"]``, ``"cable1_1" in tension``,
-    ``dict(tension)``. By index there is the array :attr:`values`, equal to ``np.array(tension)``.
+    The keys are the names of the cables: ``tension["cable1_1"]`` [N], ``"cable1_1" in tension``,
+    ``dict(tension)``. To index by number, use the array :attr:`values`, equal to
+    ``np.array(tension)``.
 
     Attributes:
         posture: The posture.
@@ -107,7 +108,7 @@ class Tension(ReadOnlyState, Named):
         return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return tension and bounds [N] of each cable as a table; MissingExtra without pandas."""
+        """Return tension and bounds [N] of each cable as a table; needs pandas (MissingExtra)."""
         columns = {
             "tension [N]": self.values,
             "minimum [N]": self.minimum,

@@ -33,7 +33,7 @@ class Tolerances:
     """Uncertainties of the dimensions of an arm and of the values measured on it.
 
     Each source of uncertainty is a :class:`Tolerance`, or a standard uncertainty (one sigma) as a
-    number, or a list of tolerances for different inputs, named by their ``of``. A number for
+    number, or a list of tolerances, each for the inputs that its ``of`` names. A number for
     ``rigidity`` or ``friction`` has the correlation 1: all cables are of one spool, all disks of
     one material. Other numbers have the correlation 0: the errors of all joints, holes, disks and
     links are independent.
@@ -42,7 +42,7 @@ class Tolerances:
         rigidity: EA of the law of each cable; relative [-].
         spring: Stiffness k_series of the spring in series with each cable, such as its anchor or
             its drive; relative [-].
-        joint_angle: Each joint angle [rad]; [m] where a joint slides.
+        joint_angle: Each joint angle [rad]; [m] for prismatic joints.
         tension: Each measured cable tension [N].
         lead: Straight length of each cable before the base disk [m].
         hole_radius: Distance of each hole from the axis of its link [m].

@@ -36,7 +36,7 @@ _DETERMINED = 1e-12
 
 
 class Balance(NamedTuple):
-    """Least tensions, and which cables are free: between their bounds; see the module."""
+    """Least tensions, and which cables are free; symbols as in the module's docstring."""
 
     tension: Tension
     free: NDArray[np.bool_]  # (C,)

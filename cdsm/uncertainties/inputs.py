@@ -139,9 +139,10 @@ class Inputs:
         return {source: by_input[columns] for source, columns in self.columns.items()}
 
     def displaced(self, errors: Mapping[str, Array]) -> Array:
-        """Return the displacements (N, n) [m] of all points of N arms, as in :meth:`Places.moved`.
+        """Convert errors of the inputs of N arms to displacements (N, n) [m] of their points.
 
-        ``errors`` has an array (N, inputs) by source; a source that is missing has no errors.
+        ``errors`` has an array (N, inputs) by source; a source that is missing has no errors. The n
+        coordinates are in the order of :meth:`Places.stacked`.
         """
         count = len(next(iter(errors.values())))
         every = np.zeros((count, self.map.shape[1]))

@@ -93,8 +93,8 @@ class MonteCarlo(ReadOnlyState):
     def to_xarray(self) -> xarray.Dataset:
         """Return the values and the errors of all inputs as a Dataset with dimension ``draw``.
 
-        The errors are drawn again from the seed: one variable per source, with the names of its
-        inputs. Tools for sensitivity analysis take such samples.
+        The errors are drawn again from the seed. Each source has one variable, labelled with the
+        names of its inputs. Tools for sensitivity analysis need such samples.
 
         Raises:
             MissingExtra: xarray is not installed (extra ``sweep``).

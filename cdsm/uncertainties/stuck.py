@@ -49,7 +49,7 @@ class Ties(NamedTuple):
 
 
 def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
-    """Return the arm of blocks at a posture, the tensions of its blocks [N], and the ties.
+    """Return the arm of blocks at a posture, the tensions of its blocks [N], and its :class:`Ties`.
 
     ``tension`` is F (C,) [N] of the cables of the arm.
     """

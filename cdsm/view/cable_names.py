@@ -47,7 +47,7 @@ class CableNames:
         self.chosen: int | None = None
 
     def choose(self, shown: Shown, origin: Array, direction: Array) -> None:
-        """Choose the cable of ``shown`` that the ray of a click hits; none if it hits no cable."""
+        """Choose the cable of ``shown`` that the ray of a click hits, or else no cable."""
         if shown.posture is not None:
             self.chosen = clicked_cable(shown.posture.cable_paths, origin, direction)
 

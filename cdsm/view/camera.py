@@ -46,7 +46,7 @@ class Ball:
         return cls(middle, max(float(np.linalg.norm(points - middle, axis=1).max()), least))
 
     def fits(self, other: Ball) -> bool:
-        """Whether a camera that is fitted to this ball shows the other ball well."""
+        """Whether a camera fitted to this ball shows ``other`` completely and not too small."""
         reach = float(np.linalg.norm(other.middle - self.middle)) + other.radius
         return _SMALL * self.radius < reach < _OUTSIDE * self.radius
 
@@ -54,8 +54,8 @@ class Ball:
 def placed(ball: Ball, direction: Array, aspect: float, free: float) -> tuple[Array, Array]:
     """Compute position and look-at point [m] of a camera that looks at a ball.
 
-    ``direction`` points to the camera. ``aspect`` is width over height of the picture, whose upper
-    part ``free`` (0 to 1) nothing covers.
+    ``direction`` points to the camera. ``aspect`` is width divided by height of the picture, whose
+    upper part ``free`` (0 to 1) nothing covers.
     """
     high = math.tan(_FOV / 2.0)
     distance = _MARGIN * ball.radius / min(high * free, high * aspect)

@@ -67,9 +67,10 @@ def serve(
         tips: A path to play, as tip positions (S, 3) [m]; give only one kind of path.
         solver: Solver of :func:`~cdsm.distribute_tension`.
         largest_tension: Right end of the slider of the lower bound [N].
-        largest_force: The sliders of the force go to ± this [N], or further if ``force`` does.
-        arm_arguments: The arm as arguments of ``cdsm``. The page then shows the command that
-            computes its numbers, otherwise lines of Python.
+        largest_force: The sliders of the force go from − to + this value [N], or further if
+            ``force`` is larger.
+        arm_arguments: Arguments of the command ``cdsm`` that describe the arm. If given, the page
+            shows the command that computes its numbers, otherwise lines of Python.
 
     Raises:
         MissingExtra: viser is not installed (extra ``[view]``).
@@ -99,7 +100,10 @@ def serve(
 
 
 def _tips(arm: Manipulator, path: Array, of_tips: bool) -> Array:
-    """Return the tips (S, 3) [m] of ``path``: tips if ``of_tips``, else joint angles, checked."""
+    """Return the tips (S, 3) [m] of ``path``: of tips if ``of_tips``, else of joint angles (S, nv).
+
+    InvalidInput if a sample of joint angles is not a posture of the arm.
+    """
     if of_tips:
         return path
     tips = []

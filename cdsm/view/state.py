@@ -76,7 +76,7 @@ class Setting(ReadOnlyState):
     """Values of the controls in SI units.
 
     Attributes:
-        q: Joint angles (nv,) [rad]; [m] where a joint slides.
+        q: Joint angles (nv,) [rad]; [m] for prismatic joints.
         minimum: Lower bound of all tensions [N].
         maximum: Upper bound of all tensions [N].
         force: Force at the tip, in base axes (3,) [N].
@@ -200,7 +200,7 @@ class Shown(ReadOnlyState):
 
 
 def remedies_of(shown: Shown) -> tuple[str, ...]:
-    """Return the remedies for the unstable arm of ``shown``; this takes some tenths of a second."""
+    """Return the remedies for the unstable arm of ``shown``; this takes tenths of a second."""
     return () if shown.stiffness is None else advice(shown.stiffness)
 
 

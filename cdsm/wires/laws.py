@@ -96,11 +96,11 @@ class StrandElasticity(Elasticity):
 
         The coefficient printed as −1e-3 is read as −1e-4: with −1e-3 the branch gives −787 884 N at
         31 N, where the other branch gives 11 352 N. The printed digits leave EA(31 N) uncertain by
-        6 kN and EA(810 N) by 35 kN. Within these limits, this law is continuous, as level as
-        possible from 400 to 810 N, where the paper calls EA near-constant, and otherwise nearest to
-        the printed values. Linear programs find it (``tests/laws/test_errata.py``). At 31 N, the
-        slope falls from 1022 to 368. No law with these digits has a continuous slope there. The
-        polynomial is negative below 2.11 N, so the domain is (2.2 N, 810 N].
+        6 kN and EA(810 N) by 35 kN. Within these limits, this law is continuous. From 400 to 810 N,
+        where the paper calls EA near-constant, it is as flat as possible; otherwise it is nearest
+        to the printed values. It was found by linear programs (``tests/laws/test_errata.py``). At
+        31 N, the slope falls from 1022 to 368. No law with these digits has a continuous slope
+        there. The polynomial is negative below 2.11 N, so the domain is (2.2 N, 810 N].
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
@@ -204,8 +204,8 @@ class TabulatedElasticity(Elasticity):
     up to 31 % if EA levels off between the last two points. Points do not show how EA rises at 0 N.
 
     Attributes:
-        tensions: Tensions F of the points [N], rising from 0 or more.
-        strains: Strains ε of the points [-], rising. Only their differences matter.
+        tensions: Tensions F of the points [N], ascending from 0 or more.
+        strains: Strains ε of the points [-], ascending. Only their differences matter.
 
     Raises:
         InvalidInput: There are fewer than two points, or they do not rise.

@@ -64,7 +64,7 @@ def _horner(table: Array, column: int, F: float) -> float:
 
 @compiled
 def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) -> Array:
-    """Integrate Fⁿ dF/p, n = ``power``, from the low end to each F (N,).
+    """Integrate Fⁿ dF/p(F), n = ``power``, from the low end of the panels to each F (N,).
 
     ``edges``, ``table`` (``coefficients``) and ``before`` are those of :class:`Panels`.
     """
@@ -95,7 +95,10 @@ class Panels(NamedTuple):
         return np.array([self.edges[:-1], self.edges[1:], self.before[0]]), self.coefficients
 
     def integral(self, F: Array, power: int) -> Array:
-        """Integrate Fⁿ dF/p, n = ``power``, from the low end to each F ≤ ``end``, any shape."""
+        """Compute ∫ Fⁿ dF/p(F), n = ``power``, from the low end of the panels to each F ≤ ``end``.
+
+        p are the polynomials of the panels. F has any shape.
+        """
         found = _integrals(self.edges, self.coefficients, self.before, power, F.ravel())
         return np.asarray(found.reshape(F.shape))
 

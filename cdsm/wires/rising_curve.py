@@ -71,7 +71,7 @@ class RisingCurve:
 
     @cached_property
     def _ends(self) -> Array:
-        """Slopes (2, n − 1) at both ends of each piece, over the slope of its chord: a and b."""
+        """Slopes (2, n − 1) at both ends of each piece, divided by its chord's slope: a and b."""
         slopes = slopes_at_points(self.chords, self._rise)
         return np.array([slopes[:-1], slopes[1:]]) / self.chords
 

@@ -79,9 +79,9 @@ class Header(NamedTuple):
 def find_header(table: Table, wanted: Sequence[str | int] | None) -> tuple[Header, Column, Column]:
     """Find the header of a table, and its columns of displacement (or strain) and force.
 
-    ``wanted`` are the names or numbers of these two columns; None: the words of the header
-    decide. Of the headers in the first 50 lines that name both, the one above the most rows of
-    numbers is taken: machines write a table of results above the points. TensileTestError if no
+    ``wanted`` are the names or numbers of these two columns; None: the words of the header decide.
+    If several of the first 50 lines name both, the one above the most rows of numbers is the
+    header, since some machines write a table of results above the points. TensileTestError if no
     header names both, or it names one of them twice.
     """
     if not table.rows:
@@ -147,7 +147,10 @@ def _numbered(table: Table) -> Header:
 
 
 def _column(at: int, cell: str, below: str) -> Column:
-    """Read cell ``at`` of a header. Its unit is in brackets, its last word, or in ``below``."""
+    """Read cell ``at`` of a header: name, unit and kind of its column.
+
+    The unit is in brackets, or is the last word of the cell, or is ``below``, the cell below it.
+    """
     groups = [each.strip() for each in re.findall(r"[\[(]([^\])]*)[\])]", cell)]
     name = re.sub(r"\s*[\[(][^\])]*[\])]", "", cell).strip()
     known = [each for each in groups if each in _KNOWN]

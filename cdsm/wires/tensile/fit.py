@@ -59,14 +59,16 @@ class Band(ReadOnlyState):
     near each tension, and t the quantile of Student's distribution. The fitted law is smoother and
     may touch the edge of the band where EA bends.
 
-    Measured, in 100 tests of 400 points each, of three wires with 0.5 N and 2 N of noise, it covers
-    95.3 % of all cases, and 89 to 100 % at each of 16 tensions. Where EA bends it may cover less:
-    Eq. 19 at 80 N 92 %. Within some newtons of a kink of force over strain it misses EA.
+    In 100 tests of 400 points each, of three wires with 0.5 N and 2 N of noise, it contained EA in
+    95.3 % of all cases, and in 89 to 100 % at each of 16 tensions. Where EA bends it may contain EA
+    less often: in 92 % for Eq. 19 at 80 N. Within a few newtons of a kink of the force as a
+    function of strain, it misses EA.
 
     The band leaves out errors of calibration and gauge length, and errors that neighbouring points
     share (drift, ripple, slip). ``TensileFit.notes`` names shared errors if the residuals show
-    them. Steps of a load cell coarser than the noise are shared, too: with steps of 0.5 N the band
-    covers 34 % of the tensions of Eq. 19 without noise, 83 % with 0.1 N, and 95 % with 0.5 N.
+    them. A load cell with steps coarser than the noise also causes shared errors: with steps of 0.5
+    N the band contains EA of Eq. 19 at 34 % of the tensions without noise, at 83 % with 0.1 N of
+    noise, and at 95 % with 0.5 N.
 
     Attributes:
         tensions: Tensions F, shape (n,) [N].
@@ -89,7 +91,7 @@ class TensileFit(ReadOnlyState):
         stages: Stages found in the rigidity curve: pre-tensioning, elastic, plastic, in this order.
         rms: Root mean square of measured minus fitted force over the domain [N]. Averaged points
             count as one point.
-        tensions: About 200 tensions F over the domain, rising, shape (n,) [N].
+        tensions: About 200 tensions F over the domain, ascending, shape (n,) [N].
         band: 95 % confidence :class:`Band` of EA at these tensions; None for ``polynomial``.
         test: The test.
         method: ``monotone`` or ``polynomial``.
@@ -140,7 +142,7 @@ class TensileFit(ReadOnlyState):
         return Tolerance(standard, correlation=1.0, of=of, tensions=self.band.tensions)
 
     def plot(self) -> Figure:
-        """Plot force [N] over displacement [mm] with the fit; EA [kN] with band and stages."""
+        """Plot force [N] against displacement [mm] with the fit; EA [kN] with band and stages."""
         from cdsm.plots.measured import plot_tensile_fit  # matplotlib imports slowly
 
         return plot_tensile_fit(self)

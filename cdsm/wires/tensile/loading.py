@@ -116,7 +116,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
 def _outliers(values: Array) -> NDArray[np.bool_]:
     """Return which values (n,) are single values far from their neighbours.
 
-    A real peak is no outlier: the steps between the values on either side of it are similar.
+    A real peak is not an outlier: the steps between the values on either side of it are similar.
     """
     # extrapolate the missing neighbour at each end
     first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
@@ -155,9 +155,10 @@ def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
 
 
 def _slack(points: Points, noise: float, least: float) -> int:
-    """Count the first points, where the force does not rise significantly: the wire is slack.
+    """Count the points at the beginning of the test at which the wire is slack.
 
-    ``noise`` and ``least`` [N] are those of :func:`_trends`.
+    There the force does not rise significantly. ``noise`` and ``least`` [N] are those of
+    :func:`_trends`.
     """
     slope, error = _trends(points, noise, least)
     flat = np.flatnonzero(slope <= _SURE * error)
@@ -174,8 +175,8 @@ def _slack(points: Points, noise: float, least: float) -> int:
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
     """Fit a line to the first n points, for each n; return slopes [N per point], standard errors.
 
-    The error follows from the ``noise`` [N] or from the scatter of the points if that is smaller,
-    but from ``least`` [N] at least.
+    The standard error follows from the ``noise`` [N], or from the scatter of the points if that is
+    smaller; a value below ``least`` [N] is replaced by ``least``.
     """
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)

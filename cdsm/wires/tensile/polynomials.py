@@ -85,7 +85,7 @@ def _joins_of(points: Points, join: float) -> tuple[float, ...]:
 
 
 def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
-    """Fit one polynomial per range to the slopes over the force; return them, lowest power first.
+    """Fit one polynomial per range to slopes against force; return them, lowest power first.
 
     Two ranges share the value v at the join. With y = F − join, the polynomials are v + Σ a_k yᵏ
     and v + Σ b_k yᵏ: one linear least-squares problem in v, a and b.

@@ -1,4 +1,4 @@
-"""Read a tensile test, forces over displacements, from CSV with its units."""
+"""Read a tensile test, forces against displacements, from CSV with its units."""
 
 from __future__ import annotations
 

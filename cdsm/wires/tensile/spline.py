@@ -1,12 +1,12 @@
-"""Fit a smooth, positive rigidity EA(F) to noisy points of force over strain.
+"""Fit a smooth, positive rigidity EA(F) to noisy points of force against strain.
 
 log EA is a cubic B-spline in a coordinate that spreads small and large tensions. So EA > 0 and F(ε)
 is C1 for all data. The fit compares forces at the measured strains. Difference quotients would be
 mostly noise. The smoothing follows from the data by restricted likelihood.
 
 On 12 tests of the strand (300 points from 5 to 600 N, noise of 1 N), EA is 1.7 % off (root mean
-square). The slope of scipy's ``make_smoothing_spline`` of force over strain is 2.0 % off with its
-strain scaled to the number of points, 74 % without, and not positive everywhere in two tests.
+square). The slope of scipy's ``make_smoothing_spline`` of force against strain is 2.0 % off with
+its strain scaled to the number of points, 74 % without, and not positive everywhere in two tests.
 """
 
 from __future__ import annotations
