@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.elasticity import Elasticity, tension_at
+from cdsm.elasticity.answers import energy_of, rigidity_of, strain_of
 from cdsm.elasticity.law import checked_law
 from cdsm.errors import CableError, CdsmError, InvalidInput, named
 from cdsm.support.format import plural
@@ -171,7 +172,7 @@ class Cable:
         """
         values = self.elasticity.domain.check(tension)
         length = _length(free_length)
-        wire = length * self.elasticity.strain(values)
+        wire = length * strain_of(self.elasticity, values)
         return np.asarray(wire + (values - self.elasticity.rest) / self.series_stiffness)
 
     def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
@@ -179,7 +180,7 @@ class Cable:
 
         Arguments (F, l_0), shapes and errors are those of :meth:`elongation`.
         """
-        rigidity = self.elasticity.rigidity(tension)
+        rigidity = rigidity_of(self.elasticity, self.elasticity.domain.check(tension))
         return np.asarray(1.0 / (_length(free_length) / rigidity + 1.0 / self.series_stiffness))
 
     def energy(self, tension: ArrayLike, free_length: float) -> Array:
@@ -189,7 +190,7 @@ class Cable:
         """
         values = self.elasticity.domain.check(tension)
         spring = (values**2 - self.elasticity.rest**2) / (2.0 * self.series_stiffness)
-        return np.asarray(_length(free_length) * self.elasticity.energy(values) + spring)
+        return np.asarray(_length(free_length) * energy_of(self.elasticity, values) + spring)
 
     def tension(self, elongation: ArrayLike, free_length: float) -> Array:
         """Compute F [N] at an elongation: the inverse of :meth:`elongation`.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.elasticity.answers import rigidity_of, strain_of
+from cdsm.elasticity.answers import rigidity_of, slope_of, strain_of
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.kernels.stiffness import single_cable_stiffness
 from cdsm.kernels.wires import AT_ONCE, CURVE, POLYNOMIAL, Wires, single_rigidity
@@ -202,18 +202,12 @@ class CableLaws:
             beside = np.where(F + step <= last, F + step, F - step)
             both = np.stack([F, beside])
             try:
-                slopes = np.asarray(law.rigidity_slope(both))
+                slopes = slope_of(law, both)
                 R = self.stretched_rigidity(law, F)
                 if self._unstrained:  # (EA (1 + ε))′ = EA′ (1 + ε) + 1
                     slopes = slopes * (1.0 + strain_of(law, both)) + 1.0
             except ElasticityRangeError as error:
                 raise self.naming(error, held) from None
-            if slopes.shape != (2, F.size) or not np.isfinite(slopes).all():
-                raise InvalidInput(
-                    "elasticity",
-                    f"{law!r} gives the slopes {slopes} of its rigidity at tensions {F} N and "
-                    "beside them; one finite number for each is needed.",
-                )
             G, spring = slopes[0] / R, k * self.series[held]
             bend = (slopes[1] - slopes[0]) / (beside - F) / R - G**2
             A = spring / R + (1.0 - spring) * G

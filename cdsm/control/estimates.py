@@ -27,6 +27,7 @@ from scipy.linalg import solve_triangular
 
 from cdsm.control.laws import Reading
 from cdsm.control.sensors import Sensors
+from cdsm.elasticity.answers import rigidity_of, strain_of
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -160,7 +161,7 @@ class Observer:
         T = shares * F[chains.cable]
         for law, of in self._problem.laws:
             mine = np.isin(chains.cable, of)
-            strain[mine] = law.strain(np.clip(T[mine], law.domain.first, law.domain.high))
+            strain[mine] = strain_of(law, np.clip(T[mine], law.domain.first, law.domain.high))
         total = np.add.reduceat(strain * segments.lengths, chains.start[:-1])
         return np.asarray(total / pose.cable_lengths)
 
@@ -168,7 +169,7 @@ class Observer:
         """Compute dL/dF (C,) [m/N] at constant ``wire``, the length l_0 (C,) [m] paid out."""
         soft = np.array(self.arm._model.laws.series)
         for law, of in self._problem.laws:
-            soft[of] += wire[of] / law.rigidity(F[of])
+            soft[of] += wire[of] / rigidity_of(law, F[of])
         return soft
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Ask a law, which a user may have written, for EA and ε, and check its answers."""
+"""Ask a law, which a user may have written, and check its answers."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from cdsm.support.values import Array
 _STRAIN = float(np.nextafter(-1.0, 0.0)), LARGEST
 """Smallest and largest valid strain."""
 
+_FINITE = -LARGEST, LARGEST
+
 
 def rigidity_of(law: Elasticity, tension: Array) -> Array:
     """Return EA(F) [N] in the shape of F [N]; InvalidInput if the law gives no valid EA."""
@@ -27,6 +29,19 @@ def strain_of(law: Elasticity, tension: Array) -> Array:
     """Return ε(F) [-] in the shape of F [N]; InvalidInput if the law gives no valid ε."""
     needed = "one number for each, zero at the low end of its domain and rising, is needed."
     return _answer(law, law.strain, tension, _STRAIN, "strain {}", needed)
+
+
+def energy_of(law: Elasticity, tension: Array) -> Array:
+    """Return ∫ F dε [N] in the shape of F [N]; InvalidInput if the law gives no valid energy."""
+    return _answer(
+        law, law.energy, tension, _FINITE, "energy {} N", "one number for each is needed."
+    )
+
+
+def slope_of(law: Elasticity, tension: Array) -> Array:
+    """Return dEA/dF [-] in the shape of F [N]; InvalidInput if the law gives no valid slope."""
+    needed = "one finite number for each is needed."
+    return _answer(law, law.rigidity_slope, tension, _FINITE, "slope {} of its rigidity", needed)
 
 
 def _answer(

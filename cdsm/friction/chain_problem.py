@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cdsm.cable import Cable
 from cdsm.cable_laws import key
 from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.elasticity.answers import energy_of, rigidity_of, strain_of
 from cdsm.kernels.chain_problem import chain_tangent, solve_chains
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
@@ -201,7 +202,7 @@ class ChainProblem:
         for law, of in self._curved:
             inside, rigidity = _within(law, tension[of])
             softness[of] = 1.0 / rigidity
-            base[of] += law.strain(inside) - inside / rigidity
+            base[of] += strain_of(law, inside) - inside / rigidity
         return base, softness
 
     def _energy(self, tension: Array) -> Array:
@@ -209,11 +210,11 @@ class ChainProblem:
         energy = self._softness * tension**2 / 2.0
         for law, of in self._curved:
             T, (inside, rigidity) = tension[of], _within(law, tension[of])
-            energy[of] = law.energy(inside) + (T**2 - inside**2) / (2.0 * rigidity)
+            energy[of] = energy_of(law, inside) + (T**2 - inside**2) / (2.0 * rigidity)
         return energy
 
 
 def _within(law: Elasticity, tension: Array) -> tuple[Array, Array]:
     """Return ``tension`` clipped to the domain of ``law``, and the rigidities EA there [N]."""
     inside = np.clip(tension, law.domain.first, law.domain.high)
-    return inside, np.asarray(law.rigidity(inside))
+    return inside, rigidity_of(law, inside)

@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cdsm.cable import Cable
+from cdsm.elasticity.answers import strain_of
 from cdsm.errors import ElasticityRangeError, SolverError
 from cdsm.friction.neighbourhood import Neighbourhood
 from cdsm.friction.remainders import TOO_FAR, Bends, Remainders
@@ -249,7 +250,7 @@ class _Wire(NamedTuple):
         If not ``unstrained``, ε is the strain minus the strain under F.
         """
         law = cable.elasticity
-        strain = float(law.strain(F))
+        strain = float(strain_of(law, np.asarray(F)))
         offset = 0.0 if unstrained else strain
         least, most = F - fall, F + rise
         at = np.linspace(least, most, _CELLS + 1)
@@ -261,7 +262,7 @@ class _Wire(NamedTuple):
                 outside,
                 cables=[cable.name],
             )
-        b = 1.0 / (1.0 + law.strain(at) - offset)
+        b = 1.0 / (1.0 + strain_of(law, at) - offset)
         share = 1.0 / (1.0 + strain - offset)
         slope = float((b[-1] - b[0]) / (most - least)) if most > least else 0.0
         line = share + slope * (at - F)

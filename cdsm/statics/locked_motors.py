@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity
-from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.elasticity.answers import rigidity_of, strain_of
+from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.roots import rising_root
@@ -214,7 +215,7 @@ class _LockedLaw:
         domain, size = law.domain, tension.shape
         self._low, self._high = np.full(size, domain.first), np.full(size, domain.high)
         # a slack branch has negative strains
-        self._least_strain = np.minimum(law.strain(domain.first), 0.0)
+        self._least_strain = np.minimum(strain_of(law, np.asarray(domain.first)), 0.0)
         softest = self._compliance(self._low)
         if (softest <= 0.0).any():
             which = np.flatnonzero(softest <= 0.0).tolist()
@@ -231,22 +232,16 @@ class _LockedLaw:
         if math.isfinite(domain.high):
             self._after = 1.0 / self._compliance(self._high)
             self._span = self._elongation(self._high)
-        elongation = self._elongation(tension)
-        ends = [elongation, self._before, self._after]
-        if not np.isfinite(ends).all() or np.isnan(self._span).any():
-            raise InvalidInput(
-                "elasticity", f"{law!r} gives strains or rigidities that are not finite."
-            )
-        self._start = lengths - elongation  # L where the law begins [m]
+        self._start = lengths - self._elongation(tension)  # L where the law begins [m]
 
     def _elongation(self, F: Array) -> Array:
         """Compute the elongation Δl = l_0 Δε + ΔF/k_series [m] from the law's lower bound to F."""
-        wire = self._free_length * (self.law.strain(F) - self._least_strain)
+        wire = self._free_length * (strain_of(self.law, F) - self._least_strain)
         return np.asarray(wire + (F - self.law.domain.low) * self._series)
 
     def _compliance(self, F: Array) -> Array:
         """Compute the derivative dΔl/dF = l_0/EA(F) + 1/k_series [m/N] of the elongation Δl."""
-        return np.asarray(self._free_length / self.law.rigidity(F) + self._series)
+        return np.asarray(self._free_length / rigidity_of(self.law, F) + self._series)
 
     def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:
         """Compute F [N] and dF/dL [N/m] at ``lengths`` L [m]; the search starts at F = ``near``."""

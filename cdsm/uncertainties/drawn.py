@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cdsm.elasticity.answers import rigidity_of, strain_of
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.kernels.distribution import OPTIMAL, search_tensions
 from cdsm.kernels.draws import stiffness_of_draws
@@ -158,9 +159,9 @@ def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
     for law, of in laws.held:
         F = tension[..., of]
         try:
-            rigidity[..., of] = law.rigidity(F)
+            rigidity[..., of] = rigidity_of(law, F)
             if arm.original_length == "unstrained":
-                strain[..., of] = law.strain(F)
+                strain[..., of] = strain_of(law, F)
         except ElasticityRangeError as error:
             low, high = float(F.min()), float(F.max())
             raise ElasticityRangeError(

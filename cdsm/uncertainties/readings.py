@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from cdsm.elasticity.answers import slope_of
 from cdsm.kernels.sensitivity import single_gradient
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
@@ -239,5 +240,5 @@ def _stretched_slope(K: Stiffness, strain: Array) -> Array:
     arm = K.posture.arm
     slope = np.zeros_like(strain)
     for law, of in arm._model.laws.held:
-        slope[of] = law.rigidity_slope(K.tension[of])
+        slope[of] = slope_of(law, K.tension[of])
     return slope * (1.0 + strain) + float(arm.original_length == "unstrained")

@@ -105,3 +105,46 @@ def test_own_elasticity_without_a_domain_is_refused_where_it_enters_a_cable() ->
 def test_domain_and_rigidity_must_be_usable(make: Callable[[], object]) -> None:
     with pytest.raises(cdsm.InvalidInput):
         make()
+
+
+@pytest.mark.parametrize("fails", ["rigidity", "strain", "energy", "rigidity_slope"])
+def test_failure_of_an_own_elasticity_beyond_the_stiffness_is_told(
+    fails: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A law may fail at the loaded arm alone: there it is asked in other places."""
+
+    def broken(tension: Any) -> Any:
+        raise ValueError("boom")
+
+    class Exponential(Own):
+        def energy(self, tension: Any) -> Array:  # ∫ F dε = F − 1 kN ln(1 + F/1 kN)
+            return np.asarray(tension) - 1e3 * self.strain(tension)
+
+    law = Exponential(lambda tension: 1e3 + tension)
+    arm = cdsm.Manipulator(GEOMETRY, law).with_friction(0.05)
+    pose, tension = arm.at(np.zeros(arm.nv)), np.full(len(arm.cables), 50.0)
+    K, cable = cdsm.stiffness(pose.arm.with_friction(0.0).at(pose.q), tension), arm.cables[0]
+    asked: dict[str, list[Callable[[], object]]] = {
+        "rigidity": [
+            lambda: cdsm.equilibrium(pose, tension),
+            lambda: cdsm.breakaway(pose, tension, "z"),
+            lambda: cable.tension(1e-3, 1.0),
+        ],
+        "strain": [
+            lambda: cdsm.equilibrium(pose, tension),
+            lambda: cdsm.breakaway(pose, tension, "z"),
+            lambda: cdsm.rest_band(pose, tension, "z"),
+            lambda: cable.elongation(50.0, 1.0),
+        ],
+        "energy": [
+            lambda: cdsm.load_cycle(pose, tension, [(0.0, 0.0, -1e-3, 0.0, 0.0, 0.0)]),
+            lambda: cable.energy(50.0, 1.0),
+        ],
+        "rigidity_slope": [lambda: cdsm.stiffness_gradient(K)],
+    }
+    monkeypatch.setattr(law, fails, broken)
+    for ask in asked[fails]:
+        with pytest.raises(
+            cdsm.InvalidInput, match=r"elasticity: .*fails at.*ValueError\('boom'\)"
+        ):
+            ask()
