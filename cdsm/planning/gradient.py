@@ -15,6 +15,7 @@ import numpy as np
 from cdsm.planning.kernels import form_by_tension
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.directions import Direction, unit_direction
+from cdsm.support.format import aligned, without_rounding
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -37,6 +38,22 @@ class StiffnessGradient(ReadOnlyState):
 
     def __repr__(self) -> str:
         return f"<StiffnessGradient of {self.stiffness.posture.arm.name}>"
+
+    def __str__(self) -> str:
+        arm = self.stiffness.posture.arm
+        columns = (without_rounding(each) for each in (self.cable_stiffness / 1e3, self.margin))
+        rows = [
+            [
+                "cable",
+                "cable stiffness [N/mm]",
+                f"smallest joint stiffness [{arm.stiffness_unit()}]",
+            ]
+        ]
+        rows += [
+            [name, *(f"{value:z.4g}" for value in values)]
+            for name, *values in zip(arm.cables.names, *columns, strict=True)
+        ]
+        return "\n".join(["change per 1 N of tension in one cable", *aligned(rows)])
 
     @cached_property
     def joint(self) -> Array:
