@@ -198,7 +198,7 @@ def _cables(report: Report) -> Section:
 
 
 def _ranks(report: Report) -> Section:
-    rows = [("", "rank", "of", "condition")]
+    rows, ratio = [("", "rank", "of", "condition")], report.closure
     for name, rank in (
         ("J_X, motion of the tip", report.jacobian_rank),
         ("its linear rows", report.translation_rank),
@@ -207,8 +207,10 @@ def _ranks(report: Report) -> Section:
         rows.append((name, str(rank.rank), str(rank.full), _number(rank.condition)))
     sentences = [
         f"Singular values below {RANK:g} of the largest count as zero; lengths in arm lengths.",
-        f"Tensions can grow without a torque, the least by {report.closure:.3g} of the largest."
-        if report.closure > 0.0
+        "Whether all tensions can grow without a torque is not known: HiGHS failed."
+        if math.isnan(ratio)
+        else f"Tensions can grow without a torque, the least by {ratio:.3g} of the largest."
+        if ratio > 0.0
         else "Tensions cannot all grow without a torque.",
     ]
     return "Rank and condition", rows, sentences

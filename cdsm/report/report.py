@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from cdsm.errors import SolverError
 from cdsm.report import facts, remarks
 from cdsm.report.facts import CableState, Rank, Readings, Sticking
 from cdsm.report.optimality import Optimality, optimality
@@ -41,7 +42,7 @@ class Report(ReadOnlyState):
         translation_rank: Rank and condition number of the linear rows of J_X.
         cable_rank: Rank and condition number of J_Lᵀ; full if cables can give every joint torque.
         closure: Largest ratio min(n)/max(n) [-] of tensions n that cause no joint torque; zero if
-            the arm cannot be pretensioned with all cables.
+            the arm cannot be pretensioned with all cables, NaN if HiGHS fails.
         readings: The three tip stiffnesses along the base axes; None if K_θ is singular.
         sticking: Tip stiffnesses under loads too small to make a cable slide; None if no cable
             sticks, or if K_θ is singular.
@@ -187,10 +188,17 @@ def report_on(K: Stiffness) -> Report:
         jacobian_rank=tip,
         translation_rank=translation,
         cable_rank=cables,
-        closure=tension_ratio(K.posture.length_jacobian * joint_unit(K.posture.arm)),
+        closure=_closure(K),
         readings=readings,
         sticking=facts.sticking(K, readings),
     )
+
+
+def _closure(K: Stiffness) -> float:
+    try:
+        return tension_ratio(K.posture.length_jacobian * joint_unit(K.posture.arm))
+    except SolverError:
+        return math.nan
 
 
 def _cable_to_json(each: CableState) -> dict[str, object]:

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
+from scipy.optimize import OptimizeResult
 
 import cdsm
 from cdsm.report import Agreement, Report
@@ -443,6 +444,17 @@ def test_cables_that_all_pull_one_way_close_nothing() -> None:
     report = cdsm.stiffness(arm.with_cables([arm.cables[0], above]).at([0.0]), [9.0, 9.0]).report()
     assert report.closure == 0.0
     assert any("cannot all be pretensioned" in note for note in report.notes)
+
+
+def test_report_says_that_a_closure_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failed(*given: Any, **options: Any) -> OptimizeResult:
+        return OptimizeResult(status=4, message="numerical difficulties")
+
+    monkeypatch.setattr("cdsm.tension.ratio.least", failed)
+    report = cdsm.stiffness(locked.hinge().at([0.0]), [20.0, 20.0]).report()
+    assert "grow without a torque is not known: HiGHS failed" in str(report)
+    assert report.to_dict()["closure"] is None
+    assert not any("pretensioned" in note for note in report.notes)
 
 
 def test_straight_arm_has_the_ranks_of_a_straight_arm() -> None:
