@@ -66,7 +66,7 @@ def plot_arm(
         taken = stiffness.posture
         if taken is not pose and not (taken.arm == pose.arm and (taken.q == pose.q).all()):
             raise InvalidInput(
-                "stiffness", "was computed at another posture; compute it at this one."
+                "stiffness", "belongs to another posture or arm; compute it for this one."
             )
     figure, axes = picture_axes()
     unstable = stiffness is not None and not stiffness.is_stable

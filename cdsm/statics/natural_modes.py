@@ -124,12 +124,14 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
         The modes. If the arm buckles, ``is_stable`` is false; this is not an error.
 
     Raises:
-        InvalidInput: ``stiffness`` belongs to another posture.
+        InvalidInput: ``stiffness`` belongs to another posture or arm.
         SingularMass: A motion of the arm moves only massless links, so it has no frequency.
     """
     arm = instance("pose", pose, Posture).arm
     if not instance("stiffness", stiffness, Stiffness).posture._equals(pose):
-        raise InvalidInput("stiffness", "was computed at another posture; compute it at this one.")
+        raise InvalidInput(
+            "stiffness", "belongs to another posture or arm; compute it for this one."
+        )
     M = arm._model.body.mass_matrix(pose.q)
     spectrum, motions = np.linalg.eigh(M)
     if spectrum[0] <= _MASSLESS * spectrum[-1]:

@@ -99,7 +99,7 @@ def test_ellipsoid_shows_where_forces_move_the_tip() -> None:
     # all are moved there by 1 N, to the scale in the legend
     np.testing.assert_allclose(np.linalg.norm(np.linalg.solve(scale * C, points.T), axis=0), 1.0)
     assert float(found[3]) == pytest.approx(1e3 * np.linalg.norm(C, 2), rel=5e-3)
-    with pytest.raises(cdsm.InvalidInput, match="another posture"):
+    with pytest.raises(cdsm.InvalidInput, match="another posture or arm"):
         plots.plot_arm(random_posture(mixed_arm(), 4), stiffness=K)
     soft = cdsm.serpentine_cables(
         pose.arm.geometry, cdsm.LinearElasticity(1e9), series_stiffness=10.0
