@@ -127,17 +127,19 @@ class ArmOptions:
 
     def read(self) -> cdsm.Manipulator:
         """Build the arm from its files and options."""
+        from cdsm.support.validation import quantity
+
         try:
             arm = self._arm()
         except cdsm.MissingWire as error:
             raise misuse("--wire", str(error)) from None
         if self.spring is not None:
-            k = 1000.0 * self.spring
+            k = quantity("--spring", 1000.0 * self.spring, "stiffness", infinite=True)
             arm = arm.with_cables([replace(cable, series_stiffness=k) for cable in arm.cables])
         if self.slack_below:
             arm = arm._with_laws([cable.elasticity.slack_below() for cable in arm.cables])
         if self.friction is not None:
-            arm = arm.with_friction(self.friction)
+            arm = arm.with_friction(quantity("--friction", self.friction, "friction", zero=True))
         if self.gravity is not None:
             arm = arm.with_gravity(gravity_of(self.gravity))
         return arm
@@ -186,17 +188,22 @@ class ArmOptions:
 
     def _wire(self) -> cdsm.Elasticity | None:
         """Return the wire of --wire, or of --rigidity, if one is given."""
+        from cdsm.support.validation import quantity
         from cdsm.wires.catalogue import as_wire
 
         if self.wire is None:
-            return None if self.rigidity is None else cdsm.LinearElasticity(self.rigidity)
+            return (
+                None
+                if self.rigidity is None
+                else as_wire(quantity("--rigidity", self.rigidity, "rigidity"))
+            )
         if self.rigidity is not None:
             raise misuse("--rigidity", "give it or --wire, not both.")
         try:
             rigidity = float(self.wire)
         except ValueError:
             return as_wire(self.wire)
-        return as_wire(rigidity)
+        return as_wire(quantity("--wire", rigidity, "rigidity"))
 
 
 @dataclass(frozen=True)

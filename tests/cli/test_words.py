@@ -415,3 +415,25 @@ def test_verbose_shows_the_log(
     asked = ("sweep", geometry, *STEEL, "--random", 4, "--out", tmp_path / "s.csv")
     assert call("--verbose", *asked).exit_code == 0
     assert "sweep of probe: 4 of 4 entries to compute" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        ("stiffness", "--spring=-3"),
+        ("stiffness", "--friction=-1"),
+        ("stiffness", "--wire=-1"),
+        ("stiffness", "--wire=nan"),
+        ("stiffness", "--rigidity=0"),
+        ("sweep", "--diameter=-1"),
+        ("sweep", "--breaking-load=0"),
+        ("sweep", "--bend-diameter=nan"),
+    ],
+)
+def test_wrong_number_is_told_by_the_option_that_was_typed(
+    geometry: Path, tmp_path: Path, command: str, option: str
+) -> None:
+    sweep = ("--out", tmp_path / "s.csv", "--random", 2, "--quantities", "wire_safety,wire_life")
+    result = call(command, geometry, *(sweep if command == "sweep" else ()), option)
+    assert result.exit_code == 1
+    assert said(result.stderr).startswith(f"error: {option.split('=')[0]}: ")
