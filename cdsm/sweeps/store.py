@@ -81,11 +81,8 @@ def read(path: Path) -> xarray.Dataset:
 
     A Dataset that xarray wrote to a Zarr folder is read completely.
     """
-    import zarr
-
-    found = _dataset(path)
-    group = zarr.open_group(path, mode="r", use_consolidated=False)
-    gap = next(_gaps(path, group), None) if _ORDER in group.attrs else None
+    found, group = _dataset(path)
+    gap = None if group is None else next(_gaps(path, group), None)
     if gap is not None:
         raise FileError(
             gap[0],
@@ -95,7 +92,8 @@ def read(path: Path) -> xarray.Dataset:
     return found
 
 
-def _dataset(path: Path) -> xarray.Dataset:
+def _dataset(path: Path) -> tuple[xarray.Dataset, Any]:
+    """Return the Dataset of a store and its Zarr group; None for the group if xarray wrote it."""
     import xarray
     import zarr
 
@@ -109,8 +107,9 @@ def _dataset(path: Path) -> xarray.Dataset:
             found.load()
     except Exception as error:  # zarr, its codecs and the file system may raise anything
         raise FileError(path, f"is not a sweep's store: {error}.") from None
+    group: Any = None
     if order is not None:
-        group: Any = zarr.open_group(path, mode="r", use_consolidated=False)
+        group = zarr.open_group(path, mode="r", use_consolidated=False)
 
         def told(names: Iterable[Hashable]) -> dict[Hashable, Any]:
             return {
@@ -126,7 +125,9 @@ def _dataset(path: Path) -> xarray.Dataset:
             texts = np.array(found[name].values.tolist())
             found = found.assign_coords({name: (found[name].dims, texts, found[name].attrs)})
         found[name].encoding = {}  # a NetCDF file must not inherit the encoding of the store
-    return found if order is None else found[[name for name in order if name in found.variables]]
+    if order is not None:
+        found = found[[name for name in order if name in found.variables]]
+    return found, group
 
 
 def _once(path: Path, array: Any) -> Any:
@@ -231,7 +232,7 @@ def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -
 
 def _check(path: Path, specification: Specification) -> None:
     """Raise a StoreError that lists the differences between a store and the specification."""
-    stored, wanted = _dataset(path), specification.frame
+    (stored, _), wanted = _dataset(path), specification.frame
     held, asked = {str(name) for name in stored.data_vars}, {*specification.variables}
     different = [f"outputs: {each} in the store alone" for each in sorted(held - asked)]
     different += [f"outputs: {each} not in the store" for each in sorted(asked - held)]

@@ -77,6 +77,22 @@ def test_a_store_holds_what_a_sweep_in_memory_does(tmp_path: Path, whole: xr.Dat
     assert [path.name for path in tmp_path.iterdir()] == ["s.zarr"]  # nothing is left beside it
 
 
+def test_a_store_is_opened_once_to_be_read(
+    tmp_path: Path, whole: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept(tmp_path / "s.zarr")
+    opened: list[object] = []
+    open_group = zarr.open_group
+
+    def counted(*given: Any, **options: Any) -> Any:
+        opened.append(given[0] if given else options["store"])
+        return open_group(*given, **options)
+
+    monkeypatch.setattr(zarr, "open_group", counted)
+    xr.testing.assert_identical(cdsm.read_sweep(tmp_path / "s.zarr"), whole)
+    assert opened.count(tmp_path / "s.zarr") == 1  # xarray, which opens it too, names it otherwise
+
+
 def test_an_interrupted_run_goes_on_where_it_stopped(
     tmp_path: Path, whole: xr.Dataset, monkeypatch: pytest.MonkeyPatch, counted: list[int]
 ) -> None:
