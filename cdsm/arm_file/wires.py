@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from cdsm.cable import Cable, Control
 from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import GeometryError, InvalidInput, UnknownName
-from cdsm.support.records import SpringStiffness, Tension, record, toml_value
+from cdsm.support.records import CrossFaults, SpringStiffness, Tension, record, toml_value
 from cdsm.support.validation import one_of
 from cdsm.wires.catalogue import WIRES, name_of
 from cdsm.wires.files import from_table, table_of
@@ -25,6 +25,13 @@ class CableSettings:
     control: Control | None = None
     minimum: Tension | None = None
     maximum: Tension | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        low, high = self.minimum, self.maximum
+        if low is not None and high is not None and low > high:
+            raise CrossFaults([f"minimum: {low:g} N given, above the maximum of {high:g} N"])
+        return self
 
 
 @record

@@ -174,6 +174,11 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
             "minimum = 400.0",
             "cable 'cable2_3': tensions from 400 to",
         ),
+        (
+            "minimum = 5.0",
+            "minimum = 5.0\nmaximum = 2.0",
+            "1 fault:\n  - minimum: 5 N given, above the maximum of 2 N",
+        ),
         ("minimum = 5.0", 'original_length = "long"', "original_length"),
         ("minimum = 5.0", "lead = 5.0", "lead: stands outside [universal]"),
         (

@@ -67,7 +67,11 @@ def test_what_is_left_out_is_nothing(tmp_path: Path) -> None:
         ('name = "left"', 'name = ""', "cables[1].name"),
         ('name = "left"', 'name = "left"\nlead = -1.0', "cables[1].lead"),
         ('name = "left"', 'name = "left"\ncontrol = "feel"', "cables[1].control"),
-        ('name = "left"', 'name = "left"\nminimum = 5.0\nmaximum = 2.0', "tensions from 5 to 2 N"),
+        (
+            'name = "left"',
+            'name = "left"\nminimum = 5.0\nmaximum = 2.0',
+            "cables[1].minimum: 5 N given, above",
+        ),
         ('name = "left"', 'name = "left"\nfriction = 2.5', "cables[1].friction: 2.5 given"),
         ("{link", "{friction = 0.1, link", "site 1 has friction or wrap"),
         ("{link", "{wrap = 20.0, link", "wrap: 20 rad given"),
