@@ -18,6 +18,7 @@ class Conditions:
     of: cdsm.Manipulator | cdsm.Posture  # the arm, or the only posture of the results
     minimum: tuple[float, ...] = ()  # given lower bounds of all tensions [N], one per case
     friction: bool = False  # whether the results include the friction of the arm
+    planned: bool = False  # whether tensions are planned, so within the domains of the laws
 
     @property
     def arm(self) -> cdsm.Manipulator:
@@ -34,6 +35,10 @@ class Conditions:
             own = max(cable.minimum for cable in self.arm.cables)
             if own > min(self.minimum):
                 words[-1] += f" (cables of their own up to {own:g} N)"
+            held = [cable for cable in self.arm.cables if cable.control == "position"]
+            first = max((cable.elasticity.domain.low for cable in held), default=0.0)
+            if self.planned and first > max(own, *self.minimum):
+                words[-1] += f" (raised to {first:g} N, where the law of a wire begins)"
         if self.arm.original_length != "unstrained":
             words.append("stretched lengths")
         words.append(self._friction)

@@ -90,7 +90,7 @@ def plan(
         write(animation, lambda file: cdsm.plots.plot_path(plan, animate=file))
         missed = len(plan.target) - len(plan.planned)
         warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"] if missed else []
-        conditions = Conditions(robot, (min_tension,))
+        conditions = Conditions(robot, (min_tension,), planned=True)
         answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
     elif wanted is None:
         raise misuse("--target", "give it, or --path.")
@@ -105,6 +105,6 @@ def plan(
         if out is not None:  # repeats the search as a path of one sample
             write(out, cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q]).write)
         write_picture(figure, lambda: best.plot(attainable))
-        conditions = Conditions(pose, (min_tension,))
+        conditions = Conditions(pose, (min_tension,), planned=True)
         results = [attainable, best]
         answer(as_json, lambda: attainable.to_dict() | best.to_dict(), conditions, *results)

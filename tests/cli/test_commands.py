@@ -656,6 +656,10 @@ def test_first_line_says_what_was_computed_with(geometry: Path, tmp_path: Path) 
         ("sweep", geometry, "--random", 1, "--out", tmp_path / "sweep.nc"),
     ):
         assert first(*command) == usual
+    plan = ("plan", geometry, "--direction", "z", "--target", 9, "--angles", 3, "--min-tension", 1)
+    raised = "least tension 1 N (raised to 2.2 N, where the law of a wire begins)"
+    assert first(*plan) == usual.replace("least tension 10 N", raised)
+    assert "raised" not in first(*plan, "--slack-below")
     given = ("--gravity", "0,1,0", "--spring", 2, "--wire", 48e3, "--min-tension", 20)
     assert first("stiffness", geometry, *given) == (
         "with wire EA 48000 N on a spring of 2 N/mm; gravity 0, 1, 0 m/s²; least tension 20 N; "
