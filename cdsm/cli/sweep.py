@@ -130,8 +130,11 @@ def sweep(
         ),
     ] = ",".join(DEFAULT),
     resume: Annotated[
-        Path | None,
-        typer.Option(help="Folder that keeps finished results; a stopped sweep resumes from it."),
+        str | None,  # a Path of "" would be the current folder
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder that keeps finished results; a stopped sweep resumes from it.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

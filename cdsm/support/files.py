@@ -15,6 +15,8 @@ from cdsm.errors import CdsmError, FileError, InvalidInput
 MAXIMUM_BYTES = 10_000_000
 """Largest size of a file that is read; a larger file is a mistake or an attack."""
 
+_MARKS = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
+
 
 def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> str:
     """Return the text of a file: UTF-8, or with ``any_encoding`` also UTF-16 or Windows-1252.
@@ -36,6 +38,8 @@ def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> st
     except FileNotFoundError:
         raise FileError(path, f"does not exist (looked in {Path.cwd()}).") from None
     except UnicodeDecodeError as error:
+        if b"\0" in data and not data.startswith(_MARKS):
+            raise FileError(path, "is a binary file; a text file is needed.") from None
         raise FileError(
             path, f"is not UTF-8 text (byte {error.start}); save it as UTF-8."
         ) from None
@@ -45,7 +49,7 @@ def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> st
 
 def _decoded(data: bytes) -> str:
     """Decode UTF-16 (it has a byte-order mark, or a zero byte first), UTF-8, or Windows-1252."""
-    if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+    if data.startswith(_MARKS):
         return data.decode("utf-16")
     if b"\0" in data[:2]:
         return data.decode("utf-16-be" if data[0] == 0 else "utf-16-le")
@@ -123,7 +127,7 @@ def as_path(path: str | os.PathLike[str]) -> Path:
     except TypeError:
         raise InvalidInput("path", f"{path!r:.100} given; the path of a file is needed.") from None
     if path == "":  # which Path takes for the folder
-        raise FileError("''", "is an empty path; the path of a file is needed.")
+        raise FileError("''", "is an empty path; give a file or folder.")
     try:
         found.lstat()
     except (FileNotFoundError, NotADirectoryError):

@@ -187,3 +187,10 @@ def test_map_of_no_sweep_is_one_message(tmp_path: Path) -> None:
     result = call("map", tmp_path / "absent.nc", "--out", tmp_path / "s.png")
     assert result.exit_code == 1
     assert "absent.nc: does not exist" in result.stderr
+
+
+def test_no_folder_to_resume_from_is_told(geometry: Path, tmp_path: Path) -> None:
+    given = ("--random", 2, "--out", tmp_path / "s.nc", "--resume", "")
+    result = call("sweep", geometry, *ARM, *given)
+    assert result.exit_code == 1
+    assert "is an empty path; give a file or folder" in result.stderr

@@ -440,6 +440,16 @@ def test_file_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"name = '\xff'")
     with pytest.raises(cdsm.FileError, match=r"not UTF-8 text \(byte 8\)"):
         cdsm.Geometry.read(path)
+    path.write_text("name = 'arm'", encoding="utf-16")
+    with pytest.raises(cdsm.FileError, match=r"not UTF-8 text \(byte 0\); save it as UTF-8"):
+        cdsm.Geometry.read(path)
+
+
+def test_picture_is_refused_as_binary(tmp_path: Path) -> None:
+    path = tmp_path / "arm.png"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
+    with pytest.raises(cdsm.FileError, match="is a binary file; a text file is needed"):
+        cdsm.Manipulator.read(path)
 
 
 def test_file_that_is_too_large_is_refused(tmp_path: Path) -> None:

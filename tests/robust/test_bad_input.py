@@ -161,7 +161,7 @@ CASES |= {
     "cables without a path": (
         lambda: ARM.with_cables(""),
         cdsm.FileError,
-        ("'': is an empty path", "the path of a file is needed"),
+        ("'': is an empty path", "give a file or folder"),
     ),
     "no text of a URDF": (
         lambda: cdsm.Manipulator.from_urdf("", ARM.cables, tip="tool0"),
