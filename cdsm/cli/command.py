@@ -17,7 +17,7 @@ from cdsm.cli.words import newer
 
 
 class Command(typer.core.TyperCommand):
-    """Command of typer that also takes older option names; --json makes errors of usage JSON."""
+    """Command of typer that accepts older option names; with --json, errors of usage are JSON."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Replace older names of options in ``args``, then parse and check them."""
@@ -39,8 +39,8 @@ class Command(typer.core.TyperCommand):
 def as_command(function: Callable[..., None]) -> Callable[..., None]:
     """Return a function as typer needs it: one parameter per option, and errors as messages.
 
-    typer reads options only from the signature. Options of several commands are the fields of a
-    dataclass; here these fields replace a parameter that is annotated with the dataclass.
+    typer reads options only from the signature. Options that several commands share are the fields
+    of a dataclass. In the signature, these fields replace the parameter annotated with it.
     """
     groups: dict[str, Any] = {}
     options: list[inspect.Parameter] = []

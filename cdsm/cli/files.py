@@ -15,7 +15,7 @@ import cdsm
 from cdsm.cli.values import misuse
 
 _WRITTEN = "cdsm.cli.files"
-"""Key of the files to write, by the name of their parameter, in the context of a command."""
+"""Key in a command's context under which it has its files to write, by parameter name."""
 
 
 def file_option(
@@ -65,7 +65,7 @@ def require_apart(context: typer.Context) -> None:
 
 
 def _alike(a: Path, b: Path) -> bool:
-    """Return whether two paths are of one file, which may not exist yet."""
+    """Return whether two paths lead to the same file, which may not exist yet."""
     with contextlib.suppress(OSError, ValueError):
         return a.resolve() == b.resolve() or a.samefile(b)
     return False

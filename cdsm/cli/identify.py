@@ -95,7 +95,7 @@ def identify(
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:
-    """Return the bounds of each parameter in ``--free``, in units of the command line, or None."""
+    """Return the bounds, in units of the command line, of each parameter of ``--free``, or None."""
     ranges: dict[str, Range | None] = {}
     for each in free:
         name, _, given = each.partition("=")

@@ -20,7 +20,7 @@ _size = {"rich_help_panel": "Its sizes"}
 
 
 _KEY = r"^(?:lead|twist)(?=: )|\b(?:link_length|base_length|disk_offset|hole_radius|link_mass)\b"
-"""A key of a geometry in its faults; ``lead`` may also be a word."""
+"""Pattern of a geometry's key in the text of a fault. Elsewhere, ``lead`` may be a word."""
 
 
 def new(

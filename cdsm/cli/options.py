@@ -176,7 +176,7 @@ class ArmOptions:
         return cdsm.Manipulator.read(self.arm, cables[0].elasticity).with_cables(cables)
 
     def at(self, angles: str) -> cdsm.Posture:
-        """Return the posture at joint coordinates ``angles`` [degrees, or mm if a joint slides]."""
+        """Return the posture at joint coordinates ``angles`` [degrees, or mm if prismatic]."""
         arm = self.read()
         return arm.at(coordinates(angles, arm) * joint_scales(arm))
 

@@ -89,7 +89,7 @@ def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
 
 
 def write(path: Path | None, fill: Callable[[Path], object]) -> None:
-    """If a path is given, write the file by ``fill(path)``, and say so on standard error."""
+    """If a path is given, write the file by ``fill(path)`` and tell the path on standard error."""
     if path is not None:
         fill(path)
         typer.echo(f"written: {path}", err=True)

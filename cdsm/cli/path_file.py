@@ -29,8 +29,8 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     """Read a path from a CSV file: a header, then one line per sample.
 
     The header names the columns and their units. Joint columns have the names of the joints of
-    the arm; joints without a column stay at 0. Other columns are ignored, but FileError if the name
-    of one looks like a typing error. Lines that begin with # are comments.
+    the arm; joints without a column stay at 0. Other columns are ignored, unless their names look
+    like typing errors: then FileError is raised. Lines that begin with # are comments.
     """
 
     def refuse(problem: str) -> NoReturn:
@@ -71,7 +71,10 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
 
 
 def one_target(given: float | None, of_file: Array | None, option: str) -> float | Array:
-    """Return the target [N/m], ``given`` or ``of_file``; BadParameter if none is there, or both."""
+    """Return the target [N/m], ``given`` or ``of_file``.
+
+    Raises BadParameter, which names ``option``, unless exactly one of them is not None.
+    """
     if given is not None and of_file is None:
         return given
     if given is None and of_file is not None:

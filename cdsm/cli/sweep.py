@@ -207,7 +207,7 @@ def map_sweep(
 
 
 def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
-    """Read a grid such as ``joint1=-20:20:9,joint2=5``, in degrees, or mm if a joint slides."""
+    """Read a grid such as ``joint1=-20:20:9,joint2=5``, in degrees (prismatic joints: mm)."""
     import numpy as np
 
     units = dict(zip(arm.joint_names, joint_scales(arm), strict=True))
@@ -240,7 +240,7 @@ def _answer(
 ) -> None:
     """Print which file was written; warn if no entry is ok, or has the ``mapped`` quantity.
 
-    ``conditions`` are given for a new sweep; then they and the counts of all statuses are printed.
+    For a new sweep, ``conditions`` are given; they and the counts of all statuses are printed, too.
     """
     from cdsm.support.tidy import status_names
 

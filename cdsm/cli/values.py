@@ -20,7 +20,7 @@ def misuse(option: str, problem: str) -> typer.BadParameter:
 
 
 def joint_scales(arm: cdsm.Manipulator) -> Array:
-    """Return the factor from each joint's unit on the command line to SI (nv,): of 1° or 1 mm."""
+    """Return the size in SI (nv,) of each joint's unit on the command line, 1° or 1 mm."""
     import numpy as np
 
     from cdsm.support.format import JointUnits
@@ -29,7 +29,7 @@ def joint_scales(arm: cdsm.Manipulator) -> Array:
 
 
 def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
-    """Return the joint coordinates of --angles (nv,) [degrees, or mm where a joint slides]."""
+    """Return the joint coordinates of --angles (nv,) [degrees, or mm if prismatic]."""
     if "=" in text:
         named = {
             name: numbers("--angles", value, 1, f"an angle, as {name}=10")[0]
@@ -49,10 +49,10 @@ def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
 
 
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:
-    """Return the text after ``JOINT=`` in an option, by joint; commas or spaces stand between.
+    """Return the text after each ``JOINT=`` in an option, by joint.
 
-    Names may have spaces, commas and ``=``. BadParameter says that ``form`` is needed; UnknownName
-    if there is no such joint.
+    Commas or spaces separate the entries; names may contain them, and ``=``. Raises BadParameter,
+    which says that ``form`` is needed, or UnknownName if there is no such joint.
     """
     from cdsm.support.validation import one_of
 
@@ -96,7 +96,7 @@ def gravity_of(text: str) -> list[float] | str:
 def numbers(option: str, text: str, count: int | None = None, form: str = "N,N,...") -> list[float]:
     """Return the ``count`` numbers in the text of an option; None: any count.
 
-    BadParameter otherwise; its message says that ``form`` is needed, such as ``FX,FY,FZ``.
+    Raises BadParameter for another text or count; its message has ``form``, such as ``FX,FY,FZ``.
     """
     from cdsm.support.format import plural
 

@@ -37,9 +37,10 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
 
 
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
-    """Plot the values of a Monte Carlo run as a histogram, beside the normal distribution.
+    """Plot the values of a Monte Carlo run as a histogram, and a normal distribution.
 
-    The normal distribution results from first-order error propagation. Dashed: 95 % intervals.
+    The normal distribution is that of first-order error propagation. Dashed lines mark the 95 %
+    intervals of both.
 
     InvalidInput if ``run`` is not a result of :func:`~cdsm.monte_carlo`.
     """

@@ -67,7 +67,7 @@ def plot_shares(shares: Shares) -> Figure:
 
 
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
-    """Plot the planned tension of each cable, and those of the softest and the stiffest arm.
+    """Plot the planned tension of each cable, and its tensions in the softest and stiffest arm.
 
     Args:
         plan: Result of :func:`~cdsm.plan_stiffness`.

@@ -41,7 +41,7 @@ _SEEN = 2e-3  # a narrower range, relative to the axis, cannot be seen
 def plot_weight_test(test: WeightTest) -> Figure:
     """Plot load against tip displacement, nonlinear and linear, and tensions against load.
 
-    Up to 24 cables are named. InvalidInput if ``test`` is not a result of
+    Up to 24 cables have names. InvalidInput if ``test`` is not a result of
     :func:`~cdsm.weight_test`.
     """
     expect("test", test, "WeightTest")
@@ -159,10 +159,11 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
 def plot_load_history(history: LoadHistory) -> Figure:
     """Plot the force against the displacement of the tip, and the tensions of one cable's segments.
 
-    Both begin at the reference. Force and displacement are components along the largest force of
-    the history. If no load has a force, the displacement is plotted against the number of the load.
-    The cable is the one whose segments differ most in tension. InvalidInput if ``history`` is not a
-    result of :func:`~cdsm.load_cycle`.
+    Both curves begin at the reference. Force and displacement are components along the largest
+    force of the history. If no load has a force, the displacement is plotted against the number of
+    the load. The cable is the one whose segments differ most in tension.
+
+    InvalidInput if ``history`` is not a result of :func:`~cdsm.load_cycle`.
     """
     expect("history", history, "LoadHistory")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _MOST_PANELS = 9
 
 _FLAT = 1e-9
-"""The tips are in a plane if their extent along an axis is below this fraction of the largest."""
+"""The tips are in a plane if their extent along one axis is below this part of the largest one."""
 
 _SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
 _THIN = 0.15  # least ratio of the sides of a map

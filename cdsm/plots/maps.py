@@ -52,10 +52,13 @@ _UNITS: Final = {
 _WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
 
 _EQUAL = 1e-9
-"""Values are one if they differ by less than this fraction; their scale is 5 % to either side."""
+"""All values are equal if they differ by less than this fraction of the largest.
+
+Their colour scale then extends 5 % to either side.
+"""
 
 _MIDDLE = (0.05, 0.95)
-"""A value is an outlier if it is further outside these quantiles than they are apart."""
+"""Two quantiles of the values. A value further outside them than their distance is an outlier."""
 
 _TALLEST = 4.0  # largest height of a panel [inch]
 _NARROWEST = 1.2  # least width of a title, and of a panel without its ticks [inch]
@@ -91,9 +94,9 @@ def plot_map(
     shown in three slices through its middle, as cells; a path is seen along each axis, as dots.
     Many postures may put the tip into one cell; the statistic determines which value it shows.
     Entries without the quantity are marked by their status. In a map of cells, no mark is drawn in
-    a cell that has a value. Unstable entries are marked too, because their stiffness has no
-    meaning, except in a map of the margin. Outliers, far from the middle 90 % of the values, and
-    infinite values have a colour of their own, at the ends of the colour bar.
+    a cell that has a value. Unstable entries are marked instead of coloured, except in a map of the
+    margin. Outliers, far from the middle 90 % of the values, and infinite values have a colour of
+    their own, at the ends of the colour bar.
 
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use

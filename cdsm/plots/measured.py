@@ -1,4 +1,4 @@
-"""Plot fits beside their measurements, and plans of measurements."""
+"""Plot fits with their measurements, and plans of measurements."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Plot predicted and measured values, and residuals in σ, named by ``labels``."""
+    """Plot predicted and measured values, and residuals divided by σ, named by ``labels``."""
     rows = fit._rows
     loops: list[Any] = [each for each in fit.measurements if hasattr(each, "forces")]
     stiff = [k for k, each in enumerate(rows) if not hasattr(each, "forces")]

@@ -74,7 +74,7 @@ def plot_paper(result: paper.Figure) -> Figure:
 def _grid(
     result: paper.StiffnessFigure, height: float, rows: int, **options: Any
 ) -> tuple[Figure, Any]:
-    """Build a figure as wide as two columns, of a height [inch]: each row has panels x, y and z."""
+    """Build a figure of two columns' width and a ``height`` [inch]; a row has panels x, y and z."""
     figure, grid = panels(TWO_COLUMNS, height, 3, rows, sharex=True, **options)
     for axes, axis in zip(grid[0], XYZ, strict=True):
         caption(axes, axis)
@@ -84,7 +84,10 @@ def _grid(
 
 
 def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings of Fig. 3 against Young's modulus; below, passive part minus total [%]."""
+    """Plot both readings of Fig. 3, and the error of the passive part [%], against Young's modulus.
+
+    The error is the passive part minus the total stiffness, divided by the total stiffness.
+    """
     figure, grid = _grid(result, 5.4, 3)
     ratio, limit = (result.claims[k].paper or () for k in (0, 1))
     looks: tuple[dict[str, Any], ...] = (
@@ -147,7 +150,7 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
-    """Plot active part and change of stiffness against tension, in columns for x, y and z."""
+    """Plot the active part and the relative change of stiffness against tension, for x, y and z."""
     figure, grid = _grid(result, 5.6, 3, sharey="row")
     first, stated = result.curves[0], result.claims[0].paper or ()
     for i in range(3):
@@ -231,7 +234,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
 
 
 def _draw_curve(axes: Any, curve: paper.Curve, values: Array, **line: Any) -> None:
-    """Draw a stiffness (N,) [N/m] against the mean tension of ``curve``; bars: range of cables."""
+    """Draw a stiffness (N,) [N/m] against the mean tension of ``curve``; bars show the range."""
     low, mean, high = curve.tension.T
     axes.plot(mean, N_PER_MM * values, **line)
     some = np.linspace(0, len(mean) - 1, _BARS).round().astype(int)

@@ -142,7 +142,7 @@ def _draw_skeleton(axes: Any, pose: Posture, shade: str) -> None:
 def _animate(
     path: str | os.PathLike[str], poses: Sequence[Posture], tensions: Array | None, limits: Array
 ) -> None:
-    """Write a GIF of up to 150 postures; ``limits`` (3, 2) [mm] are those of the axes."""
+    """Write a GIF of up to 150 postures; ``limits`` (3, 2) [mm] are the limits of the axes."""
     if as_path(path).suffix.lower() != ".gif":
         raise InvalidInput("animate", f"{str(path)!r} given; it must end in .gif.")
     figure, axes = picture_axes()

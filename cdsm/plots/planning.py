@@ -104,7 +104,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 
 
 def plot_saturation(found: Saturation) -> Figure:
-    """Plot stiffness, and its gain per newton of bound, against the lower bound of the tensions.
+    """Plot stiffness, and its gain per newton of the bound, against the lower bound of tension.
 
     InvalidInput if ``found`` is not a result of :func:`~cdsm.saturation`.
     """

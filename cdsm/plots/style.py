@@ -61,7 +61,7 @@ ROOM: Final = 1.15
 """Upper limit of an axis that begins at zero, divided by the largest value drawn."""
 
 NAMED: Final = 24
-"""Largest number of cables whose lines differ and have names; of more cables, all look alike."""
+"""Largest number of cables whose lines differ and have names. With more cables, all look alike."""
 
 _GAP: Final = 0.06  # free space around a picture [inch]
 
@@ -94,9 +94,10 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
 
 
 def expect(name: str, value: object, kind: str) -> None:
-    """Raise :class:`InvalidInput` for the argument ``name`` unless its value is a ``kind``.
+    """Raise :class:`InvalidInput` for argument ``name`` unless its value is of the class ``kind``.
 
-    The name of the class is compared. An import would be circular: results import this package.
+    The names of the classes are compared. An import of the class would be circular, because the
+    modules of the results import this package.
     """
     if kind not in (base.__name__ for base in type(value).__mro__):
         raise InvalidInput(name, f"{value!r} given; a {kind} is needed.")
@@ -177,7 +178,7 @@ def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> Non
 
 
 def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line: Any) -> None:
-    """Draw values (N, C) over x (N,), a line per cable, with a legend of up to 24 ``names``.
+    """Draw values (N, C) against x (N,), a line per cable, with a legend of up to 24 ``names``.
 
     ``line`` has further options of the lines.
     """
@@ -201,9 +202,9 @@ def equal_axes(axes: Any, zoom: float = 0.75) -> None:
 
 
 class _Picture(Axes3D):  # type: ignore[misc]
-    """3D axes that report the box around the drawing, to which notebooks crop a figure.
+    """3D axes that report a box close around the drawing, to which notebooks crop a figure.
 
-    The box of matplotlib is the whole square around the drawing.
+    Axes of matplotlib report the whole square around the drawing.
     """
 
     def get_tightbbox(self, renderer: Any = None, **options: Any) -> Bbox:

@@ -16,7 +16,7 @@ from cdsm.errors import CdsmError
 from cdsm.support.values import Array
 
 Estimates = tuple[Array, Array]
-"""Derivatives of T functions, and the error bound of their entries (T,)."""
+"""Derivatives of T functions, and the error bound of the entries of each (T,)."""
 
 Sampled = Callable[[Array], Array]
 """Function from points (P, n) to the values (P, T, ...) of T functions."""
@@ -28,10 +28,11 @@ _LEVELS = 16  # maximum number of step sizes; each is half the previous one
 _CONVERGING = 0.05  # two extrapolations have not converged if their relative difference is larger
 
 _AMPLIFIED = np.array([6.7, 99.0])
-"""Rounding error of extrapolated first and second differences, divided by noise/h and noise/h².
+"""Rounding errors of the extrapolated derivatives, first and second, in noise/h and noise/h².
 
-h is the largest of three steps. The extrapolation weighs differences of step h/4 by 64/45, of step
-h/2 by 20/45. A diagonal entry of the second differences has four times the noise of f.
+The noise is the rounding error of the function f. The extrapolation uses differences of the steps
+h, h/2 and h/4. It weighs those of step h/4 by 64/45 and those of step h/2 by 20/45. The numerator
+of a second difference, f(h) − 2 f(0) + f(−h), has an error of up to four times the noise.
 """
 
 
@@ -71,10 +72,10 @@ def hessians(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
 def _extrapolated(
     level: Callable[[float], Array], first: float, noise: Noise, order: int
 ) -> Estimates:
-    """Halve the step until rounding dominates; keep the best extrapolation of each function.
+    """Halve the step until rounding dominates; return the best extrapolation of each function.
 
     ``level(h)`` computes the differences of this ``order`` (1 or 2) with the step h. The error
-    bound is twice the error of the *coarser* of two extrapolations: it is valid even if a
+    bound is twice the error of the *coarser* of two extrapolations. It is valid even if a
     derivative is discontinuous, where the error falls only in proportion to h.
     """
     found: list[Array] = []

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 RANK = 1e-9
-"""Singular values below this part of the largest one count as zero."""
+"""Singular values below this part of the largest one are taken as zero."""
 
 
 @final
@@ -132,7 +132,7 @@ def ranks(K: Stiffness) -> tuple[Rank, Rank, Rank]:
 
 
 def balance_error(K: Stiffness) -> tuple[float, str, float]:
-    """Return the largest residual of Eq. 13 [N m], its joint, and residual / :func:`torque_size`.
+    """Return the largest residual of Eq. 13 [N m], its joint, and its ratio to :func:`torque_size`.
 
     The force at a prismatic joint is multiplied by the arm's length.
     """
@@ -183,7 +183,8 @@ class Sticking(ReadOnlyState):
     """Tip stiffnesses that small loads measure on an arm with friction in its holes.
 
     Attributes:
-        along: Stiffness along x, y, z while all cables stick (3,) [N/m].
+        along: Stiffness along x, y, z while all cables stick (3,) [N/m]; inf if the tip cannot move
+            along the axis.
         below: Loads along x, y, z (3,) [N] up to which all cables stick, to first order.
     """
 
@@ -192,9 +193,9 @@ class Sticking(ReadOnlyState):
 
 
 def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
-    """Compute the tip stiffnesses while cables stick, beside the frictionless ``readings``.
+    """Compute the tip stiffnesses while all cables stick; ``readings`` are the frictionless ones.
 
-    None if no cable sticks, K_θ is singular, or a tension is outside the domain of its law.
+    None if no cable sticks, ``readings`` is None, or a tension is outside the domain of its law.
     """
     pose, sticks = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]

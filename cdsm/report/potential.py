@@ -38,7 +38,7 @@ _BESIDE = 1e-6
 
 
 class LockedCable(NamedTuple):
-    """A cable with a locked motor: tension and energy, from strain and energy of its law."""
+    """Cable with a locked motor; strain and energy of its law give its tension and energy."""
 
     number: int  # index among the cables of the arm
     cable: Cable
@@ -54,14 +54,17 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute the rise of stored energy minus F ΔL (P,) [J] if ``longer`` by (P, C) [m]."""
+        """Compute the gain of energy less F ΔL (P,) [J] if cables are ``longer`` by (P, C) [m]."""
         cable, F, start = self.cable, self.tension, self.free_length
         tensions = self.tensions(longer)
         more = evaluate_law(cable, lambda: cable.energy(tensions, start) - cable.energy(F, start))
         return np.asarray(more - F * longer[:, self.number])
 
     def room(self) -> float:
-        """Return the distance [N] from the tension to the nearest bound or kink of the law."""
+        """Return the distance [N] from the tension to the nearest bound or kink of the law.
+
+        Points of a tabulated law are kinks, unless the tension is at the point.
+        """
         F, law = self.tension, self.cable.elasticity
         edges = [edge for edge, _ in self._edges]
         law = law.law if isinstance(law, SlackBelow) else law
@@ -116,14 +119,14 @@ _ROOT = 2e-13  # relative error of a tension that is computed from the elongatio
 
 
 class Neighbourhood:
-    """The arm near the posture of K, with its motors locked there.
+    """The arm near the posture of a stiffness K, with its motors locked there.
 
     ``places`` (P, nv) are joint displacements from the posture in units of :attr:`unit`, so all
     derivatives with respect to them are in N m.
 
     Attributes:
-        locked: The position-controlled cables. Slack cables without stiffness (at some equilibria)
-            are left out: a small motion does not tension them.
+        locked: The position-controlled cables, except slack cables without stiffness (at some
+            equilibria): a small motion does not tension them.
         unit: 1 rad for each revolute joint, the arm's length for each prismatic joint (nv,).
     """
 
@@ -179,7 +182,7 @@ class Neighbourhood:
     # --- torques and lengths ------------------------------------------------------------------
 
     def kinematic_torques(self, places: Array) -> Array:
-        """Compute torques J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m] with F of the posture."""
+        """Compute the torques J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m]; F stays as at the posture."""
         torques = []
         for q in self._angles(places):
             pose = self._pose.arm.at(q, check_limits=False)
@@ -260,7 +263,7 @@ class Neighbourhood:
         return np.array([self._tension @ self.length_noise, _ULPS * weight, _ULPS * load])
 
     def elastic_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`elastic` (1,) [N m] at ``places`` of size step."""
+        """Return the rounding error of :meth:`elastic` (1,) [N m], displacements up to ``step``."""
         k, F = self._k, self._tension
         stored = np.divide(F * F, k, out=np.zeros_like(k), where=k > 0.0).sum()
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
@@ -272,7 +275,7 @@ class Neighbourhood:
         return noise
 
     def elastic_torque_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`elastic_torques` (1,) at ``places`` of size step."""
+        """Return the error of :meth:`elastic_torques` (1,) [N m], displacements up to ``step``."""
         k = self._k
         errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
         tilted = 2.0 * step * (k * self._arms) @ self.length_noise

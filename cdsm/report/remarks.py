@@ -1,4 +1,4 @@
-"""Remarks on a stiffness: faults (it can't be trusted) and notes (how to read it)."""
+"""Remarks on a stiffness: faults are reasons not to trust it, notes explain how to read it."""
 
 from __future__ import annotations
 

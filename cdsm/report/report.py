@@ -83,19 +83,19 @@ class Report(ReadOnlyState):
 
         The self-check agrees for every term, their sum and the torque. The residual of the balance
         is at most 1e-6 of the torques. K_θ is positive definite by more than rounding. Distributed
-        tensions are the least within their bounds. Notes do not count: they say how to read the
+        tensions are the least within their bounds. Notes are ignored: they say how to read the
         stiffness.
         """
         return not self.faults
 
     @property
     def margin(self) -> float:
-        """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; [N/m] if no joint turns."""
+        """Smallest eigenvalue of K_θ's symmetric part [N m/rad]; all joints prismatic: [N/m]."""
         return self.stiffness.margin
 
     @property
     def critical_direction(self) -> Array:
-        """Return the unit eigenvector (nv,) of the margin: the softest joint motion."""
+        """Return the unit eigenvector (nv,) of :attr:`margin`: the softest joint motion."""
         return self.stiffness.critical_direction
 
     @cached_property

@@ -170,7 +170,7 @@ def self_check(K: Stiffness) -> SelfCheck:
 
 
 def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Recomputed]]:
-    """Compute the terms by second differences of the potential, and by first ones of the torque."""
+    """Compute the terms twice: as differences, second of the potential and first of the torque."""
     step = near.first_step
     moved = _differentiated(hessians, near, near.kinematic, near.kinematic_noise, step)
     turned = _differentiated(
@@ -195,9 +195,9 @@ def _differentiated(
     noise: Noise,
     step: float,
 ) -> list[_Recomputed]:
-    """Differentiate each part that ``f``, a method of ``near``, computes.
+    """Differentiate each part of a potential or torque that ``f``, a method of ``near``, computes.
 
-    If this fails, the text of the error is the reason in the result.
+    If this fails, each result has the text of the error as its reason.
     """
     try:
         values, errors = derive(f, near.unit.size, step, noise)

@@ -34,7 +34,7 @@ StiffnessAt = Callable[[float], Stiffness]
 
 
 def failure_at(at: StiffnessAt, place: float) -> Limit:
-    """Return why the arm fails at a lower bound [N] or load factor ``place``; else ``"none"``."""
+    """Return why the arm fails at ``place``, a lower bound [N] or load factor; else ``"none"``."""
     try:
         return "none" if at(place).is_stable else "buckling"
     except (InfeasibleTension, SolverError):  # a solver may fail on the very edge
@@ -74,7 +74,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 
     The scan ends where no tensions balance the arm within the domains of the elasticities. If
     tensions balance it at every bound, the scan ends where the terms of K_θ that grow with the
-    tension decide whether K_θ is positive definite.
+    tension outweigh all others, and so decide whether K_θ is positive definite.
     """
     if math.isinf(highest):
         # At large bounds the tensions grow in proportion to the bound. The active part of K_θ
@@ -106,7 +106,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 def log_samples(low: float, high: float) -> Array:
     """Return bounds (N,) [N] from ``low`` to ``high``, evenly spaced on a log scale.
 
-    They cover at most the four decades below ``high``, besides ``low``.
+    The first bound is ``low``. All others are in the four decades below ``high``.
     """
     if high <= low:
         return np.array([low])
@@ -118,7 +118,8 @@ def stable_ranges(
 ) -> tuple[Array, Array, tuple[tuple[float, float], ...]]:
     """Scan lower bounds from ``low`` to ``high`` [N]; return bounds, margins and stable ranges.
 
-    Margins (N,) [N m/rad] are the smallest eigenvalues of K_θ; a range is (low, high) [N].
+    The margins (N,) [N m/rad] are the smallest eigenvalues of K_θ at the N bounds. A range is
+    (low, high) [N].
     """
 
     def margin(place: float) -> float:

@@ -16,7 +16,7 @@ from cdsm.support.values import Array, frozen
 _FAR = 0.1  # largest joint motion [rad] from one equilibrium to the next in :func:`follow`
 
 _DENSE = 0.02
-"""Distance [rad] between postures whose stability is checked; shorter unstable parts are missed."""
+"""Distance [rad] of postures whose stability is checked; a shorter unstable part may be missed."""
 
 _FINEST = 2.0**-12  # relative precision of a buckling load
 _SLIGHT = 1e-9  # smallest part of the load to which _FINEST is relative

@@ -23,7 +23,7 @@ from cdsm.support.values import Array
 
 
 class Settled(NamedTuple):
-    """State of an arm at one posture, after its cables have slipped as far as friction demands.
+    """State of an arm at one posture, after its cables have slipped to the limit of friction.
 
     The arm need not be balanced. It is a state of :func:`~cdsm.statics.trust_region.find_rest`.
     """
@@ -42,7 +42,7 @@ class Settled(NamedTuple):
         return self.pose.q
 
     def holding_back(self, torque: Array | float) -> Settled:
-        """Return this state with ``torque`` (nv,) [N m] subtracted: a search solves r = torque."""
+        """Return this state with r − ``torque`` (nv,) [N m] as its torque, to solve r = torque."""
         return self._replace(torque=self.residual - torque)
 
 
@@ -68,7 +68,7 @@ class FrictionalArm(NamedTuple):
         return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.q), 0.0))
 
     def settled(self, pose: Posture, near: Array) -> Chain:
-        """Compute tensions and slips of all cables at a posture.
+        """Compute the tensions and slips of all segments at a posture.
 
         The search for the tensions starts at ``near`` (S,) [N].
         """

@@ -84,7 +84,7 @@ class LoadHistory(ReadOnlyState):
     def unaccounted(self) -> Array:
         """Work minus stored and dissipated energy (n,) [J].
 
-        It is the error of the integration, and the kinetic energy where the arm snaps through.
+        This is the error of the integration, and the kinetic energy where the arm snaps through.
         """
         work = self.load_work + self.motor_work
         return frozen(work - self.stored - self.dissipated)

@@ -1,14 +1,14 @@
 """Derivatives of the tips of a slowly loaded arm with friction, for changed loads or a changed arm.
 
 A "rest" is an equilibrium between two loads, or at a load. Each rest solves r(q, a) = 0, where a
-are the natural lengths of the segments at the previous rest; A(q, T) are those at this rest. So a
-small change is followed from rest to rest: it changes the residual torque by δr, the posture by δq
-= −K⁻¹ δr with K = ∂r/∂q, and the natural lengths by δA(q, T). Holes that slide continue to slide,
-others continue to stick. This is the derivative wherever no hole is just about to start or to stop
-sliding.
+are the natural lengths of the segments at the previous rest. A(q, T) are the natural lengths at
+this rest. A small change is followed from rest to rest: it changes the residual torque by δr, the
+posture by δq = −K⁻¹ δr with K = ∂r/∂q, and the natural lengths by δA(q, T). Holes that slide
+continue to slide, others continue to stick. The result is the derivative unless a hole is just
+about to start or to stop sliding.
 
-A change of the loads is followed with the tangents of the rests. A change of the arm is followed by
-evaluating the changed arm at the recorded postures, without a search: its natural lengths and
+For a change of the loads, the tangents at each rest give δr and δA. For a change of the arm, the
+changed arm is evaluated at the recorded postures, without a search: its natural lengths and
 residuals there give δa and δr. The error for a change of size δ is of order δ².
 """
 
@@ -27,10 +27,13 @@ from cdsm.statics.slow_loading import Load, SlowLoading, State
 from cdsm.support.values import Array
 
 _PARTS = 16
-"""Number of rests over the range of the loads. Tips err by up to 0.2 % where holes stop sliding."""
+"""Number of equilibria computed over the range of the loads.
+
+The error of the tips is up to 0.2 % where holes stop sliding.
+"""
 
 _SHORTEST = 2.0**-6
-"""Smallest part of a step that is tried if no rest is found at the end of the step."""
+"""Smallest part of a step that is tried if no equilibrium is found at the end of the step."""
 
 
 class _Rest(NamedTuple):
@@ -113,7 +116,10 @@ class LoadingPath:
 
     @cached_property
     def _responses(self) -> list[tuple[Array, Array]]:
-        """Return −K⁻¹ (nv, nv) and ∂A/∂q (S, nv) [m/rad] of each rest; 0 for joints at stops."""
+        """Return −K⁻¹ (nv, nv) and ∂A/∂q (S, nv) [m/rad] of each rest.
+
+        −K⁻¹ is 0 for joints at stops, ∂A/∂q for slack segments.
+        """
         responses = []
         for state, _, _ in self.rests:
             chain, settled = state.settled.chain, state.settled
@@ -147,7 +153,7 @@ class LoadingPath:
         return np.array([tips[i] for i in self.last])
 
     def by_forces(self, direction: Array) -> Array:
-        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N]: f_j is added to load j along ``direction`` (3,)."""
+        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N] by forces f_j along ``direction`` (3,) on load j."""
         count, problem, first = len(self.last), self.loading.problem, self.loading.start[:-1]
         each, none = np.eye(count), np.zeros(count)
         natural = np.zeros((len(self.start.settled.chain.natural), count))

@@ -45,7 +45,7 @@ class Iterate(NamedTuple):
         return self.K.joint
 
     def holding_back(self, torque: Array | float) -> Iterate:
-        """Return this state with ``torque`` (nv,) [N m] subtracted: a search solves r = torque."""
+        """Return this state with r − ``torque`` (nv,) [N m] as its torque, to solve r = torque."""
         return self._replace(torque=self.K.residual - torque)
 
 
@@ -174,7 +174,7 @@ def rounding(K: Stiffness) -> Array:
 
 
 def tilt_torque(pose: Posture, tension: Array) -> Array:
-    """Compute the error of joint torques (nv,) [N m] for a relative error 1 of the site positions.
+    """Compute the error of joint torques (nv,) [N m] per relative error of the site positions.
 
     Such an error rotates the segments, short ones most. ``tension`` [N] has an entry for each
     segment whose length depends on the joints.
@@ -196,9 +196,9 @@ def tilt_torque(pose: Posture, tension: Array) -> Array:
 class _LockedLaw:
     """Tension as a function of length for the n position-controlled cables with one law.
 
-    Outside the domain of the law a cable has the stiffness of the nearest bound. Arguments (n,):
-    ``free_length`` is l_0 [m], ``series`` 1/k_series [m/N]; ``lengths`` L [m] and ``tension`` F [N]
-    are those at the reference.
+    Outside the domain of the law a cable has the stiffness of the nearest bound. Arrays are (n,):
+    ``free_length`` is l_0 [m], ``series`` is 1/k_series [m/N], ``lengths`` are L [m] and
+    ``tension`` is F [N] at the reference.
     """
 
     def __init__(

@@ -176,7 +176,7 @@ def _stand_in_mass(pose: Posture) -> Array:
 
 
 def motions(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
-    """Return ω² (nv,) [1/s²], ascending, and φ (nv, nv) with φᵀMφ = 1, of ``stiffness`` and mass M.
+    """Compute ω² (nv,) [1/s²], ascending, and the shapes φ, columns (nv, nv) with φᵀMφ = 1.
 
     Raises SingularMass if M is not positive definite.
     """

@@ -25,7 +25,7 @@ _SMALLEST_STEP = 2.0**-6  # smallest load step that is tried
 
 
 _CLOSE = 1e-3
-"""Two sites of a cable meet if their distance is below this part of that at the reference."""
+"""Two sites of a cable meet if their distance is below this part of the reference distance."""
 
 
 def equilibrium(

@@ -30,13 +30,13 @@ from cdsm.statics.trust_region import RestSearch, find_rest
 from cdsm.support.values import Array
 
 _FINEST, _SHORTEST = 2.0**-12, 2.0**-6
-"""Smallest sub-steps, as a part of the step between two loads: where the energy balance stays
-inaccurate (the arm snaps through), and where no equilibrium is found."""
+"""Smallest sub-steps, as a part of the step between two loads. The first is for an energy balance
+that stays inaccurate (the arm snaps through), the second for an equilibrium that is not found."""
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)  # relative rounding of the stored energy
 
 _OF_LENGTHS = 2.0**-52
-"""Relative rounding of a cable length; times length and tension, it is an error of the work."""
+"""Relative rounding error of a cable length. The tension turns it into an error of the work."""
 
 
 class Load(NamedTuple):
@@ -143,7 +143,10 @@ class SlowLoading(NamedTuple):
         return state, total
 
     def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
-        """Return the arm with ``natural`` lengths (S,) [m] before wire slips, wrench and motors."""
+        """Return the arm under a wrench and motor commands.
+
+        ``natural`` (S,) [m] are the natural lengths of its segments before wire slips.
+        """
         forced = np.where(self.forced, motors, np.nan)
         return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
 
@@ -202,7 +205,7 @@ class SlowLoading(NamedTuple):
 
 
 def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> Settled | None:
-    """Return the arm after a joint motion (nv,) [rad] from ``old``, or None if sites meet there."""
+    """Return the arm after a joint motion (nv,) [rad] from ``old``; None if two sites coincide."""
     try:
         return arm.moved(np.clip(old.q + motion, *arm.limits), old).holding_back(holding)
     except CdsmError:
@@ -224,7 +227,7 @@ def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Arra
 
 
 def _work(force: list[Array], place: list[Array]) -> float:
-    """Integrate ``force`` over ``place`` [J] by Simpson's rule: values at start, middle and end."""
+    """Compute the work ∫ ``force``·d``place`` [J] by Simpson's rule, from start, middle and end."""
     half, whole = place[1] - place[0], place[2] - place[0]
     ends = force[0] @ (4.0 * half - whole) + force[2] @ (3.0 * whole - 4.0 * half)
     return float(ends + 4.0 * (force[1] @ whole)) / 6.0

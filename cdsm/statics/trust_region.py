@@ -27,7 +27,7 @@ from cdsm.errors import CdsmError
 from cdsm.support.values import Array
 
 _ATTEMPTS = 200
-"""Largest number of iterations. Arms with an equilibrium need up to 130, mostly below 10."""
+"""Largest number of iterations. Arms with an equilibrium need up to 130, usually below 10."""
 
 _FIRST, _WIDEST = 0.2, 0.5
 """Initial and largest trust-region radius [rad]. Longer steps might skip the nearest minimum."""
@@ -60,7 +60,7 @@ class Iterate(Protocol):
         """Derivative ∂r/∂q of the residual torque r (nv, nv) [N m/rad]."""
 
     def holding_back(self, torque: Array | float) -> Self:
-        """Return this state with ``torque`` (nv,) [N m] subtracted: a search solves r = torque."""
+        """Return this state with r − ``torque`` (nv,) [N m] as its torque, to solve r = torque."""
 
 
 State = TypeVar("State", bound=Iterate)
@@ -123,7 +123,7 @@ class _Free(NamedTuple):
 def find_rest(
     loaded: Loaded[State], start: State, holding: Array | float = 0.0
 ) -> RestSearch[State]:
-    """Find the equilibrium of ``loaded`` from ``start``: residual torque r = ``holding`` [N m]."""
+    """Find the posture of ``loaded`` where r is ``holding`` (nv,) [N m]; search from ``start``."""
     stops = loaded.stops()
     state, radius = start.holding_back(holding), _FIRST
     free = _Free.of(state, *stops)
@@ -181,7 +181,7 @@ def _trial(
 
 
 def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Return eigenvalues (ascending) and eigenvectors of K, symmetric part, of ``free`` joints."""
+    """Return ascending eigenvalues, and eigenvectors, of K's symmetric part for ``free`` joints."""
     K = stiffness[np.ix_(free, free)]
     values, vectors = np.linalg.eigh((K + K.T) / 2.0)
     return values, vectors

@@ -21,11 +21,11 @@ SLIDING = 1.25
 """The arm slides where its tangent stiffness is at most this times the frictionless one."""
 
 _SETTLED, _MOST_CYCLES = 0.01, 64
-"""Relative change of the stiffness by twice the cycles at which dither has converged; most cycles
-that are tried."""
+"""Dither has converged if twice the cycles change the stiffness by at most the first, relative to
+the stiffness. The second is the largest number of cycles that is tried."""
 
 _GROWTH, _MOST = 1.25, 100.0
-"""Factor of the load from trial to trial; largest load as a multiple of the breakaway load."""
+"""Ratio of each trial load to the one before; largest trial load, divided by the breakaway load."""
 
 _HALVINGS = 6  # number of bisections of the load from which the arm slides; they reach 0.4 %
 

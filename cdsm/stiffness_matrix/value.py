@@ -40,8 +40,8 @@ class Stiffness(CartesianReadings):
         posture: The posture.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
-        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables. With friction
-            too, it is the stiffness of whole cables that slide freely.
+        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables. Even with
+            friction, it is the stiffness of whole cables that slide freely.
         active: H_L·F (nv, nv) [N m/rad]; also called geometric.
         passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic. With friction it
             is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the segments j of length l_j and tension T_j; it is not
@@ -96,8 +96,8 @@ class Stiffness(CartesianReadings):
     def margin(self) -> float:
         """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; if negative, the arm buckles.
 
-        If an arm has prismatic and revolute joints, only its sign is independent of the unit of
-        length.
+        If an arm has both prismatic and revolute joints, the value depends on the unit of length;
+        its sign does not.
         """
         return read_margin(self.joint)
 
@@ -115,9 +115,9 @@ class Stiffness(CartesianReadings):
     def shares(self, direction: Direction) -> Shares:
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
-        With the joint motion δθ per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity and load. Argument and errors are those of :meth:`along`;
-        SingularStiffness also if the stiffness along u is infinite.
+        If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
+        sum over cables, gravity and load. Argument and errors are those of :meth:`along`. Raises
+        SingularStiffness even if the stiffness along u is infinite.
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)
@@ -146,10 +146,9 @@ class Stiffness(CartesianReadings):
         """Changes that would make an unstable arm stable, each alone; empty for a stable arm.
 
         They are stiffer wires, stiffer series springs, other lower bounds of the tensions, or other
-        disk offsets. For each, the factor at which the smallest eigenvalue of K_θ is zero is found
-        by bracketing. The posture and the wrench stay the same. Tensions of your own are not
-        distributed again: for them only wires and springs are tried. It takes a few tenths of a
-        second.
+        disk offsets. Bracketing finds the factor of each at which the smallest eigenvalue of K_θ is
+        zero. The posture and the wrench stay the same. Tensions of your own are not distributed
+        again: for them only wires and springs are tried. This takes a few tenths of a second.
         """
         from cdsm.instability import find_remedies  # here, since a stable arm does not need it
 

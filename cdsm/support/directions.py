@@ -1,4 +1,4 @@
-"""Directions in base axes: names of the axes, and vectors that are checked."""
+"""Check directions in base axes, which are given as names of axes or as vectors."""
 
 from __future__ import annotations
 

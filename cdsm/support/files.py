@@ -21,7 +21,8 @@ _MARKS = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> str:
     """Return the text of a file: UTF-8, or with ``any_encoding`` also UTF-16 or Windows-1252.
 
-    FileError if it is missing, not a regular file, too large, not readable, or of another encoding.
+    Raises FileError if the file is missing, not regular, too large, not readable, or of another
+    encoding.
     """
     path = as_path(path)
     try:
@@ -92,9 +93,9 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
 
 
 def require_writable(path: Path) -> None:
-    """Raise a FileError if there is no folder for a file to write, or something else at its path.
+    """Raise a FileError if the folder of a file to write is missing.
 
-    Something else is a folder or a device.
+    Also raise it if there is a folder or a device at the path itself.
     """
     if path.exists() and not path.is_file():
         raise FileError(path, "is not a regular file; give the path of a file.")
@@ -120,7 +121,8 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 def as_path(path: str | os.PathLike[str]) -> Path:
     """Return a path that the system can use; the file may or may not exist.
 
-    InvalidInput if it is not a path; FileError if it is too long, not text, or not accessible.
+    Raises InvalidInput if ``path`` is not a path; FileError if it is too long, not text, or not
+    accessible.
     """
     try:
         found = Path(path)

@@ -45,7 +45,7 @@ _ROUNDING = 1e-9  # a number of a table below this fraction of the largest is pr
 
 
 def without_rounding(values: Array) -> Array:
-    """Return the numbers of a table, with 0 for those that are rounding errors of the largest."""
+    """Return the numbers of a table; rounding errors of the largest number are replaced by 0."""
     size = abs(values)
     return np.where(size > _ROUNDING * size.max(initial=0.0), values, 0.0)
 

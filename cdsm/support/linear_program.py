@@ -40,8 +40,8 @@ def proved_largest(
     """Maximise cost · x with G x ≤ h, A x = b and low ≤ x ≤ high, and prove an upper bound.
 
     By weak duality the maximum is at most y·b + z·h + Σ max(r low, r high), r = cost − Aᵀ y − Gᵀ z,
-    for all y and all z ≥ 0. It is a bound even if the solver's y and z are inexact. Entries of r
-    below ``rounding`` count as 0. The bound is NaN if the solver finds no optimum.
+    for all y and all z ≥ 0. So the bound holds even if the solver's y and z are inexact. Entries of
+    r below ``rounding`` are taken as 0. The bound is NaN if the solver finds no optimum.
     """
     from scipy.optimize import linprog  # slow to import
 

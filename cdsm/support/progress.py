@@ -1,4 +1,4 @@
-"""Show a progress bar on the standard error of a terminal if work takes longer than a second.
+"""Show a progress bar in the terminal, on standard error, if work takes longer than a second.
 
 Nothing is shown where there is no terminal: in a pipe, a notebook, a log file.
 """

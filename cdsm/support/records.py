@@ -119,7 +119,7 @@ def checked_keywords(function: _Function) -> _Function:
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
     """Wrap ``validated``, which pydantic checks, so that all its faults raise one GeometryError.
 
-    ``kind`` is the record or function behind it, whose keywords the messages name.
+    ``kind`` is the record or function that is checked; the messages name its keywords.
     """
 
     @wraps(validated)

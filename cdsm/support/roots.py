@@ -18,7 +18,7 @@ def rising_root(
     stretch: Callable[[Array], Array],
     slope: Callable[[Array], Array],
 ) -> tuple[Array, Array]:
-    """Solve stretch(F) = wanted for tensions F [N]; stretch must rise with F.
+    """Solve stretch(F) = wanted for tensions F [N]; stretch must increase with F.
 
     The search begins at ``guess`` and stays between ``lower`` and ``upper``; ``upper`` may be inf.
     Return the tensions, and the values of ``slope``, the derivative of stretch, there. All arrays

@@ -22,8 +22,8 @@ from cdsm.errors import (
 class Status(IntEnum):
     """Status of one posture of a batch: which quantities exist; the others are NaN.
 
-    It names the first failure; a single posture raises the error in brackets. An unstable arm
-    (negative margin) and an infinite stiffness ``along`` (immobile direction) are not failures.
+    The status names the first failure; a single posture raises the error in brackets. A negative
+    margin (unstable arm) and an infinite stiffness ``along`` (immobile direction) are no failures.
     """
 
     OK = 0
@@ -36,8 +36,8 @@ class Status(IntEnum):
     """No tensions within the bounds balance the arm (InfeasibleTension): only quantities of the
     joint angles alone exist."""
     SOLVER_FAILED = 4
-    """The solver finds no tensions, though some exist (SolverError): the same quantities exist as
-    for INFEASIBLE."""
+    """The solver finds no tensions, though some exist (SolverError): only quantities of the joint
+    angles alone exist."""
     OUTSIDE_ELASTICITY = 5
     """A tension is outside the domain of its law (ElasticityRangeError): tensions, residual, active
     and load terms exist; quantities that need the cable stiffness do not."""

@@ -76,9 +76,9 @@ def read_table(
 ) -> Table:
     """Read a table. Its delimiter is the one with which most lines have two or more numbers.
 
-    If several ``delimiters`` do equally well, the first that occurs in the first line is taken. The
-    first ``skip`` lines are not read; ``any_encoding`` is that of :func:`read_text`. FileError
-    names the line that cannot be split into cells.
+    If several ``delimiters`` give equally many such lines, the first of them that occurs in the
+    header is taken. The first ``skip`` lines are not read; ``any_encoding`` is that of
+    :func:`read_text`. FileError names the line that cannot be split into cells.
     """
     text = read_text(path, any_encoding=any_encoding)
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and k > skip]
@@ -110,8 +110,8 @@ def named_columns(
 ) -> dict[str, tuple[int, str]]:
     """Return index and unit of each column of a table, by name.
 
-    A table may have columns beside the ``known`` ones. ``refuse`` raises an error if a name is
-    given twice, or if it looks like a misspelt known name; or if semicolons separate the columns.
+    A table may have other columns than the ``known`` ones. ``refuse`` raises an error if a name is
+    given twice or looks like a misspelt known name, or if semicolons separate the columns.
     """
     if len(table.header) == 1 and ";" in table.header[0]:
         refuse("has its columns separated by semicolons; separate them by commas")

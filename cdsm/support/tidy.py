@@ -128,7 +128,7 @@ def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
 def _components(
     variable: xarray.DataArray, status: xarray.DataArray
 ) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the name suffix and column of each component of a variable; rows as in ``status``."""
+    """Yield the name suffix and column of each component of a variable; a row per ``status``."""
     inner = [dim for dim in variable.dims if dim not in status.dims]
     names = [map(str, variable[dim].values.tolist()) for dim in inner]
     for places in itertools.product(*(enumerate(each) for each in names)):

@@ -50,8 +50,8 @@ RANGES: Final = {
 }
 """Range of each quantity: generous, from a hair of rubber to the cables of a bridge.
 
-No machine has a friction coefficient above 2 or a wrap of more than two turns, and no arm has a
-cable of half a metre: its diameter was given in millimetres.
+No machine has a friction coefficient above 2 or a wrap of more than two turns. No arm has a cable
+half a metre thick: such a diameter was meant in millimetres.
 """
 
 WRENCH: Final = "force [N], then moment [N m], base axes"
@@ -97,7 +97,7 @@ _MANY = 5000  # numbers from which BLAS may use threads of its own, which compet
 def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
     """Return a new native float64 array of finite numbers, or raise :class:`InvalidInput`.
 
-    Of the range ``kind`` only the upper end is checked: small magnitudes may be rounding.
+    Only the upper end of the range ``kind`` is checked: small magnitudes may be rounding.
     """
     array = _native(name, value)
     unit, _, largest = ("", 0.0, LARGEST) if kind is None else RANGES[kind]

@@ -27,7 +27,7 @@ _Kept = TypeVar("_Kept", covariant=True)
 
 
 class Given(Protocol[_Given, _Kept]):
-    """Type of a dataclass field that accepts one type and is read as another.
+    """Type of a dataclass field that accepts values of one type and stores those of another.
 
     Type checkers read both types from these methods, which nothing calls. mypy does so only if the
     field has a default.

@@ -190,7 +190,7 @@ def _bounds(
 
 
 def _needed(names: list[str]) -> list[str]:
-    """Return the outputs of a batch from which ``names`` follow, and the margin for the status."""
+    """Return the outputs of a batch from which the quantities ``names`` follow, and the margin."""
     if not names:
         return []
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]

@@ -11,7 +11,7 @@ CASES: Final = ("elasticity", "wrench", "minimum")
 STAGES: Final = ("pose", "tension", "joint", "tip", "matrix", "principal")
 """What must exist for a quantity: posture, tensions, K_θ, C, (C_vv)⁻¹, or a stable arm.
 
-Each stage needs all earlier stages; only ``principal`` does not need ``matrix``.
+Each stage needs all earlier stages, except that ``principal`` does not need ``matrix``.
 """
 
 

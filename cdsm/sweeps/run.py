@@ -87,17 +87,18 @@ def sweep(
         breaking_load: Breaking load of the wire [N], for ``wire_safety``.
         bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
         store: Zarr folder to which entries are written during the run. A new run with the same
-            arguments computes only missing entries, also those of lost workers, with the bits of an
-            uninterrupted run. The returned Dataset reads from the store when needed. A user-defined
-            law is identified by its class, its state, and EA and strain at up to 185 tensions; if
-            these have changed, the store has another sweep.
+            arguments computes only missing entries, including those of lost workers; the bits are
+            the same as without interruption. The returned Dataset reads from the store when needed.
+            A user-defined law is identified by its class, its state, and EA and strain at up to 185
+            tensions; if these have changed, the store has another sweep.
         client: Client of a dask cluster; the run waits while the cluster has no workers. None uses
             the threads of this machine.
         chunk: Number of stiffness matrices per block; an existing store keeps its own number.
         progress: Show a bar with rate and time left, if there is a terminal.
 
     Returns:
-        Dataset of the outputs [SI] and ``status``; dimensions: poses, cases, those of the quantity.
+        Dataset of the outputs [SI] and ``status``. Each has the dimensions of the poses, of the
+        cases and of its quantity.
 
     Raises:
         InvalidInput: An argument is wrong; the error names it and the reason.

@@ -33,16 +33,16 @@ _WIRE = {
     "breaking_load": ("breaking load of the wire", "N"),
     "bend_diameter": ("diameter of the bend in the holes", "m"),
 }
-"""Names in words and units of the sizes of the wire."""
+"""Name in words and unit of each size of the wire, by argument of :func:`sweep`."""
 
 _WORST = {
     "worst_friction": "all segments of the cables stay within the bounds, and wires are under their"
     " largest tension, whatever loads came before"
 }
-"""Attribute of a Dataset under the worst friction."""
+"""Attribute of a Dataset that was computed with ``worst_friction``."""
 
 _OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
-"""Units of torque and joint stiffness: of revolute joints, and the same of prismatic joints."""
+"""Units of torque and joint stiffness of prismatic joints, by the unit of revolute joints."""
 
 _NAME = re.compile(r"[A-Za-z0-9_\x80-\U0010ffff]([^/\\\x00-\x1f\x7f]*[^/\\\x00-\x20\x7f])?")
 """Names of variables that NetCDF and Zarr both take; a slash would divide a name into folders."""
@@ -80,7 +80,7 @@ class Specification:
         return (*self.task.outputs, "status")
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Return the dimensions of an output or ``status``: those of poses, of cases, its own."""
+        """Return the dimensions of an output or ``status``: of poses, of cases, then its own."""
         quantity = QUANTITIES.get(name, _STATUS)
         wanted = (*self.poses.sizes, *quantity.cases, *quantity.dims)
         return tuple(dim for dim in wanted if dim in self.frame.sizes)

@@ -29,10 +29,10 @@ class SweepStatus(IntEnum):
     INFEASIBLE = Status.INFEASIBLE
     """No tensions within the bounds balance the arm: tensions and stiffness do not exist."""
     SOLVER_FAILED = Status.SOLVER_FAILED
-    """The solver found no tensions, though tensions exist: as INFEASIBLE."""
+    """The solver found no tensions, though there are some: NaN for tensions and stiffness."""
     OUTSIDE_ELASTICITY = Status.OUTSIDE_ELASTICITY
-    """A tension is outside the domain of its law: the stiffness does not exist. With
-    ``wire_strain`` and friction, also if a tension along a cable is outside."""
+    """A tension is outside the domain of its law: the stiffness does not exist. If ``wire_strain``
+    is requested, this includes the largest tension along a cable with friction."""
     SINGULAR = Status.SINGULAR
     """K_θ is singular (the arm is about to buckle): Cartesian quantities do not exist."""
     IMMOBILE = Status.IMMOBILE

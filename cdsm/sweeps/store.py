@@ -131,7 +131,7 @@ def _dataset(path: Path) -> tuple[xarray.Dataset, Any]:
 
 
 def _once(path: Path, array: Any) -> Any:
-    """Return an array of a store as a lazy one that is read at most once."""
+    """Return an array of a store as a lazy array, which is read from disk at most once."""
     lazy: Any = LazilyIndexedArray(_OnDisk(path, array))
     return MemoryCachedArray(CopyOnWriteArray(lazy))  # type: ignore[no-untyped-call]
 

@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINEAR = 0.05
-"""Largest ``nonlinearity`` with which first-order propagation counts as sufficient."""
+"""Largest ``nonlinearity`` with which first-order propagation is taken as sufficient."""
 
 _PROBED = 100  # number of drawn arms with which the error of first-order propagation is estimated
 
 _ROUNDING = 1e-9
-"""A smaller relative uncertainty is rounding: critical tensions are found to 1e-10 only."""
+"""A smaller relative uncertainty is rounding: critical tensions have an error of up to 1e-10."""
 
 
 @final
@@ -176,7 +176,7 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def _unstable(self) -> tuple[str, ...]:
-        """A sentence if a stiffness of an unstable arm is read, which no weight can measure."""
+        """A sentence if the reading is a stiffness of an unstable arm, which no weight measures."""
         K = self.question.stiffness
         read = self.question.of in ("along", "stuck", "margin")
         return (verdict(K),) if read and not K.is_stable else ()
@@ -222,7 +222,8 @@ def uncertainty(
 
     Args:
         pose: The posture.
-        tension: As for :func:`~cdsm.stiffness`; a :class:`Tension` for the last two readings.
+        tension: As for :func:`~cdsm.stiffness`; a :class:`Tension` if ``of`` is ``"tension"`` or
+            ``"critical_tension"``.
         tolerances: Tolerances of the arm, the angles and the tensions. None: those of the arm, as
             in the table ``[tolerances]`` of its file.
         direction: u (3,) in base axes, any length: for ``"along"``, ``"stuck"``, ``"tip"`` only.

@@ -34,7 +34,7 @@ class Drawn(NamedTuple):
 
 
 class DrawnArms:
-    """N arms drawn at random: the arm of K with ``errors`` (N, inputs) in each source's inputs."""
+    """N arms drawn at random: the arm of K, with ``errors`` (N, inputs) of the inputs by source."""
 
     def __init__(self, K: Stiffness, errors: Mapping[str, Array]) -> None:
         pose, model, inputs = K.posture, K.posture.arm._model, inputs_of(K.posture.arm)

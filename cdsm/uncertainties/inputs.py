@@ -29,7 +29,7 @@ _LENGTHS = ("lead", "hole_radius", "disk_offset", "link_length", "site")
 _LARGEST = 0.1  # largest standard uncertainty of a length, divided by the length of the arm
 
 _ON_DISKS = ("hole_radius", "hole_angle", "disk_offset", "link_length")
-"""Sources that only an arm with disks has."""
+"""Sources that exist only for an arm with disks."""
 
 
 class Places(NamedTuple):

@@ -1,4 +1,4 @@
-"""Equivalent arm of a stuck arm: each block (cable between two sticking holes) is a cable.
+"""Equivalent arm of a stuck arm: each "block", a cable between two sticking holes, is its cable.
 
 While all cables stick, K_θ is the stiffness of the equivalent arm ("arm of blocks"). Several of its
 inputs may belong to one input of the arm: the blocks of a cable have one rigidity and one tension,
@@ -33,7 +33,7 @@ class Ties(NamedTuple):
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
-        """Convert derivatives by inputs of the arm of blocks to derivatives by the arm's inputs."""
+        """Convert derivatives by the inputs of the arm of blocks to those by the arm's inputs."""
         found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
         for source, at in self.inputs.items():
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])

@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 _FOV: Final = math.radians(45.0)  # vertical field of view
 
 _FIRST: Final = np.array([0.2, -1.5, 0.75])
-"""First direction from the arm to the camera: at its side, a little above it."""
+"""Direction from the arm to the camera at the start: from its side, a little above it."""
 
 _MARGIN = 1.3  # radius of the visible ball, over the radius of the arm
 
 _OUTSIDE, _SMALL = 1.3, 0.5
-"""Largest and smallest reach of the arm over the radius of the fitted ball without a new fit."""
+"""The cameras are fitted again if the arm reaches farther than the first, or less far than the
+second, times the radius of the fitted ball."""
 
 _USUAL = 4.0 / 3.0  # width over height of the picture for which the first camera is placed
 
@@ -70,7 +71,7 @@ def placed(ball: Ball, direction: Array, aspect: float, free: float) -> tuple[Ar
 
 @dataclass
 class _Browser:
-    """Picture of a browser: its free part, size and last camera position."""
+    """Picture of a browser: uncovered part of its height, size [pixels], last camera position."""
 
     free: float
     size: tuple[int, int]
@@ -78,7 +79,7 @@ class _Browser:
 
 
 class Cameras:
-    """Cameras of all browsers; each is fitted again when its picture is resized, unless moved."""
+    """Cameras of all browsers. A camera that its user has not moved follows a resized picture."""
 
     def __init__(self, server: viser.ViserServer, ball: Ball) -> None:
         self._server, self._ball = server, ball

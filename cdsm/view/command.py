@@ -17,7 +17,7 @@ _COPY: Final = (
     "getSelection().selectAllChildren(this.parentNode.querySelector('code'));"
     "document.execCommand('copy')"
 )
-"""JavaScript that copies the command. ``navigator.clipboard`` would need https elsewhere."""
+"""JavaScript that copies the command. ``navigator.clipboard`` needs https on other machines."""
 
 _SAVE: Final = (
     "const size=one=>one.width*one.height;"
@@ -27,14 +27,15 @@ _SAVE: Final = (
     "link.download=document.title.split(':')[0]+'.png';"
     "link.click();window.URL.revokeObjectURL(link.href)})"
 )
-"""JavaScript that saves the largest canvas, the scene. ``URL`` alone would mean the address."""
+"""JavaScript that saves the largest canvas, the scene. In a handler, ``URL`` is the page's address;
+so ``window.URL`` is written."""
 
 _BUTTON: Final = "padding:0.3em 0.8em;margin-right:0.6em;cursor:pointer"
 _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin-bottom:0.6em"
 
 
 def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str]) -> str:
-    """Write the command that prints the numbers of a setting: ``cdsm stiffness`` or ``weigh``."""
+    """Write the command for the numbers of a setting: ``cdsm stiffness`` or ``cdsm weigh``."""
     weighs, units = setting.sag and bool(setting.force.any()), JointUnits(arm.slides).shown
     options = {
         "angles": _joined(x / unit for x, (_, unit) in zip(setting.q.tolist(), units, strict=True)),

@@ -11,7 +11,10 @@ _FARTHEST = 1e6  # largest coordinate [m]; farther away no arm is seen
 
 
 def scene_message(message: Any) -> dict[str, Any] | None:
-    """Return the allowed part of a scene message, or None. ValueError for bad points."""
+    """Return the allowed part of a message about the scene; None if the message is refused.
+
+    Raises ValueError if a point of the message is not three numbers of at most 1e6 m.
+    """
     match message:
         case {"type": "ViewerCameraMessage"}:  # viser keeps a camera for each client
             return dict(message)
@@ -44,7 +47,7 @@ def scene_message(message: Any) -> dict[str, Any] | None:
 
 
 def _point(value: object) -> list[float]:
-    """Return three finite numbers, or raise ValueError."""
+    """Return three numbers of magnitude up to 1e6; raise ValueError for any other value."""
     if not isinstance(value, list) or len(value) != 3:
         raise ValueError(f"{value!a:.40} is not a point")
     for number in value:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cdsm.view.guard import Control
 
 _FASTEST, _SPEED = 30.0, 10.0
-"""Largest and first speed [samples/s]."""
+"""Largest speed, and speed at the start [samples/s]."""
 
 _PLAY, _PAUSE = "Play", "Pause"
 

@@ -100,9 +100,9 @@ def serve(
 
 
 def _tips(arm: Manipulator, path: Array, of_tips: bool) -> Array:
-    """Return the tips (S, 3) [m] of ``path``: of tips if ``of_tips``, else of joint angles (S, nv).
+    """Return the tips (S, 3) [m] of ``path``, which has tips if ``of_tips``, else angles (S, nv).
 
-    InvalidInput if a sample of joint angles is not a posture of the arm.
+    Raises InvalidInput if a sample of joint angles is not a posture of the arm.
     """
     if of_tips:
         return path

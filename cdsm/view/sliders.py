@@ -20,10 +20,11 @@ _STEPS = 500
 
 _TURN: Final = 2.0 * math.pi
 _LENGTHS = 10.0
-"""Range of a sliding joint without limits, in lengths of the arm; others turn once each way."""
+"""Range of a prismatic joint without limits, in arm lengths. A revolute joint turns once each way.
+"""
 
 _DECIMALS: Final = 9
-"""Decimals of a position that is not a step, in degrees, mm or N: further ones are noise."""
+"""Decimals of a position that is not a step, in degrees, mm or N. Further decimals are noise."""
 
 _ROUND = 1e-9  # largest difference of an end from a round number, as a fraction of a step
 
@@ -31,7 +32,7 @@ _ROUND = 1e-9  # largest difference of an end from a round number, as a fraction
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, step, first position and digits of a slider, in a shown unit of size ``unit`` in SI."""
+    """Ends, step, first position and digits of a slider; their unit has the SI size ``unit``."""
 
     label: str
     low: float
@@ -64,7 +65,7 @@ def slider_range(label: str, low: float, high: float, initial: float, unit: floa
 
 
 def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
-    """Return the slider range of each joint [degrees or mm], first at ``q`` (nv,) [rad or m]."""
+    """Return each joint's slider range [degrees or mm], with first positions q (nv,) [rad or m]."""
     most = np.where(arm.slides, _LENGTHS * arm.length, _TURN)
     low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
     units = JointUnits(arm.slides).shown

@@ -128,7 +128,7 @@ class Shown(ReadOnlyState):
 
     @property
     def posture(self) -> Posture | None:
-        """Posture that is shown: at rest under the force, or the reference."""
+        """Posture that is shown: at the equilibrium under the force, or else the reference."""
         return self.reference if self.rest is None else self.rest.pose
 
     @property
@@ -200,7 +200,7 @@ class Shown(ReadOnlyState):
 
 
 def remedies_of(shown: Shown) -> tuple[str, ...]:
-    """Return the remedies for the unstable arm of ``shown``; this takes tenths of a second."""
+    """Return the remedies for the unstable arm of ``shown``; takes a few tenths of a second."""
     return () if shown.stiffness is None else advice(shown.stiffness)
 
 

@@ -77,7 +77,7 @@ class TipHandle:
         self._q = q
 
     def remark(self, q: Array) -> str:
-        """Return why the tip did not reach the handle; empty if ``q`` has changed since."""
+        """Return why the tip did not reach the handle; empty if ``q`` has changed since then."""
         return self._remark if np.array_equal(q, self._q) else ""
 
     def update(self, shown: Shown) -> None:

@@ -54,8 +54,8 @@ class StrandElasticity(Elasticity):
         high: High end of the domain [N], included.
 
     Raises:
-        InvalidInput: The numbers or their count do not fit, the tensions do not rise, or two ranges
-            do not meet at their join.
+        InvalidInput: The numbers or their count do not fit, the tensions are not ascending, or two
+            ranges do not meet at their join.
     """
 
     coefficients: tuple[tuple[float, ...], ...]
@@ -96,11 +96,12 @@ class StrandElasticity(Elasticity):
 
         The coefficient printed as −1e-3 is read as −1e-4: with −1e-3 the branch gives −787 884 N at
         31 N, where the other branch gives 11 352 N. The printed digits leave EA(31 N) uncertain by
-        6 kN and EA(810 N) by 35 kN. Within these limits, this law is continuous. From 400 to 810 N,
-        where the paper calls EA near-constant, it is as flat as possible; otherwise it is nearest
-        to the printed values. It was found by linear programs (``tests/laws/test_errata.py``). At
-        31 N, the slope falls from 1022 to 368. No law with these digits has a continuous slope
-        there. The polynomial is negative below 2.11 N, so the domain is (2.2 N, 810 N].
+        6 kN and EA(810 N) by 35 kN. Within these limits, this law is continuous. Its upper branch
+        is as flat as possible from 400 to 810 N, where the paper calls EA near-constant. Its lower
+        branch is as near to the printed one as possible. Both were found by linear programs
+        (``tests/laws/test_errata.py``). At 31 N, the slope falls from 1022 to 368. No law with
+        these digits has a continuous slope there. The polynomial is negative below 2.11 N, so the
+        domain is (2.2 N, 810 N].
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
@@ -184,7 +185,7 @@ class StrandElasticity(Elasticity):
 @final
 @dataclass(frozen=True)
 class TabulatedElasticity(Elasticity):
-    """Rising curve of strain over tension through measured points of any wire.
+    """Strain as an increasing function of tension, through measured points of any wire.
 
     Between two points, the chord has the slope c = Δε/ΔF, and the curve has dε/dF = c N/D²: a c at
     the first point, b c at the second. N = b θ² + 2 θ θ' + a θ'² and D = θ² + (a + b) θ θ' + θ'²,
@@ -208,7 +209,7 @@ class TabulatedElasticity(Elasticity):
         strains: Strains ε of the points [-], ascending. Only their differences matter.
 
     Raises:
-        InvalidInput: There are fewer than two points, or they do not rise.
+        InvalidInput: There are fewer than two points, or they are not ascending.
     """
 
     tensions: tuple[float, ...]

@@ -30,19 +30,19 @@ _NEAREST = 6.0
 """Least ρ of a panel. ρ^-24 = 2e-19 leaves a factor of 1000 for the growth of 1/p."""
 
 _ROUNDING = 1e-14
-"""A polynomial below this fraction of the sum of the magnitudes of its terms counts as zero."""
+"""A polynomial below this fraction of the sum of its terms' magnitudes is taken as zero."""
 
 _NEGLIGIBLE = 1e-30  # share of the largest term of a polynomial: a smaller term is neglected
 _NARROWEST = 4  # width of a panel in units in the last place; panels shrink towards a root
 
 
 def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
-    """Stack the coefficients of polynomials ``rows``, lowest power first; (powers, polynomials)."""
+    """Return coefficients as an array (powers, polynomials); ``rows`` has a polynomial per row."""
     return np.array(list(zip_longest(*rows, fillvalue=0.0)))
 
 
 def piecewise(joins: Array, table: Array, F: Array) -> Array:
-    """Evaluate the polynomials of a table at F, any shape; column i is valid up to the join i."""
+    """Evaluate piecewise polynomials at F, any shape; column i of ``table`` is valid to join i."""
     return np.asarray(_polynomials(joins, table, F.ravel()).reshape(F.shape))
 
 
@@ -127,7 +127,10 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
 
 
 def _significant(row: Sequence[float], high: float) -> list[float]:
-    """Drop coefficients of high powers that are negligible up to ``high``: their roots overflow."""
+    """Drop coefficients of high powers that are negligible up to ``high``.
+
+    The roots that they cause would overflow.
+    """
     sizes = abs(np.array(row)) * high ** np.arange(len(row))
     last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
     return list(row[: last + 1])

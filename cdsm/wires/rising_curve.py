@@ -1,4 +1,4 @@
-"""Rising C1 curve through rising points. The slopes of the chords nearby bound its slope.
+"""Increasing C1 curve through points. The slopes of the nearby chords bound its slope.
 
 Between two points, the curve is the rational quadratic of Gregory and Delbourgo (IMA J. Numer.
 Anal. 2, 1982) in the notation of :class:`cdsm.TabulatedElasticity`:
@@ -31,7 +31,7 @@ _NODES, _WEIGHTS = (leggauss(24)[0] + 1.0) / 2.0, leggauss(24)[1] / 2.0
 
 
 class RisingCurve:
-    """Curve through n points with rising x and y (n,). A point belongs to the piece below it.
+    """Curve through n points with ascending x and y (n,). A point belongs to the piece below it.
 
     ``chords`` are the slopes (n − 1,) of the straight lines between neighbouring points.
     """

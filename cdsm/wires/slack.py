@@ -20,7 +20,7 @@ _SHORTEST: Final = 0.5
 @final
 @dataclass(frozen=True)
 class SlackBelow(Elasticity):
-    """A law continued to 0 N with the rigidity of its low end; see :meth:`Elasticity.slack_below`.
+    """A law continued to 0 N with its rigidity at its low end; see :meth:`Elasticity.slack_below`.
 
     Attributes:
         law: The law. Within its domain, rigidity, strain and energy are those of the law, bit for

@@ -23,7 +23,7 @@ UNITS: Final = {
     "strain": {"%": 1e-2, "mm/mm": 1.0, "m/m": 1.0, "-": 1.0},
     "force": {"mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605, "kgf": 9.80665},
 }
-"""Units of each kind of column in SI. A strain is a displacement over the gauge length."""
+"""Units of each kind of column in SI. A strain is a displacement divided by the gauge length."""
 
 _WORDS: Final = {  # English, German, French, Spanish, Italian, Portuguese, Dutch, Chinese, Japanese
     "displacement": {
@@ -81,8 +81,8 @@ def find_header(table: Table, wanted: Sequence[str | int] | None) -> tuple[Heade
 
     ``wanted`` are the names or numbers of these two columns; None: the words of the header decide.
     If several of the first 50 lines name both, the one above the most rows of numbers is the
-    header, since some machines write a table of results above the points. TensileTestError if no
-    header names both, or it names one of them twice.
+    header, since some machines write a table of results above the points. Raises TensileTestError
+    if no header names both, or the header names one of them twice.
     """
     if not table.rows:
         raise TensileTestError("holds no data; a header and one line per point are needed.")

@@ -59,12 +59,12 @@ class Band(ReadOnlyState):
     near each tension, and t the quantile of Student's distribution. The fitted law is smoother and
     may touch the edge of the band where EA bends.
 
-    In 100 tests of 400 points each, of three wires with 0.5 N and 2 N of noise, it contained EA in
-    95.3 % of all cases, and in 89 to 100 % at each of 16 tensions. Where EA bends it may contain EA
-    less often: in 92 % for Eq. 19 at 80 N. Within a few newtons of a kink of the force as a
-    function of strain, it misses EA.
+    In 100 tests of 400 points each, of three wires with 0.5 N and 2 N of noise, the band contained
+    EA in 95.3 % of all cases, and in 89 to 100 % at each of 16 tensions. Where EA bends it may
+    contain EA less often: in 92 % for Eq. 19 at 80 N. Within a few newtons of a kink of the force
+    as a function of strain, it misses EA.
 
-    The band leaves out errors of calibration and gauge length, and errors that neighbouring points
+    The band ignores errors of calibration and gauge length, and errors that neighbouring points
     share (drift, ripple, slip). ``TensileFit.notes`` names shared errors if the residuals show
     them. A load cell with steps coarser than the noise also causes shared errors: with steps of 0.5
     N the band contains EA of Eq. 19 at 34 % of the tensions without noise, at 83 % with 0.1 N of
@@ -162,7 +162,7 @@ def fit_tensile_test(
     follows from the data (restricted likelihood). ``polynomial`` is the method of the paper, for
     comparison: two polynomials of degree 6 through slopes of the measured curve, without a band.
 
-    Points of equal displacement are averaged. Left out are unloading, points after the largest
+    Points of equal displacement are averaged. The fit ignores unloading, points after the largest
     force, single points far from their neighbours, and slack, which ends where the force rises
     beyond three standard deviations of its noise. ``notes`` lists these points, points far from the
     curve, falls of the force (a grip slips) and correlated residuals (drift).

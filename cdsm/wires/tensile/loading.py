@@ -53,7 +53,7 @@ class Points:
 
 
 def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
-    """Return the points of a test to fit, their noise [N] (one sigma), notes on points left out."""
+    """Return the points of a test to fit, their noise [N] (one σ), and notes on ignored points."""
     notes: list[str] = []
     _require(test.force.size, "points are given")
     outlier = _outliers(test.force)
@@ -131,7 +131,7 @@ def _outliers(values: Array) -> NDArray[np.bool_]:
 
 
 def local_noise(errors: Array) -> Array:
-    """Estimate the local standard deviation (n,) of errors (n,); nowhere below the overall one."""
+    """Estimate the local standard deviation (n,) of errors (n,), at least the overall one."""
     width = min(_AROUND, len(errors))
     near = np.pad(abs(errors), (width // 2, width - 1 - width // 2), mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(near, width), axis=1)
@@ -245,7 +245,7 @@ def _is_loading(strain: Array) -> NDArray[np.bool_]:
 
 
 def _noise(points: Points) -> float:
-    """Estimate the noise [N] of a point: how far points are off lines through their neighbours."""
+    """Estimate the noise [N] of a point from distances to lines through neighbouring points."""
     before, at, after = points.strain[:-2], points.strain[1:-1], points.strain[2:]
     share = (at - before) / (after - before)
     error = points.force[1:-1] - (1.0 - share) * points.force[:-2] - share * points.force[2:]

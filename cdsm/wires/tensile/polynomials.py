@@ -75,7 +75,7 @@ def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[f
 
 
 def _joins_of(points: Points, join: float) -> tuple[float, ...]:
-    """Return (``join``,), or () if a range beside it is too narrow or has too few points."""
+    """Return (``join``,), or () if the range on one side of it is too narrow or has few points."""
     below = int(np.count_nonzero(points.force <= join))
     enough = 2 * (_DEGREE + 1)
     low, high = float(points.force.min()), float(points.force.max())
