@@ -97,8 +97,9 @@ def stiffness(
 def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[str, cdsm.Breakaway]:
     """Compute the breakaway load in each direction of ``along``, by name of the direction.
 
-    A direction is left out if the arm buckles before a cable slides, if one slides without a load,
-    or if none slides at any load.
+    The result has no entry for a direction in which the arm buckles or a tension leaves the domain
+    of its law before a cable slides, a cable slides without a load, or no cable slides at any load.
+    It is empty if the arm has no friction.
     """
     found = {}
     if tension.posture.arm.has_friction:

@@ -112,7 +112,7 @@ def _show(
 
 @contextmanager
 def misuse_reported(as_json: bool) -> Iterator[None]:
-    """With ``as_json``, print an error of usage as JSON and exit with 2; else typer reports it."""
+    """If ``as_json``, print an error of usage as JSON and exit with 2; else typer reports it."""
     try:
         yield
     except _UsageError as error:

@@ -44,8 +44,8 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
         """Return n columns (S, n) in SI; None if the table has none of them.
 
-        ``wanted`` has the names of the columns, with the units of each and their sizes in SI. With
-        ``some``, missing columns are zero; otherwise they are an error.
+        ``wanted`` has the names of the n columns, with the units of each and their sizes in SI. If
+        only some columns are missing, they are zero if ``some`` is True, otherwise an error.
         """
         if not wanted.keys() & found.keys():
             return None

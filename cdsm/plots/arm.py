@@ -152,8 +152,8 @@ def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
 def frame_arms(axes: Any, limits: Array | None, label: str = "{} [mm]") -> None:
     """Set the limits (3, 2) of 3D axes with equal scales, and their labels.
 
-    In ``label``, {} stands for the name of the axis. Without limits, the axes contain all that is
-    drawn.
+    In ``label``, {} stands for the name of the axis. If ``limits`` is None, the axes contain all
+    that is drawn.
     """
     axes.tick_params(labelsize=SMALL, pad=-3)
     if limits is None:

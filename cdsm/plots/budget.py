@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def plot_uncertainty(budget: Uncertainty) -> Figure:
     """Plot the contribution of each source to the standard uncertainty, and their root sum square.
 
-    InvalidInput if ``budget`` is not a result of :func:`~cdsm.uncertainty`.
+    Raises InvalidInput if ``budget`` is not a result of :func:`~cdsm.uncertainty`.
     """
     expect("budget", budget, "Uncertainty")
     unit, size = budget.question.unit
@@ -42,7 +42,7 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
     The normal distribution is that of first-order error propagation. Dashed lines mark the 95 %
     intervals of both.
 
-    InvalidInput if ``run`` is not a result of :func:`~cdsm.monte_carlo`.
+    Raises InvalidInput if ``run`` is not a result of :func:`~cdsm.monte_carlo`.
     """
     expect("run", run, "MonteCarlo")
     (unit, size), first = run.budget.question.unit, run.budget

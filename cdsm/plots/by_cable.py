@@ -40,7 +40,7 @@ _WIDE = 12  # above this number of cables, a figure with their names is two colu
 def plot_shares(shares: Shares) -> Figure:
     """Plot the contribution of each cable, of gravity and of the load to a stiffness as bars.
 
-    InvalidInput if ``shares`` is not a result of :meth:`Stiffness.shares <cdsm.Stiffness.shares>`.
+    Raises InvalidInput if ``shares`` is not a result of :meth:`cdsm.Stiffness.shares`.
     """
     expect("shares", shares, "Shares")
     arm = shares.stiffness.posture.arm
@@ -95,7 +95,7 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None =
 def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
     """Plot the tension of each cable for the softest and for the stiffest arm.
 
-    InvalidInput if ``attainable`` is not a result of :func:`~cdsm.stiffness_range`.
+    Raises InvalidInput if ``attainable`` is not a result of :func:`~cdsm.stiffness_range`.
     """
     expect("attainable", attainable, "StiffnessRange")
     return _plot_tensions(_ends(attainable), _along(attainable))
@@ -104,8 +104,8 @@ def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
 def plot_tensions(tensions: Tensions) -> Figure:
     """Plot the median tension of each cable over many postures, with the least and the largest.
 
-    InvalidInput if ``tensions`` is not a result of :func:`~cdsm.distribute_tensions`, or all are
-    NaN.
+    Raises InvalidInput if ``tensions`` is not a result of :func:`~cdsm.distribute_tensions`, or all
+    tensions are NaN.
     """
     expect("tensions", tensions, "Tensions")
     found, names = tensions.values[tensions.ok], tensions.arm.cables.names

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def plot_force_polytope(polytope: ForcePolytope) -> Figure:
     """Plot the tip forces [N] that the cables can balance, and the worst direction.
 
-    InvalidInput if ``polytope`` is not a result of :func:`~cdsm.force_polytope`, or has no surface:
-    the tip cannot move in some direction, or the cables balance forces in one plane only.
+    Raises InvalidInput if ``polytope`` is not a result of :func:`~cdsm.force_polytope`, or has no
+    surface: the tip cannot move in some direction, or the cables balance forces in one plane only.
     """
     expect("polytope", polytope, "ForcePolytope")
     if not len(polytope.faces):

@@ -41,7 +41,7 @@ _SEEN = 2e-3  # a narrower range, relative to the axis, cannot be seen
 def plot_weight_test(test: WeightTest) -> Figure:
     """Plot load against tip displacement, nonlinear and linear, and tensions against load.
 
-    Up to 24 cables have names. InvalidInput if ``test`` is not a result of
+    Up to 24 cables have names. Raises InvalidInput if ``test`` is not a result of
     :func:`~cdsm.weight_test`.
     """
     expect("test", test, "WeightTest")
@@ -68,7 +68,7 @@ def plot_weight_test(test: WeightTest) -> Figure:
 def plot_critical_tension(critical: CriticalTension) -> Figure:
     """Plot the stability margin against the lower bound of all tensions, unstable ranges shaded.
 
-    InvalidInput if ``critical`` is not a result of :func:`~cdsm.critical_tension`.
+    Raises InvalidInput if ``critical`` is not a result of :func:`~cdsm.critical_tension`.
     """
     expect("critical", critical, "CriticalTension")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
@@ -109,7 +109,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
 def plot_critical_load(critical: CriticalLoad) -> Figure:
     """Plot the stability margin against the factor of the load, up to the critical factor.
 
-    InvalidInput if ``critical`` is not a result of :func:`~cdsm.critical_load`.
+    Raises InvalidInput if ``critical`` is not a result of :func:`~cdsm.critical_load`.
     """
     expect("critical", critical, "CriticalLoad")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
@@ -134,7 +134,7 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
 def plot_bifurcation(found: Bifurcation) -> Figure:
     """Plot how far a slight push moves the tip, against the lower bound of all tensions.
 
-    InvalidInput if ``found`` is not a result of :func:`~cdsm.bifurcation`.
+    Raises InvalidInput if ``found`` is not a result of :func:`~cdsm.bifurcation`.
     """
     expect("found", found, "Bifurcation")
     figure, ((axes,),) = panels(ONE_COLUMN, 2.4, 1)
@@ -163,7 +163,7 @@ def plot_load_history(history: LoadHistory) -> Figure:
     force of the history. If no load has a force, the displacement is plotted against the number of
     the load. The cable is the one whose segments differ most in tension.
 
-    InvalidInput if ``history`` is not a result of :func:`~cdsm.load_cycle`.
+    Raises InvalidInput if ``history`` is not a result of :func:`~cdsm.load_cycle`.
     """
     expect("history", history, "LoadHistory")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)

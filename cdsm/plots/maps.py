@@ -58,7 +58,7 @@ Their colour scale then extends 5 % to either side.
 """
 
 _MIDDLE = (0.05, 0.95)
-"""Two quantiles of the values. A value further outside them than their distance is an outlier."""
+"""Two quantiles, d apart. A value more than d below the first or above the second is an outlier."""
 
 _TALLEST = 4.0  # largest height of a panel [inch]
 _NARROWEST = 1.2  # least width of a title, and of a panel without its ticks [inch]

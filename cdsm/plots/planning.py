@@ -106,7 +106,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 def plot_saturation(found: Saturation) -> Figure:
     """Plot stiffness, and its gain per newton of the bound, against the lower bound of tension.
 
-    InvalidInput if ``found`` is not a result of :func:`~cdsm.saturation`.
+    Raises InvalidInput if ``found`` is not a result of :func:`~cdsm.saturation`.
     """
     expect("found", found, "Saturation")
     bound, along, slope = found.curve.T
@@ -137,8 +137,8 @@ def plot_saturation(found: Saturation) -> Figure:
 def plot_path_plan(plan: PathPlan) -> Figure:
     """Plot wanted and planned stiffness, and tensions, against the samples of a path.
 
-    Infeasible samples are shaded. Up to 24 cables have colours and names. InvalidInput if ``plan``
-    is not a result of :func:`~cdsm.plan_path`, or its target is the Cartesian matrix.
+    Infeasible samples are shaded. Up to 24 cables have colours and names. Raises InvalidInput if
+    ``plan`` is not a result of :func:`~cdsm.plan_path`, or its target is the Cartesian matrix.
     """
     expect("plan", plan, "PathPlan")
     if plan.direction is None:

@@ -40,7 +40,7 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     the first direction of the plan. The shaded band contains all displacements at which friction
     lets the tip rest.
 
-    InvalidInput if ``run`` is not a result of :func:`~cdsm.track`.
+    Raises InvalidInput if ``run`` is not a result of :func:`~cdsm.track`.
     """
     expect("run", run, "TrackingRun")
     figure, axes = panels(TWO_COLUMNS, 6.4, 1, 4, sharex=True)

@@ -37,7 +37,7 @@ _ENDLESS: Final = 1000.0  # tension [N] up to which a law without a highest tens
 def plot_elasticity(law: Elasticity) -> Figure:
     """Plot tangent and secant rigidity EA [kN] against the tension [N].
 
-    A law without a highest tension is drawn up to 1000 N. InvalidInput if ``law`` is not an
+    A law without a highest tension is drawn up to 1000 N. Raises InvalidInput if ``law`` is not an
     elasticity.
     """
     expect("law", law, "Elasticity")

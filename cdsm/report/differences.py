@@ -72,7 +72,7 @@ def hessians(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
 def _extrapolated(
     level: Callable[[float], Array], first: float, noise: Noise, order: int
 ) -> Estimates:
-    """Halve the step until rounding dominates; return the best extrapolation of each function.
+    """Extrapolate differences to the step zero; the steps are halved until rounding dominates.
 
     ``level(h)`` computes the differences of this ``order`` (1 or 2) with the step h. The error
     bound is twice the error of the *coarser* of two extrapolations. It is valid even if a

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 
 ONE_SIDED = 1e-4
-"""A tension counts as at a bound or kink of its law if their relative distance is at most this."""
+"""A tension is at a bound or kink of its law if their relative distance is at most this."""
 
 _BESIDE = 1e-6
-"""A tension counts as at a point of a tabulated law if their relative distance is at most this."""
+"""A tension is at a point of a tabulated law if their relative distance is at most this."""
 
 
 class LockedCable(NamedTuple):

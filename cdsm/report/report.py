@@ -90,7 +90,7 @@ class Report(ReadOnlyState):
 
     @property
     def margin(self) -> float:
-        """Smallest eigenvalue of K_θ's symmetric part [N m/rad]; all joints prismatic: [N/m]."""
+        """Smallest eigenvalue of K_θ's symmetric part [N m/rad], [N/m] for prismatic joints."""
         return self.stiffness.margin
 
     @property

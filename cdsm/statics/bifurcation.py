@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _UNMOVED: Final = 1e-9
-"""A tip motion of a buckling mode below this part of the arm's length [1/rad] counts as zero."""
+"""A buckling mode's tip motion below this part of the arm's length [1/rad] is taken as zero."""
 
 _AROUND: Final = frozen(np.linspace(0.8, 1.3, 26))
 """Default lower bounds of tension as multiples of the critical bound."""

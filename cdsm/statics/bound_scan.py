@@ -1,4 +1,4 @@
-"""Scan a fixed posture over the lower bound of the tensions, or over a load factor.
+"""Examine a fixed posture at many lower bounds of the tensions, or under many load factors.
 
 A ``place`` is one lower bound [N] or one load factor [-]. The stiffness at a place is that of the
 least tensions there; the functions below get it from their argument ``at``.
@@ -61,7 +61,7 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
 
 
 def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
-    """Bisect between a, where ``true`` holds, and b, where it does not; return both ends."""
+    """Narrow the interval from a, where ``true`` holds, to b, where it does not, by bisection."""
     nothing = PRECISION**2 * b  # a may be zero, and the condition false right above it
     while b - a > max(PRECISION * b, nothing):
         middle = (a + b) / 2.0

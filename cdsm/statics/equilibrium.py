@@ -94,7 +94,7 @@ class Equilibrium(ReadOnlyState):
     def compliance(self) -> Array:
         """Compliance at the tip (6, 6): tip motion per wrench, with joints at stops fixed.
 
-        C = J_X K_θ⁻¹ J_Xᵀ over the joints without stop reaction. Linear rows and columns are first,
+        C = J_X K_θ⁻¹ J_Xᵀ of the joints without stop reaction. Linear rows and columns are first,
         in [m/N], [rad/N] and [rad/(N m)].
 
         Raises:

@@ -153,7 +153,10 @@ class LoadingPath:
         return np.array([tips[i] for i in self.last])
 
     def by_forces(self, direction: Array) -> Array:
-        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N] by forces f_j along ``direction`` (3,) on load j."""
+        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N] of all tips and loads.
+
+        The force f_j [N] along the unit vector ``direction`` (3,) is added to load j.
+        """
         count, problem, first = len(self.last), self.loading.problem, self.loading.start[:-1]
         each, none = np.eye(count), np.zeros(count)
         natural = np.zeros((len(self.start.settled.chain.natural), count))

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _MASSLESS = 1e-12  # a motion has no mass if its eigenvalue of M is below this part of the largest
 
 _STAND_IN = 0.02
-"""Largest share of the kinetic energy that placeholder masses may have: a frequency errs by 1 %."""
+"""Largest share of placeholder masses in the kinetic energy; it changes a frequency by 1 %."""
 
 
 @final
@@ -160,7 +160,10 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
 
 def _stand_in_mass(pose: Posture) -> Array:
-    """Compute the part of M (nv, nv) from placeholder masses: of crosses and massless links."""
+    """Compute the part of M (nv, nv) from placeholder masses.
+
+    Massless links and the crosses of universal joints have such masses.
+    """
     if not pose.arm.is_serpentine:
         return np.zeros((pose.arm.nv, pose.arm.nv))
     inertia, stand_ins = CROSS_INERTIA * np.eye(3), []

@@ -36,7 +36,7 @@ def equilibrium(
     Solve r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13). The elongation of a cable is its elongation at
     the reference plus its change of length. For a pure force the solution is a minimum of the
     potential of cables, weight and load: the search leaves saddle points, so an arm that buckles
-    comes to rest beside the posture that became unstable. Joint limits act as stops.
+    comes to rest away from the posture that became unstable. Joint limits act as stops.
 
     The whole load acts from the start. It is divided into steps only if the search fails. If
     several equilibria exist, slow loading (:func:`~cdsm.weight_test`) may reach another one.

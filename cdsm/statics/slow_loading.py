@@ -93,7 +93,7 @@ class Passage(NamedTuple):
 
 
 class SlowLoading(NamedTuple):
-    """Arm with friction that is loaded slowly; these values are the same for all loads."""
+    """Arm with friction that is loaded slowly; its fields are the same for all loads."""
 
     problem: ChainProblem
     start: Indices  # first segment of each cable, and the number of segments (C+1,)
@@ -234,7 +234,7 @@ def _work(force: list[Array], place: list[Array]) -> float:
 
 
 def _dissipated(jump: list[Array], half: Array, other: Array) -> float:
-    """Compute the dissipation [J] of a sub-step: the integral of P_{j+1} − P_j over the slip s_j.
+    """Compute the dissipation [J] of a sub-step: the sum of ∫ (P_{j+1} − P_j) ds_j over its holes.
 
     ``jump`` are the differences of P at start, middle and end, ``half`` and ``other`` the slips in
     the two halves. Every term is ≥ 0.

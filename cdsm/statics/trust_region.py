@@ -123,7 +123,10 @@ class _Free(NamedTuple):
 def find_rest(
     loaded: Loaded[State], start: State, holding: Array | float = 0.0
 ) -> RestSearch[State]:
-    """Find the posture of ``loaded`` where r is ``holding`` (nv,) [N m]; search from ``start``."""
+    """Find the posture near ``start`` where the residual torque r is ``holding`` (nv,) [N m].
+
+    A joint at a stop need not be balanced: the stop gives the missing torque.
+    """
     stops = loaded.stops()
     state, radius = start.holding_back(holding), _FIRST
     free = _Free.of(state, *stops)

@@ -21,8 +21,8 @@ SLIDING = 1.25
 """The arm slides where its tangent stiffness is at most this times the frictionless one."""
 
 _SETTLED, _MOST_CYCLES = 0.01, 64
-"""Dither has converged if twice the cycles change the stiffness by at most the first, relative to
-the stiffness. The second is the largest number of cycles that is tried."""
+"""Dither has converged if doubling its cycles changes the stiffness by at most the first number,
+relative to the stiffness. The second is the largest number of cycles that is tried."""
 
 _GROWTH, _MOST = 1.25, 100.0
 """Ratio of each trial load to the one before; largest trial load, divided by the breakaway load."""

@@ -44,9 +44,9 @@ def progress_bar(
 ) -> Iterator[Callable[[int], None]]:
     """Show a bar called ``what``, and yield a function that advances it by a number of items.
 
-    ``done`` of the ``total`` items (None: unknown) are finished already. With ``rate``, the bar
-    also shows how many items it finishes per second. If the bar is not ``wanted``, bars inside it
-    are not shown either.
+    ``done`` of the ``total`` items (None: unknown) are finished already. If ``rate`` is True, the
+    bar also shows how many items are finished per second. If the bar is not ``wanted``, bars inside
+    it are not shown either.
     """
     outermost = _outermost.get()
     token = _outermost.set(False)
@@ -62,7 +62,7 @@ def progress_bar(
 def progress_allowed(progress: bool) -> Iterator[None]:
     """Hide all bars that are opened inside this context, unless ``progress`` is True.
 
-    InvalidInput if ``progress`` is not a bool.
+    Raises InvalidInput if ``progress`` is not a bool.
     """
     token = _outermost.set(flag("progress", progress) and _outermost.get())
     try:

@@ -175,7 +175,7 @@ def toml_value(value: object) -> str:
 
 
 def _keys(kind: Callable[..., Any]) -> list[str]:
-    """Return the keywords of a function or the fields of a record, also those of nested records."""
+    """Return the keywords of a function, or the fields of a record and of its nested records."""
     hints = get_type_hints(kind)
     hints.pop("return", None)
     entries = [entry for hint in hints.values() for entry in get_args(hint)]

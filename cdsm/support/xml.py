@@ -31,7 +31,7 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
 
     ``doctype`` is a pattern of the system identifier of an allowed DOCTYPE without other content;
     its DTD is not read. Any other DOCTYPE is refused: it can define entities or name files to read.
-    XmlFault if the text is not well-formed, too large or too deep, or has another root.
+    Raises XmlFault if the text is not well-formed, too large or too deep, or has another root.
     """
     if len(text) > MAXIMUM_BYTES:
         raise XmlFault(f"is larger than the {MAXIMUM_BYTES} characters that are read")

@@ -55,7 +55,7 @@ class Choice(ReadOnlyState, Generic[_Values]):
 def laws_of(
     elasticity: Elasticity | Mapping[str, Elasticity] | None,
 ) -> Choice[tuple[Elasticity | None, ...]]:
-    """Check one elasticity of all cables, or several by name; None keeps those of the arm."""
+    """Check one law for all cables, or several laws by name; None keeps the laws of the arm."""
     if elasticity is None or isinstance(elasticity, Elasticity):
         return Choice("elasticity", (elasticity,), None)
     if not isinstance(elasticity, Mapping) or not all(

@@ -24,7 +24,7 @@ _WITHIN = 65
 """Number of evenly spaced tensions over a domain; narrow domains contain few of ``_SAMPLES``."""
 
 _SAMPLED = re.compile(r"\b([\w.<>]+) (\w+), samples ([0-9a-f]{16})")
-"""Pattern of :func:`law_text`: class, state, and a digest of domain, EA and strain."""
+"""Pattern of texts of :func:`law_text`: class, state, and a digest of domain, EA and strain."""
 
 
 def attributes_of(arm: Manipulator) -> dict[str, str]:
@@ -43,7 +43,7 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
 
 
 def law_text(law: Elasticity) -> str:
-    """Return an elasticity as text; equal laws have equal texts, also in another process.
+    """Return an elasticity as text; equal laws have equal texts, even in another process.
 
     The text of a user-defined law has its class, and digests of its state, domain, EA and strain.
     """

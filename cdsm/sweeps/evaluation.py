@@ -54,7 +54,7 @@ _BATCH_NAMES = {
 class SweepTask(ReadOnlyState):
     """Arm, quantities and cases of a sweep, which a worker computes at the postures that it gets.
 
-    InvalidInput if an output needs an argument that is missing, or an argument is invalid.
+    Raises InvalidInput if an output needs an argument that is missing, or an argument is invalid.
     """
 
     arm: Manipulator

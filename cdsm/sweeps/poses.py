@@ -125,8 +125,8 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     Attributes:
         waypoints: Joint angles (n, nv) [rad] of two or more postures.
-        count: Number of postures, evenly spaced in √Σδθ² along the path, with both ends; None uses
-            the waypoints themselves.
+        count: Number of postures, evenly spaced in √Σδθ² along the path, including both ends; None
+            uses the waypoints themselves.
 
     Raises:
         InvalidInput: ``waypoints`` is not (n, nv) with n ≥ 2, the path has no length, or ``count``

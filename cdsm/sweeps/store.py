@@ -187,7 +187,7 @@ def _gaps(path: Path, group: Any) -> Iterator[tuple[Path, tuple[slice, ...]]]:
 
 
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> bool:
-    """Write an empty store, with chunks of the size ``extent``, beside ``path``; then rename it.
+    """Write an empty store, with chunks of the size ``extent``, near ``path``; then rename it.
 
     Returns False if another run has made a store there in the meantime.
     """

@@ -36,7 +36,7 @@ _DETERMINED = 1e-12
 
 
 class Balance(NamedTuple):
-    """Least tensions, and which cables are free; symbols as in the module's docstring."""
+    """Least tensions, and which cables are free; the module's docstring explains the symbols."""
 
     tension: Tension
     free: NDArray[np.bool_]  # (C,)

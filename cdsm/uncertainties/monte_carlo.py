@@ -161,7 +161,7 @@ def monte_carlo(
     """Compute a reading for many arms, drawn within the tolerances (JCGM 101).
 
     Each draw has its own angles, tensions, rigidities, leads, holes, disks, links and masses. The
-    same seed gives the same bits on any number of threads, also after an interruption.
+    same seed gives the same bits on any number of threads, even after an interruption.
 
     Args:
         pose: The posture.

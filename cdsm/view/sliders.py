@@ -89,7 +89,7 @@ class Slider:
         return float(self.handle.value) * self.range.unit
 
     def move(self, value: float) -> None:
-        """Move the slider to a value in SI, also between two steps."""
+        """Move the slider to a value in SI, which may be between two steps."""
         position = round(value / self.range.unit, _DECIMALS) + 0.0  # no -0
         self.handle.value = position  # type: ignore[misc]
 

@@ -114,7 +114,8 @@ class Shown(ReadOnlyState):
         stiffness: Stiffness at the posture that is shown; None if the tensions are missing or
             outside the domain of the law.
         rest: Equilibrium under the force; None if the arm does not sag, or none was found.
-        history: Load history from the reference to ``rest``; None without friction or ``rest``.
+        history: Load history from the reference to ``rest``; None if the arm has no friction or
+            ``rest`` is None.
     """
 
     setting: Setting

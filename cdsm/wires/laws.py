@@ -111,9 +111,9 @@ class StrandElasticity(Elasticity):
         return Domain(self.low, self.high, low_included=False)
 
     def polynomial(self, tension: ArrayLike) -> Array:
-        """Evaluate the polynomials [N] at F of any shape, also beyond the domain.
+        """Evaluate the polynomials [N] at F of any shape, even beyond the domain.
 
-        InvalidInput if ``tension`` is not finite numbers.
+        Raises InvalidInput if ``tension`` is not finite numbers.
         """
         values = number_array("tension", tension)
         return piecewise(self._joins, self._table, values)
@@ -193,7 +193,7 @@ class TabulatedElasticity(Elasticity):
     1982). Strain and its inverse are C1. EA = 1/(dε/dF) is continuous and positive.
 
     The slopes at the points follow from ln EA of the chords. Each value is assigned to the middle
-    of the chord's strain, and the values are interpolated over the strain. At an end, ln EA changes
+    of the chord's strain, and the values are interpolated in the strain. At an end, ln EA changes
     by at most the change of a straight line, and by at least half of it. A slope is at most 3 times
     that of either neighbouring chord, and at least the smaller of the two, or half of it at an end.
     EA on an interval is then at most 2.1 times the largest rigidity of its chord and the two

@@ -1,4 +1,4 @@
-"""Build B-splines of log EA over the tensions of a test."""
+"""Build B-splines of log EA as a function of the tensions of a test."""
 
 from __future__ import annotations
 

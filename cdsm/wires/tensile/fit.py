@@ -96,7 +96,7 @@ class TensileFit(ReadOnlyState):
         test: The test.
         method: ``monotone`` or ``polynomial``.
         start: Displacement at the low end of the domain [m].
-        notes: One sentence for each part of the test that was left out, and for each doubt.
+        notes: One sentence for each part of the test that was not used, and for each doubt.
     """
 
     elasticity: Elasticity
@@ -133,7 +133,7 @@ class TensileFit(ReadOnlyState):
 
         The standard uncertainty of EA(F) is half the width of the band of ln EA, divided by 1.96.
         All cables are of one spool, so they share one error; ``of`` are their names, as for
-        :class:`~cdsm.Tolerance`. InvalidInput for a fit by polynomials, which has no band.
+        :class:`~cdsm.Tolerance`. Raises InvalidInput for a fit by polynomials, which has no band.
         """
         if self.band is None:
             raise InvalidInput("method", "a fit by polynomials has no band; fit by 'monotone'.")
@@ -253,7 +253,7 @@ def _stages(
 
 
 def _as_law(curve: Curve, points: Points) -> TabulatedElasticity:
-    """Return the law of a fitted curve: a table of its strains over the range of the points."""
+    """Return the law of a fitted curve: a table of its strains within the range of the points."""
     grid = curve.basis.tensions
     # the ends follow from the fit: noise would shift the extreme forces
     first, last = curve.force(points.strain[[0, -1]])
@@ -274,6 +274,6 @@ def _band(tensions: Array, curve: Curve, points: Points) -> Band:
 
 
 def _grid(low: float, high: float, grid: Array) -> Array:
-    """Thin out a grid of tensions [N] to (n,) from low to high, about 200 over the whole grid."""
+    """Return low, high, and tensions of ``grid`` between them (n,) [N]: about 200 for all of it."""
     inside = grid[(grid > low) & (grid < high)][5 :: len(grid) // _KNOTS]
     return np.array([low, *inside[:-1], high])

@@ -43,7 +43,7 @@ def _neighbours(values: Array) -> Array:
 
 
 def _least_variance(points: Points) -> float:
-    """Compute the variance [N²] below which a test with these points counts as exact."""
+    """Compute the variance [N²] below which a test with these points is taken as exact."""
     return (1e-6 * float(np.ptp(points.force))) ** 2
 
 
