@@ -16,7 +16,7 @@ from cdsm.support.validation import instance, one_of, scalar, text
 
 
 class _Kind(NamedTuple):
-    """Kind of parameter, and where its value is in a geometry or a :class:`~cdsm.Cable`."""
+    """Kind of parameter: its unit, and its place in a geometry or a :class:`~cdsm.Cable`."""
 
     unit: str  # unit shown to the user
     size: float  # size of ``unit`` in SI
@@ -89,13 +89,13 @@ class ArmParameters:
         return kind, (int(number),) if at else tuple(range(1, joints + 1))
 
     def unit(self, name: str) -> tuple[str, float]:
-        """Return the unit of the parameter ``name`` shown to the user, and its size in SI."""
+        """Return the unit in which the parameter ``name`` is printed, and its size in SI."""
         kind = KINDS[self._place(name)[0]]
         return kind.unit, kind.size
 
     @property
     def present(self) -> dict[str, float]:
-        """Value of each parameter in :attr:`arm`, in SI: the median where joints differ."""
+        """Value of each parameter in :attr:`arm`, in SI; the median if joints differ."""
         return {name: float(np.median(self._values(name))) for name in self.names}
 
     def __call__(self, **values: float) -> Manipulator:

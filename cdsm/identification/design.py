@@ -30,7 +30,7 @@ _GAIN = 1e-9  # smallest gain of ln f that is worth an exchange
 
 
 class Design(NamedTuple):
-    """Design of an experiment: candidates of tests, known information, wanted parameters."""
+    """Problem of experimental design: which N of n candidate tests determine parameters best."""
 
     information: Array  # M_i (n, r, r) of each of n candidates, for r parameters
     known: Array  # M_0 (r, r), the prior information
@@ -39,9 +39,9 @@ class Design(NamedTuple):
     tests: int  # number N of tests
 
     def value(self, M: Array) -> Array:
-        """Compute ln f (…), with f the criterion, of information matrices (…, r, r).
+        """Compute ln f (…) of information matrices (…, r, r), with f the criterion of the design.
 
-        It is −inf where a matrix is singular.
+        It is −inf for a singular matrix.
         """
         regular = np.linalg.cond(M) < 1e14
         C = np.linalg.inv(np.where(regular[..., None, None], M, np.eye(M.shape[-1])))
@@ -60,7 +60,7 @@ class Design(NamedTuple):
         """Compute tr M_i G (n,), and a proved lower bound of the efficiency f/f_best of a design.
 
         The gain of one more test i is proportional to tr M_i G. ``M`` (r, r) is the information of
-        the design; G follows from it, see the module's docstring. The bound is between 0 and 1.
+        the design, and G follows from M (see the module). The bound is between 0 and 1.
         """
         C = np.linalg.inv(M)
         right = C @ self.wanted.T
@@ -73,7 +73,7 @@ class Design(NamedTuple):
         return each, float(np.sum(M * G)) / most
 
     def shares(self) -> Array:
-        """Compute the best numbers of tests (n,) that add up to N; they are not whole numbers."""
+        """Compute the best repetitions n_i (n,), whose sum is N; they are not whole numbers."""
         counts = np.full(len(self.information), self.tests / len(self.information))
         power = 1.0 if self.criterion == "D" else 0.5
         for _ in range(_ITERATIONS):
@@ -85,7 +85,7 @@ class Design(NamedTuple):
         return np.asarray(counts)
 
     def whole(self, shares: Array) -> Array:
-        """Round numbers of tests ``shares`` (n,); then exchange single tests while ln f rises."""
+        """Round the repetitions ``shares`` (n,), then exchange single tests while ln f rises."""
         counts = np.floor(shares)
         left = self.tests - int(counts.sum())
         counts[np.argsort(counts - shares)[:left]] += 1.0
@@ -105,7 +105,7 @@ class Design(NamedTuple):
             here = best
 
     def best(self) -> tuple[Array, float]:
-        """Find the whole number of each test (n,), and a proved lower bound of f/f_best in 0…1."""
+        """Find whole repetitions (n,), and a proved lower bound of f/f_best, between 0 and 1."""
         shares = self.shares()
         counts = self.whole(shares)
         M, ideal = self.total(counts), self.total(shares)

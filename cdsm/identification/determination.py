@@ -16,7 +16,7 @@ from cdsm.support.values import Array, frozen
 
 @dataclass(frozen=True, eq=False)
 class Determination:
-    """Which combinations of parameters measurements determine, from derivatives of residuals."""
+    """Determined and undetermined combinations of parameters, from derivatives of residuals."""
 
     names: tuple[str, ...]  # names of the parameters p (P,)
     jacobian: Array  # J = ∂r/∂p (n, P) with the residuals r in standard deviations
@@ -52,12 +52,12 @@ class Determination:
 
     @property
     def dependent(self) -> Any:
-        """Indices of parameters, one per undetermined combination; fix them to determine all."""
+        """Index of one parameter per undetermined combination; fix them to determine the others."""
         return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
 
     @property
     def coordinates(self) -> Array:
-        """Matrix A (P, rank) with p = A c, c the coordinates of the determined combinations."""
+        """Matrix A (P, rank) with p = A c: c (rank,) are coordinates that are determined."""
         scaled = self._svd[1][self.determined].T
         return np.asarray(scaled / self._column_norms[:, None])
 
@@ -103,7 +103,7 @@ class Determination:
 
     @property
     def _null(self) -> Array:
-        """Undetermined combinations of the scaled parameters, as orthonormal rows (·, P)."""
+        """Undetermined combinations of the scaled parameters, orthonormal rows (P − rank, P)."""
         return np.asarray(self._svd[1][~self.determined])
 
     @cached_property

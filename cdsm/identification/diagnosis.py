@@ -20,7 +20,7 @@ _UNLIKELY = 1e-3
 
 
 _LEFT = 1e-2
-"""Decrease of χ² that a search with loops may miss: kinks of χ² stop it a tenth of a σ early."""
+"""With loops, χ² has kinks, which stop a search early: this further fall of χ² is tolerated."""
 
 
 def warnings_of(result: Identification) -> list[str]:

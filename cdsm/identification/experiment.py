@@ -52,8 +52,8 @@ def plan_experiment(
     of relative variances) of the covariance C of the wanted parameters. A proved bound limits how
     much better any other plan could be.
 
-    The derivatives are those at the expected values. If the identified values differ much, plan
-    again.
+    The plan uses derivatives at the expected values. If the identified values differ much from
+    them, plan again.
 
     Args:
         model_of: Function that builds the arm from the parameters, as for :func:`identify`.
@@ -67,8 +67,8 @@ def plan_experiment(
         force_std: Standard deviation of a force [N].
         tension_std: Standard deviation of each tension [N].
         steps: Number of steps from zero force to the largest.
-        wanted: Names of the parameters to determine well; the others are unknown, but their
-            uncertainty does not count. Default: all.
+        wanted: Names of the parameters to determine well; the others are unknown too, but the plan
+            does not minimise their uncertainty. Default: all.
         known: Prior standard deviations of known parameters, by name, in the parameter's unit.
         criterion: ``"D"`` or ``"A"``.
         progress: Show a bar on the standard error, if that is a terminal.
@@ -76,7 +76,8 @@ def plan_experiment(
     Raises:
         InvalidInput: An argument is invalid, or no candidate can be tested, or none determines the
             wanted parameters.
-        UnknownName: ``model_of`` does not take a parameter; or ``wanted`` or ``known`` names none.
+        UnknownName: ``model_of`` does not take a parameter, or a name in ``wanted`` or ``known`` is
+            not among ``parameters``.
     """
     noise = (displacement_std, force_std, tension_std)
     candidates = _candidates(postures, directions, weights, minimum, noise, steps)
@@ -173,7 +174,7 @@ def _checked_parameters(parameters: Mapping[str, float]) -> dict[str, float]:
 def _wanted(
     values: dict[str, float], wanted: Sequence[str] | None, known: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Return the names of the parameters to determine; check them and those of ``known``."""
+    """Return the names of the parameters to determine; check them and the names in ``known``."""
     chosen = tuple(values) if wanted is None else tuple(wanted)
     for kind, given in (("wanted", chosen), ("known", tuple(known))):
         for name in given:
@@ -187,7 +188,7 @@ def _wanted(
 
 
 def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
-    """Return the rows (P, P) of the prior: |p|/σ on the diagonal where p is known, else 0."""
+    """Return prior information as rows (P, P): diagonal |p|/σ for known parameters p, else 0."""
     weights = dict.fromkeys(values, 0.0)
     for name, std in known.items():
         if not (sigma := scalar(f"known[{name!r}]", std)) > 0.0:
@@ -199,9 +200,10 @@ def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
 def _followed(
     model_of: Callable[..., Manipulator], values: dict[str, float], candidates: Sequence[WeightLoop]
 ) -> tuple[tuple[WeightLoop, ...], list[Array], tuple[tuple[str, str], ...]]:
-    """Return the loops that can be tested, the :func:`_rows` of each, and why others cannot be.
+    """Return the loops that can be tested, the derivatives of each, and why others cannot be.
 
-    The reasons are pairs (label of the loop, text of the error).
+    The derivatives are the :func:`_rows` of the loop. A reason is a pair (label of the loop, text
+    of the error).
     """
     rows, failures = list[Array](), dict[str, str]()
     for loop in track(candidates, "following the candidates"):

@@ -76,7 +76,7 @@ class ExperimentPlan(ReadOnlyState):
 
     @cached_property
     def std(self) -> Array:
-        """Expected standard deviations of the parameters (P,) [m, kg, …]; inf: undetermined."""
+        """Expected standard deviations of the parameters (P,) [m, kg, …]; inf if undetermined."""
         return self._std(self.counts)
 
     @cached_property
@@ -91,7 +91,7 @@ class ExperimentPlan(ReadOnlyState):
 
     @property
     def factors(self) -> dict[str, float]:
-        """Interval width of ``even_tests`` divided by that of the plan [-], by wanted parameter."""
+        """``even_std`` divided by ``std`` [-], by wanted parameter; NaN if it is undetermined."""
         found = zip(self.names, self.even_std, self.std, strict=True)
         return {
             name: float(even / std) if math.isfinite(std) else math.nan

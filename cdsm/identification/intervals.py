@@ -25,7 +25,7 @@ from cdsm.identification.least_squares import METHODS, Box, LeastSquares
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 RANK_TOLERANCE = 1e-6
-"""Smallest singular value of J with unit columns that counts for its rank (J errs by 1e-10)."""
+"""Singular values of J, scaled to unit columns, below this are zero; J is accurate to 1e-10."""
 
 NEGLIGIBLE = 1e-3
 """Difference of χ² that is neglected. A difference of 1 is one standard deviation."""
@@ -36,10 +36,10 @@ _LONGEST = 0.25  # step at most, as a share of the range of the parameter
 _HALVINGS = 8  # of a step from which the model does not exist; then the profile ends
 
 _NEAR, _REFINEMENTS = 0.25, 4
-"""Largest relative distance of a knot from a goal; largest number of knots added to reach it."""
+"""A knot is near a wanted Δχ² within this part of it; up to so many knots are added for that."""
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8)
-"""ftol, xtol and gtol of the fit at a knot. The cubic between knots is not more exact."""
+"""ftol, xtol and gtol of the fit at a knot: as accurate as the cubic between knots."""
 
 _SEARCHED = 50  # largest number of evaluations of such a fit, without those of the differences
 
@@ -78,9 +78,9 @@ class Profile(ReadOnlyState):
         """Find the farthest value of the parameter on one ``side`` where Δχ² is at most ``rise``.
 
         ``side`` is −1 for values below the best one, 1 for values above. Between the values, Δχ² is
-        a cubic over the searched parameter (or its logarithm). If Δχ² stays below ``rise`` up to
-        the bound or the end of the model, the crossing is infinite. It is None if the profile does
-        not reach ``rise``.
+        a cubic in the searched parameter (or its logarithm). If Δχ² stays below ``rise`` up to the
+        bound or the end of the model, the result is −inf or inf. None: the profile has no such end,
+        but was computed only for smaller Δχ².
         """
         outward = slice(self.best, None, side)
         values, height = self.values[outward], self.rise[outward]
@@ -111,7 +111,7 @@ def other_minimum(
     Such a point refutes the intervals (P, 2) of all parameters, since they belong to one of several
     minima. Searches begin at those of ``starts`` that are outside the intervals. Returns None if no
     search finds such a minimum. Points are in the unit cube. Raises LowerOptimumError if χ² is
-    lower there than at ``best``.
+    lower at the minimum than at ``best``.
     """
 
     def outside(point: Array) -> bool:
@@ -154,8 +154,8 @@ class Profiler:
     def profile(self) -> tuple[Profile, list[Array]]:
         """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ².
 
-        Also return points (P,) in the unit cube, at most one on each side. There Δχ² falls again
-        after it has exceeded the first value in ``exact``, so another minimum of χ² may be near.
+        Also return points (P,) in the unit cube, at most one on each side, where Δχ² falls again
+        after it has exceeded the value ``exact[0]``. Another minimum of χ² may be near them.
         """
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
@@ -181,7 +181,7 @@ class Profiler:
         return [min(falling, key=lambda knot: knot.rise).point] if falling else []
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
-        """Compute the knots on one side, from the optimum outward; also return why they end."""
+        """Compute the knots on one side, from the optimum outward; and return why they end."""
         knots = [self._knot(self.best, self.jacobian[:, self.i], self.jacobian[:, self.others])]
         for goal in (*self.exact, self.far):
             while knots[-1].rise < goal:
@@ -214,7 +214,7 @@ class Profiler:
         return knot
 
     def _refine(self, knots: list[_Knot], goal: float) -> None:
-        """Add knots until one is so near Δχ² = ``goal`` that the cubic is exact enough."""
+        """Add knots until Δχ² at one is so near ``goal`` that the cubic is accurate."""
         for _ in range(_REFINEMENTS):
             last = max(k for k, knot in enumerate(knots) if knot.rise < goal)
             pair = knots[last : last + 2]

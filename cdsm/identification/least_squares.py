@@ -157,7 +157,7 @@ class LeastSquares:
         here, step = self.residuals(point), _CENTRAL if central else _ONE_SIDED
 
         def at(k: int) -> Array | None:
-            """Compute the residuals k steps away, or None beyond the bounds or the model."""
+            """Compute the residuals k steps away; None beyond the bounds or without a model."""
             moved = point.copy()
             moved[i] += k * step
             if not 0.0 <= moved[i] <= 1.0:

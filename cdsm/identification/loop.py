@@ -1,4 +1,4 @@
-"""Loops of a weight test: forces, readings of the tip, and the weights of the readings."""
+"""Loops of a weight test: forces, readings of the tip, and statistical weights of the readings."""
 
 from __future__ import annotations
 
@@ -149,15 +149,15 @@ def measured(measurement: Measurement | WeightLoop) -> Array:
 
 
 class Weights:
-    """Weights of the readings of a loop; each axis has an unknown offset.
+    """Statistical weights of the readings of a loop; each axis has an unknown offset.
 
-    e are the errors predicted − measured, V their covariance, and Z z adds the offset z of each
-    axis. χ² is the least (e + Z z)ᵀ V⁻¹ (e + Z z) over all z. It is |R e|² with the symmetric root
-    R of the matrix of that quadratic form, so an entry of R e is the residual of its reading in
+    e are the errors predicted − measured, and V is their covariance. Z z adds the offset z of each
+    axis. χ² is the least (e + Z z)ᵀ V⁻¹ (e + Z z) over all z: a quadratic form in e. R is the
+    symmetric root of its matrix, so χ² = |R e|². An entry of R e is the residual of one reading, in
     standard deviations.
 
     Attributes:
-        root: R (m, m) [1/m] for the m readings, axis by axis within each force.
+        root: R (m, m) [1/m] for the m readings, sorted by force, then axis.
         zero: Matrix (k, m) that gives the offsets −z (k,) from errors e (m,).
     """
 
@@ -166,8 +166,8 @@ class Weights:
     ) -> None:
         """Compute the weights from the standard deviations that the loop gives.
 
-        ``by_forces`` (m, n) and ``by_tensions`` (m, C) are the derivatives of the readings. If they
-        are not given, errors of the forces and tensions are ignored.
+        ``by_forces`` (m, n) and ``by_tensions`` (m, C) are derivatives of readings. The errors of
+        forces or tensions are ignored if their derivatives are None.
         """
         axes = len(loop.axes)
         covariance = loop.displacement_std**2 * np.eye(len(loop.forces) * axes)

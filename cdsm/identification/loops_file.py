@@ -41,15 +41,15 @@ def read_loops(
 
     The header names the columns, with the unit in brackets; the order is free:
 
-    - ``test``: name of the loop; its lines stand together, in the order of the forces.
-    - The joints of the arm, ``joint1_1 [deg]``: angles before the first force; [rad], or [mm] or
-      [m] for prismatic joints. Joints without a column are at 0.
-    - ``direction``: of the forces, an axis such as ``-z``.
-    - ``force [N]``: along the direction, 0 where nothing hangs.
-    - ``displacement [mm]`` along the direction, or ``x [mm]``, ``y [mm]`` and ``z [mm]``; [um] or
-      [m]. Any offset. Without these columns the tests are planned, not yet made.
-    - The cables of the arm, ``cable1_1 [N]``: their tensions before the first force; or
-      ``minimum [N]``, the lower bound with which they are distributed.
+    - ``test``: name of the loop; its lines are consecutive, in the order of the forces.
+    - A column per joint, such as ``joint1_1 [deg]`` or ``[rad]``; ``[mm]`` or ``[m]`` for prismatic
+      joints: the angle before the first force. A joint without a column is at 0.
+    - ``direction``: direction of the forces, an axis such as ``-z``.
+    - ``force [N]``: force along the direction, 0 where nothing hangs.
+    - ``displacement [mm]``: reading along the direction; or ``x [mm]``, ``y [mm]`` and ``z [mm]``.
+      The unit may be um or m, and the offset is arbitrary. A file of planned tests has no readings.
+    - A column per cable, such as ``cable1_1 [N]``: the tension before the first force. Or
+      ``minimum [N]``: the lower bound with which the tensions are distributed.
 
     A cell of a joint, a cable, ``direction`` or ``minimum`` may be empty after the first line of a
     test. Lines that begin with # are ignored. Columns with other names are ignored too, unless a

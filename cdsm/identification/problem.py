@@ -106,8 +106,8 @@ class Model:
     def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
         """Compute the residuals (n,) for slightly changed parameters ``moved``, to first order.
 
-        The residuals of loops follow from their equilibria at ``here``, without another search for
-        equilibria, which is ten times as fast.
+        The residuals of loops follow from their equilibria at ``here``. No other equilibria are
+        searched for, so this is ten times as fast.
         """
         return self.weigh(self.predict(moved, here)[1])
 
@@ -116,9 +116,9 @@ class Model:
     ) -> tuple[Manipulator, list[Array]]:
         """Build the arm of ``parameters``; predict each stiffness (1,) [N/m] or loop (m,) [m].
 
-        The predicted displacements of a loop start from the tip of the arm without the forces. They
-        are exact; or, if ``near`` is given, computed to first order from the equilibria at the
-        parameters ``near``.
+        The predicted displacements of a loop are relative to the tip without the forces. They are
+        exact unless ``near`` is given: then they are computed to first order from the equilibria at
+        the parameters ``near``.
         """
         arm = self.arm(parameters)
         paths = self._paths_at(near) if near else self._paths_at(parameters, arm)
@@ -205,7 +205,7 @@ class Model:
     def _tension(
         self, pose: Posture, measurement: Measurement | WeightLoop, parameters: Parameters
     ) -> tuple[Tension | ArrayLike, ArrayLike | None]:
-        """Return the tensions of a measurement, and its wrench unless a Tension contains it."""
+        """Return the tensions of a measurement, and its wrench (None if a Tension contains it)."""
         tension: Tension | ArrayLike
         if self.tension_of is not None:
             tension = _call_model("tension_of", self.tension_of, parameters, pose, measurement)
@@ -219,9 +219,9 @@ class Model:
     def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
         """Compute the derivatives of the readings of ``loop``, whose equilibria are ``path``.
 
-        The first array has the derivatives with respect to the forces (m, n) [m/N], the second
-        those with respect to the tensions (m, C) [m/N]. An array has no columns if its forces or
-        tensions are exact.
+        The first array (m, n) [m/N] has the derivatives with respect to the forces, the second one
+        (m, C) [m/N] with respect to the tensions. An array has no columns if the forces or tensions
+        are exact.
         """
         u, axes, pose = unit_direction("direction", loop.direction), loop.axes, path.start.pose
         by_forces = np.zeros((len(loop.forces) * len(axes), 0))

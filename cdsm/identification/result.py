@@ -40,10 +40,11 @@ class Identification(ReadOnlyState):
         values: Values of the parameters (P,) [m, kg, N/m, …].
         bounds: Bounds of the parameters (P, 2), low and high [m, kg, N/m, …].
         measurements: The measurements.
-        predicted: Stiffnesses of the model [N/m], and its loops with their fitted offsets [m] (n,).
-        residuals: Residuals r (n,) in standard deviations [-]: (predicted − measured)/σ of a
-            stiffness; of a loop, weighted by its :class:`~cdsm.identification.loop.Weights`.
-        jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …], r in standard deviations.
+        predicted: Predicted numbers (n,): stiffnesses [N/m], and readings of loops [m] with fitted
+            offsets.
+        residuals: Residuals r (n,) in standard deviations [-]. For a stiffness, r is (predicted −
+            measured)/σ; for loops, see :class:`~cdsm.identification.loop.Weights`.
+        jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …].
         arm: Arm with these values.
         warnings: One sentence for each reason not to trust the result; empty if there is none.
         profiles: One :class:`Profile` of χ² for each parameter; None if it is not determined, or if
@@ -63,7 +64,7 @@ class Identification(ReadOnlyState):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Values by name, as ``model_of`` takes them."""
+        """Values of the parameters by name, in the units of ``model_of``."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
     @cached_property
@@ -235,7 +236,7 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def _rows(self) -> list[Measurement | WeightLoop]:
-        """Measurement to which each of the n measured numbers belongs."""
+        """The measurement to which each of the n measured numbers belongs."""
         return [each for each in self.measurements for _ in measured(each)]
 
     @property
@@ -248,7 +249,7 @@ class Identification(ReadOnlyState):
 
     @property
     def _labels(self) -> list[str]:
-        """Name of each of the n measured numbers: of a stiffness, or of a reading of a loop."""
+        """Name of each of the n measured numbers, a stiffness or a reading of a loop."""
         names = []
         for i, each in enumerate(self.measurements):
             axes = len(each.axes) if isinstance(each, WeightLoop) else 0
@@ -270,7 +271,7 @@ class Identification(ReadOnlyState):
     def _rise(self, level: float, *, scaled: bool) -> float:
         """Compute the Δχ² [-] at the limits of a confidence interval of this ``level``.
 
-        ``scaled`` is that of :meth:`confidence`.
+        ``scaled`` is the argument of :meth:`confidence`.
         """
         half = (1.0 + level) / 2.0
         if not scaled:
@@ -281,7 +282,7 @@ class Identification(ReadOnlyState):
 
     @property
     def _goals(self) -> tuple[list[float], float]:
-        """Δχ² [-] at the limits of 95 % intervals (ascending), and the largest of the profiles."""
+        """Δχ² [-] at the limits of the 95 % intervals, ascending, and Δχ² at which profiles end."""
         exact, far = [self._rise(0.95, scaled=False)], self._rise(0.999, scaled=False)
         if self.freedom:
             exact.append(self._rise(0.95, scaled=True))

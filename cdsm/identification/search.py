@@ -62,8 +62,8 @@ def identify(
     domain of a law.
 
     A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
-    its width determines the friction. Errors of its forces and tensions count as errors of its
-    readings, with their correlations. Derivatives of loops need no search for equilibria.
+    its width determines the friction. Errors of its forces and tensions are converted to correlated
+    errors of its readings. Derivatives of loops need no search for equilibria.
 
     The search predicts all measurements about 50 P times, the profiles of
     :meth:`Identification.confidence` about 20 P² times. A measurement with a force takes ten times
@@ -252,7 +252,7 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
 
 
 def _optima(problem: LeastSquares, starts: Sequence[Array]) -> list[Array]:
-    """Search from each of ``starts``; return the ends, the best one first and more exact."""
+    """Search from each of ``starts``; return the optima, with the best one first and refined."""
     coarse, fine = (_OF_LOOPS, _OF_LOOPS) if problem.followed else (_COARSE, _FINE)
     found = [
         problem.search(point, method="trf", tolerances=coarse, most=_EVALUATIONS)
@@ -270,7 +270,7 @@ def _optima(problem: LeastSquares, starts: Sequence[Array]) -> list[Array]:
 def _result(
     model: Model, problem: LeastSquares, best: Array, ends: Sequence[Array]
 ) -> Identification:
-    """Compute the result at the optimum ``best``; other searches have ended at ``ends``."""
+    """Compute the result at the optimum ``best``; ``ends`` are the ends of the other searches."""
     values = problem.parameters(best)
     arm, predicted = model.predict(values)
     jacobian = problem.jacobian(best, central=True)

@@ -38,14 +38,14 @@ _JOINTS: Final = {
     "T_XYZ": "XYZ",
     "SPATIAL_EULER_XYZ": "XYZxyz",
 }
-"""Coordinates of each CASPR joint type: x, y, z turn about an axis, X, Y, Z slide along it."""
+"""Coordinates of each CASPR joint type: x, y, z are rotations, X, Y, Z translations."""
 
 _OBLIQUE: Final = {"R_AXIS": ("turn", "revolute"), "P_AXIS": ("slide", "prismatic")}
-"""Joint types about or along a given axis: name and URDF type of their single joint."""
+"""Joint types with any axis: suffix of the name, and URDF type, of the single joint."""
 
 
 class SingleJoint(NamedTuple):
-    """Joint of one coordinate."""
+    """Joint of one coordinate, as in a URDF."""
 
     name: str
     kind: str  # type in URDF: revolute or prismatic

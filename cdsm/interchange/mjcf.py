@@ -95,9 +95,9 @@ def to_mjcf(
     mass get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs steps of microseconds.
 
     Damping: the cables damp with c = β k [N s/m]. A mode has the ratio ζ = β (J_L φ)ᵀ k (J_L φ)/2ω,
-    about β ω/2. β gives the least damped mode the ``damping_ratio``, usually the lowest one; all
-    others settle as fast or faster. Modes with less than half of their ω² from the cables do not
-    count and are damped less.
+    about β ω/2. β gives the least damped mode, usually the lowest one, the ``damping_ratio``; all
+    others settle as fast or faster. Modes that get less than half of their ω² from the cables are
+    not considered for β; they are damped less.
 
     A comment at the top states time step, damping with the range of ζ, and actuators. If K_θ is not
     positive definite, the model leaves the posture by itself: the comment says UNSTABLE, and a
@@ -227,7 +227,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
 
 
 def _without_motors(K: Stiffness) -> Stiffness:
-    """Return the stiffness with the same tensions if all motors control force: no passive term."""
+    """Return the stiffness under the same tensions if all motors control force: no passive part."""
     arm = K.posture.arm
     free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
     return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.wrench)

@@ -30,10 +30,10 @@ _GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mas
 
 
 def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> list[Carried]:
-    """Add the tree of links to ``root``, joints at ``start`` [rad, m]; return the masses.
+    """Add the tree of links to ``root``, with joints at ``start`` [rad, m]; return the masses.
 
-    MuJoCo moves a joint by qpos − ref from where the file places it. With ref at ``start``, a new
-    ``mjData`` starts there.
+    MuJoCo moves a joint by qpos − ref from its place in the file. Since ref is ``start``, a new
+    ``mjData`` begins with the joints at ``start``.
     """
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}

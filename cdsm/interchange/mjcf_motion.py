@@ -42,8 +42,8 @@ def choose_motion(
 ) -> Motion:
     """Choose the time step for the fastest mode of K and ``masses``, and the damping.
 
-    Without ``damping`` of the joints, the cables damp with c = β k, so that the least damped mode
-    has the ``ratio``. Joint dampers would slow down the slow motions of a long arm tenfold.
+    If ``damping`` (of the joints) is None, the cables damp with c = β k, so that the least damped
+    mode has the ``ratio``. Joint dampers would slow down the slow motions of a long arm tenfold.
     """
     wires, joints = np.zeros(len(arm.cables)), damping or 0.0
     step, reason = _DEFAULT_STEP, "MuJoCo's own"

@@ -10,9 +10,9 @@ the upper one,
 
     F = F₀ + T z,    T = 1 − J_L S⁻¹ J_Lᵀ,    S = J_Lᵀ J_L.
 
-z is given for free cables (it is 0), F for the others (it is the bound). A step exchanges the roles
-of z and F of one cable: a principal pivot in the tableau T. So it costs C² operations and no
-solution of equations. When the search ends, tensions and multipliers are computed again from the
+For free cables z is given (it is 0), for the others F (it is the bound). A step exchanges the roles
+of z and F of one cable: a principal pivot in the tableau T. It costs C² operations; no equations
+are solved. When the search ends, tensions and multipliers are computed again from the
 bounds that it found, so errors of the steps do not accumulate. The caller verifies the optimum or
 the proof.
 """
@@ -39,7 +39,7 @@ _STEPS = 20
 """Maximum number of steps per cable; one or two are usual."""
 
 _NONE, _STUCK = -1, -2
-"""In place of the number of a cable: _NONE: no cable; _STUCK − p: cable p can't reach its bound."""
+"""Replace the number of a cable: _NONE if there is none, _STUCK − p if p can't reach its bound."""
 
 
 class State(NamedTuple):
@@ -54,7 +54,7 @@ class State(NamedTuple):
         system: S, b and J_Lᵀ, then S⁻¹ b and S⁻¹ J_Lᵀ (nv, nv + 1 + C, W).
         free: Σ J_cᵀ J_c over the free cables c, and a right-hand side (nv, nv + 1, W).
         cables: Scratch, such as a column and a row of the tableau (2, max(C, nv), W).
-        scratch: Scratch; in the steps the last row is what counts as zero in T (4, W).
+        scratch: Scratch (4, W); smaller entries of T than its last row count as zero in a step.
         chosen: The cable that moves to its bound, and the cable of the pivot (2, W).
     """
 
@@ -92,8 +92,8 @@ def search(J: Array, b: Array, low: Array, high: Array, state: State, width: Wid
     """Find the least tensions F within bounds that balance the arm; fill F and y of the state.
 
     J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and ``high`` are the bounds
-    (C, W). y are the multipliers of the balance, or a proof that no tensions exist. Verify both:
-    rounding or too many steps can end the search before.
+    (C, W). y are the multipliers of the balance, or a proof that no tensions exist. The caller must
+    verify both: rounding or the limit of steps may end the search too early.
     """
     _start(J, b, state, width)
     entering, nothing = state.chosen[0], state.scratch[3]
@@ -159,7 +159,7 @@ def _set_gram(J: Array, side: Array, system: Array, width: Width) -> None:
 def _choose(
     F: Array, low: Array, high: Array, side: Array, entering: Indices, worst: Array, width: Width
 ) -> None:
-    """Choose the free cable farthest outside its bounds where ``entering`` (W,) is _NONE."""
+    """Where ``entering`` (W,) is _NONE, choose the free cable farthest outside its bounds."""
     for w in lanes(width):
         worst[w] = 0.0 if entering[w] == _NONE else math.inf
     for c in upwards(0, F.shape[0]):
@@ -178,7 +178,7 @@ def _choose(
 def _step(low: Array, high: Array, state: State, width: Width) -> None:
     """Move the entering cables towards their bounds, until z of another cable would change sign.
 
-    ``chosen`` returns the cables of the pivots, _NONE where there is none.
+    Sets the second row of ``chosen`` to the cables of the pivots; _NONE: no pivot.
     """
     F, z, side, T, rate = state.F, state.z, state.side, state.tableau, state.cables[0]
     sign, step, limit = state.scratch[0], state.scratch[1], state.scratch[2]
@@ -229,7 +229,7 @@ def _step(low: Array, high: Array, state: State, width: Width) -> None:
 
 @inner
 def _exchange(state: State, width: Width) -> None:
-    """Exchange z and F of the pivots in the tableau."""
+    """Exchange z and F of the pivot cables in the tableau T."""
     T, pivot, inverse, nothing = state.tableau, state.chosen[1], state.scratch[0], state.scratch[3]
     column, row = state.cables[0], state.cables[1]
     for w in lanes(width):
@@ -258,12 +258,12 @@ def _exchange(state: State, width: Width) -> None:
 
 @inner
 def _finish(J: Array, b: Array, low: Array, high: Array, state: State, width: Width) -> None:
-    """Fill F and y of ``state``: cables with a side get their bound, ``low`` or ``high``.
+    """Fill F and y of ``state``. Cables at a bound get this bound, ``low`` or ``high``.
 
     Free cables get the least tensions that balance the torque b (nv, W). If the search ended
-    because cable p cannot reach its bound, they balance J_p alone, and y is the proof: J_p y < 0,
-    and other free cables do no work. The torque that rounding leaves is balanced twice more: the
-    system squares the condition number of J_L.
+    because cable p cannot reach its bound, y is the proof: J_c y = 0 for the other free cables c,
+    and J_p y is −1 if F_p is too low, 1 if it is too high. The residual torque is balanced twice
+    more, because the system squares the condition number of J_L.
     """
     F, y, side, system, entering = state.F, state.y, state.side, state.free, state.chosen[0]
     sign, torque, nv = state.cables[0, 0], state.cables[1], np.uint64(y.shape[0])

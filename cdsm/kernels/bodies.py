@@ -55,9 +55,9 @@ def tip_jacobian(
 ) -> None:
     """Fill ``tip`` (4, 4, W) with the tip pose, and ``jacobian`` (6, nv, W) with J_X.
 
-    J_X is filled in the columns of joints that move the tip. ``rotation`` are the rotations of
+    J_X is filled in the columns of joints that move the tip. The caller sets the other columns, and
+    the last row of the pose, to zero. ``rotation`` are the rotations of
     :func:`~cdsm.kernels.tree.forward_kinematics`.
-    The caller sets the other columns and the last row of the pose to zero.
     """
     origin, axis, slide, _ = frames
     i = np.uint64(masses.tip)
@@ -97,9 +97,9 @@ def gravity_torque(
     torque: Array,
     width: Width,
 ) -> None:
-    """Fill g ``torque`` (nv, W), and γ × z, z × r and M of each joint ``carried`` (nv+1, 7, W).
+    """Fill ``torque`` (nv, W) with g, and ``carried`` (nv+1, 7, W) with γ × z, z × r and M.
 
-    The symbols are those of the module's docstring.
+    A row of ``carried`` belongs to a joint. The symbols are explained at the top of the module.
     """
     parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
@@ -144,7 +144,7 @@ def gravity_torque(
 
 @inner
 def set_gravity_stiffness(parent: Indices, carried: Array, gravity: Array, width: Width) -> None:
-    """Fill ``gravity`` (nv, nv, W), i ≤ j, with ∂g/∂θ; ``carried``: see :func:`gravity_torque`."""
+    """Fill ``gravity`` (nv, nv, W), i ≤ j, with ∂g/∂θ; ``carried`` is of :func:`gravity_torque`."""
     for j in range(parent.shape[0] - 1, 0, -1):
         last = np.uint64(j)
         i = last

@@ -53,7 +53,7 @@ class Velocities(NamedTuple):
 
 
 class SlipRates(NamedTuple):
-    """Terms of the breakaway load of each hole, stored in the row of the next hole that holds."""
+    """Terms of the breakaway load of each hole, stored for the next hole that holds, or the end."""
 
     jump: Array  # |Ṫ′ − Ṫ|/F (P, W)
     turning: Array  # μ φ̇ (P, W)
@@ -152,7 +152,10 @@ def _set_velocities(
 def _set_velocity(
     turn: Array, moved: Array, origin: Array, point: Array, velocity: Array, width: Width
 ) -> None:
-    """Fill v + ω × (x − o) (3, W), x a ``point`` of a link; v and ω are those of its origin o."""
+    """Fill ``velocity`` (3, W) with v + ω × (x − o), the velocity of the ``point`` x of a link.
+
+    o, v ``moved`` and ω ``turn`` are origin, velocity of the origin and angular velocity.
+    """
     for r in range(3):
         m, n = (r + 1) % 3, (r + 2) % 3
         for w in lanes(width):
@@ -226,10 +229,10 @@ def _store_hole(
     slips: SlipRates,
     width: Width,
 ) -> None:
-    """Store the slip rates of the last hole, now that the section after it ends at hole p.
+    """Store the slip rates of the last hole that holds; the section after it ends at hole p.
 
-    Hole p becomes the last hole, and the next section starts there. v (3, W) is the direction of
-    the cable after p.
+    If hole p holds, it becomes the last hole, and the next section starts there. v (3, W) is the
+    direction of the cable after p.
     """
     set_stiffness(wire, c, section, width)
     u, mu, own = section.before, holes.friction[p], holes.wrap[p]

@@ -73,7 +73,8 @@ class Wire(NamedTuple):
 def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
     """Compute D_j′ = a_j − A_j(T) [m] of segment j, and its derivative with respect to T [m/N].
 
-    A_j(T) is the natural length that fits segment j under T; a_j is that before wire slips.
+    A_j(T) is the natural length that fits segment j under T; a_j is its natural length before wire
+    slips.
     """
     stretch = wire.base[j] + wire.softness[j] * T
     natural = (wire.length[j] - wire.spring[j] * (T - wire.rest[j])) / stretch
@@ -95,9 +96,9 @@ def _slope(
 ) -> tuple[float, float, float]:
     """Compute V_j′ [m] at a tension of segment j, ∂V_j′/∂T [m/N], and a sum of natural lengths [m].
 
-    V_j and y*_i are those of the module's docstring. ``best`` (S,) has exp(y*_i) of the segments i
-    after j [N]; ``last`` is the cable's last segment. The sum is over the segments up to the next
-    hole that sticks; it is the size against which rounding errors are compared.
+    V_j and y*_i are explained at the top of the module. ``best`` (S,) has exp(y*_i) of the segments
+    i after j [N]; ``last`` is the cable's last segment. The sum is over the segments up to the next
+    hole that sticks; rounding errors are compared with it.
     """
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.natural[j])
@@ -116,7 +117,7 @@ def _slope(
 def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
     """Find the tension exp(y*_j) [N] at which V_j′ is zero, or 0 if V_j′ ≥ 0 at all tensions.
 
-    The search starts at the tension ``near`` [N]. Other arguments are those of :func:`_slope`.
+    The search starts at the tension ``near`` [N]. The other arguments are as for :func:`_slope`.
     """
     if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
         return 0.0

@@ -126,8 +126,8 @@ def grip_rows(
 ) -> None:
     """Fill ``grip`` (B, C) [-] with Σ μ φ over the holes of each cable at angles q (B, nv) [rad].
 
-    ``routing`` is that of the segments; ``cable`` (P,) is the cable in each hole, and ``friction``
-    (P,) the μ there; ``hole`` and ``own`` (P,) are as for :func:`_set_wraps`.
+    ``routing`` has the segments as cables. ``cable`` (P,) is the cable in each hole, and
+    ``friction`` (P,) its μ. ``hole`` and ``own`` (P,) are as for :func:`_set_wraps`.
     """
     rows, nv = q.shape
     before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)

@@ -44,7 +44,7 @@ def _between(p: Array, q: Array, r: Array, s: Array) -> float:
 
 @inner
 def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> float:
-    """Compute the distance [m] from segment pq to a disk; if pq pierces it, minus that to its rim.
+    """Compute the distance [m] of segment pq from a disk; negative, from its rim, if pq pierces it.
 
     The disk has its ``centre`` (3,) [m], the unit vector ``axis`` (3,) and ``radius`` [m].
     """
@@ -140,9 +140,10 @@ def clearance_rows(
         disk_radius: Radius of each disk (D,) [m].
         own: 1 or 2 if the first or second end of a segment is in a hole of the disk, else 0 (S, D).
         q: Joint angles (B, nv) [rad].
-        distance: Between the axes of two cables; between the axis of a cable and the surface of a
-            bone; between the axis of a cable and a disk, or the rim of a disk whose hole it is in.
-        nearest: Two segments; segment and bone; segment and disk; −1 if there is no pair.
+        distance: Three distances. The first is between the axes of two cables. The second is from
+            the axis of a cable to the surface of a bone. The third is from the axis of a cable to a
+            disk, or to the rim of a disk in whose hole it is.
+        nearest: Indices of two segments, of segment and bone, and of segment and disk; −1: no pair.
     """
     rows, nv = q.shape
     count = tree.parent.shape[0]

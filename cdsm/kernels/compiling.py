@@ -139,13 +139,13 @@ def _own_folder() -> str:
 
 
 _NEW, _KEPT = (0.5, 2**15), (0.02, 2**12)
-"""Python runs a kernel up to so many seconds in all, for arrays of up to so many numbers.
+"""Python runs a kernel for so many seconds in total, and on arrays of up to so many numbers.
 
-The first pair is for a new kernel, the second for one that is compiled on the disk.
+The first pair is for a new kernel, the second for one whose compiled form is on the disk.
 """
 
 _PATIENCE = 8.0
-"""Python runs a new kernel for blocks wider than :data:`WIDTH` up to so many seconds in all."""
+"""Python runs a new kernel on blocks wider than :data:`WIDTH` for so many seconds in total."""
 
 _at_once = False
 
@@ -238,7 +238,7 @@ def _announce() -> None:
 
 
 WIDTH = 64
-"""Largest number of postures in a block of a compiled kernel: some vectors of the processor."""
+"""Largest number of postures in a block of a compiled kernel: several vector registers."""
 
 Index = int | np.integer[Any]
 """Index in a loop over postures. If it may be negative, numba does not vectorise the loop."""

@@ -30,15 +30,15 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 OPTIMAL, INFEASIBLE, UNDECIDED = range(3)
-"""Outcome: certified tensions; a proof that there are none; neither."""
+"""Outcome of a search: certified tensions, a proof that there are none, or neither."""
 
 _NUMBERS = 2**17
-"""Count of numbers in the memory of a block that is searched, so that the cache holds it."""
+"""Largest count of numbers in the arrays of a searched block, so that they fit the cache."""
 
 
 @inner
 def set_torque(jacobian: Array, force: Array, opposed: Array, torque: Array, width: Width) -> None:
-    """Fill ``torque`` (nv, W) with Jᵀ f − τ, of J (m, nv, W), f ``force`` (m, W), τ ``opposed``.
+    """Fill ``torque`` (nv, W) with Jᵀ f − τ: J is (m, nv, W), f ``force`` (m, W), τ ``opposed``.
 
     With J_X, W and g it is the torque J_Xᵀ W − g that the cables must balance. With J_L, F and this
     torque it is the residual of Eq. 13.
@@ -62,7 +62,7 @@ def set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
 
 @inner
 def keep_balance(arms: Array, torque: Array, balance: Balance, row: Index, w: Index) -> None:
-    """Copy moment arms (C, nv, W) and torque (nv, W) of posture w of a block to a row."""
+    """Copy moment arms (C, nv, W) and torque (nv, W) of posture w to row ``row`` of ``balance``."""
     for i in upwards(0, torque.shape[0]):
         balance.torque[row, i] = torque[i, w]
     for c in upwards(0, arms.shape[0]):
@@ -112,9 +112,9 @@ def single_guess(
 ) -> tuple[Array, bool]:
     """Guess the least tensions (C,) [N] of one posture, and say whether they are optimal.
 
-    The first four arguments are the fields of :class:`Blocks`; the others are J_X, J_L, g, W, the
-    bounds, and the least moment arm that counts [m]. The result has the same bits as in a block of
-    postures.
+    The first four arguments are the fields of :class:`Blocks`; the others are J_X, J_L, g, W and
+    the bounds. Moment arms below ``smallest`` [m] become zero. The result has the same bits as in a
+    block of postures.
     """
     count, nv = length_jacobian.shape
     blocks = Blocks(row, row_start, cable, cable_start)
@@ -134,11 +134,11 @@ def single_guess(
 def search_tensions(
     J: Array, b: Array, low: Array, high: Array, tension: Array, outcome: Indices
 ) -> None:
-    """Solve for the tensions of r postures, whose guess is wrong.
+    """Search for the least tensions of r postures whose guess is not optimal.
 
-    J is (r, C, nv) and b (r, nv); ``low`` and ``high`` are (r, C), or (1, C) for all postures: as
-    in :func:`distribute`. Fills the tensions (r, C) and the outcome (r,). The tensions are valid
-    only if the outcome is OPTIMAL.
+    J is (r, C, nv) and b (r, nv), as in :func:`distribute`. The bounds ``low`` and ``high`` are
+    (r, C), or (1, C) for all postures. Fills the tensions (r, C) and the outcome (r,). The tensions
+    are valid only if the outcome is OPTIMAL.
     """
     rows, count, nv = J.shape
     width = max(1, min(WIDTH, rows, _NUMBERS // (count * (count + nv))))

@@ -42,10 +42,10 @@ def stiffness_of_draws(
 
     Their shapes are (N, nv, nv), (N, 3, nv), (N, 3), (N, C, nv) and (N, nv).
 
-    All arms share the first arguments: ``first`` (C+1,) is the first site of each cable, then come
-    1/k_series and the tension at rest of the series springs (C,), and W. Each arm has its own q
-    (N, nv), tensions, EA (1 + ε) (N, C), leads (N, C), masses (N, nv+1), and (N, …) sites, joint
-    origins, centres of mass and tip.
+    All arms share the first arguments: ``first`` (C+1,) is the first site of each cable, ``series``
+    and ``rest`` (C,) are 1/k_series and the tension at rest of the springs, ``wrench`` is W. Each
+    arm has its own q (N, nv), tensions, EA (1 + ε) and leads (N, C), masses (N, nv+1), and sites,
+    joint origins, centres of mass and tip (N, …).
     """
     row, tip_joints, count = routing.row, masses.tip_joints, tension.shape[1]
     fixed, none = np.empty(count), np.zeros(count)

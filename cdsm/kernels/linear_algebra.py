@@ -138,7 +138,7 @@ def smallest_eigenvalue(A: Array, scratch: Array, x: Array, width: Width) -> Non
 def _set_derivatives(
     d: Array, e: Array, x: Array, sums: Array, scratch: Array, width: Width
 ) -> None:
-    """Fill the rows of ``sums`` (3, W): the least ratio g of leading minors of T − x, and G and H.
+    """Fill ``sums`` (3, W): the least ratio g of leading minors of T − x, then G and H.
 
     The matrix T has the diagonal d and the off-diagonal e, (n, W) each, and the eigenvalues λ. Each
     g is a leading minor divided by the minor before it, G = Σ 1/(λ − x) and H = Σ 1/(λ − x)².

@@ -54,9 +54,9 @@ def move(
 def set_motion(
     tree: Tree, origin: Array, axis: Array, slide: Array, z: Array, motion: Motion
 ) -> None:
-    """Fill ``motion``, that of the joint frames, for the joint velocities z (nv,), base first.
+    """Fill ``motion`` of all joint frames for the joint velocities z (nv,), from the base on.
 
-    ``origin``, ``axis`` and ``slide`` (nv+1, 3) are those of :class:`Frames` of one posture.
+    ``origin``, ``axis`` and ``slide`` (nv+1, 3) are the fields of :class:`Frames` of one posture.
     """
     turning, rate, velocity, acceleration = motion
     arm, v, a, way = np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
@@ -98,8 +98,8 @@ def to_frame(rotation: Array, vector: Array, turned: Array) -> None:
 def pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
     """Fill ``pulled`` (3,) with ∂Ψ/∂δ = X + V × ω + A × ω̇ + (A × ω) × ω, δ a point's displacement.
 
-    δ is in a frame that moves with ω ``turning`` and ω̇ ``rate``. ``weight`` (3, 3) are X, V and A,
-    the derivatives of Ψ with respect to the point's position, velocity and acceleration.
+    δ is in a frame that moves with ω ``turning`` and ω̇ ``rate``. The rows of ``weight`` (3, 3) are
+    X, V and A: ∂Ψ by the point's position, velocity and acceleration.
     """
     X, V, A = weight[0], weight[1], weight[2]
     cross(A, turning, scratch)

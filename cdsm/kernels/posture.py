@@ -53,7 +53,7 @@ def compute_pose(tree: Tree, routing: Routing, masses: Masses, q: Array) -> _Pos
 
 @compiled
 def single_pose(arm: tuple[Any, ...], q: Array) -> _Pose:
-    """Compute a posture; ``arm`` holds the fields of its tree, its routing and its masses, in turn.
+    """Compute a posture at q (nv,); ``arm`` has the fields of its tree, then of routing and masses.
 
     Python passes and receives plain arrays: named tuples took a third of the total time.
     """

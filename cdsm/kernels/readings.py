@@ -72,12 +72,12 @@ def _set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
 def solve(
     K: Array, parts: Array, system: Array, status: Indices, scale: Array, peak: Array, width: Width
 ) -> int:
-    """Replace the columns B of the system by K_θ⁻¹ B.
+    """Replace the last n columns X of ``system`` by K_θ⁻¹ X, in B blocks of W postures.
 
-    The system is (B, nv, nv + 1 + n, W): scratch for K_θ, a probe torque, then the n columns B. K
+    The columns of ``system`` (B, nv, nv + 1 + n, W) are scratch for K_θ, a probe torque, and X. K
     is K_θ, and ``parts`` is P, the sum of the magnitudes of its terms, (B, nv, nv, W). With the
     diagonal D of P, ``scale`` becomes D^-½ (B, nv, W). ``peak`` (B, W) becomes the largest entry of
-    D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number of such postures.
+    D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number of postures where it may be.
     """
     rows, largest, doubtful = np.empty((4, K.shape[3])), np.empty(K.shape[3]), 0
     moved = np.empty(K.shape[3])
@@ -135,7 +135,7 @@ def _equilibrate(
 
 @inner
 def _rescale(scale: Array, system: Array, moved: Array, width: Width) -> None:
-    """Scale the solutions back to K_θ⁻¹ B.
+    """Scale the last columns of ``system`` back to K_θ⁻¹ X; see :func:`solve`.
 
     Fills ``moved`` (W,), the largest scaled joint motion that the probe torque causes.
     """

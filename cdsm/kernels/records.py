@@ -40,7 +40,7 @@ def copy(matrix: Array, block: Array, width: Width) -> None:
 
 @inner
 def clear(matrix: Array, width: Width) -> None:
-    """Set the upper triangle of matrices (n, n, W) to zero."""
+    """Set the upper triangle of each ``matrix`` (n, n, W), with its diagonal, to zero."""
     for i in upwards(0, matrix.shape[0]):
         for j in upwards(i, matrix.shape[1]):
             for w in lanes(width):

@@ -81,7 +81,7 @@ def _set_direction(
 def set_derivative(
     frames: Frames, sign: float, site: Index, j: Index, d: Array, width: Width
 ) -> None:
-    """Fill d (3, W) = ∂(b − a)/∂θ_j of a segment from a to b: ±z × (x − o), or ± the slide.
+    """Fill d (3, W) = ∂(b − a)/∂θ_j of a segment from a to b: ±z × (x − o); prismatic joints: ±s.
 
     x is the end that joint j moves, at ``site``; ``sign`` is 1 for b and −1 for a.
     """
@@ -137,7 +137,7 @@ def _add_rate(
 
 @inner
 def _add_slide_rate(u: Array, slide: Array, sign: float, rate: Array, width: Width) -> None:
-    """Add u·d to ``rate`` (W,), with d = ± the slide; ``sign`` is 1 or −1."""
+    """Add u·d to ``rate`` (W,), with d = ±s for the ``slide`` s; ``sign`` is 1 or −1."""
     for w in lanes(width):
         rate[w] += sign * (u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w])
 
@@ -186,7 +186,7 @@ def _set_factors(
 def _add_slide_factor(
     slide: Array, u: Array, inverse: Array, sign: float, weight: Array, c: Array, width: Width
 ) -> None:
-    """Add the share of a slide s to the left factor c (3, W): ``weight`` times ±(s − (u·s) u)/ℓ."""
+    """Add ``weight`` times ±(s − (u·s) u)/ℓ to the left factor c (3, W), with the ``slide`` s."""
     for r in axes(c.shape[0], width):
         for w in lanes(width):
             along = u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w]

@@ -1,12 +1,13 @@
 """Guess of the tensions of a serpentine arm.
 
-The cables that end at a joint turn this joint and the joints before it, but no joint behind it. So
+The cables that end at a joint turn this joint and the joints before it, but none behind it. So
 J_Lᵀ is block triangular; a block is the axes of one joint (at most two) and the cables that end
 there. From the last joint to the first, one cable per axis is raised above its lower bound to
 balance the joint. From the first joint to the last, the multipliers follow from these cables: see
-:mod:`cdsm.kernels.serpentine_multipliers`. Mostly this guess is the optimum: with three cables for
+:mod:`cdsm.kernels.serpentine_multipliers`. Usually this guess is the optimum: with three cables for
 each universal joint, in all of 9000 random postures up to half the joint limits, and in three of
-four up to nine tenths. A guess takes 0.3 µs, a search by :mod:`cdsm.kernels.active_set` about 4 µs.
+four postures up to nine tenths. A guess takes 0.3 µs, a search by :mod:`cdsm.kernels.active_set`
+about 4 µs.
 """
 
 from __future__ import annotations

@@ -25,11 +25,10 @@ def set_cable_stiffness(
 ) -> None:
     """Fill ``stiffness`` (C, W) [N/m] with k = 1/(l_0/EA + 1/k_series).
 
-    It is 0 where EA is given as 0: the motor controls the force.
-    The length of the wire is the cable length L without the series spring, ℓ = L − (F −
-    F_0)/k_series. Therefore l_0/EA = ℓ/(EA (1 + ε)). ``rigidity`` is EA (1 + ε) (C, W) [N],
-    ``series`` is 1/k_series (C,) [m/N], and ``rest`` is F_0 (C,) [N], the tension at which the
-    springs are at rest.
+    It is 0 where EA is given as 0: the motor controls the force. Without the series spring, the
+    wire has the length ℓ = L − (F − F_0)/k_series, so l_0/EA = ℓ/(EA (1 + ε)). ``length`` is L,
+    ``tension`` F and ``rigidity`` EA (1 + ε), (C, W) each [m, N, N]. ``series`` is 1/k_series (C,)
+    [m/N], and ``rest`` is F_0 (C,) [N], the tension at which the springs are at rest.
     """
     for c in upwards(0, length.shape[0]):
         for w in lanes(width):
@@ -78,7 +77,8 @@ def _add_rows(
 ) -> None:
     """Add p·(x, y, z) to the entries ``first`` to ``end`` − 1 of ``upper`` and ``lower`` (nv, W).
 
-    ``rows`` x, y and z (nv, W) are of J_L; p (6, W) has three factors for each of the two.
+    ``rows`` are three rows x, y and z (nv, W) of J_L. p (6, W) has three factors for ``upper`` and
+    three for ``lower``.
     """
     x, y, z = rows
     for j in upwards(first, end):
@@ -147,7 +147,7 @@ def sum_terms(
 ) -> None:
     """Fill K_θ ``K``, and ``parts`` with the sum of the magnitudes of its terms, (nv, nv, W) each.
 
-    ``parts`` may be empty; then it is left out. Of the symmetric terms, all but ``load``, only
+    An empty ``parts`` is not filled. Of all terms but ``load`` (which is not symmetric), only the
     entries with i ≤ j are read.
     """
     for i in upwards(0, K.shape[0]):

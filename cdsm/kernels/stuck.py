@@ -200,7 +200,7 @@ def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> N
 
 @inner
 def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> None:
-    """Fill the stiffness k (W,) of sections that end at the current hole; 0 where it does not hold.
+    """Fill k (W,) of the sections that end at the current hole; 0 where this hole does not hold.
 
     ``wire`` is EA (1 + ε) (C, W) [N].
     """

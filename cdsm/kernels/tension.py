@@ -18,7 +18,7 @@ from cdsm.kernels.compiling import Width, compiled, inner, lanes, upwards
 from cdsm.support.values import Array
 
 NO_ARM = 1e-15
-"""Moment arm, over the length of the arm, that counts as rounding: the cable crosses the axis."""
+"""Moment arms below this part of the arm's length are rounding: the cable crosses the axis."""
 
 OPTIMALITY = 1e-9
 """Largest accepted violation of balance, bounds and stationarity, relative to the largest force."""
@@ -124,9 +124,9 @@ def _power_of_two(value: float) -> float:
 def single_optimality(
     A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
 ) -> tuple[float, float, float]:
-    """Measure the violation of optimality of one point; arguments as for :func:`set_violations`.
+    """Measure how far one point x is from the optimum; arguments as for :func:`set_violations`.
 
-    A is Jᵀ (m, n). The arrays have no last axis. Returns the first three rows of the violations.
+    A is Jᵀ (m, n). No array has an axis of postures. Returns the first three violations.
     """
     m, n = A.shape
     J, violations = np.ascontiguousarray(A.T).reshape(n, m, 1), np.empty((5, 1))
@@ -155,9 +155,9 @@ def set_violations(
     multipliers of the equations. z (n, W) are the multipliers of the bounds: negative at low,
     positive at high.
 
-    The first three of the rows of ``violations`` (5, W) or more are all zero exactly at the
-    optimum. First, the largest violation of balance (divided by the largest moment arm) and of the
-    bounds. Second, the largest |x + J y + z|, or z⁺ where high is infinite. Third, the duality gap
+    Fills the first three rows of ``violations`` (5 or more, W), which are zero only at the optimum.
+    Row 0 is the largest violation of balance (divided by the largest moment arm) and of the bounds.
+    Row 1 is the largest |x + J y + z|, or z⁺ where high is infinite. Row 2 is the duality gap
     |xᵀx + bᵀy + lowᵀz⁻ + highᵀz⁺|; twice the gap bounds the squared distance from the optimum.
     """
     primal, dual, gap = violations[0], violations[1], violations[2]

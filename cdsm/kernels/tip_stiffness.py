@@ -29,9 +29,8 @@ from cdsm.support.values import Array
 def decompose(JX: Array, left: Array, right: Array, status: Indices, width: Width) -> None:
     """Decompose J_v = U S V (singular values S); fill ``left`` with O = U S⁻¹ and ``right`` with V.
 
-    Their shapes are (B, 3, 3, W) and (B, 3, nv, W).
-    JX is J_X (B, 6, nv, W), its first rows are J_v. Where the tip is immobile, the status (B, W)
-    changes from READ to IMMOBILE.
+    ``left`` is (B, 3, 3, W) and ``right`` (B, 3, nv, W). JX is J_X (B, 6, nv, W), whose first rows
+    are J_v. Where the tip is immobile, the status (B, W) changes from READ to IMMOBILE.
     """
     scratch, S = np.empty((5, JX.shape[3])), np.empty((3, JX.shape[3]))
     for b in range(JX.shape[0]):

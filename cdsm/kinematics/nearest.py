@@ -64,10 +64,11 @@ _Newton = Callable[[Array, NDArray[np.bool_]], _NewtonStep]
 
 
 def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, int]:
-    """Find the angles nearest to the guess with ‖r‖ ≤ ``tolerance``, or least ‖r‖, of ``residual``.
+    """Find the joint angles nearest to ``guess`` with ‖r‖ ≤ ``tolerance``, or else least ‖r‖.
 
-    They are nearest locally; a differently folded arm may be nearer still. If the search from the
-    guess finds no solution, it is repeated from random postures, the same ones in each call.
+    r is the ``residual``. The angles are nearest locally; a differently folded arm may be nearer
+    still. If the search from the guess finds no solution, it is repeated from random postures, the
+    same ones in each call.
 
     Returns:
         The joint angles (nv,) [rad] within the limits, and the number of evaluations of r.
@@ -189,7 +190,7 @@ class _Search:
     def _iterate(
         self, newton: _Newton, q: Array, free: NDArray[np.bool_]
     ) -> tuple[Array, Array | None]:
-        """Iterate Newton's method for the free joints; return q and gradient (None: failed)."""
+        """Iterate Newton's method for the free joints; return q and gradient, or None instead."""
         least = math.inf
         for _ in range(_ATTEMPTS):
             step = newton(q, free)

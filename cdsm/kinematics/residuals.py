@@ -39,7 +39,7 @@ class Residual(ABC):
     def curvature(self, q: Array, weight: Array) -> Array:
         """Compute the Hessian (nv, nv) of weight · r with respect to q, for constant weights (m,).
 
-        It may be exact only where r = 0.
+        It is exact where r = 0, elsewhere perhaps approximate.
         """
 
     def hessian(self, q: Array) -> Array:

@@ -19,7 +19,7 @@ from cdsm.support.validation import instance, quantity
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 KINDS = ("cable_clearance", "link_clearance", "disk_clearance")
-"""Clearances in the order of the kernel."""
+"""Names of the clearances, in the order of the columns of the kernel's result."""
 
 _BACKBONE = 0.2
 """Radius of a link's backbone, divided by the hole radius of its first disk, as in the URDF."""
@@ -37,12 +37,12 @@ class Clearance(ReadOnlyState):
     Attributes:
         posture: The posture.
         diameter: Diameter of all cables [m].
-        cables: Between the surfaces of two cables [m].
-        links: Between a cable and the backbone of a link [m].
-        disks: Between a cable and a disk through which it does not run, or the outer rim of one
-            through which it runs [m].
-        nearest: Names of the two nearest bodies for each of the three distances; empty where it is
-            inf.
+        cables: Distance between the surfaces of two cables [m].
+        links: Distance between a cable and the backbone of a link [m].
+        disks: Distance between a cable and a disk [m], or the outer rim of a disk through which the
+            cable runs.
+        nearest: Names of the two nearest bodies for each of the three distances; empty names for a
+            distance of inf.
     """
 
     posture: Posture
@@ -79,11 +79,11 @@ class Clearance(ReadOnlyState):
 def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
     """Compute the smallest signed distances of the cables at a posture.
 
-    Cables are straight between their sites, with round sections; leads are left out. Links are
-    bars from joint to joint, as the URDF draws them: their radius is a fifth of the hole radius. In
-    an arm from a URDF they are lines. Disks are plates without thickness. For a cable in its own
-    hole the distance is that from the cable's surface to the outer rim of the disk. For a cable
-    that pierces a disk elsewhere it is negative. A distance is inf if the arm has no such pair.
+    Cables are straight between their sites, with round sections; leads are ignored. Links are bars
+    from joint to joint, as the URDF draws them: their radius is a fifth of the hole radius. In an
+    arm from a URDF they are lines. Disks are plates without thickness. A cable in a hole of a disk
+    has, as distance from this disk, the distance between its surface and the outer rim. If a cable
+    pierces a disk elsewhere, the distance is negative. It is inf if the arm has no such pair.
 
     Args:
         pose: The posture.
@@ -121,7 +121,7 @@ def clearances(
     """Compute the distances of :func:`clearance` at postures q (B, nv) [rad].
 
     Returns ``cable_clearance``, ``link_clearance`` and ``disk_clearance``, (B,) [m] each.
-    ``diameter`` [m] is that of all cables; ``threads`` is the largest number of threads, by default
+    All cables have the ``diameter`` [m]. ``threads`` is the largest number of threads, by default
     one for each core. Raises InvalidInput as :func:`clearance` does, and if ``q`` is not (B, nv)
     numbers.
     """

@@ -65,7 +65,7 @@ def hull_of(loads: Loads) -> Hull | None:
 
 
 def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[float]]:
-    """Return points (k,) that span a polytope, and normals and offsets of its facets of width zero.
+    """Return points (k,) that span a polytope; for directions of width zero, normals and offsets.
 
     ``farthest(u)`` returns the largest u·x in the polytope, and a point x with it.
     """

@@ -91,7 +91,7 @@ def payload(
 
         f = max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum,
 
-    also f |C_vv u| ≤ ``deflection``, and K_θ positive definite under all loads up to f u. K_θ is
+    f |C_vv u| ≤ ``deflection``, and K_θ is positive definite under all loads up to f u. K_θ is
     computed with the least tensions under each load. C_vv is the compliance without the force,
     since the motors are locked before the force acts. The worst direction has the smallest f. It is
     the normal of the nearest facet of the :func:`force_polytope`, or the softest direction of C_vv.
@@ -105,7 +105,7 @@ def payload(
             direction is wanted.
         wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m].
         deflection: Largest allowed displacement of the tip [m]; inf for no limit.
-        worst_friction: As for :func:`~cdsm.distribute_tension`, in the limit of the tensions.
+        worst_friction: Narrow the bounds for friction, as :func:`~cdsm.distribute_tension` does.
 
     Raises:
         InvalidInput: An argument has the wrong shape or range; or a cable has no upper bound.
@@ -186,8 +186,8 @@ def _until_unstable(
     """Return direction, force [N] and reason at which an arm becomes unstable under a load along u.
 
     The reason is ``"buckling"`` (K_θ is not positive definite) or ``"elasticity"`` (a least tension
-    leaves the domain of its law). The force is inf if neither happens up to ``most`` [N]. With
-    ``worst``, u and 26 other directions are examined, and the least force is returned.
+    leaves the domain of its law). The force is inf if neither happens up to ``most`` [N]. If
+    ``worst``, u and 26 other directions are examined, and the one of least force is returned.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

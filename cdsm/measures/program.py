@@ -24,7 +24,7 @@ from cdsm.tension import tension_ratio
 
 
 class Loads(NamedTuple):
-    """Balance under loads, in dimensionless form; symbols as in the module's docstring."""
+    """Balance under loads, in dimensionless form; symbols as at the top of the module."""
 
     A: Array  # [J_Lᵀ, −J_vᵀ U], scaled (nv, C+k)
     b: Array  # torque J_Xᵀ W − g, scaled (nv,)
@@ -55,7 +55,7 @@ class Loads(NamedTuple):
     def largest(self, along: Array, *, positive: bool = False) -> tuple[float, Array] | None:
         """Compute the largest a·x, a = ``along`` (k,), over all balanced loads x, and one such x.
 
-        With ``positive``, only x ≥ 0 is allowed. The value is inf, and x is NaN, if a·x is
+        If ``positive``, only x ≥ 0 is allowed. The value is inf, and x is NaN, if a·x is
         unbounded. Return None if no load is balanced; SolverError if the solver stops for another
         reason.
         """

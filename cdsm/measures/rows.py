@@ -71,7 +71,7 @@ def measured(
 ) -> dict[str, Array]:
     """Compute the measures ``names`` of :data:`MEASURED`, (B,) each, at postures q (B, nv) [rad].
 
-    ``diameter`` [m] is that of all cables.
+    All cables have the ``diameter`` [m].
     """
     found: dict[str, Array] = {}
     if any(name in KINDS for name in names):

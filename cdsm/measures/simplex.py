@@ -172,7 +172,7 @@ def payload_rows(
     """Fill ``force`` (B, D) [N] with the largest forces of B postures along D directions u.
 
     J is J_L (B, C, nv), ``torque`` J_Xᵀ W − g (B, nv), ``motion`` J_vᵀ u (B, D, nv), ``reach`` the
-    length of the arm [m]. The bounds are (B, C) [N]. NaN: the method proves no force.
+    length of the arm [m]. The bounds are (B, C) [N]. Forces without a proof are NaN.
     """
     rows, count, nv = J.shape
     columns, x = np.empty((nv, count + 1)), np.empty(count + 1)

@@ -142,7 +142,7 @@ def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
 
 
 def to_markdown(figures: Sequence[Figure]) -> str:
-    """Return a Markdown table of all claims of ``figures`` with assumptions, and further tables."""
+    """Return a Markdown table of all claims with assumptions, then the tables of each figure."""
     further = [table for figure in figures for table in figure.tables()]
     return "\n\n".join([markdown_table(HEADER, to_rows(figures)), EXPLANATION, *further]) + "\n"
 

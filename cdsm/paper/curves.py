@@ -34,7 +34,7 @@ FROM_FIG_6: Final = "prototype searched for Fig. 6"
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Curve:
-    """Stiffness in x, y and z over a swept quantity.
+    """Stiffness in x, y and z as a function of a swept quantity.
 
     Attributes:
         label: Name of the curve in its figure.
@@ -130,8 +130,8 @@ def over_cases(
 ) -> Pair:
     """Compute the stiffness at a posture q (nv,) [rad] for N cases: laws with lower bounds [N].
 
-    ``swept`` (N,) is the abscissa of the curves. Its unit is that of ``Curve.swept``. ``part`` is
-    the term of K_θ that is computed beside the total.
+    ``swept`` (N,) is the abscissa of the curves [Pa or N]. ``part`` is the term of K_θ whose
+    stiffness is computed in addition to the total.
     """
 
     def curve(length: OriginalLength) -> Curve:

@@ -29,7 +29,7 @@ HALF_UNITS: Final = (
     frozen(np.array([5e-3, 5e-3, 5e-3, 5e-3, 5e-3, 5e-5, 5e-5])),
     frozen(np.array([5e-2, 5e-3, 5e-3, 5e-5, 5e-9, 5e-12, 5e-15])),
 )
-"""Half a unit of the last printed digit of each coefficient, lowest power first: of the lower and
+"""Half a unit of the last printed digit of each coefficient, lowest power first, for the lower and
 the upper branch."""
 
 _SAMPLES = 200  # number of tensions at which the lower branch is sampled
@@ -72,7 +72,7 @@ def band(tension: ArrayLike) -> tuple[Array, Array]:
 
 
 def powers(tension: ArrayLike, slope: bool = False) -> Array:
-    """Return the powers Fⁱ (N, 7), i = 0 to 6, of N tensions; with ``slope`` instead i Fⁱ⁻¹."""
+    """Return the powers Fⁱ (N, 7), i = 0 to 6, of N tensions; if ``slope``, i Fⁱ⁻¹ instead."""
     F, i = np.atleast_1d(np.asarray(tension, dtype=np.float64))[:, None], np.arange(7)
     return np.asarray(i * F ** np.maximum(i - 1, 0) if slope else F**i)
 

@@ -179,7 +179,7 @@ def _over_tension(fit: PrototypeFit) -> list[Trace]:
 def _configurations(
     fit: PrototypeFit, swept: Array, curves: Sequence[Array], paper: Sequence[float]
 ) -> tuple[Trace, ...]:
-    """Build a trace per configuration: a curve over ``swept``, divided by its first value.
+    """Build a trace per configuration: a curve against ``swept``, divided by its first value.
 
     ``paper`` has the paper's ratio of the last to the first value of each curve.
     """

@@ -35,7 +35,7 @@ class LeadFigure(Figure):
     Attributes:
         leads: Leads of all cables (N,) [m].
         pseudoinverse: Change of K_R, computed with the unstrained length l_0; x, y, z (N, 3) [%].
-        along: The same for the stiffness that a small weight measures (N, 3) [%].
+        along: Change of the stiffness that a small weight measures, with this l_0 (N, 3) [%].
         stretched_pseudoinverse: ``pseudoinverse`` computed with l_0 = L as in the paper (N, 3) [%].
         stretched_along: ``along`` computed with l_0 = L as in the paper (N, 3) [%].
     """
@@ -83,7 +83,7 @@ def figure_lead() -> LeadFigure:
 
 
 def _changes(lead: float, length: OriginalLength) -> Array:
-    """Compute the change of K_R and of what a weight measures, over :data:`MINIMA` (2, 3) [%]."""
+    """Compute how K_R and the stiffness for a weight change between :data:`MINIMA` (2, 3) [%]."""
     arm = presets.virtual_prototype(presets.ELASTIC_STAGE, lead=lead, original_length=length)
     q = np.full(arm.nv, presets.TEN_DEGREES)
     first, last = (readings(at_minimum(arm, q, F)) for F in MINIMA)

@@ -120,7 +120,7 @@ class Prototype:
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
-        """Compute stiffness (N, 3) [N/m] in x, y, z: secant for a weight, tangent if that is 0."""
+        """Compute stiffness (N, 3) [N/m] in x, y, z: secant for a weight, tangent for weight 0."""
         forced = [cable.name for cable in pose.arm.cables if cable.control == "force"]
         rows = []
         for tension in np.atleast_1d(np.asarray(tensions, dtype=np.float64)).tolist():

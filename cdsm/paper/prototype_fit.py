@@ -73,7 +73,7 @@ class Step:
         table: Table II (5, 3) [N/m], as printed or with exchanged entries.
         free: Names of the searched parameters.
         start: Start of the search. Parameters that are not free keep these values.
-        table_alone: Whether only Table II counts, without Figs. 12, 13 and Section V-B.
+        table_alone: Whether only Table II is fitted, without Figs. 12, 13 and Section V-B.
     """
 
     label: str

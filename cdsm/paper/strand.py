@@ -28,9 +28,9 @@ class StrandFigure(Figure):
     Attributes:
         gauge_length: Length of the tested wire [m].
         tension: F (N,) [N].
-        displacement: Stretch of the wire above 2.2 N, ∫ l_0 dF/EA (N,) [m].
+        displacement: Elongation of the wire since 2.2 N, ∫ l_0 dF/EA (N,) [m].
         tangent: Tangent rigidity EA of the repaired Eq. 19 (N,) [N].
-        secant: Secant rigidity of the repaired Eq. 19, Eq. 18 (N,) [N].
+        secant: Secant rigidity (Eq. 18) of the repaired Eq. 19 (N,) [N].
         low: Least EA of all continuous laws that round to the printed digits (N,) [N].
         high: Largest EA of all continuous laws that round to the printed digits (N,) [N].
         printed: EA by Eq. 19 as printed (N,) [N].

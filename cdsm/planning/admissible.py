@@ -43,7 +43,7 @@ class Admissible:
 
     @cached_property
     def kinks(self) -> list[tuple[int, float]]:
-        """Kinks of EA(F), where its slope jumps, within the bounds: (cable index, tension [N])."""
+        """Kinks of EA(F) (jumps of its slope) within the bounds, as (cable index, tension [N])."""
         return [
             (c, kink)
             for c, cable in enumerate(self.least.posture.arm.cables)
@@ -55,7 +55,7 @@ class Admissible:
     def piece(self, F: Array) -> tuple[Array, Array]:
         """Return the bounds (C,) [N] of the range without kinks that contains F (C,) [N].
 
-        A tension exactly at a kink belongs to the range below the kink; so its slope is used there.
+        A tension exactly at a kink belongs to the range below, whose slope of EA is used there.
         """
         low, high = self.low.copy(), self.high.copy()
         for c, kink in self.kinks:

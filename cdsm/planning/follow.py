@@ -45,8 +45,8 @@ class Follower:
 
         The plan takes the least tensions that hit the target and that the rate allows after the
         last planned sample. If only other tensions hit the target, earlier samples are planned
-        again so that the rate allows those. Raises UnreachableStiffness or SingularStiffness if no
-        tensions hit the target, even with an unlimited rate.
+        again so that the rate allows these tensions. Raises UnreachableStiffness or
+        SingularStiffness if no tensions hit the target, even with an unlimited rate.
         """
         region = sample.model.region
         last = self.planned[-1] if self.planned else None
@@ -68,7 +68,7 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Return the tensions of ``region`` that are within the rate from those of ``other``."""
+        """Return the part of ``region`` that the rate allows from the tensions of ``other``."""
         if region is None or other is None:
             return region
         return region.within(self.rate * abs(other.index - sample.index), other.F)
@@ -81,7 +81,7 @@ class Follower:
         return replace(sample, F=found[0]) if found and found[1] else None
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
-        """Plan a sample alone, by :meth:`Planner.least`; None if it misses a target."""
+        """Plan a sample as if it were the only one; None if the tensions miss a target."""
         found = Planner(sample.model, sample.constraints, self.starts, self.seed).least()
         if found is None:
             return None

@@ -54,8 +54,9 @@ def half_way(
 ) -> HalfWay:
     """Compute the arm half-way between sample number ``index`` and the next sample.
 
-    ``ends`` are the stiffnesses of both samples. ``unstrained`` (H,) [m] and ``target`` [N/m] are
-    the means of their lengths l_0 and targets. ``directions`` are (3,), (n, 3) or None.
+    ``ends`` are the stiffnesses of both samples. ``unstrained`` (H,) [m] are the means of the
+    original lengths l_0 of the H position-controlled cables, and ``target`` [N/m] is the mean of
+    the targets. ``directions`` are (3,), (n, 3) or None.
     """
     K, value, off, reason = None, None, math.inf, ""
     try:
@@ -72,8 +73,7 @@ def half_way(
 def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     """Compute K_θ at the equilibrium near the mean of two postures.
 
-    ``ends`` are the stiffnesses at both postures. ``unstrained`` (H,) [m] are the original lengths
-    l_0 of the H position-controlled cables.
+    ``ends`` are the stiffnesses at both postures; ``unstrained`` is as for :func:`half_way`.
     """
     one, other = ends
     q = (one.posture.q + other.posture.q) / 2.0

@@ -158,7 +158,7 @@ def constraint_hessian(
 
 @compiled
 def convex(W: Array, null: Array, normals: Array) -> Array:
-    """Return W (C, C) made positive definite, unchanged on admissible steps if it is so there.
+    """Return W (C, C) made positive definite; on admissible steps, a positive definite W is kept.
 
     Admissible steps keep the balance (columns of ``null`` (C, p) are an orthonormal basis) and, to
     first order, the constraints with the gradients ``normals`` (n, C).

@@ -28,7 +28,7 @@ def target_constraints(
 ) -> Constraints:
     """Build the constraints along = target [N/m], or cartesian = target if directions are None.
 
-    SingularStiffness if the tip cannot move along a direction.
+    Raises SingularStiffness if the tip cannot move along a direction.
     """
     K = stiffness(model.pose, model.region.least)
     if directions is None:
@@ -73,7 +73,7 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
 def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
     """Return ‖achieved/target − 1‖ [-].
 
-    Without directions ‖S − target‖/‖target‖, with S the symmetric part of ``achieved``.
+    If ``directions`` is None, return ‖S − target‖/‖target‖, S the symmetric part of ``achieved``.
     """
     if directions is None:
         off = (achieved + achieved.T) / 2.0 - target

@@ -94,7 +94,7 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def steps(self) -> Array:
-        """Largest tension change per step since the previous planned sample (P,) [N]; first 0."""
+        """Largest tension change per step since the last planned sample (P,) [N]; first is 0."""
         changes = np.zeros(len(self.planned))
         moved = abs(np.diff(self.tensions, axis=0)).max(axis=1, initial=0.0)
         changes[1:] = moved / np.diff(self.planned)
@@ -120,10 +120,10 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def between(self) -> tuple[HalfWay, ...]:
-        """Arm half-way between each two consecutive planned samples; motors move at constant speed.
+        """Arm half-way between any two neighbouring samples that are both planned.
 
-        Half the step gives a quarter of the misfit. The first use takes a few milliseconds per
-        pair.
+        The motors move at constant speed. With half the step between samples, the misfit falls to a
+        quarter. The first use takes a few milliseconds per pair.
         """
         pairs = list(zip(self.planned, self.planned[1:], strict=False))
         l_0, targets = self.unstrained_lengths, self.target

@@ -67,7 +67,7 @@ class StiffnessPlan(ReadOnlyState):
     def misfit(self) -> float:
         """‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``.
 
-        With a moment in the wrench ``cartesian`` is not symmetric. Then its symmetric part counts.
+        If the wrench has a moment, ``cartesian`` is not symmetric; its symmetric part is compared.
         """
         return misfit(np.asarray(self.achieved), np.asarray(self.target), self.direction)
 

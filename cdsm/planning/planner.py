@@ -1,6 +1,6 @@
 """Search from several starts for the least tensions that hit a target.
 
-The search is local. :func:`~cdsm.planning.plan.plan_stiffness` says how far it can miss the least.
+The search is local: :func:`~cdsm.planning.plan.plan_stiffness` tells how near it ends to the least.
 """
 
 from __future__ import annotations
@@ -154,8 +154,8 @@ class Planner:
     ) -> list[Evaluation]:
         """Find stable points that hit the target, on lines from ``hub`` to ``others``.
 
-        The point of least ‖F‖ is first. ``precision`` is the relative error of their place on these
-        lines.
+        The point of least ‖F‖ is first. ``precision`` is the relative error of the points' places
+        on the lines.
         """
         at_hub, guesses = self._miss(hub), []
         for other in others:
@@ -176,7 +176,7 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find stable points that hit the target, on lines from points below to points above it."""
+        """Find stable points on target, on lines from points below target to points above."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]

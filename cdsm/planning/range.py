@@ -138,7 +138,7 @@ def stiffness_range(
     or levels off, ``along`` is a concave function of F: it has one maximum, and many minima in the
     corners of the set of admissible tensions. So the search for ``low`` needs many starts. With
     other laws the search for ``high`` needs them too. ``high_found`` shows how often ``high`` was
-    found. A larger number of starts includes those of a smaller number. If tension can buckle the
+    found. The starts of a smaller number are among those of a larger one. If tension can buckle the
     arm, the arm is softest just before it buckles, and ``low`` depends on ``margin``.
 
     From the softest corner found, one cable after the other is moved to its other bound, until no
@@ -208,8 +208,9 @@ def range_ends(
 ) -> tuple[RangeEnd, RangeEnd]:
     """Find the lowest and the highest stiffness of ``model`` along a unit direction ``u`` (3,).
 
-    Unbounded tensions get a cap of 1e2 times the least tensions. It rises up to 1e6 times until the
-    tensions at both ends lie below it. ``starts`` and ``seed`` are as for :func:`stiffness_range`.
+    Tensions without bound are capped at 1e2 times the largest of the least tensions, then at 1e4
+    and 1e6 times, until the tensions at both ends lie below the cap. ``starts`` and ``seed`` are as
+    for :func:`stiffness_range`.
     """
     region = model.region
     if np.isfinite(region.high).all():
@@ -284,7 +285,7 @@ def _beside(region: Admissible, anchor: Evaluation, F: Array) -> Iterator[Evalua
 
 
 def _rigidities_rise(region: Admissible) -> bool:
-    """Return whether all rigidities rise within the bounds; False for user-defined laws."""
+    """Return whether no rigidity falls within the bounds; False for user-defined laws."""
     cables = region.least.posture.arm.cables
     for cable, low, high in zip(cables, region.low, region.high, strict=True):
         law = cable.elasticity

@@ -133,7 +133,7 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 
 
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
-    """Find a local optimum of ``program``; with ``in_piece`` only between the kinks around it."""
+    """Find a local optimum of ``program``; if ``in_piece``, only in the piece of ``start``."""
     region, iterate = program.region, program.constraints.at(start)
     multipliers = np.zeros(iterate.values.size if program.objective.effort else 0)
     step, radius = _Step(np.zeros_like(start.F), multipliers, 0.0, 0.0, _FIRST_PRICE), _FIRST_RADIUS

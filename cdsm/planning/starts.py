@@ -26,7 +26,8 @@ class StartPoints:
 
     Attributes:
         anchor: A stable point well inside.
-        points: The anchor, and stable points towards the corners; more directions only add some.
+        points: The anchor, and stable points towards the corners. More random directions add points
+            and keep the others.
     """
 
     def __init__(

@@ -122,7 +122,7 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """Return the first range of lower bounds [N] in which the arm is stable, without its edges."""
+    """Return the first range of lower bounds [N] of a stable arm, without ends where it buckles."""
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
         best = at(float(places[int(margins.argmax())]))

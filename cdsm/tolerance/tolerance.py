@@ -35,12 +35,12 @@ class Tolerance(ReadOnlyState):
         correlation: Correlation ρ of every two inputs [-]: 0: the errors are independent; 1: all
             inputs have the same error. Or a correlation matrix (n, n) of the n inputs.
         of: Names of the inputs that have this tolerance, as a pattern: ``"cable1_*"``. Default all.
-        tensions: Rising tensions (n,) [N] at which ``standard`` (n,) is given; None: one standard.
+        tensions: Ascending tensions (n,) [N] at which ``standard`` (n,) is given; None: one value.
 
     Raises:
         InvalidInput: ``standard`` is negative or not a number; ``correlation`` is not between 0 and
             1, or is a matrix that is not symmetric, has no ones on its diagonal, or is not positive
-            semidefinite; ``tensions`` do not rise or are not as many as the standards.
+            semidefinite; ``tensions`` are not ascending, or not as many as the standards.
         UnknownName: ``distribution`` is unknown.
     """
 
@@ -97,7 +97,7 @@ class Tolerance(ReadOnlyState):
             of: As for :class:`Tolerance`.
 
         Raises:
-            InvalidInput: ``half_width`` is negative or not a number, or as for :class:`Tolerance`.
+            InvalidInput: ``half_width`` is negative or not a number; or see :class:`Tolerance`.
             UnknownName: ``distribution`` is not one of these two.
         """
         width = WIDTH[one_of("distribution of half-widths", distribution, WIDTH)]
