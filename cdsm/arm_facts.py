@@ -177,7 +177,7 @@ class ArmFacts(Printed):
         """Check the arguments of :class:`Manipulator`, and set all attributes from them.
 
         ``urdf`` is a text that has been checked. ``tip`` is the link whose frame is the tip. Doubts
-        about units are issued as warnings, except those in ``told``, of which the user was already
+        are issued as warnings, except those in ``told``, of which the user was already
         warned.
         """
         self._cables = cables = _checked_cables(cables)
@@ -189,13 +189,13 @@ class ArmFacts(Printed):
         self._parts = ArmParts(
             geometry, urdf, cables, tip, g, original_length, body.joint_names, tolerances
         )
-        for doubt in self._unit_doubts:
+        for doubt in self._doubts:
             if doubt not in told:
                 warn(f"{self.name}: {doubt}")
 
     @cached_property
-    def _unit_doubts(self) -> list[str]:
-        """Doubts about the unit of lengths of the robot and of its cables."""
+    def _doubts(self) -> list[str]:
+        """Doubts about the unit of lengths of the robot and of its cables, and about its tip."""
         length = self._model.body.length
         # without lengths between the joints, the frame of the robot may be as long as any arm
         most = max(_FARTHEST, 10.0 * length) if length > 0.0 else LONGEST
@@ -207,7 +207,13 @@ class ArmFacts(Printed):
         ]
         # a geometry warns of its own length
         largest = max(sizes, key=lambda size: size[1])
-        return doubts_about_units(0.0 if self.is_serpentine else length, [largest])
+        doubts = doubts_about_units(0.0 if self.is_serpentine else length, [largest])
+        if not self._model.masses.tip_joints.size:
+            doubts.append(
+                f"no joint moves its tip {self._parts.tip}, so its stiffness is infinite; give "
+                "another link as tip."
+            )
+        return doubts
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, type(self)) and self._parts == other._parts
@@ -265,7 +271,7 @@ class ArmFacts(Printed):
 
     def _replace(self, **changes: Any) -> Self:
         arm = type(self).__new__(type(self))
-        arm._build(*self._parts._replace(**changes), told=self._unit_doubts)
+        arm._build(*self._parts._replace(**changes), told=self._doubts)
         return arm
 
 

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,11 +92,11 @@ _RAIL = """<robot name="rail"><link name="floor"/><link name="car"/><link name="
 <origin xyz="{x} 0 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
-def _rail(x: float = 0.1, site: float = 0.01, lead: float = 0.2) -> None:
+def _rail(x: float = 0.1, site: float = 0.01, lead: float = 0.2, tip: str = "hand") -> None:
     """Build an arm of length ``x`` [m] with a cable through ``site``, behind ``lead`` [m]."""
     sites = cdsm.Site("floor", (0.0, 0.02, 0.0)), cdsm.Site("hand", (site, 0.01, 0.0))
     cable = cdsm.Cable(name="pull", sites=sites, elasticity=STEEL, lead=lead)
-    arm = cdsm.Manipulator.from_urdf(_RAIL.format(x=x), [cable], tip="hand")
+    arm = cdsm.Manipulator.from_urdf(_RAIL.format(x=x), [cable], tip=tip)
     arm.with_gravity("y").with_friction(0.1)  # which say nothing again
 
 
@@ -108,11 +109,17 @@ def _rail(x: float = 0.1, site: float = 0.01, lead: float = 0.2) -> None:
         ({"lead": 50.0}, "rail: the lead of pull is 50 m: it looks as if lengths are in mm"),
     ],
 )
-def test_lengths_in_another_unit_are_doubted_once(given: dict[str, float], said: str) -> None:
+def test_lengths_in_another_unit_are_doubted_once(given: dict[str, Any], said: str) -> None:
     with pytest.warns(cdsm.CdsmWarning) as told:
         _rail(**given)
     (warning,) = told
     assert said in str(warning.message)
+
+
+def test_tip_that_no_joint_moves_is_doubted_once(recwarn: pytest.WarningsRecorder) -> None:
+    _rail(tip="floor")
+    said = "rail: no joint moves its tip floor, so its stiffness is infinite; give another link"
+    assert [said in str(warning.message) for warning in recwarn.list] == [True]
 
 
 @pytest.mark.filterwarnings("error:.*looks as if:cdsm.CdsmWarning")
