@@ -60,7 +60,7 @@ class Design(NamedTuple):
         """Compute tr M_i G (n,), and a proved lower bound of the efficiency f/f_best of a design.
 
         The gain of one more test i is proportional to tr M_i G. ``M`` (r, r) is the information of
-        the design, and G follows from M (see the module). The bound is between 0 and 1.
+        the design; the top of the module gives G. The bound is between 0 and 1.
         """
         C = np.linalg.inv(M)
         right = C @ self.wanted.T

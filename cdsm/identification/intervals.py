@@ -181,7 +181,7 @@ class Profiler:
         return [min(falling, key=lambda knot: knot.rise).point] if falling else []
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
-        """Compute the knots on one side, from the optimum outward; and return why they end."""
+        """Compute the knots on one side, from the optimum outward; return also why they end."""
         knots = [self._knot(self.best, self.jacobian[:, self.i], self.jacobian[:, self.others])]
         for goal in (*self.exact, self.far):
             while knots[-1].rise < goal:

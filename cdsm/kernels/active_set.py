@@ -39,7 +39,7 @@ _STEPS = 20
 """Maximum number of steps per cable; one or two are usual."""
 
 _NONE, _STUCK = -1, -2
-"""Replace the number of a cable: _NONE if there is none, _STUCK − p if p can't reach its bound."""
+"""Values in place of a cable number: _NONE: no cable; _STUCK − p: p can't reach its bound."""
 
 
 class State(NamedTuple):
@@ -54,7 +54,7 @@ class State(NamedTuple):
         system: S, b and J_Lᵀ, then S⁻¹ b and S⁻¹ J_Lᵀ (nv, nv + 1 + C, W).
         free: Σ J_cᵀ J_c over the free cables c, and a right-hand side (nv, nv + 1, W).
         cables: Scratch, such as a column and a row of the tableau (2, max(C, nv), W).
-        scratch: Scratch (4, W); smaller entries of T than its last row count as zero in a step.
+        scratch: Scratch (4, W). Its last row is the size below which an entry of T is zero.
         chosen: The cable that moves to its bound, and the cable of the pivot (2, W).
     """
 
@@ -178,7 +178,7 @@ def _choose(
 def _step(low: Array, high: Array, state: State, width: Width) -> None:
     """Move the entering cables towards their bounds, until z of another cable would change sign.
 
-    Sets the second row of ``chosen`` to the cables of the pivots; _NONE: no pivot.
+    Sets the second row of ``chosen`` to the cables of the pivots, or to _NONE without a pivot.
     """
     F, z, side, T, rate = state.F, state.z, state.side, state.tableau, state.cables[0]
     sign, step, limit = state.scratch[0], state.scratch[1], state.scratch[2]

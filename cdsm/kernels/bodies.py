@@ -144,7 +144,7 @@ def gravity_torque(
 
 @inner
 def set_gravity_stiffness(parent: Indices, carried: Array, gravity: Array, width: Width) -> None:
-    """Fill ``gravity`` (nv, nv, W), i ≤ j, with ∂g/∂θ; ``carried`` is of :func:`gravity_torque`."""
+    """Fill ``gravity`` (nv, nv, W), i ≤ j, with ∂g/∂θ; :func:`gravity_torque` fills ``carried``."""
     for j in range(parent.shape[0] - 1, 0, -1):
         last = np.uint64(j)
         i = last

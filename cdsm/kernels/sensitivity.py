@@ -111,9 +111,9 @@ def _by_joint(
     """Fill ``placement`` (3,) with ∂Ψ/∂(origin of joint i) in base axes; return ∂Ψ/∂q_i.
 
     ``before`` is the row of its parent, ``beyond`` (nv+1,) marks the rows that joint i moves.
-    ``frames`` are origin, axis and slide of all joints; ``row``, ``point`` and ``weight`` the row,
-    motion, and X, V and A of all points. ``spin`` and ``spin_rate`` (3,) are the derivatives with
-    respect to ω and ω̇ of the tip.
+    ``frames`` are origin, axis and slide of all joints. ``row``, ``point`` and ``weight`` hold the
+    joint's row, the motion, and X, V and A of all points. ``spin`` and ``spin_rate`` (3,) are the
+    derivatives with respect to ω and ω̇ of the tip.
     """
     origin, axis, slide = frames
     turning, rate, velocity, acceleration = motion

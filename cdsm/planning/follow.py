@@ -68,7 +68,7 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Return the part of ``region`` that the rate allows from the tensions of ``other``."""
+        """Return the part of ``region`` that the rate allows if ``other`` keeps its tensions."""
         if region is None or other is None:
             return region
         return region.within(self.rate * abs(other.index - sample.index), other.F)

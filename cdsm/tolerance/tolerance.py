@@ -32,8 +32,8 @@ class Tolerance(ReadOnlyState):
             A rigidity may have one value for each of ``tensions``, shape (n,) [-]; between them, u
             is interpolated linearly.
         distribution: ``"normal"``, ``"uniform"`` or ``"triangular"``. Only Monte Carlo needs it.
-        correlation: Correlation ρ of every two inputs [-]: 0: the errors are independent; 1: all
-            inputs have the same error. Or a correlation matrix (n, n) of the n inputs.
+        correlation: Correlation ρ of every two inputs [-]: 0 if their errors are independent, 1 if
+            all inputs have the same error. Or a correlation matrix (n, n) of the n inputs.
         of: Names of the inputs that have this tolerance, as a pattern: ``"cable1_*"``. Default all.
         tensions: Ascending tensions (n,) [N] at which ``standard`` (n,) is given; None: one value.
 
