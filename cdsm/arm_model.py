@@ -60,7 +60,8 @@ class ArmModel:
         blocks: Joints and cables in groups that are solved one after the other for a first guess
             of the tensions.
         laws: Elasticities of the cables.
-        arrays: All fields of tree, routing and masses, in turn, as ``single_pose`` takes them.
+        arrays: Fields of tree, routing and masses, one after the other: arguments of the kernel
+            ``single_pose``.
         lowest: Lower joint limits (nv,) [rad], minus the rounding tolerance.
         highest: Upper joint limits (nv,) [rad], plus the rounding tolerance.
     """
@@ -102,7 +103,7 @@ class ArmModel:
 
     @cached_property
     def chain_arrays(self) -> tuple[Any, ...]:
-        """Routing, spans, holes and wraps of the segments, as ``single_chains`` takes them."""
+        """Arguments of the kernel ``single_chains``: routing, spans, holes, wraps of segments."""
         chains, routing = self.chains, route(self.body, self.tree, self.chains.segments)
         span = np.zeros((len(chains.segments), 3), dtype=np.intp)
         moving = routing.segment[:-1, 0]
@@ -113,9 +114,9 @@ class ArmModel:
     def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
         """Segments whose length the joints change, and these joints: (a, b, segment, joint).
 
-        ``a`` and ``b`` (n,) are the indices of the two sites of each of these segments. ``segment``
-        and ``joint`` (m,) form pairs: the index of a segment in ``a``, and the row in :attr:`tree`
-        of a joint between its sites.
+        Segment i of these n segments lies between the sites ``a[i]`` and ``b[i]``. Each of the m
+        pairs ``segment[j]``, ``joint[j]`` is a segment, as an index into ``a``, and a joint between
+        its sites, as a row of :attr:`tree`.
         """
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
@@ -138,7 +139,7 @@ class ArmModel:
 
     @cached_property
     def holes(self) -> Holes:
-        """Holes of the cables, as the kernels of batches take them."""
+        """Holes of the cables, in the form that the kernels of batches need."""
         cables = self._cables
         first = np.cumsum([0, *(len(cable.sites) for cable in cables)])
         sites = [site for cable in cables for site in cable.sites]

@@ -157,7 +157,7 @@ class Cable:
         return replace(self, sites=tuple(sites))
 
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
-        """Compute Δl = l_0 ε(F) + ΔF/k_series [m]; Δl, ε and ΔF are 0 at the elasticity's ``rest``.
+        """Compute the elongation Δl = l_0 ε(F) + (F − F_0)/k_series [m], zero at F_0 = ``rest``.
 
         Wire and series spring carry the same tension, and their elongations add up. Examples are
         the paper's hybrid cable, a wire and a spring (Fig. 11), and a wire on a compliant drive.
@@ -176,7 +176,7 @@ class Cable:
         return np.asarray(wire + (values - self.elasticity.rest) / self.series_stiffness)
 
     def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
-        """Compute dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m] for any type of motor control.
+        """Compute dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m], whatever ``control`` is.
 
         Arguments (F, l_0), shapes and errors are those of :meth:`elongation`.
         """
@@ -184,7 +184,7 @@ class Cable:
         return np.asarray(1.0 / (_length(free_length) / rigidity + 1.0 / self.series_stiffness))
 
     def energy(self, tension: ArrayLike, free_length: float) -> Array:
-        """Compute the energy l_0 ∫ F dε + (F² − F_0²)/(2 k_series) [J]; it is 0 at F_0 = ``rest``.
+        """Compute the energy l_0 ∫ F dε + (F² − F_0²)/(2 k_series) [J], zero at F_0 = ``rest``.
 
         Arguments (F, l_0), shapes and errors are those of :meth:`elongation`.
         """

@@ -29,9 +29,10 @@ class Chains:
     """Segments and holes of all cables of an arm; S segments, P holes, actuator side first.
 
     Attributes:
-        segments: Each segment as a cable between two sites. Only the first of each cable has the
-            series spring and, if the cable has friction, the motor control. The lead is a segment
-            that arrives along x of the link of the first site.
+        segments: Each segment as a cable between two sites. The series spring is in the first
+            segment of each cable. If the cable has friction, only this segment has the cable's
+            motor control; the others are position-controlled. The lead is a segment along x of the
+            link of the first site.
         cable: Index of the cable of each segment (S,).
         start: Index of the first segment of each cable, then S (C+1,).
         hole: Index of the segment before each hole (P,); the segment after it has the next index.
@@ -123,7 +124,7 @@ class Segments(ReadOnlyState):
     def ratio(self) -> Array:
         """Largest ratio T_{j+1}/T_j (S,) [-] that the hole after segment j allows: e^μφ.
 
-        It is 1 for the last segment of a cable, which has no hole after it.
+        The entry is 1 for the last segment of a cable, which has no hole after it.
         """
         found = np.ones(self.lengths.size)
         found[self.chains.hole] = np.exp(self.grip)

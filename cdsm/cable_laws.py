@@ -157,7 +157,7 @@ class CableLaws:
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
         """Compute EA (1 + ε) [N] of a law at ``tension``, in the shape of ``tension``.
 
-        If ``original_length`` of the arm is "stretched", as in the paper, it is EA.
+        If ``original_length`` of the arm is "stretched", as in the paper, the result is EA.
         """
         if isinstance(law, LinearElasticity):
             rigidity = law.rigidity(tension)
@@ -219,7 +219,7 @@ class CableLaws:
     def naming(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """Return ``error`` of a law again, with names and indices of the cables outside its domain.
+        """Return the error of a law anew, with names and indices of the cables outside its domain.
 
         ``held`` selects the cables that have this law.
         """
@@ -254,7 +254,7 @@ def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | No
 
 
 def _joined(tables: list[Array]) -> Array:
-    """Join tables of coefficients side by side, with rows of zeros up to a multiple of AT_ONCE."""
+    """Join tables of coefficients side by side; zeros fill up the rows to a multiple of AT_ONCE."""
     rows = AT_ONCE * -(-max(map(len, tables)) // AT_ONCE)
     return np.hstack([np.pad(each, ((0, rows - len(each)), (0, 0))) for each in tables])
 

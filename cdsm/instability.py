@@ -58,11 +58,12 @@ class Remedy(ReadOnlyState):
         change: ``"wire"`` (EA of all wires), ``"spring"`` (all series springs), ``"tension"`` (the
             lower bounds of the tensions) or ``"disk offset"``.
         now: Current values: EA(F) (n,) [N] of the position-controlled cables, k_series (n,) [N/m]
-            of those with a spring, lower bounds (C,) [N], or disk offsets (joints,) [m].
+            of cables with a series spring, lower bounds (C,) [N], or disk offsets (joints,) [m].
         factor: Factor of all these values, nearest to 1, at which the arm becomes stable [-]; None
             if no factor that was tried makes it stable.
         slope: dλ/d ln(factor) at the current values [N m/rad], λ the smallest eigenvalue of K_θ.
-            1 % more changes λ by 0.01 times this. None if a small change is not admissible.
+            An increase by 1 % changes λ by 0.01 times the slope. None if a small change is not
+            admissible.
     """
 
     change: Change

@@ -44,10 +44,10 @@ class Manipulator(ArmFacts):
 
     Args:
         geometry: The arm.
-        elasticity: One law for all cables, or one law per cable. The cables are then those of
+        elasticity: One law for all cables, or one law per cable. The cables are then routed by
             :func:`~cdsm.serpentine_cables`.
-        cables: The cables, if ``elasticity`` is not given: any sites on any links of :attr:`urdf`.
-            Or the path of a file of :func:`~cdsm.write_cables`.
+        cables: The cables, if ``elasticity`` is not given; their sites may be on any links of
+            :attr:`urdf`. Or the path of a file that :func:`~cdsm.write_cables` has written.
         gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s² along
             it; (0, 0, 0) for none.
         original_length: Which length is l_0 in the stiffness EA/l_0 of a wire of length ℓ under
@@ -132,10 +132,11 @@ class Manipulator(ArmFacts):
         ``tip``, and ``file`` (a path, from the folder of this file) or ``text``; optional are
         ``joint_names`` and ``check_inertia`` (see :meth:`from_urdf`). All other keys are optional:
 
-        - ``wire``: of all cables: a name such as ``"1x19-1.2mm"``, a constant EA [N], a table in
-          the form of :func:`~cdsm.read_elasticity`, or the NAME of a table ``[wires.NAME]``.
-        - ``series_stiffness`` [N/m], ``control``, ``minimum``, ``maximum`` [N]: of all cables, as
-          in :class:`Cable`.
+        - ``wire``: the wire of all cables: a name such as ``"1x19-1.2mm"``, a constant EA [N], a
+          table in the form of :func:`~cdsm.read_elasticity`, or the NAME of a table
+          ``[wires.NAME]``.
+        - ``series_stiffness`` [N/m], ``control``, ``minimum``, ``maximum`` [N]: attributes of all
+          cables, as in :class:`Cable`.
         - ``[cables.NAME]``: the same keys for one cable of the geometry; or ``[[cables]]``: all
           cables through any points, as in :func:`~cdsm.read_cables`.
         - ``gravity`` [m/s²], ``original_length``: as for :class:`Manipulator`.

@@ -131,9 +131,9 @@ class Posture(ReadOnlyState):
         return tuple(lines)
 
     def _stick_figure(self, without: Collection[int]) -> tuple[list[Array], list[Array]]:
-        """Return bones and brackets, without those of some joints.
+        """Return :attr:`bones` and :attr:`brackets`, but leave out the lines of some joints.
 
-        ``without`` are the rows of these joints, from 1 on; 0 is the base.
+        ``without`` has the numbers of these joints, from 1; 0 is the base.
         """
         rows = self.arm._model.routing.row.tolist()
         brackets = zip(rows, self.brackets, strict=True)
@@ -199,8 +199,8 @@ class Posture(ReadOnlyState):
     def _joint_stiffness(self, tension: Array, cable_stiffness: Array, wrench: Array) -> Array:
         """Compute five matrices (5, nv, nv) [N m/rad]: active, passive and load term, P, and K_θ.
 
-        P is the sum of the magnitudes of the four terms. Tensions (C,) [N], cable stiffnesses (C,)
-        [N/m] and wrench (6,) are checked already.
+        P is the sum of the magnitudes of the four terms of K_θ. ``tension`` (C,) [N],
+        ``cable_stiffness`` (C,) [N/m] and ``wrench`` (6,) are checked already.
         """
         model = self.arm._model
         terms = stiffness_kernels.single_stiffness(

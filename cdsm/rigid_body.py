@@ -22,7 +22,7 @@ from cdsm.support.values import Array, frozen
 
 
 class BodyState(NamedTuple):
-    """Tip and gravity of an arm at joint angles."""
+    """Pose and Jacobian of the tip, and torque and stiffness of gravity, at joint angles."""
 
     tip: Array  # pose (4, 4)
     jacobian: Array  # of the tip (6, nv), linear rows first, base axes
@@ -31,7 +31,7 @@ class BodyState(NamedTuple):
 
 
 class Shapes(NamedTuple):
-    """Shapes of a URDF, drawn by viser."""
+    """Drawn shapes of a URDF in a viser server: a function that moves them, and their joints."""
 
     place: Callable[[Array], None]  # moves the shapes to joint angles (nv,) [rad]
     rows: frozenset[int]  # rows in Tree of the joints whose links have shapes
@@ -86,7 +86,8 @@ class RigidBody:
     def locate(self, link: str) -> tuple[int, Array, Array]:
         """Return the row of a link's joint, and the link's frame in the frame of that joint.
 
-        The frame is a rotation (3, 3) and a translation (3,) [m]. UnknownName for an unknown link.
+        The frame is a rotation (3, 3) and a translation (3,) [m]. UnknownName if there is no such
+        link.
         """
         frame = self._model.frames[self._frame(link)]
         return (
@@ -182,7 +183,7 @@ class RigidBody:
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
         """Draw the URDF's shapes below a node of a viser server; None if the URDF has no shapes.
 
-        UrdfError if a shape cannot be read; then nothing is drawn.
+        Raises UrdfError, and draws nothing, if a shape cannot be read.
         """
         from pinocchio.visualize import ViserVisualizer
 
@@ -204,11 +205,11 @@ class RigidBody:
         return Shapes(lambda q: drawn.display(q[self._ours]), rows)
 
     def _path(self, joint: int) -> list[int]:
-        """Return the indices in Pinocchio of the joints from the base to a joint, it included."""
+        """Return the indices in Pinocchio of the joints from the base up to and including one."""
         return list(self._model.supports[joint])[1:]
 
     def _row(self, joint: int) -> int:
-        """Return the row in :class:`Tree` of the joint with this index in Pinocchio; base: 0."""
+        """Return the row in :class:`Tree` of the joint with this index in Pinocchio; 0: base."""
         return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:

@@ -1,18 +1,19 @@
 """Derivatives of segment tensions with respect to joint angles, for sticking and sliding cables.
 
-Segment j of length l_j and unstrained length a_j has the tension T_j = f(l_j/a_j − 1). With k =
-∂T/∂l = EA/a and κ = −∂T/∂a = k (1 + ε), a joint motion δθ and a change δa_j of the unstrained
-length, as wire slides into the segment, change the tension by
+Segment j of length l_j and unstrained length a_j has the tension T_j = f(ε_j), with the strain ε_j
+= l_j/a_j − 1 and the law f of its wire. Let k = ∂T/∂l = EA/a and κ = −∂T/∂a = k (1 + ε). The joint
+angles change by δθ, and wire that slides into the segment lengthens a_j by δa_j. Then T_j changes
+by
 
     δT_j = k_j g_j·δθ − κ_j δa_j,   g_j = ∂l_j/∂θ.
 
-No wire passes a hole in which the cable sticks. Segments that are joined by holes in which it
-slides form a block with Σ δa_j = 0, whose δT_j :func:`~cdsm.kernels.chain_problem.chain_tangent`
-computes. Without friction, each cable is one block: this gives the frictionless stiffness.
+No wire passes a hole in which the cable sticks. Neighbouring segments between which the cable
+slides form a block: Σ δa_j of a block is zero. :func:`~cdsm.kernels.chain_problem.chain_tangent`
+computes its δT_j. Without friction, each cable is one block: this gives the frictionless stiffness.
 
 A force of 1 N at the tip of a stuck arm moves the joints by θ̇ (nv,) [rad/N]. Hole i is between the
 segments j and j + 1, with the friction coefficient μ and the wrap angle φ_i. To first order, the
-cable begins to slide in it under the load
+cable begins to slide in this hole under the load
 
     W_i = μ φ_i/(|x_i| − y_i),   x_i = (∂ln T_{j+1}/∂θ − ∂ln T_j/∂θ)·θ̇,   y_i = μ ∂φ_i/∂θ·θ̇.
 """

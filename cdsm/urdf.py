@@ -50,8 +50,8 @@ def to_urdf(geometry: Geometry) -> str:
 
     Each link has the inertia of a solid cylinder, centred at mid-link, with the hole radius of its
     first disk. A cross, or a link of mass zero, has :data:`CROSS_MASS` and :data:`CROSS_INERTIA`.
-    Disks and backbone are visual shapes. Collision shapes are left out, since neighbouring disks
-    touch at the joint limits. InvalidInput if ``geometry`` is not a Geometry.
+    Disks and backbone are visual shapes. There are no collision shapes, since neighbouring disks
+    touch at the joint limits. Raises InvalidInput if ``geometry`` is not a Geometry.
     """
     instance("geometry", geometry, Geometry)
     disks = geometry.disks
@@ -96,7 +96,7 @@ def origin(xyz: Iterable[float], rpy: str = "0.0 -0.0 0.0") -> etree._Element:
 
 
 def inertial(mass: float, inertia: Array, *place: etree._Element) -> etree._Element:
-    """Build the inertial element: mass [kg], inertia (3, 3) [kg m²], at the origin ``place``."""
+    """Build the inertial element: mass [kg], inertia (3, 3) [kg m²]; ``place`` is its origin."""
     moments = {
         f"i{'xyz'[i]}{'xyz'[j]}": float(inertia[i, j]) for i in range(3) for j in range(i, 3)
     }

@@ -136,7 +136,7 @@ def _tolerances(given: object) -> Tolerances:
 
 
 def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
-    """Return the cables of ``[[cables]]``, or of the geometry with settings of [cables.NAME]."""
+    """Return the cables of the tables [[cables]], or of the geometry with its [cables.NAME]."""
     if geometry is None or isinstance(cables, list):
         return read_routed(cables)
     tables = {} if cables is None else cables
@@ -161,7 +161,7 @@ def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
 
 
 def arm_text(parts: ArmParts) -> str:
-    """Return the ARM.toml of an arm's parts; InvalidInput if an elasticity cannot be written."""
+    """Return the text of an ARM.toml; InvalidInput if an elasticity cannot be written."""
     geometry, cables = parts.geometry, parts.cables
     wires, tables = wire_entries(cables)
     settings = [setting_lines(cable) for cable in cables]

@@ -88,7 +88,7 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     The file has one table ``[[cables]]`` per cable with ``name`` and ``sites`` (two or more
     ``{link = "…", xyz = [x, y, z]}``, [m]). Its ``wire`` is a name such as ``"1x19-1.2mm"``, a
     constant rigidity [N], or the NAME of a table ``[wires.NAME]`` in the form of
-    :func:`~cdsm.read_elasticity`. Optional are ``lead`` [m] (the straight cable between its
+    :func:`~cdsm.read_elasticity`. Optional are ``lead`` [m] (the straight cable between the
     actuator and the first site), ``series_stiffness`` [N/m], ``control`` (``"position"`` or
     ``"force"``), ``minimum`` and ``maximum`` [N]. ``wire`` and the optional keys except ``lead``
     may also stand once at the top, for all cables. ``friction`` of a cable is the coefficient in
@@ -176,7 +176,8 @@ def build_cables(
 ) -> tuple[Cable, ...]:
     """Build cables with ``wires``; ``settings`` apply to every cable without its own.
 
-    GeometryError lists every faulty setting. MissingWire if the only fault is a missing wire.
+    Raises GeometryError, which lists every fault, or MissingWire if wires are missing and nothing
+    else is wrong.
     """
     cables: list[Cable] = []
     faults: list[str] = []
@@ -214,7 +215,7 @@ def setting_lines(cable: Cable) -> list[str]:
 def cable_lines(
     cables: Sequence[Cable], wires: Sequence[str], settings: Sequence[Sequence[str]]
 ) -> list[str]:
-    """Return the TOML of ``[[cables]]``, each with its wire (``""``: none) and its settings."""
+    """Return the TOML lines of [[cables]], each with its wire (``""``: none) and its settings."""
     lines = []
     for cable, wire, given in zip(cables, wires, settings, strict=True):
         lines += ["[[cables]]", f"name = {toml_value(cable.name)}"]

@@ -84,8 +84,8 @@ def template(
 ) -> str:
     """Return the text of an ARM.toml called ``name``.
 
-    ``wire`` is a name or EA [N], ``gravity`` is in base axes [m/s²]. Each of ``sections`` has
-    ``"universal"`` or ``"hinged"``, and the keywords of this constructor of :class:`Geometry`.
+    ``wire`` is a name or EA [N], ``gravity`` is in base axes [m/s²]. Each of ``sections`` is the
+    name of a constructor of :class:`Geometry`, ``"universal"`` or ``"hinged"``, and its keywords.
     """
     lines = [
         _HEAD.format(

@@ -17,7 +17,7 @@ _KEYS = ("standard", "within", "distribution", "correlation", "of", "tensions")
 
 
 def read_tolerances(path: str | os.PathLike[str]) -> Tolerances:
-    """Read the tolerances of a file, or of an ARM.toml; as :meth:`cdsm.Tolerances.read`."""
+    """Read tolerances from a file of their own or an ARM.toml; see :meth:`cdsm.Tolerances.read`."""
     try:
         table = read_toml(read_text(path))
         own = table.get("tolerances", table)

@@ -60,7 +60,7 @@ class Wires(NamedTuple):
 
 
 def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
-    """Read the wires of a file, or raise GeometryError; ``forced`` is as in :class:`Wires`."""
+    """Read the wires of a file, or raise GeometryError; ``forced`` replaces them for all cables."""
     if not isinstance(keys.wires, dict):
         raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
     named, usual, faults = {}, None, []
@@ -101,7 +101,7 @@ def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire")
 
 
 def wire_entries(cables: Sequence[Cable]) -> tuple[list[str], list[str]]:
-    """Return the value of the key ``wire`` of each cable, and the TOML of tables [wires.NAME]."""
+    """Return the value of the key ``wire`` of each cable, and the lines of tables [wires.NAME]."""
     values: dict[str, str] = {}
     lines: list[str] = []
     keys = []

@@ -60,7 +60,7 @@ class Asked(NamedTuple):
 class Kept(NamedTuple):
     """Arrays that the kernel fills, and from which readings such as ``along`` are computed.
 
-    They are for B blocks of W postures. B is 0 for an array that no requested reading needs.
+    There are B blocks of W postures. B is 0 for an array that no requested reading needs.
     """
 
     joint: Array  # K_θ (B, nv, nv, W)
@@ -70,5 +70,5 @@ class Kept(NamedTuple):
     stuck_parts: Array  # the same sum while the cables stick (B, nv, nv, W)
 
     def first(self, blocks: int) -> Kept:
-        """Return the first blocks."""
+        """Return the same arrays for the first ``blocks`` blocks only."""
         return Kept(*(each[:blocks] for each in self))

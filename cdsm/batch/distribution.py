@@ -56,7 +56,7 @@ class Tensions(ReadOnlyState):
         return frozen(self.status == OK)
 
     def plot(self) -> Figure:
-        """Plot median tension [N] and range of each cable; InvalidInput if none were found."""
+        """Plot each cable's median tension [N] and range; InvalidInput if none were found."""
         return cdsm.plots.plot_tensions(self)
 
     def to_xarray(self) -> xarray.Dataset:

@@ -138,11 +138,11 @@ def evaluate(
         arm: The arm.
         q: Joint angles (B, nv) [rad], a row for each posture.
         tension: F (C,) for all postures or (B, C) [N], not negative, or the result of
-            :func:`distribute_tensions` at these postures. Leave it out if ``minimum`` is given or
-            no output depends on tensions.
+            :func:`distribute_tensions` at these postures. Omit it if ``minimum`` is given or no
+            output depends on tensions.
         wrench: W (6,) for all postures or (B, 6) at ``tool0`` in base axes: force [N], then moment
-            [N m]; zero if not given. Leave it out if ``tension`` comes from
-            :func:`distribute_tensions`.
+            [N m]; zero if not given. Omit it if ``tension`` is a result of
+            :func:`distribute_tensions`, which contains it.
         outputs: Names of the quantities to store. Of a posture: ``"tip"``, ``"jacobian"``,
             ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``. Of a stiffness:
             ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
@@ -152,7 +152,7 @@ def evaluate(
             ``"stuck_compliance"``, and ``"breakaway"`` [N], the load at which the first cable
             slides, to first order (:attr:`Breakaway.first_order`). The tensions: ``"tension"``.
         direction: u of ``"along"``, ``"stuck_along"`` and ``"breakaway"``: an axis such as ``"z"``,
-            or (3,), any length; or several (D, 3), then these outputs are (B, D).
+            or (3,), any length. For several directions (D, 3) these outputs are (B, D).
         minimum: Lower bounds [N] for :func:`distribute_tensions`, which then finds the tensions.
         maximum: Upper bounds [N] of distributed tensions; no bounds if not given.
         check_limits: Skip postures beyond the joint limits; their status is ``BEYOND_LIMITS``.

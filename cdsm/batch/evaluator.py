@@ -27,15 +27,15 @@ from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
 _SHORT, _LONG = 2**11, 2**15
-"""Counts of numbers in a posture's record from which a block has a half and a quarter of
+"""If a posture's record has at least so many numbers, a block has only a half or a quarter of
 :data:`WIDTH` postures, so that the processor's cache holds it."""
 
 _CACHE, _FEWEST = 2**17, 4
-"""Readings keep K_θ of as many blocks as have this count of numbers, but at least of 4 blocks."""
+"""K_θ is kept for readings of as many blocks as have this count of numbers, but at least of 4."""
 
 _BLOCK, _BATCH = 2**22, 2**27
-"""Largest counts of numbers in the records of a block, and of a batch, that numpy computes while
-the kernel is not yet compiled."""
+"""While the kernel is not yet compiled, numpy computes batches whose records have at most
+``_BATCH`` numbers, in blocks of about ``_BLOCK`` numbers."""
 
 _CODES = np.array([OK, Status.INFEASIBLE, UNDECIDED], dtype=np.uint8)
 """Status of each outcome of a search: OPTIMAL, INFEASIBLE, UNDECIDED."""
@@ -170,7 +170,7 @@ class Evaluator:
         out: Array,
         balance: Balance | None = None,
     ) -> None:
-        """Fill status and outputs of the postures ``rows``; with bounds, guess their tensions."""
+        """Fill status and outputs of the postures ``rows``; if bounds are given, guess tensions."""
         balance = balance or self._empty_balance(0)
         read, (nv, width) = wanted > layout.STUCK_JOINT, (self._arm.nv, self._block)
         stuck = np.isin(wanted, STUCK)
@@ -224,7 +224,10 @@ class Evaluator:
         found: Codes,
         out: Array,
     ) -> None:
-        """Fill the readings ``names`` of frictionless and of stuck arms; update the status."""
+        """Fill readings from ``kept``, and update the status.
+
+        ``names`` has two lists of readings: of the frictionless arm, and of the stuck arm.
+        """
         status = np.full(len(kept.jacobian) * self._block, UNREAD)
         status[: found.size][found == OK] = READ
         for kind, quantities in enumerate(names):

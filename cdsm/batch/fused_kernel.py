@@ -82,9 +82,9 @@ def evaluate_rows(
         out: The requested quantities in one row per posture; NaN where they do not exist.
         status: On entry OK, or the reason why no tensions were found; on return the status of each
             posture. UNDECIDED: the guess gave neither the tensions nor a proof that there are none.
-            POSTPONED: the guess gave the tensions, but for less than two thirds of the block.
-            Quantities that depend on tensions are then computed later, in a block of postponed
-            postures.
+            POSTPONED: the guess gave the tensions, but for less than two thirds of the postures of
+            the block. Quantities that depend on tensions are then computed later, together with
+            other such postures.
     """
     tree, routing, masses, holes, blocks = arm.tree, arm.routing, arm.masses, arm.holes, arm.blocks
     start, stored, joint, stuck = asked.start, asked.stored, kept.joint, kept.stuck
@@ -239,7 +239,7 @@ def evaluate_rows(
 
 @inlined
 def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
-    """Where the code is OK, record in ``known`` that quantities 0 to ``number`` are computed."""
+    """For postures with the code OK, record in ``known`` that quantities 0…``number`` exist."""
     for w in lanes(width):
         if code[w] == OK:
             known[w] = number + 1

@@ -21,7 +21,7 @@ _MOST = 4096
 
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
-    """Return an arm as the kernel takes it, with infinite joint limits if they are not checked."""
+    """Return the arrays of an arm for the kernel; unchecked joint limits become infinite."""
     model, endless = arm._model, np.full(arm.nv, np.inf)
     checked = flag("check_limits", check_limits)
     return Arm(
@@ -54,7 +54,7 @@ def postures(arm: Manipulator, q: ArrayLike) -> Array:
 def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, kind: str) -> Array:
     """Check ``value``, (width,) for all postures or (rows, width); return it read-only.
 
-    ``name`` and ``meaning`` describe it in an error; ``kind`` is the quantity that fixes its range.
+    An error contains ``name`` and ``meaning``. ``kind`` is the quantity whose range is checked.
     """
     array = number_array(name, value, kind)
     if array.shape not in ((width,), (rows, width)):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cdsm.batch.layout import Codes
 
 _SHOWN: Final = DIMENSIONS | {"tip_position": (("axis",), "m"), "tip_rotation": (AXES, "1")}
-"""Dimensions of each variable of a Dataset after that of the postures, and its unit."""
+"""Dimensions and unit of each variable of a Dataset; the dimension of the postures is left out."""
 
 
 def to_dataset(

@@ -23,7 +23,7 @@ OUTSIDE_ELASTICITY = int(Status.OUTSIDE_ELASTICITY)
 UNDECIDED = 255
 """Internal status: the guess of tensions is not optimal; a search or a solver follows."""
 POSTPONED = 254
-"""Internal status: the tensions exist; what needs them is computed beside other postures."""
+"""Internal status: the tensions are known; quantities that need them are computed later."""
 
 JOINTS: Final = ("joint", "joint_column")
 MOTIONS: Final = ("motion", "motion_column")
@@ -58,10 +58,10 @@ DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     "stuck_compliance": (MOTIONS, "1"),
     "breakaway": (("direction",), "N"),
 }
-"""Dimensions of each quantity, in the order of the record, and its unit.
+"""Dimensions and unit of each quantity, in the order in which a record contains them.
 
 The unit is 1 for matrices whose entries have different SI units. Units of "torque" and "stiffness"
-depend on the joints of the arm: N m and N m/rad, or N and N/m where joints slide.
+depend on the joints of the arm: N m and N m/rad, or N and N/m for prismatic joints.
 """
 
 QUANTITIES: Final = tuple(DIMENSIONS)

@@ -14,7 +14,7 @@ from cdsm.support.values import Array, frozen
 def rigidities(laws: CableLaws, tension: Array, usable: Flags) -> Array:
     """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N]; ``usable`` (b,) marks valid rows.
 
-    It is 0 for force-controlled cables and in all other rows, and −1 outside the domain of a law.
+    An entry is 0 for force-controlled cables and in invalid rows, and −1 outside a law's domain.
     """
     if not usable.any():  # a user-defined law may fail on empty arrays
         return frozen(np.zeros_like(tension))

@@ -14,7 +14,7 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array, frozen
 
 STUCK = (STUCK_JOINT, STUCK_ALONG, STUCK_COMPLIANCE, BREAKAWAY)
-"""Numbers of the quantities of the stuck arm."""
+"""Numbers, in a record, of the quantities of the stuck arm."""
 
 WITHOUT_FRICTION = {
     "stuck_joint": "joint",
@@ -36,8 +36,8 @@ def read_stuck(
     """Compute readings of the stuck arm at the postures ``rows`` under tensions F (b, C) [N].
 
     ``names`` are the names of the wanted readings, which are computed from the arrays ``kept``.
-    ``directions`` (D, 3) are unit vectors. ``status`` (B, W) is READ or UNREAD; it becomes SINGULAR
-    where K_θ is singular. The posture is the last axis of all results.
+    ``directions`` (D, 3) are unit vectors. ``status`` is READ or UNREAD for B blocks of W postures
+    (B, W); it becomes SINGULAR where K_θ is singular. The last axis of all results is the posture.
     """
     blocks, width = status.shape
     load = np.zeros((status.size, len(directions)))

@@ -4,15 +4,15 @@ A cable with the wire l_0 and the tension F at its motor has the length
 
     L(q) = l_0 (1 + ε̄/s) + (F − F_rest)/k_series,   ε̄ = Σ_j l_j ε(ρ_j F)/Σ_j l_j,
 
-with the length l_j and the tension ρ_j F of segment j, the strain ε of the law, the tension F_rest
-at which the series spring is at rest, and the rigidity factor s: the actual rigidity of all wires
-divided by that of their laws. There are more cables than joints. So their lengths give the angles
-and s: the rigidity is calibrated while the arm moves. s follows from all steps (recursive least
-squares), the angles from one step.
+with the length l_j and the tension ρ_j F of segment j, the strain ε of the law, and the tension
+F_rest at which the series spring has no elongation. The rigidity factor s is the actual rigidity of
+all wires divided by the rigidity of their laws. There are more cables than joints, so the cable
+lengths give the angles and s: the rigidity is calibrated while the arm moves. All steps together
+give s (recursive least squares); the last step gives the angles.
 
-ρ_j is the tension of segment j divided by that at the motor; friction makes it differ from 1. The
-estimate contains the length of wire in each segment. At each step wire slides through the holes
-according to the friction law.
+ρ_j is the tension of segment j divided by the tension at the motor; friction makes it differ from
+1. The estimate contains the length of wire in each segment. At each step wire slides through the
+holes according to the friction law.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class Observer:
     def gain(self, estimate: Estimate, reading: Reading) -> Array:
         """Compute κ = −∂F/∂l_0 (C,) [N/m] at the estimated posture and the tensions of a reading.
 
-        The cable lengths are constant. κ is 0 for force-controlled cables.
+        The derivative is taken at constant cable lengths. κ is 0 for force-controlled cables.
         """
         F = np.maximum(reading.tension, self._least)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
@@ -139,10 +139,10 @@ class Observer:
         return Estimate(pose, means * F, means, force, softness, variance, natural, shares)
 
     def _tip_force(self, pose: Posture, tension: Array) -> Array:
-        """Compute the force (3,) [N] at the tip that balances tensions (S,) [N] best.
+        """Compute the force f (3,) [N] at the tip that best balances tensions T (S,) [N].
 
-        Weighted least squares of J_vᵀ f = Σ_j T_j g_j + g, with g_j the gradient of the length of
-        segment j. The weights follow from the uncertainty of noise and friction.
+        f solves J_vᵀ f = Σ_j T_j g_j + g by weighted least squares, with the gravity torque g and
+        the gradient g_j of the length of segment j. The weights follow from noise and friction.
         """
         segments, J = pose.segments, pose.length_jacobian
         F = tension[segments.chains.start[:-1]]

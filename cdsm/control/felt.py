@@ -1,12 +1,13 @@
-"""Stiffness measured by the motors: they excite the tip, and sensors give its displacement.
+"""Stiffness measured with the motors: they move the tip, and sensors give its displacement.
 
 A force f at the tip causes the joint torques J_vᵀ f. Changes x of the tensions cause the same
 torques if −J_Lᵀ x = J_vᵀ f. Motors that pay out the wire −x/κ, with κ = −∂F/∂l_0 of each cable,
 move the joints as f does. Wire and tension give the posture before and after. So the controller
 measures the stiffness with its own sensors.
 
-Without friction the result is the stiffness. With friction it is too high: friction reduces the
-effect of the motors on the joints, and the estimate does not include all of this.
+Without friction the result is the stiffness. With friction the result is too high: friction reduces
+the effect of the motors on the joints, and the estimated posture does not include all of this
+effect.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from cdsm.support.values import Array
 _DISPLACED: Final = 5e-3  # displacement of the tip in each direction, over the length of the arm
 
 _RESERVE: Final = 0.5
-"""Largest change of a tension by the excitation, over its distance from the nearest bound."""
+"""Largest change of a tension by the motors, divided by its distance from the nearest bound."""
 
 _READINGS: Final = 64  # number of load cell readings that are averaged at rest
 

@@ -1,10 +1,10 @@
 """Motor laws: pure functions from references and readings to a command within the bounds.
 
 The motor of a position-controlled cable keeps the length of wire that it has paid out, l_0,
-constant. A law computes the next l_0. At rest a change of l_0 changes the tension by −k Δl_0, so
-each command corresponds to a tension, F + k (l_0 measured − l_0 commanded). No law commands a
-tension outside the bounds: below, a cable may be slack; above, overloaded. A user-defined law is
-any function of a :class:`Moment` that returns :func:`limited` of its wire.
+constant. A law computes the next l_0. At a constant posture, a change of l_0 changes the tension by
+−k Δl_0, so each command corresponds to a tension, F + k (l_0 measured − l_0 commanded). No law
+commands a tension below its lower bound, where the cable may be slack, or above its upper bound. A
+user-defined law is any function of a :class:`Moment` that returns ``limited(moment, wire)``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cdsm.support.validation import vector
 from cdsm.support.values import Array
 
 PROPORTIONAL, INTEGRAL = 0.2, 0.3
-"""Gains of the tension control [-]: parts of the tension error that one step corrects."""
+"""Gains of the tension control [-]: fractions of the tension error that one step corrects."""
 
 
 _ROUNDING = 1e-9  # distance of a tension beyond its bound [N] that counts as rounding
@@ -97,7 +97,7 @@ Law = Callable[[Moment], Command]
 
 
 def limited(moment: Moment, wire: Array) -> Command:
-    """Return the command of the wire (C,) [m], clamped so that tensions stay within the bounds.
+    """Return the command to pay out ``wire`` (C,) [m], clamped to keep tensions in their bounds.
 
     The commanded tensions follow from the measured ones and the change of wire at constant posture.
     """
@@ -131,7 +131,7 @@ def checked_command(command: object, moment: Moment, names: Sequence[str]) -> Co
 
 
 def feedforward(moment: Moment) -> Command:
-    """Pay out the wire of the plan, with its stretch under load. This law needs no sensor."""
+    """Pay out the wire of the plan, which includes its stretch; this law needs no sensor."""
     return _clamped(moment, moment.reference.wire, moment.reference.tension)
 
 

@@ -32,17 +32,17 @@ AnyState = TypeVar("AnyState", bound=PlantState)
 
 
 class Plant(Protocol[AnyState]):
-    """An arm with motors, as :func:`~cdsm.track` drives it."""
+    """An arm whose motors :func:`~cdsm.track` commands."""
 
     @property
     def arm(self) -> Manipulator:
         """The true arm."""
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> AnyState:
-        """Return the arm at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
+        """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
 
     def move(self, state: AnyState, command: Command, wrench: Array) -> AnyState:
-        """Return the state that follows ``state`` when the motors have followed a command.
+        """Return the state after ``state``, when the motors have executed a command.
 
         ``wrench`` (6,) is the load: force [N], then moment [N m].
 
@@ -94,14 +94,14 @@ class SlowPlant:
         require_unstrained("arm", self.arm)
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> SlowState:
-        """Return the arm at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
+        """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         pose = self.arm.at(q)
         loading = slow_loading(pose, tension, wrench, self.accuracy)
         wire = self.arm._model.laws.original_lengths(pose.cable_lengths, tension)
         return SlowState(loading, wire, loading.begin(tension, wrench))
 
     def move(self, state: SlowState, command: Command, wrench: Array) -> SlowState:
-        """Move the arm as :meth:`Plant.move`; EquilibriumError if it buckles on the way."""
+        """Return the next state, see :meth:`Plant.move`; EquilibriumError if the arm buckles."""
         loading = state.loading
         taken_in = state.reference_wire - command.wire
         motors = np.where(loading.forced, command.tension, taken_in)

@@ -54,7 +54,7 @@ class TrackingRun(ReadOnlyState):
         angles: True joint angles (n, nv) [rad]; [m] for prismatic joints.
         estimated_angles: Angles that the controller estimated before each step (n, nv) [rad].
         tips: True tip positions (n, 3) [m].
-        wanted_tension: References of the tensions at the motors (n, C) [N].
+        wanted_tension: Reference values of the tensions at the motors (n, C) [N].
         commanded_tension: Tensions that correspond to the commands (n, C) [N], within the bounds.
         commanded_wire: Commanded wire to pay out (n, C) [m].
         measured_tension: Readings of the load cells before each step (n, C) [N].
@@ -72,8 +72,7 @@ class TrackingRun(ReadOnlyState):
         wrench: Load (n, 6): force [N], then moment [N m].
         estimated_force: Force at the tip that the controller estimated (n, 3) [N].
         rigidity: Estimated rigidity of the wires, divided by the rigidity of their laws (n,) [-].
-        short: Whether the outer loop failed to find tensions within the bounds that give the target
-            (n,).
+        short: Whether the outer loop found no tensions within the bounds that give the target (n,).
         refused: The reason, by number of the step, if the outer loop could not plan tensions and
             kept the previous ones.
         outcome: ``"completed"``; ``"lost"``: the tip left its path or the plant diverged, since the
@@ -131,7 +130,7 @@ class TrackingRun(ReadOnlyState):
 
     @cached_property
     def stiffness_error(self) -> Array:
-        """True stiffness/target − 1 (n, D) [-]; NaN where the arm has no stiffness."""
+        """Error of the stiffness: true stiffness/target − 1 (n, D) [-]; NaN if there is none."""
         return frozen(self.stiffness / self.target - 1.0)
 
     @cached_property
@@ -232,7 +231,7 @@ class TrackingRun(ReadOnlyState):
     def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
         """Plot tip error, stiffness, tensions and the proved band over time.
 
-        ``animate`` is a ``.gif`` to write too; arguments and errors as for :meth:`animate`.
+        ``animate`` is the path of a ``.gif`` to write as well; for errors see :meth:`animate`.
         """
         if animate is not None:
             self.animate(animate)

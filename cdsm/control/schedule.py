@@ -70,8 +70,8 @@ def checked_plan(plan: PathPlan) -> Manipulator:
 def tension_controlled(plan: PathPlan, names: Sequence[str] | None) -> NDArray[np.bool_]:
     """Return which cables (C,) a mixed law controls by tension: ``names``, or a default choice.
 
-    The lengths of the other cables, as many as there are joints, give the posture. By default, a
-    pivoted QR decomposition of J_Lᵀ at the first sample chooses these other cables.
+    The lengths of the other cables give the posture. By default there are nv other cables, chosen
+    by a pivoted QR decomposition of J_Lᵀ at the first sample.
     """
     cables = plan.arm.cables.names
     forced = np.ones(len(cables), dtype=np.bool_)

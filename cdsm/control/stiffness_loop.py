@@ -1,4 +1,4 @@
-"""Outer loop: it plans the tensions for the target stiffness again at the estimated posture."""
+"""Outer loop of control: plan the tensions for the target stiffness at the estimated posture."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class StiffnessLoop:
         Args:
             wanted: The reference of the plan at this step. Tension, wire and stiffness are
                 replaced, the angles are kept.
-            target: Stiffness [N/m], () or (n,).
+            target: Wanted stiffness [N/m] along the directions, () or (n,).
             estimate: Estimated posture, load, wire and friction.
             before: Mean tensions of the previous step (C,) [N].
         """

@@ -129,4 +129,4 @@ def tip_force(
 
 
 _ROUNDING = 1e-12
-"""Reduced costs below this count as zero; ``_WIDEST`` would multiply their rounding by 1e6."""
+"""Reduced costs below this are taken as zero: ``_WIDEST`` would multiply their rounding by 1e6."""

@@ -35,7 +35,7 @@ from cdsm.tension import checked_bounds
 _MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
 
 _LOST: Final = 0.1
-"""Tip error over the length of the arm [-] from which the loop counts as unstable."""
+"""If the tip error divided by the length of the arm [-] is larger, the loop is called unstable."""
 
 
 def track(
@@ -91,7 +91,7 @@ def track(
         felt: The stiffness is measured with the motors every ``felt`` steps
             (:mod:`cdsm.control.felt`); 0: never. A copy of the arm is moved, so that the run stays
             the same.
-        seed: Seed of the noise: the same seed gives the same bits.
+        seed: Seed of the noise; the same seed gives the same run, bit for bit.
 
     Raises:
         InvalidInput: The plan is not complete, or is for ``cartesian`` instead of directions; or

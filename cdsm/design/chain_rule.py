@@ -52,7 +52,7 @@ class Chain:
     def at(self, tension: Tension, loss: Array) -> Posed:
         """Return the chain rule at the posture of ``tension``.
 
-        ``loss`` (C,) [-] is exp(Σ μ φ) of each cable, or 1 without ``worst_friction``.
+        ``loss`` (C,) [-] is exp(Σ μ φ) of each cable, or 1 if ``worst_friction`` is False.
         """
         pose = tension.posture
         turned, grip = pose.q[:, None] * self._limits, np.zeros_like(self._bound)
@@ -61,9 +61,9 @@ class Chain:
         return Posed(self, Balance.of(tension), turned, grip, loss[:, None] * self._bound)
 
     def apply(self, by_input: dict[str, Array]) -> Array:
-        """Compute the derivatives (n,) with respect to the variables at constant tension bounds.
+        """Compute a quantity's derivatives (n,) with respect to the variables, at constant bounds.
 
-        ``by_input`` has the derivatives with respect to the inputs, by their source such as
+        ``by_input`` has its derivatives with respect to the inputs of the arm, by source, such as
         ``link_mass``.
         """
         return np.array(
@@ -96,9 +96,9 @@ class Posed(NamedTuple):
     def slopes(self, by_input: dict[str, Array], by_tension: Array) -> Array:
         """Return the derivatives (n,) of a quantity.
 
-        ``by_input`` are its derivatives with respect to the inputs at constant tensions, by
-        source; empty if it depends on the tensions alone. ``by_tension`` (C,) are its derivatives
-        with respect to the tensions.
+        ``by_input`` has its derivatives with respect to the inputs of the arm at constant tensions,
+        by source; it is empty for a quantity of the tensions alone. ``by_tension`` (C,) are its
+        derivatives with respect to the tensions.
         """
         followed = self.balance.gradient(self.chain.inputs, by_tension)
         total = {name: by_input.get(name, 0.0) + g for name, g in followed.items()}
@@ -116,7 +116,7 @@ def _joints(arm: Manipulator, variable: Variable) -> list[int]:
 
 
 def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
-    """Return (dλ/dx)/λ (nv,) for joint limits λ = 2 atan(h/R) and a variable x; 0 if λ is given."""
+    """Return (dλ/dx)/λ (nv,) of joint limits λ = 2 atan(h/R) for a variable x; 0 for given λ."""
     geometry, joints = arm.geometry, _joints(arm, variable)
     found = []
     for k, (joint, limit) in enumerate(zip(geometry.joints, geometry.joint_limits, strict=True)):

@@ -65,10 +65,10 @@ class Designs(ReadOnlyState, Named):
 
     @property
     def violations(self) -> Array:
-        """Relative violation of each constraint (D, 1 + constraints) [-]; 0 if it is met.
+        """Violation of each constraint, divided by its limit (D, 1 + constraints) [-]; 0 if met.
 
-        A violation is relative to the limit. Column 0 is the fraction of all pairs of posture and
-        load that are not held. It is 0 if the problem does not require that all are held.
+        Column 0 is the fraction of all pairs of posture and load that are not held. It is 0 if the
+        problem does not require that all are held.
         """
         return violations(self.problem, self.values)
 
@@ -126,7 +126,7 @@ def evaluate_designs(
     client: Client | None = None,
     progress: bool = True,
 ) -> Designs:
-    """Compute all quantities of designs, each over all postures and loads of the problem.
+    """Compute all quantities of designs over all postures and loads of the problem.
 
     Args:
         problem: The problem.
@@ -157,7 +157,7 @@ def evaluate_designs(
 
 
 def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Designs:
-    """Build the :class:`Designs` from designs ``rows`` (D, n) and the evaluation of each."""
+    """Build the :class:`Designs` from designs ``rows`` (D, n) and their quantities ``found``."""
     width = len(problem.measures)
     return Designs(
         problem=problem,

@@ -83,7 +83,8 @@ KINDS: Final[dict[str, Kind]] = {
     "wire_safety": Kind("least breaking load over tension", "1", _ONE, "most"),
     "wire_life": Kind("least life margin of a wire", "1", _ONE, "most"),
 }
-"""Quantities of a design. Each is the worst value over all postures and loads that are held."""
+"""Quantities of a design. If a quantity depends on posture or load, its value is the worst one over
+all postures and loads that are held, except for ``workspace``, ``held`` and ``wire_length``."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ class Measure:
 
     @property
     def words(self) -> str:
-        """The quantity in words."""
+        """Name of the quantity as text, with its direction."""
         words = KINDS[self.of].words
         along = "" if self.direction is None else f" {self.key.removeprefix(self.of + ' ')}"
         return words + along
@@ -147,17 +148,19 @@ class Objective(Measure):
             ``"motor_force"``, ``"payload"``, ``"capacity_margin"``, ``"tension_factor"``,
             ``"cable_clearance"``, ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``,
             ``"held"``, ``"mass"``, ``"length"``, ``"cables"``, ``"joint_range"``,
-            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. The value is
-            the worst one over all postures and loads that are held. ``stiffness``, ``softest``,
-            ``isotropy`` and ``margin`` are computed with the least tensions under the load.
+            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. If the value
+            depends on posture or load, it is the worst one over all that are held. ``stiffness``,
+            ``softest``, ``isotropy`` and ``margin`` are computed with the least tensions under the
+            load.
             ``deflection`` is |C_vv f| with the force f of the load, to first order. Its C_vv is
             computed with the least tensions without the load, since the motors are locked before
-            the load acts, as in :func:`~cdsm.payload` and :func:`~cdsm.weight_test`; it is inf if
-            the arm is not held without the load. ``payload`` is the largest force along u that
-            tensions within the bounds balance in addition to the load; ``capacity_margin`` is the
-            largest force that they balance in every direction. The ``workspace`` is the volume of
-            the convex hull of the tips. Clearances are those of :func:`~cdsm.clearance`, quantities
-            of wires those of :func:`~cdsm.wire_use`.
+            the load acts, as in :func:`~cdsm.payload` and :func:`~cdsm.weight_test`. The deflection
+            is inf if the arm is not held without load. ``payload`` is the largest force along u
+            that tensions within the bounds balance in addition to the load; ``capacity_margin`` is
+            the largest force that they balance in every direction. ``workspace`` is the volume of
+            the convex hull of the tips of held postures, ``held`` the fraction of pairs of posture
+            and load that are held. :func:`~cdsm.clearance` and :func:`~cdsm.wire_use` define
+            clearances and quantities of wires.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` to maximise, ``"least"`` to minimise; None: the usual one, e.g. the most
             stiffness, the least mass.

@@ -32,12 +32,12 @@ SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "le
 _ALIKE = 1e-20  # two unit vectors are equal if their squared distance is below this
 
 _STEP = 1e-4
-"""Step of the differences of uncertainties, over the range of a variable: the error is 1e-6."""
+"""Step of differences of uncertainties, as a fraction of a variable's range; the error is 1e-6."""
 
 _CENTRAL = {-1.0: -0.5, 1.0: 0.5}
 _ONE_SIDED = {1.0: -2.5, 2.0: 4.0, 3.0: -1.5}
-"""Number of steps: weight of the value there in a difference of second order. The one-sided
-difference leaves out the end of the range: there a design may be special, such as one without lead.
+"""Weights in a one-sided difference of second order, by the number of steps from the design. The
+design itself has no weight: at the end of a range it may be special, such as one without lead.
 """
 
 
@@ -46,10 +46,11 @@ def rows_and_gradients(
 ) -> tuple[Array, Array]:
     """Compute the quantity ``measure`` of a design (n,) in R cases, and its derivatives (R, n).
 
-    The cases are all combinations of postures and loads, and for ``motor_force`` of cables. A
-    constrained quantity includes its margin for tolerances, ± coverage · u. With ``worst_friction``
-    the bounds of the tensions, minimum · exp(Σ μ φ) and maximum · exp(−Σ μ φ), follow the wrap
-    angles φ; see :mod:`cdsm.design.grip`.
+    The cases are all combinations of postures and loads; ``motor_force`` has one case per cable for
+    each, ``mass`` and ``length`` have one case only. A constrained quantity includes its margin for
+    tolerances, ± coverage · u. If ``worst_friction`` is True, the bounds of the tensions,
+    minimum · exp(Σ μ φ) and maximum · exp(−Σ μ φ), depend on the wrap angles φ; see
+    :mod:`cdsm.design.grip`.
 
     Raises:
         InvalidInput: The quantity has no exact derivatives, or the tensions have none for this
@@ -140,7 +141,7 @@ def _reading(K: Stiffness, measure: Measure, posed: Posed, force: Array) -> tupl
 
 
 def _displacement(K: Stiffness, force: Array) -> tuple[float, dict[str, Array]]:
-    """Return |C_vv f| and its derivatives at constant tensions, by source.
+    """Return |C_vv f| and its derivatives by the arm's inputs and by the tensions, by source.
 
     With unit vectors n of the displacement and f̂ of the force f, and c(u) = uᵀ C_vv u,
     |C_vv f| = |f| nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.

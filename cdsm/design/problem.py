@@ -29,7 +29,7 @@ from cdsm.tolerance import Tolerances
 from cdsm.wires.catalogue import as_wire
 
 MISSED = "held"
-"""Key of the share of postures and loads that are held; every problem computes it."""
+"""Key of the fraction of postures and loads that are held; it is computed for every problem."""
 
 
 @final
@@ -60,7 +60,7 @@ class DesignProblem(ReadOnlyState):
         bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
         tolerances: Tolerances of every design; constraints on ``stiffness``, ``margin`` and
             ``motor_force`` must then be met with a margin of ``coverage`` standard uncertainties
-            u. A quantity with such a constraint holds its margin: stiffness − coverage · u.
+            u. The value of such a quantity includes the margin, e.g. stiffness − coverage · u.
         coverage: Coverage factor: number of standard uncertainties in this margin [-], 0 or more.
 
     Raises:
@@ -246,13 +246,13 @@ class DesignProblem(ReadOnlyState):
         return float(self.minimum)
 
     def postures_of(self, arm: Manipulator) -> Array:
-        """Return the postures q (P, nv) [rad] of an arm; InvalidInput if the set does not fit."""
+        """Return the postures q (P, nv) [rad] of an arm; InvalidInput if they do not fit it."""
         poses = poses_of(arm, self.postures)
         return poses.angles({dim: slice(0, size) for dim, size in poses.sizes.items()})
 
     @cached_property
     def start(self) -> Array | None:
-        """The given arm as a design (n,) [m, rad, N, -]; None if variables cannot express it."""
+        """The given arm as a design (n,) [m, rad, N, -]; None if it is outside the variables."""
         found = []
         for variable, (low, high) in zip(self.variables, self.bounds.tolist(), strict=True):
             value: Value | None = present(variable, self.arm.geometry, self.minimum)

@@ -22,7 +22,7 @@ _SAFE = 1e-7
 """Relative distance of a refined design from each limit, so that rounding violates none."""
 
 _FAR = 10.0
-"""Violation of each condition that SLSQP gets for a design that does not hold all postures."""
+"""Violation of every condition that is passed to SLSQP if a design does not hold all postures."""
 
 _AT_END = 1e-9  # distance from the end of a range, over the range, that is rounding
 _ROUNDS = 2  # number of times that a design is improved and then moved inside its limits
@@ -112,9 +112,10 @@ class _PostureNotHeld(Exception):
 class _SmoothProblem:
     """The smooth problem: min t with all conditions c(y) + a t ≥ 0, at every posture and load.
 
-    y (n,) is the design, with each variable scaled to 0…1. The first conditions are those of the
-    objective, t − objective/``scale`` ≥ 0, with a = 1. The others are those of the constraints,
-    with a = 0: c is the distance of a quantity from its limit, divided by the limit.
+    y (n,) is the design, with each variable scaled to 0…1. The first conditions have a = 1 and
+    belong to the objective: t − s · objective/``scale`` ≥ 0, with s = −1 if it is maximised, else
+    1. The others have a = 0 and belong to the constraints: c is the distance of a quantity from its
+    limit, divided by the limit.
 
     Attributes:
         visited: All designs (n,) for which the conditions were computed.
@@ -129,7 +130,7 @@ class _SmoothProblem:
         self._found: dict[bytes, tuple[Array, Array] | None] = {}
 
     def rows(self, y: Array) -> tuple[Array, Array]:
-        """Return c (R,) and ∂c/∂y (R, n); raise _PostureNotHeld if they do not exist."""
+        """Return c (R,) and ∂c/∂y (R, n), or raise _PostureNotHeld."""
         key = y.tobytes()
         if key not in self._found:
             low, high = self._problem.bounds.T
@@ -142,7 +143,7 @@ class _SmoothProblem:
         return found
 
     def conditions(self, z: Array) -> Array:
-        """Compute c + a t (R,) at z = (y, t); far below 0 if they do not exist."""
+        """Compute c + a t (R,) at z = (y, t); far below 0 if a posture is not held."""
         try:
             return np.asarray(self.rows(z[:-1])[0] + z[-1] * self._raised)
         except _PostureNotHeld:  # the line search then takes a smaller step

@@ -117,14 +117,14 @@ class DesignSearch(ReadOnlyState):
     def write_arm(self, folder: str | os.PathLike[str], number: int | None = None) -> list[Path]:
         """Write a design as ``arm.toml``, ``arm.urdf``, ``arm.xml`` and tables; return their paths.
 
-        ``holes.csv`` has each hole of each disk. ``cables.csv`` has the lengths of each cable, lead
-        included: of the straight arm, and the shortest and the longest (the cut) within the joint
-        limits. The stroke is the difference of these two, which the motor winds. They are geometric
-        lengths: the stretch under tension is not subtracted, and the wire needed to fix both ends
-        is not included.
+        ``holes.csv`` has each hole of each disk. ``cables.csv`` has three lengths of each cable,
+        lead included: in the straight arm, and the shortest and the longest (the cut) within the
+        joint limits. The stroke, which the motor winds, is the difference of the last two. All are
+        geometric lengths: the stretch under tension is not subtracted, and the wire needed to fix
+        both ends is not included.
 
         Args:
-            folder: The folder; it is made.
+            folder: The folder; it is created if it does not exist.
             number: Number of the design on the front, from 0; None: the compromise.
 
         Raises:
@@ -196,7 +196,7 @@ class DesignSearch(ReadOnlyState):
     def plot(self) -> Figure:
         """Plot two or three objectives of all designs, with the front and :attr:`compromise`.
 
-        With one objective: its best value against the number of designs.
+        If there is one objective, its best value is plotted against the number of designs.
         """
         return cdsm.plots.plot_designs(self)
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _FAR = 1e3
-"""Violation assigned to a design that makes no arm, and to a quantity that does not exist."""
+"""Violation of a design from which no arm can be built, and of a quantity that does not exist."""
 
 
 def search_designs(
@@ -114,7 +114,8 @@ def search_designs(
 def pareto(designs: Designs) -> Indices:
     """Return the rows (m,) of the feasible designs that no other feasible design dominates.
 
-    They are sorted by the first objective, the best first; equal designs count once.
+    They are sorted by the first objective, the best first. Of designs with equal objectives, only
+    the first is returned.
     """
     problem = designs.problem
     goals = np.column_stack([each.sign * designs[each.key] for each in problem.objectives])

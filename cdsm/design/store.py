@@ -26,11 +26,11 @@ from cdsm.sweeps.description import attributes_of
 from cdsm.sweeps.poses import poses_of
 
 _MEANING = "deflection: without the load; all: held postures"
-"""What quantities mean: a record made when they meant something else belongs to another problem."""
+"""How some quantities are defined; a store written under other definitions is not resumed."""
 
 
 class Store:
-    """Evaluated designs, found by the exact bits of their numbers.
+    """Evaluated designs, which are looked up by the exact bits of their numbers.
 
     Args:
         path: The file; None keeps them in memory.

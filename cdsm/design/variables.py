@@ -56,7 +56,7 @@ class Variable:
     Attributes:
         of: ``"hole_radius"``, ``"disk_offset"``, ``"link_length"`` [m]: of one joint or of all
             joints; a link keeps its mass per length. ``"lead"`` [m]: of the cables of one joint or
-            of all joints. ``"phase"`` [rad]: angle added to the hole angles of these cables.
+            of all joints. ``"phase"`` [rad]: angle added to the hole angles of the same cables.
             ``"hole_angle"`` [rad]: of one cable. ``"end"``: number of the joint at which one cable
             ends. ``"cables_per_joint"``: number of evenly spaced cables of each joint. ``"wire"``:
             wire of all cables. ``"minimum"`` [N]: lower bound of all tensions.
@@ -208,7 +208,7 @@ def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:
-    """Return ``count`` evenly spaced cables per joint, else equal to the joint's first cable."""
+    """Return ``count`` evenly spaced cables per joint, otherwise like the joint's first cable."""
     n = len(geometry.joints)
     if all(len(joint.axes) == 2 for joint in geometry.joints):
         angles = evenly_spaced(n, count)

@@ -54,9 +54,9 @@ def _answer(
 ) -> Array:
     """Return what ``function`` of a law gives at ``tension`` F [N], checked.
 
-    InvalidInput if ``function`` fails, or if its answer has another shape than F or a number
-    outside ``allowed``. ``named`` is the name of the answer in the message, which stands at its
-    braces; ``needed`` says what is needed.
+    Raises InvalidInput if ``function`` fails, or if its answer has another shape than F or a number
+    outside the range ``allowed``. In the message, ``named`` is the name of the answer, with braces
+    in the place of its value, and ``needed`` is a sentence about a valid answer.
     """
     try:
         answer = np.asarray(function(tension))

@@ -26,7 +26,8 @@ class Domain:
         low_included: Whether ``low`` itself belongs to the domain.
 
     Raises:
-        InvalidInput: Not two numbers with 0 <= low < high, or ``low_included`` is not a bool.
+        InvalidInput: ``low`` and ``high`` are not two numbers with 0 <= low < high, or
+            ``low_included`` is not a bool.
     """
 
     low: float

@@ -80,7 +80,7 @@ class Elasticity(ABC):
         return self if 0.0 in self.domain else SlackBelow(self)
 
     def scaled(self, factor: float) -> Elasticity:
-        """Return this law with ``factor`` times its rigidity, as of a stiffer or softer spool.
+        """Return this law with ``factor`` times its rigidity, e.g. for a wire of another spool.
 
         Strains and energies are divided by the factor [-]. InvalidInput if it is not positive.
         """
@@ -104,8 +104,8 @@ class Elasticity(ABC):
         """Compute the slope dEA/dF [-] of the tangent rigidity, at tensions of any shape.
 
         By default it is the central difference over F ± 6e-6 max(F, 1 N), with about ten correct
-        digits. Near an end of :attr:`domain` the difference is one-sided. A law may override it.
-        ElasticityRangeError outside the domain.
+        digits. Near an end of :attr:`domain` the difference is one-sided. A law may override this
+        method. Raises ElasticityRangeError outside the domain.
         """
         values = self.domain.check(tension)
         step = _STEP * np.maximum(values, 1.0)
@@ -117,14 +117,15 @@ class Elasticity(ABC):
     def strain(self, tension: ArrayLike) -> Array:
         """Compute the strain Δl/l_0 = ∫ dF/EA(F) [-] from :attr:`rest` to F of any shape.
 
-        ElasticityRangeError as for :meth:`rigidity`.
+        Raises ElasticityRangeError as :meth:`rigidity` does.
         """
 
     @abstractmethod
     def energy(self, tension: ArrayLike) -> Array:
         """Compute the elastic energy ∫ F dε = ∫ F dF/EA(F) [N] = [J/m] per unstretched metre.
 
-        It is zero at :attr:`rest`; F has any shape. ElasticityRangeError as for :meth:`rigidity`.
+        The energy is zero at :attr:`rest`; F has any shape. Raises ElasticityRangeError as
+        :meth:`rigidity` does.
         """
 
     def tension(self, strain: ArrayLike) -> Array:

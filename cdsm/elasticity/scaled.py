@@ -1,4 +1,4 @@
-"""A law whose rigidity is that of another law, times a factor."""
+"""A law that has the rigidity of another law, multiplied by a factor."""
 
 from __future__ import annotations
 

@@ -38,9 +38,9 @@ class RestBand(ReadOnlyState):
     The reference is the posture of ``stiffness``, with one tension in all segments of each cable.
     If ``proved``, ``low`` and ``high`` bound all states of rest in a neighbourhood of the
     reference. This neighbourhood is the set of all states that are at rest to first order, scaled
-    by ``room``. The same is true of ``tensions``, ``end_tensions`` and ``loads``, which raise
-    SolverError or ElasticityRangeError if they cannot be proved. A simulation may come near to
-    these bounds, but never exceeds them.
+    by ``room``. The bounds ``tensions``, ``end_tensions`` and ``loads`` also hold for all these
+    states; they raise SolverError or ElasticityRangeError if they cannot be proved. A simulation
+    may come near to the bounds, but never exceeds them.
 
     Attributes:
         stiffness: Frictionless K of the reference, with its posture, tensions and wrench.
@@ -48,8 +48,9 @@ class RestBand(ReadOnlyState):
         low: Least displacement of the tip from the reference along u [m], not positive.
         high: Largest displacement of the tip from the reference along u [m], not negative.
         first_order: Largest displacement along ±u to first order [m], in closed form.
-        room: Size of the neighbourhood, divided by that of the set of all states at rest to first
-            order [-]; 0 if no cable can stick at the reference: it is then the only state of rest.
+        room: Size of the neighbourhood, divided by the size of the set of all states at rest to
+            first order [-]; 0 if no cable can stick at the reference, which is then the only state
+            of rest.
         proved: Whether ``low`` and ``high`` are proved. False if no neighbourhood is large enough,
             because second-order terms are as large as the band. Then both hold to first order only,
             and the tip may rest a few percent beyond them. The paper's arm with a lead of 0.3 m is
@@ -78,7 +79,7 @@ class RestBand(ReadOnlyState):
 
     @cached_property
     def tensions(self) -> Array:
-        """Least and largest tension (S, 2) [N] of each segment at rest.
+        """Least and largest tension (S, 2) [N] of each segment over all states of rest.
 
         The computation takes a few milliseconds per segment.
         """
@@ -86,7 +87,7 @@ class RestBand(ReadOnlyState):
 
     @cached_property
     def end_tensions(self) -> Array:
-        """Least and largest tension (C, 2) [N] of the last segment of each cable at rest."""
+        """Least and largest tension (C, 2) [N] of each cable's last segment over these states."""
         start = self.stiffness.posture.segments.chains.start
         return self._tensions((start[1:] - 1).tolist())
 
@@ -121,8 +122,8 @@ def rest_band(
 
     The reference is the posture with the given tension in all segments of each cable. The motors
     are locked there, or control force. Any other loads may have acted before ``wrench``. The band
-    is proved by linear programs with an outer correction for finite displacements and nonlinear
-    laws, unless :attr:`RestBand.proved` is false.
+    is proved by linear programs, which include bounds for the errors of linearising geometry and
+    laws, unless :attr:`RestBand.proved` is False.
 
     Args:
         pose: The posture of the reference.

@@ -30,8 +30,8 @@ _SLACK = 1e-6
 _CONVERGED = 1e-9
 """Relative change of the tensions that ends the iteration.
 
-The remaining error is some ten times its square. The rounding of a tension is some 1e-16 EA/T, so
-changes below 1e-13 may never occur.
+The remaining error is about ten times its square. The relative rounding of a tension is about
+1e-16 EA/T, so changes below 1e-13 may never occur.
 """
 
 
@@ -49,16 +49,17 @@ class Chain(NamedTuple):
 class ChainProblem:
     """Laws, series springs and motors of all cables, divided into segments.
 
-    A force-controlled motor keeps the tension of the first segment constant, a position-controlled
-    motor the length of wire. The series spring belongs to the first segment. Outside the domain of
-    its law a segment has the rigidity of the nearest bound; a cable whose tension is zero is slack.
+    A force-controlled motor keeps the tension of the first segment constant; a position-controlled
+    motor keeps the length of wire constant. The series spring belongs to the first segment. Outside
+    the domain of its law a segment has the rigidity at the nearest end of the domain. A cable whose
+    tension is zero is slack.
 
     Args:
         cables: Cables of the arm.
         start: First segment of each cable; the last entry is the number of segments (C+1,).
-        tension: F (C,) [N] at which the natural lengths are defined.
+        tension: F (C,) [N]; needed only if ``unstrained`` is False.
         unstrained: Whether ε is the strain of the law. If not, ε is this strain minus the strain at
-            ``tension``.
+            ``tension``. A natural length is the length at ε = 0.
 
     Attributes:
         laws: Each law with the indices of its cables.
@@ -93,7 +94,7 @@ class ChainProblem:
     def settle(
         self, length: Array, natural: Array, ratio: Array, forced: Array, near: Array
     ) -> Chain:
-        """Solve for the tensions of segments of ``length`` l (S,) [m] with friction in their holes.
+        """Solve for the tensions of the segments of lengths ``length`` (S,) [m], with friction.
 
         ``natural`` (S,) [m] are the natural lengths before wire slips. ``ratio`` (S,) is exp(μ φ)
         of the hole between a segment and the next one, 1 for the last segment of a cable.
@@ -143,7 +144,7 @@ class ChainProblem:
     ) -> Array:
         """Compute ∂T/∂θ (S, nv) [N/rad] of the cables in the state ``chain``.
 
-        ``forced`` is that of :meth:`settle`. ``gradient`` (S, nv) [m/rad] is ∂l/∂θ of the lengths,
+        ``forced`` is as in :meth:`settle`. ``gradient`` (S, nv) [m/rad] is ∂l/∂θ of the lengths,
         ``friction_gradient`` (S, nv) [1/rad] is μ ∂φ/∂θ of the hole to the next segment. See
         :func:`~cdsm.kernels.chain_problem.chain_tangent`.
         """
@@ -161,7 +162,7 @@ class ChainProblem:
     def _shortened(self, T: Array, new: Array, length: Array, natural: Array) -> Array:
         """Return tensions (S,) [N] between ``T`` and ``new`` with about the least Σ D_j(ln T_j).
 
-        D_j is that of :mod:`cdsm.kernels.chain_problem`. The sum is convex on a line in ln T.
+        :mod:`cdsm.kernels.chain_problem` defines D_j. The sum is convex on a line in ln T.
         """
         T = np.maximum(T, _SLACK)
         step = np.log(np.maximum(new, _SLACK) / T)
@@ -176,7 +177,7 @@ class ChainProblem:
         """Compute the stored energy [J] of segments and series springs.
 
         ``natural`` (S,) [m] are natural lengths, ``tension`` (S,) [N] the tensions of the segments.
-        It is zero where each wire is at the lower bound of its law and each spring at rest.
+        The energy is zero if each tension is the smallest one in the domain of its law.
         """
         spring = self._spring @ (tension**2 - self._rest**2) / 2.0
         return float(natural @ self._energy(tension) + spring)
@@ -206,7 +207,7 @@ class ChainProblem:
         return base, softness
 
     def _energy(self, tension: Array) -> Array:
-        """Compute ∫ T dε (S,) [N] from the lower bounds of the laws."""
+        """Compute ∫ T dε (S,) [N] from the smallest tensions in the domains of the laws."""
         energy = self._softness * tension**2 / 2.0
         for law, of in self._curved:
             T, (inside, rigidity) = tension[of], _within(law, tension[of])

@@ -58,7 +58,7 @@ class Neighbourhood:
         self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
     def still(self, K: Stiffness) -> Self:
-        """Return the states with the joint angles of the reference ``K``; only tensions vary.
+        """Return the neighbourhood in which only tensions vary, at the joint angles of ``K``.
 
         In each cable, |ln T/F| is at most Σ μ φ over its holes.
         """
@@ -72,18 +72,18 @@ class Neighbourhood:
         return same
 
     def largest(self, rows: Array) -> Array:
-        """Compute the largest |a·δ| (…,) over the joint motions δ, for ``rows`` a (…, nv)."""
+        """Compute the largest |a·δ| (…,) over all δ of the neighbourhood, for ``rows`` (…, nv)."""
         return np.asarray(abs(rows @ self._steps).sum(axis=-1))
 
     def curved(self, forms: Array) -> Array:
-        """Compute a bound (…,) of |δᵀ A δ|/2 over the joint motions δ, for ``forms`` A (…, nv, nv).
+        """Compute a bound (…,) of |δᵀ A δ|/2 over all these δ, for ``forms`` A (…, nv, nv).
 
-        It is a sum over pairs of holes; in each pair, opposite joint motions cancel.
+        The bound is a sum over pairs of holes, whose joint motions may cancel.
         """
         both = self._steps.T @ forms @ self._steps
         return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)
 
     def cubed(self, form: Array) -> float:
-        """Bound |Σ A_ijk δ_i δ_j δ_k|/6 over the joint motions δ; ``form`` is A (nv, nv, nv)."""
+        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 over all these δ, for A (nv, nv, nv)."""
         first = np.tensordot(self._steps, form, (0, 0))
         return float(abs(self._steps.T @ first @ self._steps).sum()) / 6.0

@@ -1,10 +1,11 @@
 """Bounds of the remainders of a linear model of an arm in a neighbourhood of a posture.
 
-Let r be the largest distance of a segment's sites from the joints that change it, p the largest
-motion of the sites across the segment per turn, m its smallest length, and σ the sum of the turns.
-Then the third derivative of its length l has |l′′′| ≤ c σ³ with c = 3 r p²/m² + 3 r p/m + r. So l
-differs from its second-order expansion by at most c σ³/6, and ∂l/∂θ_i from its tangent by at most
-c σ²/2. The segment turns by p σ/m, with a second derivative of at most (2 p r/m² + p²/m² + r/m) σ².
+Some joints change the length l of a segment. Let σ [rad] be the sum of their turns, and r the
+largest distance of the segment's sites from them. Let p be the largest motion of the sites across
+the segment per radian, and m the smallest length. Then |l′′′| ≤ c σ³ with c = 3 r p²/m² + 3 r p/m +
+r. So l differs from its second-order expansion by at most c σ³/6, and ∂l/∂θ_i from its tangent by
+at most c σ²/2. The segment turns by at most p σ/m. The second derivative of this angle is at most
+(2 p r/m² + p²/m² + r/m) σ².
 """
 
 from __future__ import annotations

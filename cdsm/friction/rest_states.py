@@ -12,11 +12,11 @@ a neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T and added to the right-hand si
 contains all states of rest in the neighbourhood (outer correction):
 
 - δ is a sum of one motion per hole. So quadratic and cubic forms of δ are sums over two and three
-  holes, bounded term by term: those of the lengths, of the torques of weight and wrench, and of the
-  tip displacement. What these forms leave out is bounded by :mod:`~cdsm.friction.remainders`.
+  holes, bounded term by term. This bounds the terms of second and third order of lengths, tip
+  displacement, and torques of weight and wrench. :mod:`~cdsm.friction.remainders` bounds the rest.
 - The wrap angles are replaced by their tangents, or by constants, with bounded errors.
-- Over a range |ΔT| ≤ ρ_T of tensions, 1/(1 + ε) falls, and lies between two parallel lines.
-- Products of δ and ΔT are at most those of ρ and ρ_T.
+- Over a range |ΔT| ≤ ρ_T of tensions, 1/(1 + ε) decreases, and lies between two parallel lines.
+- Products of δ and ΔT are at most the products of ρ and ρ_T.
 
 The maximum that the solver returns is not a proof. Its multipliers give one, by weak duality.
 """
@@ -126,7 +126,7 @@ class RestStates:
     def load(self, u: Array) -> float:
         """Compute the largest force [N] along u (3,) that some tensions of the polyhedron balance.
 
-        The neighbourhood needs ρ = 0 (:meth:`Neighbourhood.still`): no joint moves.
+        The neighbourhood must have ρ = 0, so that no joint moves; see :meth:`Neighbourhood.still`.
         """
         from scipy.sparse import csc_array, hstack
 
@@ -150,7 +150,7 @@ class RestStates:
         return self._largest(np.append(np.zeros(low.size), 1.0), widened).bound
 
     def _largest(self, cost: Array, program: tuple[Any, ...] | None = None) -> End:
-        """Maximize cost · x over the polyhedron, or over that of another linear ``program``."""
+        """Maximise cost · x over the polyhedron, or subject to another linear ``program``."""
         scale = float(abs(cost).max())
         if scale == 0.0:
             return End(0.0, 0.0, 0.0)
@@ -167,9 +167,10 @@ def _locked(
 ) -> tuple[Array, tuple[float, float]]:
     """Return the linear equation of the wire of cable ``c``, whose motor is locked.
 
-    b(F) Σ g·δ + Σ l b′ ΔT + slack = 0 with b = 1/(1 + ε). It is a row (1, nv + S) for δ/ρ and
-    ΔT/ρ_T, and the bounds of its slack. H (S, nv, nv) are the Hessians of the lengths l, and
-    ``straight`` (S,) the largest |g·δ|.
+    The equation is b(F) (Σ g·δ − ΔT_1/k_series) + Σ l b′ ΔT + slack = 0 with b = 1/(1 + ε) and its
+    mean slope b′. Returned are the coefficients (1, nv + S) of δ/ρ and ΔT/ρ_T, and the two bounds
+    of the slack. H (S, nv, nv) are the Hessians of the lengths l. ``straight`` (S,) is the largest
+    |g·δ|.
     """
     pose, cable = K.posture, K.posture.arm.cables[c]
     segments, apart, nv = pose.segments, near.tensions, near.joints.size
@@ -197,9 +198,9 @@ def _locked(
 def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tuple[Any, Array]:
     """Return A and b of the friction cone A x ≤ b: T_{j+1} ≤ e^{μφ} T_j and T_j ≤ e^{μφ} T_{j+1}.
 
-    x are the variables of :class:`RestStates`, ``size`` in number. ``far`` bounds the remainders of
-    the wrap angles φ. With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1 + ψ + ψ²/2 e^|ψ|. The linear part of ψ is in
-    A if φ is differentiable; otherwise b bounds it.
+    x (``size``,) are the variables of :class:`RestStates`. ``far`` bounds the remainders of the
+    wrap angles φ. With ψ = μ (φ(θ) − φ_0), e^ψ ≤ 1 + ψ + ψ²/2 e^|ψ|. A contains the linear part of
+    ψ if φ is differentiable; otherwise b contains a bound of ψ.
     """
     from scipy.sparse import csc_array
 
@@ -247,7 +248,7 @@ class _Wire(NamedTuple):
     def of(cls, cable: Cable, F: float, fall: float, rise: float, unstrained: bool) -> _Wire:
         """Bound b for tensions of a locked cable from F − fall to F + rise [N].
 
-        If not ``unstrained``, ε is the strain minus the strain under F.
+        If ``unstrained`` is False, ε is the strain minus the strain under F.
         """
         law = cable.elasticity
         strain = float(strain_of(law, np.asarray(F)))

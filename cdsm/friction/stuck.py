@@ -61,7 +61,7 @@ def sliding_stiffness(
 
     Raises:
         InvalidInput: An argument has the wrong shape or is not numbers, a tension is negative, or
-            the tensions beside a hole are further apart than its friction allows.
+            friction does not allow the ratio of the tensions on both sides of a hole.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     chains = instance("pose", pose, Posture).segments.chains
@@ -88,7 +88,7 @@ def sliding_stiffness(
 
 
 def _require_friction(pose: Posture, tension: Array, signs: Array) -> None:
-    """Raise InvalidInput unless friction allows the ratio of the tensions beside each hole.
+    """Raise InvalidInput unless friction allows the ratio of tensions at both sides of each hole.
 
     ``tension`` is (S,) [N]; ``signs`` (P,) are those of :func:`sliding_stiffness`.
     """

@@ -35,7 +35,7 @@ def serpentine_cables(
         control: Motor control of all cables, as in :class:`Cable`.
 
     Raises:
-        InvalidInput: ``elasticity`` is not a law, or the number of laws is not that of the cables.
+        InvalidInput: ``elasticity`` is not a law, or the numbers of laws and of cables differ.
         CableError: A cable is invalid.
     """
     count = len(instance("geometry", geometry, Geometry).cables)

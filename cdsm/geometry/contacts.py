@@ -48,8 +48,8 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
     """Return the points (n, 3) of n solid cylinders that are nearest to ``points`` (n, 3) [m].
 
-    Each cylinder has its ``centre``, the unit vector ``axis``, ``half`` of its length and its
-    ``radius`` [m].
+    Each cylinder has a ``centre`` (3,) [m], a unit vector ``axis`` (3,), half of its length
+    ``half`` [m], and a ``radius`` [m].
     """
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)

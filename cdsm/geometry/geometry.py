@@ -84,8 +84,9 @@ class Geometry(Description):
         """Build an arm of n universal joints with m cables each.
 
         Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m) + phase_k, or
-        at φ = hole_angles[k][j] + phase_k. Without these keywords all holes of the base disk are
-        evenly spaced. Sizes are one number for all joints, or one for each joint, base to tip.
+        at φ = hole_angles[k][j] + phase_k. If ``hole_angles`` and ``phase`` are not given, all
+        holes of the base disk are evenly spaced. A size is one number for all joints, or a list
+        with one for each joint, base to tip.
 
         Args:
             joints: n, 1 to 100.
@@ -100,7 +101,8 @@ class Geometry(Description):
             joint_limit: Largest angle about each axis in both directions [rad]. None: the angle
                 2 atan(h/r) at which disks of radius r touch, at most 80°; r is ``disk_radius``, or
                 else R.
-            disk_radius: Outer radius of the disks [m]; None: 1.1 times that of the farthest hole.
+            disk_radius: Outer radius of the disks [m]; None: 1.1 times the distance of the farthest
+                hole from the axis.
             cable_radius: Distance of the holes from the axis on all disks [m], for the cables of
                 each joint, e.g. on an inner ring; None: the ``hole_radius`` of each disk.
             hole_angles: φ of the cables of a joint [rad]: one list for all joints, or a list of
@@ -147,9 +149,9 @@ class Geometry(Description):
 
         Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist. The link frames are not
         twisted. Cable j = 0…m−1 of hinge k has its holes at φ = ψ_k + 90° + 2πj/m + phase_k: by
-        default (m = 2) an antagonistic pair at ψ_k ± 90°. With ``hole_angles``, φ =
-        hole_angles[k][j] + phase_k, counted from y. All other arguments, errors and warnings are
-        those of :meth:`universal`.
+        default (m = 2) an antagonistic pair at ψ_k ± 90°. If ``hole_angles`` is given, φ =
+        hole_angles[k][j] + phase_k, measured from y. All other arguments, errors and warnings are
+        as for :meth:`universal`.
 
         Hinges with parallel axes, e.g. every second one if the twist is 90°, have cables that share
         holes; ``spread`` separates them.

@@ -44,16 +44,16 @@ class Joint:
     """One joint of the arm and the two disks next to it.
 
     Attributes:
-        axes: One axis (hinge) or two (universal joint, in this order), in the axes of the previous
-            link. Any length; no axis is zero, and two axes are not parallel.
+        axes: One axis (hinge), or the first and the second axis (universal joint), in the frame of
+            the previous link. Any length; no axis is zero, and two axes are not parallel.
         disk_offset: h: distance from the joint centre to the disk on each side [m].
         limit: Largest angle about each axis in both directions [rad]; None: the angle at which
             disks of radius r touch, at most 80°; r is ``disk_radius``, or the hole radius if that
             is None.
         hole_radius: R: distance of the holes of its two disks from the arm's axis [m]; None: the
             ``hole_radius`` of the :class:`Geometry`.
-        disk_radius: Outer radius of its two disks [m]; None: 1.1 times the radius of the farthest
-            hole.
+        disk_radius: Outer radius of its two disks [m]; None: 1.1 times the distance of the farthest
+            hole from the axis.
 
     Raises:
         GeometryError: Some attributes are invalid; lists every fault.

@@ -89,7 +89,8 @@ def _joined(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Split the parsed TOML of an arm into the keys of its geometry and all other keys.
 
-    ``cables`` belongs to the geometry if there are ``joints`` or ``links``, or no other keys.
+    The key ``cables`` belongs to the geometry if there is a key ``joints`` or ``links``, or if it
+    is the only key.
     """
     passed_over = set(ARM_KEYS)
     if data.keys() - {"cables"} and not data.keys() & {"joints", "links"}:

@@ -47,7 +47,8 @@ def uniform(
 ) -> dict[str, Any]:
     """Return the attributes of the Geometry of a uniform arm; GeometryError if one is invalid.
 
-    ``axes`` has the axes of each joint, ``keywords`` are those of :meth:`Geometry.universal`.
+    ``axes`` has the axes of each joint. ``keywords`` are the arguments of
+    :meth:`Geometry.universal` by name.
     ``usual_angles`` is a function that returns the default hole angles of each joint for a number
     of cables per joint.
     """
