@@ -20,7 +20,10 @@ def fit(
     test: Annotated[Path, typer.Argument(metavar="TEST.csv", help="Tensile test to read.")],
     gauge_length: Annotated[
         float | None,
-        typer.Option(help="Length of the tested wire in mm; default: that of the file.", min=0.0),
+        typer.Option(
+            help="Length of the tested wire in mm; default: that of the file. A strain needs none.",
+            min=0.0,
+        ),
     ] = None,
     columns: Annotated[
         str | None,

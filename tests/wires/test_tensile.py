@@ -236,6 +236,31 @@ def test_band_covers_the_truth_as_often_as_it_says() -> None:
     assert np.mean(shares) == pytest.approx(0.95, abs=0.04)
 
 
+def test_band_contains_its_own_fit_and_few_points_are_told() -> None:
+    """18 points written down by hand, with steps of 0.5 N at large forces."""
+    strain = [0, 2, 4, 6, 8, 10, 13, 16, 20, 25, 30, 35, 40, 50, 60, 70, 80, 90]  # 1e-4
+    first = [0, 2.1, 5.2, 9.5, 15, 21.8, 33.5, 47, 66.5]
+    force = [*first, 93, 121, 150, 179.5, 240, 301, 363, 425, 488]
+    fit = cdsm.fit_tensile_test(1e-4 * np.array(strain), force, 1.0)
+    assert fit.band is not None
+    own = fit.elasticity.rigidity(fit.tensions)
+    assert (fit.band.low <= own).all()
+    assert (own <= fit.band.high).all()
+    assert any(note.startswith("18 points, fewer than 41") for note in fit.notes)
+    assert not any("fewer" in note for note in cdsm.fit_tensile_test(*linear_test(41, 1), 1).notes)
+
+
+@pytest.mark.parametrize("points", [30, 100])
+def test_band_without_noise_is_as_wide_as_the_error_of_the_fit(points: int) -> None:
+    F = np.linspace(0.0, 805.0, 40_001)
+    stretch = np.concatenate([[0.0], np.cumsum(np.diff(F) / toe((F[1:] + F[:-1]) / 2.0))])
+    strain = np.linspace(0.0, stretch[-1], points)
+    band = cdsm.fit_tensile_test(strain, np.interp(strain, stretch, F), 1.0).band
+    assert band is not None
+    truth = toe(band.tensions)
+    assert ((band.low <= truth) & (truth <= band.high))[band.tensions > 10.0].mean() > 0.95
+
+
 def test_band_misses_a_kink_and_what_lies_next_to_it() -> None:
     """From 15 kN to 45 kN at 200 N, as the docstring says."""
     F = np.linspace(0.0, 840.0, 300)

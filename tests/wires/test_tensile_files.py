@@ -111,6 +111,21 @@ def test_strain_of_a_machine_without_a_displacement(tmp_path: Path) -> None:
     path = written(tmp_path, header + "".join(f"{1e-3 * k},{k}\n" for k in range(9)))
     test = cdsm.read_tensile_csv(path, gauge_length=0.4)
     np.testing.assert_allclose(test.displacement, 4e-4 * np.arange(9), rtol=1e-12)
+    assert "1 m" not in test.source
+
+
+def test_a_strain_needs_no_gauge_length(tmp_path: Path) -> None:
+    path = written(
+        tmp_path, "strain [%],force [N]\n" + "".join(f"{k},{50 * k}\n" for k in range(9))
+    )
+    test = cdsm.read_tensile_csv(path)
+    np.testing.assert_allclose(test.displacement / test.gauge_length, 1e-2 * np.arange(9))
+    assert test.source.endswith("no gauge length: displacements are those of 1 m of wire")
+    found = CliRunner().invoke(app, ["fit", str(path)])
+    assert found.exit_code == 0, found.output
+    assert "no gauge length: displacements are those of 1 m of wire" in found.output
+    law = cdsm.fit_tensile_test(test.displacement, test.force, test.gauge_length).elasticity
+    np.testing.assert_allclose(law.rigidity([50.0, 350.0]), 5000.0, rtol=1e-6)
 
 
 def test_a_table_of_results_before_the_points_is_not_the_test(tmp_path: Path) -> None:

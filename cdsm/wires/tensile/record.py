@@ -103,7 +103,8 @@ def read_tensile_csv(
             The same as the first of ``units``; give one or the other.
         force_unit: ``mN``, ``N``, ``kN``, ``MN``, ``lbf`` or ``kgf``. The same
             as the second of ``units``.
-        gauge_length: l_0 [m], if the file does not give it.
+        gauge_length: l_0 [m], if the file does not give it. A strain needs none, since EA does not
+            depend on it: the test is then that of 1 m of wire, and ``source`` says so.
 
     Raises:
         FileError: The file cannot be read.
@@ -122,14 +123,21 @@ def read_tensile_csv(
         scales = [_scale(each, unit) for each, unit in zip(read, given, strict=True)]
         displacement, force = (table.column(each.at, _bad_cell, header.first) for each in read)
         length = _gauge_length(table, header, gauge_length)
+        if length is None and read[0].kind != "strain":
+            raise TensileTestError(
+                "has no gauge length. Pass gauge_length= [m], or add a line: "
+                "# gauge_length = 500 mm"
+            )
     except TensileTestError as error:
         raise TensileTestError(f"{path}: {error}") from None
+    assumed = "; no gauge length: displacements are those of 1 m of wire" if length is None else ""
+    length = 1.0 if length is None else length
     if read[0].kind == "strain":
         scales[0] *= length
     places = [each.at for each in read]
     others = [each for each in header.columns if each.kind and each.at not in places]
     unread = f"; not read: {', '.join(map(str, others))}" if others else ""
-    source = f"{' and '.join(map(str, read))} of line {header.line}{unread}"
+    source = f"{' and '.join(map(str, read))} of line {header.line}{unread}{assumed}"
     return TensileTest(scales[0] * displacement, scales[1] * force, length, source)
 
 
@@ -163,7 +171,8 @@ def _bad_cell(problem: str) -> NoReturn:
     )
 
 
-def _gauge_length(table: Table, header: Header, given: float | None) -> float:
+def _gauge_length(table: Table, header: Header, given: float | None) -> float | None:
+    """Return the gauge length [m], given or read from the file; None if there is none."""
     known = UNITS["displacement"]
     lengths = [] if given is None else [scalar("gauge_length", given)]
     decimal_comma = table._replace(delimiter=";")
@@ -183,9 +192,7 @@ def _gauge_length(table: Table, header: Header, given: float | None) -> float:
             if unit in known and math.isfinite(value := decimal_comma.number(number)):
                 lengths.append(value * known[unit])
     if not lengths:
-        raise TensileTestError(
-            "has no gauge length. Pass gauge_length= [m], or add a line: # gauge_length = 500 mm"
-        )
+        return None
     if max(lengths) - min(lengths) > 1e-9 * abs(max(lengths)):
         listed = " and ".join(f"{1e3 * length:g} mm" for length in dict.fromkeys(lengths))
         raise TensileTestError(f"the gauge length is {listed}; give one, as gauge_length= [m].")

@@ -24,7 +24,8 @@ from cdsm.support.values import Array
 from cdsm.wires.tensile.basis import Basis
 from cdsm.wires.tensile.loading import Points
 
-_NEAR = 41  # neighbouring points over which the noise is assumed constant
+NEAR = 41
+"""Neighbouring points over which the noise is assumed constant."""
 _ROUGHER = 1000.0  # less smoothing of the band's curve: its bias is then far below its scatter
 
 
@@ -37,7 +38,7 @@ def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
 
 def _neighbours(values: Array) -> Array:
     """Sum the values (n,) of the points around each point, reflected at the ends."""
-    near = min(_NEAR, len(values))
+    near = min(NEAR, len(values))
     padded = np.pad(values, (near // 2, near - 1 - near // 2), mode="reflect")
     return np.convolve(padded, np.ones(near), mode="valid")
 
@@ -150,7 +151,7 @@ class Curve:
         variance = float((error**2).sum() / freedom)
         # enlarge the residuals by the part of the noise that the curve follows
         error = error / np.sqrt(np.maximum(1.0 - leverage, 0.1))
-        local = _neighbours(error**2) / min(_NEAR, len(error))
+        local = _neighbours(error**2) / min(NEAR, len(error))
         # scatter from the local noise, and bias from the prior of the smoothing
         moved = (inverse @ rows.T) * np.sqrt(local)
         covariance = moved @ moved.T + variance * inverse @ self._penalty @ inverse
