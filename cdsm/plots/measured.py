@@ -59,7 +59,7 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
     right.plot(tension, KN * fit.elasticity.rigidity(tension), color=VERMILLION, label="EA")
     shade_stages(right, [(stage.name, stage.low, stage.high) for stage in fit.stages])
     right.set(xlabel="tension [N]", ylabel="tangent rigidity EA [kN]")
-    right.set_ylim(bottom=0.0)
+    right.set_ylim(0.0, 1.1 * right.get_ylim()[1])  # room for the names of the stages
     for axes in (left, right):
         legend(axes)
     return figure
