@@ -75,7 +75,7 @@ class Observer:
         """
         pose = self.arm.at(q)
         cable = pose.segments.chains.cable
-        F = np.maximum(reading.tension, self._least)
+        F = np.clip(reading.tension, *self._domains)
         natural = self._problem.natural(pose.segments.lengths, F[cable])
         one, shares = np.ones(F.size), np.ones(cable.size)
         force = self._tip_force(pose, F[cable])
@@ -84,7 +84,7 @@ class Observer:
     def update(self, before: Estimate, reading: Reading) -> Estimate:
         """Return the estimate after one more reading; ``before`` is the previous estimate."""
         locked, laws = self.arm.cables.position_controlled, self.arm._model.laws
-        F, wire = np.maximum(reading.tension, self._least), reading.wire
+        F, wire = np.clip(reading.tension, *self._domains), reading.wire
         pose, x, variance = before.pose, before.softness, before.variance
         strain = self._mean_strain(pose, before.shares, F)
         spring = laws.series * (F - laws.rest)
@@ -116,7 +116,7 @@ class Observer:
 
         The derivative is taken at constant cable lengths. κ is 0 for force-controlled cables.
         """
-        F = np.maximum(reading.tension, self._least)
+        F = np.clip(reading.tension, *self._domains)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
         soft = self._compliance(reading.wire, F) * estimate.softness
         return np.where(self.arm.cables.position_controlled, stretch / soft, 0.0)
@@ -132,7 +132,9 @@ class Observer:
         segments = pose.segments
         chains, near = segments.chains, before.shares * F[segments.chains.cable]
         chain = self._problem.settle(segments.lengths, before.natural, segments.ratio, F, near)
-        shares = chain.tension / F[chains.cable]
+        motor = F[chains.cable]
+        # in a slack cable all tensions are 0: their ratio is taken as even
+        shares = np.divide(chain.tension, motor, out=np.ones_like(motor), where=motor > 0.0)
         means = np.add.reduceat(shares * segments.lengths, chains.start[:-1]) / pose.cable_lengths
         force = self._tip_force(pose, chain.tension)
         natural = chain.natural
@@ -180,8 +182,9 @@ class Observer:
         return ChainProblem(arm.cables, chains.start, even, unstrained=True)
 
     @cached_property
-    def _least(self) -> Array:
-        return np.array([cable.elasticity.domain.first for cable in self.arm.cables])
+    def _domains(self) -> Array:
+        domains = [cable.elasticity.domain for cable in self.arm.cables]
+        return np.array([[each.first for each in domains], [each.high for each in domains]])
 
     @property
     def _encoder_spread(self) -> float:

@@ -100,8 +100,10 @@ def limited(moment: Moment, wire: Array) -> Command:
     """Return the command to pay out ``wire`` (C,) [m], clamped to keep tensions in their bounds.
 
     The commanded tensions follow from the measured ones and the change of wire at constant posture.
+    InvalidInput if ``wire`` is not one number per cable.
     """
     reading, k = moment.reading, moment.reference.stiffness
+    wire = vector("wire", wire, k.size, "one length [m] per cable")
     asked = reading.tension + k * (reading.wire - wire)
     return _clamped(moment, wire, np.where(k > 0.0, asked, moment.reference.tension))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cdsm.control.estimates import Estimate
 from cdsm.control.laws import Reference
-from cdsm.errors import CdsmError
+from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import least_change
 from cdsm.planning.objectives import target_constraints
@@ -60,8 +60,9 @@ class StiffnessLoop:
             estimate: Estimated posture, load, wire and friction.
             before: Mean tensions of the previous step (C,) [N].
         """
-        arm, mean, refused, short = self._with_softness(estimate.softness), before, "", False
+        arm, mean, refused, short = self._calibrated, before, "", False
         try:
+            arm = self._with_softness(estimate.softness)
             bounds = self.minimum * estimate.ratio, self.maximum * estimate.ratio
             wrench = np.append(estimate.force, np.zeros(3))
             model = StiffnessModel(arm.at(estimate.pose.q), *bounds, wrench, MARGIN)
@@ -87,7 +88,14 @@ class StiffnessLoop:
         return Replanned(reference, mean, refused, short)
 
     def _with_softness(self, softness: float) -> Manipulator:
-        """Return the arm with the rigidity of its wires divided by the estimated ``softness``."""
+        """Return the arm with the rigidity of its wires divided by the estimated ``softness``.
+
+        InvalidInput if the softness is not positive.
+        """
+        if softness <= 0.0:  # far from the posture of the plan, readings fit no wire
+            raise InvalidInput(
+                "rigidity", f"estimated as {1.0 / softness:.3g} times that of the wires' laws."
+            )
         if abs(softness - self._softness) > _SOFTER:
             self._softness = softness
             self._calibrated = with_rigidity(self.arm, 1.0 / softness)

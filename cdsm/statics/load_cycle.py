@@ -11,7 +11,7 @@ from cdsm.errors import InvalidInput
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.posture import Posture
 from cdsm.statics.load_history import LoadHistory
-from cdsm.statics.locked_motors import LoadedArm, require_domains, stops
+from cdsm.statics.locked_motors import LoadedArm, stops
 from cdsm.statics.rest_search import require_between_stops
 from cdsm.statics.slow_loading import Load, Passage, SlowLoading, State
 from cdsm.stiffness_matrix import checked_tension
@@ -95,7 +95,6 @@ def load_cycle(
         state, passage = loading.carry(
             state, Load(wrench, none, command), f"the step to load {k + 1}"
         )
-        _require_domains(loading, state, k)
         history.append((state, passage))
     return _labelled(pose, F, W, loads, commands, history)
 
@@ -132,19 +131,6 @@ def _commands(motors: ArrayLike, forced: NDArray[np.bool_], shape: tuple[int, ..
     number_array("motors", commands[:, ~forced], "length")
     number_array("motors", tensions, "tension")
     return commands
-
-
-def _require_domains(loading: SlowLoading, state: State, load: int) -> None:
-    cables, T = loading.reference.arm.cables, state.settled.chain.tension
-    first = loading.start[:-1]
-    # a motor that holds the tension of a cable without friction needs no law
-    groups = [
-        (law, np.array([c for c in of if not loading.forced[c] or any(cables[c].friction)]))
-        for law, of in loading.problem.laws
-    ]
-    known = [(law, of) for law, of in groups if of.size]
-    for extreme in (np.minimum, np.maximum):
-        require_domains(cables, known, extreme.reduceat(T, first), f"at load {load + 1}")
 
 
 def _labelled(

@@ -25,6 +25,7 @@ from cdsm.friction.chain_problem import ChainProblem
 from cdsm.kernels.tree import Indices
 from cdsm.posture import Posture
 from cdsm.statics.frictional_arm import FrictionalArm, Settled
+from cdsm.statics.locked_motors import require_domains
 from cdsm.statics.rest_search import no_rest
 from cdsm.statics.trust_region import RestSearch, find_rest
 from cdsm.support.values import Array
@@ -116,7 +117,8 @@ class SlowLoading(NamedTuple):
         """Change the load of the equilibrium ``before`` to ``load`` in sub-steps.
 
         Returns the new state, and the energies and slips on the way. Raises EquilibriumError if no
-        equilibrium was found on the way; its text names the step as ``what``.
+        equilibrium was found on the way, and ElasticityRangeError if a tension of the new state is
+        outside the domain of its law; their texts name the step as ``what``.
         """
         first, state = before.load, before
         total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
@@ -140,7 +142,19 @@ class SlowLoading(NamedTuple):
                 residual = np.where(search.at_stop, 0.0, search.state.torque)
                 raise no_rest(self.reference, search.state.pose, residual, reached, what)
             part = (goal - reached) / 2.0
+        self._require_domains(state, what)
         return state, total
+
+    def _require_domains(self, state: State, what: str) -> None:
+        cables, T = self.reference.arm.cables, state.settled.chain.tension
+        # a motor that holds the tension of a cable without friction needs no law
+        groups = [
+            (law, np.array([c for c in of if not self.forced[c] or any(cables[c].friction)]))
+            for law, of in self.problem.laws
+        ]
+        known = [(law, of) for law, of in groups if of.size]
+        for extreme in (np.minimum, np.maximum):
+            require_domains(cables, known, extreme.reduceat(T, self.start[:-1]), f"after {what}")
 
     def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
         """Return the arm under a wrench and motor commands.

@@ -72,7 +72,7 @@ class WeightFriction(ReadOnlyState):
 
         The tangent is then at most 1.25 times :attr:`frictionless`. The load is 0 without friction.
         It is inf if the arm does not slide up to 100 times the breakaway load, or if no equilibrium
-        is found before.
+        is found before, or if a tension leaves the domain of its law before.
         """
         first, u = self.breakaway.load, self.breakaway.direction
         if not 0.0 < first < math.inf:

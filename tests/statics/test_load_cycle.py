@@ -387,7 +387,7 @@ def test_bad_arguments_are_named() -> None:
 
 def test_load_that_no_law_covers_is_named() -> None:
     pose, pull = prototype(0.1, cdsm.StrandElasticity.eq19_repaired())
-    with pytest.raises(cdsm.ElasticityRangeError, match="at load 2"):
+    with pytest.raises(cdsm.ElasticityRangeError, match="after the step to load 2"):
         cdsm.load_cycle(pose, pull, along_z(1.0, 900.0))
 
 
