@@ -103,7 +103,7 @@ def limited(moment: Moment, wire: Array) -> Command:
     InvalidInput if ``wire`` is not one number per cable.
     """
     reading, k = moment.reading, moment.reference.stiffness
-    wire = vector("wire", wire, k.size, "one length [m] per cable")
+    wire = vector("wire of the law", wire, k.size, "one length [m] per cable")
     asked = reading.tension + k * (reading.wire - wire)
     return _clamped(moment, wire, np.where(k > 0.0, asked, moment.reference.tension))
 

@@ -8,6 +8,10 @@ import pytest
 import cdsm
 from cdsm import presets
 from cdsm.control import with_rigidity
+from cdsm.control.estimates import Observer
+from cdsm.control.laws import Reading
+from cdsm.control.schedule import Schedule
+from cdsm.control.stiffness_loop import StiffnessLoop
 from tests.support.tracking import small_path
 
 
@@ -31,3 +35,16 @@ def test_scaled_arm_is_the_arm_that_is_built_with_scaled_laws(factor: float) -> 
         np.testing.assert_array_equal(K.joint, wanted.joint)
         np.testing.assert_array_equal(K.cable_stiffness, wanted.cable_stiffness)
     assert quick.cables[1].elasticity == presets.STRAND_1X19.scaled(factor)
+
+
+def test_an_estimate_that_is_no_rigidity_keeps_the_last_tensions() -> None:
+    plan = small_path()
+    schedule = Schedule.of(plan, 1)
+    wanted, F = schedule.references[0], plan.tensions[0]
+    low, high = np.full(6, 10.0), np.full(6, 250.0)
+    loop = StiffnessLoop(plan.arm, schedule.directions, low, high, np.full(6, 10.0))
+    estimate = Observer(plan.arm, cdsm.Sensors()).begin(wanted.angles, Reading(wanted.wire, F))
+    assert not loop.next(wanted, schedule.targets[0], estimate, F).refused
+    planned = loop.next(wanted, schedule.targets[0], estimate._replace(softness=-0.5), F)
+    assert planned.refused == "rigidity: estimated as -2 times that of the wires' laws."
+    np.testing.assert_array_equal(planned.mean, F)
