@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from cdsm.design.result import DesignSearch
 
 
+_WIDEST = 34  # characters of a label beside an axis of 2.4 inches
+
+
 def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
     """Plot the objectives of all designs that meet the constraints, and their Pareto front.
 
@@ -39,7 +43,8 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
     """
     expect("found", found, "DesignSearch")
     objectives = found.problem.objectives
-    scales, names = [each.unit[1] for each in objectives], found._labels
+    scales = [each.unit[1] for each in objectives]
+    names = [textwrap.fill(label, _WIDEST) for label in found._labels]
     if len(objectives) == 1:
         figure, axes = panels(ONE_COLUMN, 2.4, 1)
         panel = axes[0, 0]

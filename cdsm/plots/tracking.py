@@ -62,7 +62,7 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
         from_zero(stiffness, *(N_PER_MM * each for each in (run.target, run.stiffness, run.felt)))
     low, high = MM * run.band.T
     at = run.banded  # steps with a computed band; the area has a gap where it was not proved
-    if at.any():
+    if np.isfinite(low[at]).any():
         band.fill_between(t[at], low[at], high[at], color=SKY, alpha=0.4, label="proved band")
     moved = MM * run.displacement
     band.plot(t, moved, color=VERMILLION, label="tip")
