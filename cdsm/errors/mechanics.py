@@ -196,6 +196,8 @@ class UnreachableStiffness(CdsmError):
                 ". Ask for a stiffness within it, or widen it: change minimum=, maximum=, "
                 "the load or the posture, or take other cables."
             )
+            if low <= 1e3 * target <= high:
+                message += " It looks as if the target is in N/mm: give it in N/m."
         super().__init__(message)
 
 

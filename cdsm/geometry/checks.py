@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,9 @@ LONGEST = 30.0
 
 WIDEST = 1.0
 """A hole radius or disk offset larger than this [m] is probably in millimetres."""
+
+WIDEST_ANGLE = 8.0 * math.pi
+"""A hole angle larger than this [rad] is probably in degrees."""
 
 _SHORTEST = 1e-3  # an arm shorter than this [m] was probably given in metres where mm are taken
 
@@ -104,6 +108,11 @@ def doubts_about(geometry: Description) -> list[str]:
     ]
     doubts = doubts_about_units(geometry.length, sizes)
     names = geometry.cable_names
+    widest = max(geometry.cables, key=lambda cable: abs(cable.angle))
+    if abs(widest.angle) > WIDEST_ANGLE:
+        doubts.append(
+            f"a hole angle is {widest.angle:.4g} rad: it looks as if it is in degrees; give rad."
+        )
     groups = [
         " and ".join(names[c] for c in each) for each in sharing(geometry.cables, geometry.disks)
     ]

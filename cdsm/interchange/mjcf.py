@@ -75,9 +75,9 @@ def to_mjcf(
     cable are ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. Links without a drawable
     visual are sticks. The model has no leads (straight cables of constant length before the first
     site), no friction in the holes, and no wrench. Apply the wrench in MuJoCo at run time;
-    ``xfrc_applied`` acts at the centre of mass of a link. Motors that keep lengths have the constant
-    stiffness k of the posture, so a large load moves an arm with nonlinear wires by another amount
-    than :func:`~cdsm.equilibrium` says.
+    ``xfrc_applied`` acts at the centre of mass of a link. Motors that keep lengths have the
+    constant stiffness k of the posture, so a large load moves an arm with nonlinear wires by
+    another amount than :func:`~cdsm.equilibrium` says.
 
     A new ``mjData`` and the keyframe ``pose`` have the joint coordinates of the posture, which are
     those of cdsm. ``actuators`` is one of

@@ -1,5 +1,6 @@
 """Sizes that differ from joint to joint, holes where they are wanted, sections, warnings."""
 
+import dataclasses
 import math
 import warnings
 from pathlib import Path
@@ -232,6 +233,13 @@ def test_lengths_in_mm_are_noticed_once() -> None:
     assert len(told) == 1
     with pytest.warns(cdsm.CdsmWarning, match="hole_radius is 20 m: it looks as if lengths are in"):
         universal(hole_radius=20.0)
+
+
+def test_hole_angles_in_degrees_are_noticed() -> None:
+    first, *others = universal().cables
+    turned = dataclasses.replace(first, angle=-120.0)
+    with pytest.warns(cdsm.CdsmWarning, match=r"a hole angle is -120 rad: .* degrees; give rad"):
+        universal().replace(cables=(turned, *others))
 
 
 # --- sections -------------------------------------------------------------------------------

@@ -231,6 +231,8 @@ def test_unreachable_targets_are_refused_with_the_range(name: str) -> None:
         assert error.target == target
         np.testing.assert_allclose(error.nearest, [end], rtol=1e-9)
         np.testing.assert_array_equal(error.direction, DOWN)
+    with pytest.raises(cdsm.UnreachableStiffness, match=r"in N/mm: give it in N/m\.$"):
+        cdsm.plan_stiffness(pose, DOWN, 5e-4 * (found.low + found.high), low, high)
     for end in (found.low, found.high):
         plan = cdsm.plan_stiffness(pose, DOWN, end, low, high)
         assert plan.achieved == pytest.approx(end, rel=1e-6)
