@@ -62,9 +62,8 @@ class Band(ReadOnlyState):
     error of a fit without noise.
 
     In 100 tests of 400 points each, of three wires with 0.5 N and 2 N of noise, the band contained
-    EA in 95.3 % of all cases, and in 89 to 100 % at each of 16 tensions. Where EA bends it may
-    contain EA less often: in 92 % for Eq. 19 at 80 N. Within a few newtons of a kink of the force
-    as a function of strain, it misses EA.
+    EA in 95.9 % of all cases, and in 90 to 100 % at each of 14 tensions. Within a few newtons of a
+    kink of the force as a function of strain, it misses EA.
 
     With fewer than 41 points it may contain EA less often, and ``TensileFit.notes`` says so: one
     scatter is then taken for all tensions, and a bend of EA between two points shows in no
