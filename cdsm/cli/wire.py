@@ -76,8 +76,10 @@ def fit(
             fitted = cdsm.fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
     except cdsm.TensileTestError as error:
         raise cdsm.TensileTestError(_as_options(str(error))) from None
+    spread = None if tolerances is None else cdsm.Tolerances(rigidity=fitted.tolerance())
     write(out, lambda file: cdsm.write_elasticity(fitted.elasticity, file))
-    write(tolerances, lambda file: cdsm.Tolerances(rigidity=fitted.tolerance()).write(file))
+    if spread is not None:
+        write(tolerances, spread.write)
     write_picture(figure, fitted.plot)
     read = f"{test}: {data.source}"
     answer(as_json, lambda: {"read": data.source, **_numbers(fitted)}, f"{read}\n{fitted}")
