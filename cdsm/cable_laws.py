@@ -229,10 +229,11 @@ class CableLaws:
 
 
 def kinks(law: Elasticity) -> tuple[float, ...]:
-    """Return the tensions [N], in ascending order, at which dEA/dF of a law is discontinuous.
+    """Return the tensions [N], in ascending order, at which dEA/dF of a law jumps: its kinks.
 
-    At a kink, ``rigidity_slope`` returns the slope below it. The weak kinks at the points of a
-    tabulated law are not returned.
+    They are the joins of the polynomials of a strand, and the end of a slack branch. At a kink,
+    ``rigidity_slope`` returns the slope below it. dEA/dF also jumps at the points of a tabulated
+    law, but these points are not returned.
     """
     if isinstance(law, SlackBelow):
         return law.rest, *kinks(law.law)

@@ -130,7 +130,10 @@ class _SmoothProblem:
         self._found: dict[bytes, tuple[Array, Array] | None] = {}
 
     def rows(self, y: Array) -> tuple[Array, Array]:
-        """Return c (R,) and ∂c/∂y (R, n), or raise _PostureNotHeld."""
+        """Return c (R,) and ∂c/∂y (R, n) of the R conditions, for a scaled design y (n,).
+
+        Raises _PostureNotHeld if the design does not hold all postures; see :class:`DesignProblem`.
+        """
         key = y.tobytes()
         if key not in self._found:
             low, high = self._problem.bounds.T

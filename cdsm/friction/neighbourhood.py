@@ -76,7 +76,7 @@ class Neighbourhood:
         return np.asarray(abs(rows @ self._steps).sum(axis=-1))
 
     def curved(self, forms: Array) -> Array:
-        """Compute a bound (…,) of |δᵀ A δ|/2 over all these δ, for ``forms`` A (…, nv, nv).
+        """Compute a bound (…,) of |δᵀ A δ|/2 for ``forms`` A (…, nv, nv), over the neighbourhood.
 
         The bound is a sum over pairs of holes, whose joint motions may cancel.
         """
@@ -84,6 +84,9 @@ class Neighbourhood:
         return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)
 
     def cubed(self, form: Array) -> float:
-        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 over all these δ, for A (nv, nv, nv)."""
+        """Compute a bound of |Σ A_ijk δ_i δ_j δ_k|/6 for all δ of the neighbourhood.
+
+        ``form`` is A (nv, nv, nv).
+        """
         first = np.tensordot(self._steps, form, (0, 0))
         return float(abs(self._steps.T @ first @ self._steps).sum()) / 6.0

@@ -165,12 +165,26 @@ class RestStates:
 def _locked(
     K: Stiffness, c: int, near: Neighbourhood, far: Remainders, H: Array, straight: Array
 ) -> tuple[Array, tuple[float, float]]:
-    """Return the linear equation of the wire of cable ``c``, whose motor is locked.
+    """Return the linear equation of cable ``c``, whose locked motor keeps the length of its wire.
 
-    The equation is b(F) (Σ g·δ − ΔT_1/k_series) + Σ l b′ ΔT + slack = 0 with b = 1/(1 + ε) and its
-    mean slope b′. Returned are the coefficients (1, nv + S) of δ/ρ and ΔT/ρ_T, and the two bounds
-    of the slack. H (S, nv, nv) are the Hessians of the lengths l. ``straight`` (S,) is the largest
-    |g·δ|.
+        b (Σ g·δ − ΔT_1/k_series) + b′ Σ l ΔT + slack = 0
+
+    The sums are over the segments of the cable. At the reference, a segment has the length l with
+    the gradient g. ΔT is the change of its tension. ΔT_1, of the first segment, also stretches the
+    series spring. b = 1/(1 + ε) is taken at the reference tension F; b′ is its mean slope over the
+    range of tensions. The slack stands for the terms that are neglected. δ, ρ and ρ_T are those of
+    the module.
+
+    Args:
+        K: Stiffness at the reference.
+        c: Index of the cable.
+        near: The neighbourhood, which gives ρ and ρ_T.
+        far: Bounds of the neglected terms of the lengths.
+        H: Hessians of the lengths of all S segments (S, nv, nv).
+        straight: Largest |g·δ| of each segment (S,).
+
+    Returns:
+        The coefficients (1, nv + S) of δ/ρ and ΔT/ρ_T, and the bounds (low, high) of the slack.
     """
     pose, cable = K.posture, K.posture.arm.cables[c]
     segments, apart, nv = pose.segments, near.tensions, near.joints.size

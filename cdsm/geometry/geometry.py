@@ -250,8 +250,8 @@ class Geometry(Description):
         The file has the full form that :meth:`write` writes, or one table ``[universal]`` or
         ``[hinged]``. The keys of the table are the keywords of the constructor with this name. An
         arm of sections has such a table in each ``[[sections]]`` (``[sections.universal]``), and
-        ``name`` and ``spread`` at the top. From an ARM.toml (see :meth:`cdsm.Manipulator.read`),
-        only the geometry is read.
+        at the top ``name`` and ``spread``, keywords of :meth:`sections`. From an ARM.toml (see
+        :meth:`cdsm.Manipulator.read`), only the geometry is read.
 
         Raises:
             FileError: The file cannot be read.

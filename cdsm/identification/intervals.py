@@ -172,7 +172,11 @@ class Profiler:
         ), falls
 
     def _falls(self, knots: list[_Knot], side: Side) -> list[Array]:
-        """Return the lowest point on one ``side`` at which Δχ² falls again, if there is one."""
+        """Return a list of at most one point: the lowest knot at which the profile falls again.
+
+        ``knots`` are those on one ``side``, from the optimum outward. It falls again at a knot if
+        Δχ² was above ``exact[0]`` at the knot before, and is lower here or has a falling slope.
+        """
         falling = [
             knot
             for before, knot in pairwise(knots)

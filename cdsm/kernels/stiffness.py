@@ -179,8 +179,9 @@ def single_stiffness(
 ) -> Array:
     """Compute five matrices of one posture (5, nv, nv): active, passive and load term, P, and K_θ.
 
-    P is the sum of the magnitudes of the four terms. ``segment`` and ``joint`` are fields of
-    :class:`Routing`, the next four are those of :class:`Frames`. No array has the axis of postures.
+    An entry of P is |active| + |passive| + |gravity| + |load|, the scale of the rounding errors of
+    K_θ; ``gravity`` (nv, nv) is the gravity term. ``segment`` and ``joint`` are fields of
+    :class:`Routing`, the next four are those of :class:`Frames`. Arrays have no axis of postures.
     """
     count, nv = length_jacobian.shape
     J, JX = length_jacobian.reshape(count, nv, 1), jacobian.reshape(6, nv, 1)

@@ -124,9 +124,11 @@ def _proved(
     inverse: Array,
     price: Array,
 ) -> bool:
-    """Correct x by its residual; return whether it then meets the conditions of a maximum.
+    """Correct x so that A x = b up to rounding; return whether x is then proved to be a maximum.
 
-    ``state``, ``basis``, ``inverse`` and ``price`` are those of :func:`single_largest` at x.
+    The proof: x meets A x = b and its bounds, and by the ``price`` of each equation no variable can
+    move so that cost · x rises. ``state``, ``basis``, ``inverse`` and ``price`` are those of
+    :func:`single_largest` when it ends.
     """
     m, n = A.shape
     left, size = b.copy(), np.abs(b)

@@ -78,9 +78,10 @@ def powers(tension: ArrayLike, slope: bool = False) -> Array:
 
 
 def _branches(rows: Array) -> tuple[Array, Array]:
-    """Pad rows (..., 7) with zeros to (..., 14): once for the lower branch, once for the upper one.
+    """Place rows (..., 7) among the 14 coefficients of both branches of Eq. 19, as (lower, upper).
 
-    The first 7 columns are those of the lower branch.
+    Columns 0 to 6 are of the lower branch, columns 7 to 13 of the upper one. In each result
+    (..., 14), the columns of the other branch are zero.
     """
     none = np.zeros_like(rows)
     return np.hstack([rows, none]), np.hstack([none, rows])

@@ -1,1 +1,5 @@
-"""Stiffness control at one posture or along a path: gradients, range, saturation and plans."""
+"""Plan tensions for a wanted stiffness, at one posture or along a path.
+
+Also: derivatives of the stiffness by the tensions, the range of stiffness that the tensions can
+reach, and saturation: the tension above which more tension hardly stiffens the arm.
+"""

@@ -108,10 +108,10 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def unstrained_lengths(self) -> Array:
-        """Unstretched lengths l_0 (P, H) [m] paid out by motors of H position-controlled cables.
+        """Lengths l_0 (P, H) [m] without strain of the H position-controlled cables: paid-out wire.
 
-        l_0 + Δl(F, l_0) = L, with Δl of :meth:`~cdsm.Cable.elongation`. They do not depend on
-        ``original_length`` of the arm, which only affects K_θ.
+        l_0 + Δl(F, l_0) = L, with Δl of :meth:`~cdsm.Cable.elongation`. With given
+        tensions F they do not depend on ``original_length`` of the arm, which only affects K_θ.
         """
         motors = CableLaws(self.arm.cables, "unstrained")
         pairs = zip(self.cable_lengths, self.tensions, strict=True)

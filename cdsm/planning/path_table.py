@@ -44,10 +44,10 @@ def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
 
 
 def _numbered(plan: PathPlan, count: int) -> list[str]:
-    """Return the suffixes of the names of the target columns.
+    """Return the suffixes of the columns "stiffness" and "target", such as "stiffness xy".
 
-    They are xx, xy … for ``cartesian``, and 1, 2 … for several directions. The suffix is empty for
-    one direction.
+    They are xx, xy, … zz for a plan of ``cartesian``; 1, 2, … for a plan of several directions,
+    ``count`` in all; and empty for one direction.
     """
     if plan.direction is None:
         return [f" {a}{b}" for a in "xyz" for b in "xyz"]

@@ -105,7 +105,7 @@ class Evaluation:
 
     @cached_property
     def reserve_gradient(self) -> Array:
-        """Derivative of the reserve with respect to the tensions (C,) [m/rad²]."""
+        """Derivative of :attr:`reserve` (λ_min minus floor) by the tensions (C,) [m/rad²]."""
         return self.mode_gradient(self.eigenvectors[:, :1])
 
     def mode_gradient(self, v: Array) -> Array:

@@ -170,7 +170,10 @@ class Neighbourhood:
         return np.array(rows)
 
     def elastic(self, places: Array) -> Array:
-        """Compute the passive part of the potential U (P, 1) [N m]."""
+        """Compute the passive part of U (P, 1) [N m] at ``places``: Σ (gain of energy − F ΔL).
+
+        The sum is over the cables with locked motors. F is the tension at the posture.
+        """
         arm = self._pose.arm
         lengths = [arm.cable_lengths(q, check_limits=False) for q in self._angles(places)]
         longer = np.array(lengths) - self._pose.cable_lengths

@@ -26,17 +26,17 @@ class CriticalTension(ReadOnlyState):
     Attributes:
         posture: The fixed posture.
         wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
-        minimum: Lower bound of tension [N] at which the arm, stable below, buckles. It is inf if
-            the arm is stable up to the end of :attr:`examined`. It is the low end of
-            :attr:`examined` if the arm is stable at no bound.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at ``minimum``; at the bound
-            where the arm is softest if it does not buckle.
+        minimum: Lower bound of tension [N] at which the arm buckles as the bound rises: the end of
+            the first range in :attr:`stable`. It is inf if that range reaches the end of
+            :attr:`examined`, and the low end of :attr:`examined` if no range is stable.
+        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at ``minimum``. If the arm
+            does not buckle, at the bound of :attr:`bounds` with the smallest margin.
         tension: F (C,) [N] at the bound to which ``mode`` belongs.
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
         examined: Range [N] of the lower bound that was scanned. It ends where no tensions balance
             the arm within the domains of the elasticities. If tensions balance the arm at every
-            bound, it ends where the terms that grow with the tension decide whether K_θ is positive
-            definite.
+            bound, it ends where the terms of K_θ that grow with the tension outweigh the others,
+            and so decide alone whether the arm is stable.
         bounds: Lower bounds (n,) [N] that were evaluated.
         margins: Smallest eigenvalue of K_θ at each of these bounds (n,) [N m/rad].
     """

@@ -1,15 +1,19 @@
-"""Derivatives of the tips of a slowly loaded arm with friction, for changed loads or a changed arm.
+"""How the tip of a slowly loaded arm with friction moves at each load, if loads or arm change.
 
-A "rest" is an equilibrium between two loads, or at a load. Each rest solves r(q, a) = 0, where a
-are the natural lengths of the segments at the previous rest. A(q, T) are the natural lengths at
-this rest. A small change is followed from rest to rest: it changes the residual torque by δr, the
-posture by δq = −K⁻¹ δr with K = ∂r/∂q, and the natural lengths by δA(q, T). Holes that slide
-continue to slide, others continue to stick. The result is the derivative unless a hole is just
-about to start or to stop sliding.
+A "rest" is an equilibrium on the way: at a load, or between two loads. The natural length of a
+segment is its length without tension. At a rest, the joint angles q solve r(q, a) = 0: r is the
+residual torque, and a are the natural lengths of the segments at the rest before. Wire that slips
+through holes then changes the natural lengths to A(q, T), with the segment tensions T. A is the a
+of the next rest.
+
+A small change of loads or arm is followed from rest to rest. It changes r by δr, q by δq = −K⁻¹ δr
+with K = ∂r/∂q, and A by δA. Holes that slide continue to slide, others continue to stick. So the
+result is the derivative, unless a hole is just about to start or to stop sliding.
 
 For a change of the loads, the tangents at each rest give δr and δA. For a change of the arm, the
-changed arm is evaluated at the recorded postures, without a search: its natural lengths and
-residuals there give δa and δr. The error for a change of size δ is of order δ².
+changed arm is evaluated at the recorded q, without a search for its own equilibrium: its residual
+torques there give δr, and its natural lengths there the part of δA that does not come from δq. The
+error for a change of size δ is of order δ².
 """
 
 from __future__ import annotations

@@ -117,9 +117,10 @@ def checked_keywords(function: _Function) -> _Function:
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
-    """Wrap ``validated``, which pydantic checks, so that all its faults raise one GeometryError.
+    """Wrap ``validated`` so that all faults that pydantic finds raise one GeometryError.
 
-    ``kind`` is the record or function that is checked; the messages name its keywords.
+    pydantic checks the values given to ``validated`` before it builds a record or runs a function.
+    ``kind`` is this record or function; messages use the names of its keywords.
     """
 
     @wraps(validated)

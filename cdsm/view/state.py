@@ -106,13 +106,14 @@ class Shown(ReadOnlyState):
 
     Attributes:
         setting: Values of the controls.
-        condition: State of the arm.
-        problem: Error message, or why the arm is not stable; empty for a stable arm.
+        condition: Whether the arm is stable, or why not, or what went wrong: a :class:`Condition`.
+        problem: Error message, or why the arm is not stable. For a stable arm, a sentence if it
+            passes through itself; else empty.
         reference: Posture of the setting. None if its angles are invalid or beyond a limit, or
             sites of a cable coincide.
         tension: Tensions at the reference; None if none balance the arm.
-        stiffness: Stiffness at the posture that is shown; None if the tensions are missing or
-            outside the domain of the law.
+        stiffness: Stiffness at the posture that is shown. None if no tensions or no equilibrium
+            were found, or a tension is outside the domain of the law.
         rest: Equilibrium under the force; None if the arm does not sag, or none was found.
         history: Load history from the reference to ``rest``; None if the arm has no friction or
             ``rest`` is None.

@@ -30,7 +30,10 @@ class Worker:
         futures.wait([self._last] if self._last else [])
 
     def no_request_within(self, seconds: float) -> bool:
-        """Wait in the job for up to ``seconds`` [s]; return whether no request came meanwhile."""
+        """Wait up to ``seconds`` [s] for a request; return True if none came since the run began.
+
+        Only the job itself calls this.
+        """
         return not self._asked.wait(seconds)
 
     def close(self) -> None:

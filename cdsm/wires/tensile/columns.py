@@ -120,7 +120,7 @@ def _is_data(table: Table, k: int) -> bool:
 
 
 def _rows_of_data(table: Table, first: int) -> int:
-    """Count the rows of numbers of a table that follow each other, from row ``first`` on."""
+    """Count the unbroken run of rows of numbers that begins at row ``first`` of a table."""
     rows = range(first, len(table.rows))
     return next((k for k in rows if not _is_data(table, k)), len(table.rows)) - first
 
