@@ -9,7 +9,7 @@ from typing import Final, Literal, NamedTuple, final, get_args
 
 from cdsm.errors import InvalidInput
 from cdsm.geometry import CableRoute, Geometry
-from cdsm.geometry.checks import WIDEST, WIDEST_ANGLE, doubts_about_units
+from cdsm.geometry.checks import WIDEST, doubts_about_angle, doubts_about_units
 from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles
 from cdsm.support.validation import one_of, quantity, scalar, whole_number
 from cdsm.support.warning import warn
@@ -44,6 +44,8 @@ UNITS: Final = {
     "minimum": "N",
 }
 """SI unit of each variable that has one."""
+
+_WIDEST_ANGLE = 4.0 * math.pi  # a range of angles beyond this [rad] is probably in degrees
 
 
 @final
@@ -107,9 +109,10 @@ class Variable:
             if self.of in ("hole_radius", "disk_offset"):
                 for doubt in doubts_about_units(0.0, [(self.of, high, WIDEST)]):
                     warn(doubt)
-            most = max(-low, high)
-            if UNITS.get(self.of) == "rad" and most > WIDEST_ANGLE:
-                warn(f"{self.of} up to {most:g} rad: it looks as if it is in degrees; give rad.")
+            if UNITS.get(self.of) == "rad":
+                most = max(-low, high)
+                for doubt in doubts_about_angle(f"{self.of} up to", most, _WIDEST_ANGLE):
+                    warn(doubt)
         if self.of in _OF_CABLE and not isinstance(self.at, str):
             raise InvalidInput(self.of, f"needs at= the name of a cable, not {self.at!r}.")
         if self.of in _OF_JOINT and self.at is not None:

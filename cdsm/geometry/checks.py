@@ -18,8 +18,8 @@ LONGEST = 30.0
 WIDEST = 1.0
 """A hole radius or disk offset larger than this [m] is probably in millimetres."""
 
-WIDEST_ANGLE = 8.0 * math.pi
-"""A hole angle larger than this [rad] is probably in degrees."""
+_WIDEST_ANGLE = 8.0 * math.pi
+"""A hole angle larger than this [rad] is probably in degrees; angle and phase may add up to 4 π."""
 
 _SHORTEST = 1e-3  # an arm shorter than this [m] was probably given in metres where mm are taken
 
@@ -100,6 +100,17 @@ def doubts_about_units(length: float, sizes: Iterable[tuple[str, float, float]] 
     return [f"{', '.join(large)}: it looks as if lengths are in mm; give them in metres."]
 
 
+def doubts_about_angle(what: str, angle: float, most: float) -> list[str]:
+    """Return a doubt about the unit of an angle [rad] as a text in a list; the list may be empty.
+
+    The text begins with ``what``, such as "a hole angle is"; ``most`` is the largest plausible
+    magnitude [rad].
+    """
+    if abs(angle) <= most:
+        return []
+    return [f"{what} {angle:g} rad: it looks as if it is in degrees; give rad."]
+
+
 def doubts_about(geometry: Description) -> list[str]:
     """Return doubts as texts, e.g. lengths that look like millimetres, or shared holes."""
     sizes = [
@@ -109,10 +120,7 @@ def doubts_about(geometry: Description) -> list[str]:
     doubts = doubts_about_units(geometry.length, sizes)
     names = geometry.cable_names
     widest = max(geometry.cables, key=lambda cable: abs(cable.angle))
-    if abs(widest.angle) > WIDEST_ANGLE:
-        doubts.append(
-            f"a hole angle is {widest.angle:.4g} rad: it looks as if it is in degrees; give rad."
-        )
+    doubts += doubts_about_angle("a hole angle is", widest.angle, _WIDEST_ANGLE)
     groups = [
         " and ".join(names[c] for c in each) for each in sharing(geometry.cables, geometry.disks)
     ]

@@ -57,9 +57,8 @@ def identify(
 
     With ``arm = model_of(**p)``, the prediction K_i(p) is ``stiffness(arm.at(angles), tension,
     wrench).along(direction)``. For a measurement with a ``force`` it is ``weight_test(
-    arm.at(angles), tension, force, wrench=wrench).stiffness``. The search shortens a step to
-    parameters for which the arm is unstable, buckles under the force, or a tension leaves the
-    domain of a law.
+    arm.at(angles), tension, force, wrench=wrench).stiffness``. A step is shortened where the arm is
+    unstable, buckles under the force, or a tension leaves the domain of a law.
 
     A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
     its width determines the friction. Errors of its forces and tensions are converted to correlated
@@ -86,8 +85,7 @@ def identify(
         measurements: Stiffnesses and loops. They have at least as many numbers as there are
             parameters; a loop of n forces has n − 1 per axis, since its offset is unknown.
         free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
-            they are positive and a factor of 100 or more apart, the search uses the logarithm of
-            the parameter.
+            they are positive and a factor of 100 or more apart, the search is logarithmic.
         start: First value of each parameter. If not given, several searches start from points
             spread over the bounds (always the same points), and the best result is returned.
         tension_of: Function ``tension_of(posture, measurement, **p)`` that returns the tensions
