@@ -43,12 +43,12 @@ class Rows(NamedTuple):
     wire: Array  # as ``rigidity``, but of the laws ``Arm.wires``
 
     def take(self, rows: slice | Indices) -> Rows:
-        """Return these rows; an array with one row for all postures stays as it is."""
+        """Return the inputs of some ``rows``; an array with one row for all stays as it is."""
         return Rows(*(frozen(each[rows]) if len(each) > 1 else each for each in self))
 
 
 class Asked(NamedTuple):
-    """Requested quantities, by their numbers in :mod:`cdsm.batch.layout`."""
+    """Requested quantities; each quantity has a number, see :mod:`cdsm.batch.layout`."""
 
     start: Indices  # index in the record at which each quantity begins
     stored: Flags  # whether the kernel copies each quantity to its output

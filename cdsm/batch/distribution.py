@@ -64,7 +64,7 @@ class Tensions(ReadOnlyState):
         return to_dataset(self.arm, self.q, self.status, {"tension": self.values})
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table in SI, a row for each posture; needs xarray (MissingExtra)."""
+        """Return :meth:`to_xarray` as a table, a row per posture; needs xarray (MissingExtra)."""
         return tidy(self.to_xarray())
 
     def __len__(self) -> int:

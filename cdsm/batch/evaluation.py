@@ -43,10 +43,11 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 class Batch(ReadOnlyState, Named):
     """Quantities at B postures: ``batch["joint"]`` is K_θ (B, nv, nv); ``len(batch)`` is B.
 
-    The keys are :attr:`outputs`, also in ``"joint" in batch``, ``list(batch)`` and ``dict(batch)``.
-    Names, shapes and units are those of :class:`~cdsm.Posture` and :class:`~cdsm.Stiffness`, with
-    the posture as first axis. A quantity that does not exist is NaN; :attr:`status` says why. A
-    batch has no ``plot``, since its rows have no order. Plot the table of :meth:`to_pandas`, or
+    The keys are the names in :attr:`outputs`; ``"joint" in batch``, ``list(batch)`` and
+    ``dict(batch)`` use them too. Names, shapes and units are as in :class:`~cdsm.Posture` and
+    :class:`~cdsm.Stiffness`, with the posture as an additional first axis. A quantity that does not
+    exist is NaN; :attr:`status` says why. A batch has no ``plot``, since its rows have no order.
+    Plot the table of :meth:`to_pandas`, or
     compute a :func:`~cdsm.sweep` and plot it with :func:`cdsm.plots.plot_map`.
 
     Attributes:
@@ -60,7 +61,8 @@ class Batch(ReadOnlyState, Named):
             (D, 3); or None.
         status: :class:`Status` of each posture (B,).
         outputs: Names of the requested quantities.
-        values: The requested quantities, (B, …) each, in SI units: [m], [N], [rad].
+        values: The requested quantities, (B, …) each, in the order of ``outputs``, in SI units such
+            as [m], [N] and [rad].
     """
 
     arm: Manipulator
@@ -228,7 +230,10 @@ def _checked_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 def _checked_load(
     arm: Manipulator, q: Array, tension: Tensions | ArrayLike | None, wrench: ArrayLike | None
 ) -> tuple[Array | None, Array, Codes]:
-    """Return the given tensions (or None), the wrench, and the status before evaluation."""
+    """Return checked tensions (or None) and wrench, and the status (B,) before evaluation.
+
+    The status is the one of given :class:`Tensions`, else OK.
+    """
     if not isinstance(tension, Tensions):
         given = None if tension is None else given_tension(arm, tension, len(q))
         return given, given_wrench(wrench, len(q)), np.zeros(len(q), dtype=np.uint8)

@@ -27,11 +27,12 @@ from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
 _SHORT, _LONG = 2**11, 2**15
-"""If a posture's record has at least so many numbers, a block has only a half or a quarter of
-:data:`WIDTH` postures, so that the processor's cache holds it."""
+"""Size of a posture's record [numbers] from which a block has only 1/2, or 1/4, of :data:`WIDTH`
+postures, so that it fits into the processor's cache."""
 
 _CACHE, _FEWEST = 2**17, 4
-"""K_θ is kept for readings of as many blocks as have this count of numbers, but at least of 4."""
+"""Readings are computed for several blocks at a time: for as many as have K_θ and P of ``_CACHE``
+numbers, which fit into the processor's cache, but for at least ``_FEWEST``."""
 
 _BLOCK, _BATCH = 2**22, 2**27
 """While the kernel is not yet compiled, numpy computes batches whose records have at most
@@ -45,13 +46,12 @@ _INVERSE = QUANTITIES[layout.PSEUDOINVERSE + 1 :]
 
 
 class Evaluator:
-    """Evaluation of a batch in ranges of rows (postures); arguments as in :func:`cdsm.evaluate`.
+    """Evaluates a batch in ranges of rows (postures); arguments as in :func:`cdsm.evaluate`.
 
     ``tension`` is F (C,) or (B, C) [N]. ``bounds`` are the lower and the upper bounds of
-    distributed tensions, (C,) or (B, C) [N]. If neither is given, no output depends on tensions.
-    The private methods take the inputs of b postures as ``rows``, and the wanted quantities by
-    their numbers, ``wanted``. They fill the status ``found`` (b,) and the outputs ``out`` (b, n) in
-    place.
+    distributed tensions, (C,) or (B, C) [N]. If neither is given, no output may depend on tensions.
+    In the private methods, ``rows`` are the inputs of b postures, and ``wanted`` the numbers of the
+    wanted quantities. The methods fill the status ``found`` (b,) and the outputs ``out`` (b, n).
 
     Attributes:
         values: The outputs in the order of ``names``, filled by :meth:`run`.
@@ -112,12 +112,12 @@ class Evaluator:
         ]
 
     def run(self, status: Codes, threads: int | None) -> None:
-        """Fill the values and the status (B,) in several threads, each for ranges of rows."""
+        """Fill :attr:`values` and ``status`` (B,) in several threads; each takes ranges of rows."""
         count = checked_threads(threads)
         run_slices(lambda part: self._fill(part, status), len(self._out), self._block, count)
 
     def _fill(self, part: slice, status: Codes) -> None:
-        """Fill the values and the status (B,) of the range of rows ``part``."""
+        """Fill :attr:`values` and ``status`` (B,) in the range of rows ``part``."""
         rows, found, out = self._rows.take(part), status[part], self._out[part]
         if len(rows.low):
             self._distribute(rows, found, out)
@@ -146,7 +146,10 @@ class Evaluator:
             found[again], out[again] = codes, values
 
     def _search(self, rows: Rows, left: Indices, balance: Balance) -> Codes:
-        """Search for tensions of the rows ``left`` (r,); fill them and return status codes (r,)."""
+        """Search for the least tensions of the rows ``left`` (r,); return their status codes (r,).
+
+        The tensions go to ``balance.tension``.
+        """
         given, outcome = rows.take(left), np.empty(left.size, dtype=np.intp)
         arms, torque, tension = (each[left] for each in balance)
         search_tensions(arms, torque, given.low, given.high, tension, outcome)
@@ -205,7 +208,7 @@ class Evaluator:
                     values[:, self._place[name]] = math.nan
 
     def _with_rigidities(self, rows: Rows, found: Codes) -> Rows:
-        """Return the rows with the rigidities that only Python computes, if they are needed."""
+        """Return ``rows`` with rigidities, if they are needed and some law is a Python function."""
         if not (self._asks and len(rows.tension)):
             return rows
         model, usable = self._arm._model, found == OK
@@ -224,7 +227,7 @@ class Evaluator:
         found: Codes,
         out: Array,
     ) -> None:
-        """Fill readings from ``kept``, and update the status.
+        """Compute readings from the arrays ``kept``; fill ``out`` and update the status ``found``.
 
         ``names`` has two lists of readings: of the frictionless arm, and of the stuck arm.
         """

@@ -76,10 +76,9 @@ def evaluate_rows(
         asked: The requested quantities.
         width: W, the number of postures in a block.
         kept: Arrays to fill, from which the readings are computed.
-        balance: Moment arms and torques of the balance (b, …), to fill for UNDECIDED postures, and
-            tensions, to fill for POSTPONED postures. They have no rows if no tensions are
-            distributed.
-        out: The requested quantities in one row per posture; NaN where they do not exist.
+        balance: Arrays (b, …) to fill with the moment arms and torques of UNDECIDED postures, and
+            the tensions of POSTPONED ones. They have no rows if no tensions are distributed.
+        out: To fill: the requested quantities, one row per posture; NaN where they do not exist.
         status: On entry OK, or the reason why no tensions were found; on return the status of each
             posture. UNDECIDED: the guess gave neither the tensions nor a proof that there are none.
             POSTPONED: the guess gave the tensions, but for less than two thirds of the postures of
@@ -239,7 +238,7 @@ def evaluate_rows(
 
 @inlined
 def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
-    """For postures with the code OK, record in ``known`` that quantities 0…``number`` exist."""
+    """Set ``known`` to ``number`` + 1 where ``code`` is OK: quantities 0 to ``number`` exist."""
     for w in lanes(width):
         if code[w] == OK:
             known[w] = number + 1

@@ -21,7 +21,7 @@ _MOST = 4096
 
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
-    """Return the arrays of an arm for the kernel; unchecked joint limits become infinite."""
+    """Return an arm as arrays for the kernel; its joint limits are infinite if not checked."""
     model, endless = arm._model, np.full(arm.nv, np.inf)
     checked = flag("check_limits", check_limits)
     return Arm(
@@ -52,9 +52,10 @@ def postures(arm: Manipulator, q: ArrayLike) -> Array:
 
 
 def per_row(name: str, value: ArrayLike, rows: int, width: int, meaning: str, kind: str) -> Array:
-    """Check ``value``, (width,) for all postures or (rows, width); return it read-only.
+    """Check that ``value`` is (width,), for all postures, or (rows, width); return it read-only.
 
-    An error contains ``name`` and ``meaning``. ``kind`` is the quantity whose range is checked.
+    The message of an error contains ``name`` and ``meaning``. ``kind`` names the physical quantity,
+    which determines the allowed range.
     """
     array = number_array(name, value, kind)
     if array.shape not in ((width,), (rows, width)):

@@ -1,4 +1,4 @@
-"""Batches as labelled Datasets: dimensions and units of each quantity."""
+"""Convert a batch to a labelled Dataset, with dimensions and a unit for each quantity."""
 
 from __future__ import annotations
 

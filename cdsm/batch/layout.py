@@ -76,7 +76,10 @@ DIRECTIONAL: Final = tuple(name for name, (dims, _) in DIMENSIONS.items() if "di
 
 
 def shapes(nv: int, cables: int, directions: int) -> dict[str, tuple[int, ...]]:
-    """Return the shape of each quantity at one posture, for nv joint coordinates."""
+    """Return the shape of each quantity at one posture.
+
+    The arguments are the numbers of joints, of cables, and of directions u.
+    """
     sizes = {"joint": nv, "cable": cables, "direction": directions}
     sizes |= {"row": 4, "column": 4, "motion": 6, "axis": 3}
     return {

@@ -12,9 +12,10 @@ from cdsm.support.values import Array, frozen
 
 
 def rigidities(laws: CableLaws, tension: Array, usable: Flags) -> Array:
-    """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N]; ``usable`` (b,) marks valid rows.
+    """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N] in the rows that are ``usable`` (b,).
 
-    An entry is 0 for force-controlled cables and in invalid rows, and −1 outside a law's domain.
+    Other rows are 0, and so are cables that ``laws`` treats as force-controlled. Outside a law's
+    domain an entry is −1.
     """
     if not usable.any():  # a user-defined law may fail on empty arrays
         return frozen(np.zeros_like(tension))

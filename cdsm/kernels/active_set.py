@@ -10,11 +10,11 @@ the upper one,
 
     F = F₀ + T z,    T = 1 − J_L S⁻¹ J_Lᵀ,    S = J_Lᵀ J_L.
 
-For free cables z is given (it is 0), for the others F (it is the bound). A step exchanges the roles
-of z and F of one cable: a principal pivot in the tableau T. It costs C² operations; no equations
-are solved. When the search ends, tensions and multipliers are computed again from the
-bounds that it found, so errors of the steps do not accumulate. The caller verifies the optimum or
-the proof.
+For a free cable, z is known: it is 0. For the others, F is known: it is the bound. A step exchanges
+the roles of z and F of one cable: this is a principal pivot in the tableau T. It costs C²
+operations; no equations are solved. When the search ends, tensions and multipliers are computed
+again from the bounds that it found, so errors of the steps do not accumulate. The caller verifies
+the optimum or the proof.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 _DEPENDENT = 1e-10
-"""If T[p, p] is at most this, F_p cannot move while the free cables keep the balance."""
+"""If T[p, p] is at most this, F_p cannot change while the free cables keep the balance."""
 
 _ROUNDING = 1e-13
 """Rounding of a bound, relative to the largest tension, and of T, relative to its largest entry."""
@@ -39,7 +39,7 @@ _STEPS = 20
 """Maximum number of steps per cable; one or two are usual."""
 
 _NONE, _STUCK = -1, -2
-"""Values in place of a cable number: _NONE: no cable; _STUCK − p: p can't reach its bound."""
+"""Values in place of a cable number. _NONE: no cable. _STUCK − p: cable p can't reach its bound."""
 
 
 class State(NamedTuple):
@@ -48,14 +48,15 @@ class State(NamedTuple):
     Attributes:
         F: Tensions (C, W).
         y: Multipliers of balance, or a proof of infeasibility (nv, W).
-        side: Of each cable: 1 at its lower bound, −1 at its upper bound, 0 free (C, W).
+        side: 1 for a cable at its lower bound, −1 at its upper bound, 0 for a free one (C, W).
         z: Multipliers of the bounds (C, W).
         tableau: T (C, C, W).
-        system: S, b and J_Lᵀ, then S⁻¹ b and S⁻¹ J_Lᵀ (nv, nv + 1 + C, W).
+        system: S, b and J_Lᵀ side by side; b and J_Lᵀ become S⁻¹ b and S⁻¹ J_Lᵀ (nv, nv + 1 + C,
+            W).
         free: Σ J_cᵀ J_c over the free cables c, and a right-hand side (nv, nv + 1, W).
         cables: Scratch, such as a column and a row of the tableau (2, max(C, nv), W).
         scratch: Scratch (4, W). Its last row is the size below which an entry of T is zero.
-        chosen: The cable that moves to its bound, and the cable of the pivot (2, W).
+        chosen: The entering cable, which moves to its bound, and the cable of the pivot (2, W).
     """
 
     F: Array
@@ -89,11 +90,11 @@ def empty_state(nv: int, cables: int, width: int) -> State:
 
 @inner
 def search(J: Array, b: Array, low: Array, high: Array, state: State, width: Width) -> None:
-    """Find the least tensions F within bounds that balance the arm; fill F and y of the state.
+    """Find the least tensions F within bounds that balance the arm; fill F and y of ``state``.
 
-    J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and ``high`` are the bounds
-    (C, W). y are the multipliers of the balance, or a proof that no tensions exist. The caller must
-    verify both: rounding or the limit of steps may end the search too early.
+    J is J_L (C, nv, W), b (nv, W) the torque to balance; ``low`` and ``high`` (C, W) are the
+    bounds. y becomes the multipliers of the balance, or a proof that no tensions exist. The caller
+    must verify both, since rounding or the limit of steps may end the search too early.
     """
     _start(J, b, state, width)
     entering, nothing = state.chosen[0], state.scratch[3]
@@ -178,7 +179,7 @@ def _choose(
 def _step(low: Array, high: Array, state: State, width: Width) -> None:
     """Move the entering cables towards their bounds, until z of another cable would change sign.
 
-    Sets the second row of ``chosen`` to the cables of the pivots, or to _NONE without a pivot.
+    Sets the second row of ``state.chosen`` to the cable of the pivot, _NONE if there is no pivot.
     """
     F, z, side, T, rate = state.F, state.z, state.side, state.tableau, state.cables[0]
     sign, step, limit = state.scratch[0], state.scratch[1], state.scratch[2]
@@ -229,7 +230,7 @@ def _step(low: Array, high: Array, state: State, width: Width) -> None:
 
 @inner
 def _exchange(state: State, width: Width) -> None:
-    """Exchange z and F of the pivot cables in the tableau T."""
+    """Exchange the roles of z and F of the pivot cable in the tableau T (a principal pivot)."""
     T, pivot, inverse, nothing = state.tableau, state.chosen[1], state.scratch[0], state.scratch[3]
     column, row = state.cables[0], state.cables[1]
     for w in lanes(width):
@@ -260,10 +261,10 @@ def _exchange(state: State, width: Width) -> None:
 def _finish(J: Array, b: Array, low: Array, high: Array, state: State, width: Width) -> None:
     """Fill F and y of ``state``. Cables at a bound get this bound, ``low`` or ``high``.
 
-    Free cables get the least tensions that balance the torque b (nv, W). If the search ended
-    because cable p cannot reach its bound, y is the proof: J_c y = 0 for the other free cables c,
-    and J_p y is −1 if F_p is too low, 1 if it is too high. The residual torque is balanced twice
-    more, because the system squares the condition number of J_L.
+    Free cables get the least tensions that balance the rest of the torque b (nv, W). If the search
+    ended because cable p cannot reach its bound, y is the proof: J_c y = 0 for the other free
+    cables c, and J_p y is −1 if F_p is too low, 1 if it is too high. The solution is refined twice,
+    because the system of equations squares the condition number of J_L.
     """
     F, y, side, system, entering = state.F, state.y, state.side, state.free, state.chosen[0]
     sign, torque, nv = state.cables[0, 0], state.cables[1], np.uint64(y.shape[0])

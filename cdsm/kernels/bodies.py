@@ -7,7 +7,7 @@ acceleration of gravity γ,
 
     g_i = −γ·(z_i × r_i),    ∂g_i/∂θ_j = −γ·(z_i × (z_j × r_j)) if i is j or moves joint j.
 
-If joint j slides along s, M s replaces z_j × r_j, and z_j is 0.
+If joint j is prismatic with direction s, M s replaces z_j × r_j, and z_j is 0.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from cdsm.support.values import Array
 
 
 class Masses(NamedTuple):
-    """Masses that the joints carry, and the position of the tip; rows as in :class:`Tree`.
+    """Masses that the joints carry, and the position of the tip; rows as those of :class:`Tree`.
 
     Attributes:
         mass: Mass of the bodies fixed to each joint's frame, (nv+1,) [kg].
         centre: Centre of mass of these bodies in the joint's frame, (nv+1, 3) [m].
         gravity: Gravity in base axes (3,) [m/s²].
         tip: Row of the joint that moves the tip.
-        tip_joints: Coordinates of the joints that move the tip, base first.
+        tip_joints: Indices in q of the joints that move the tip, from the base on.
         rotation: Rotation of the tip in the frame of joint ``tip``, (3, 3).
         point: Origin of the tip in the frame of joint ``tip``, (3,) [m].
     """
@@ -55,8 +55,8 @@ def tip_jacobian(
 ) -> None:
     """Fill ``tip`` (4, 4, W) with the tip pose, and ``jacobian`` (6, nv, W) with J_X.
 
-    J_X is filled in the columns of joints that move the tip. The caller sets the other columns, and
-    the last row of the pose, to zero. ``rotation`` are the rotations of
+    Only the columns of joints that move the tip are filled. The caller sets the others, and the
+    last row of the pose, to zero before. ``rotation`` (nv+1, 3, 3, W) and ``frames`` are results of
     :func:`~cdsm.kernels.tree.forward_kinematics`.
     """
     origin, axis, slide, _ = frames
@@ -99,7 +99,7 @@ def gravity_torque(
 ) -> None:
     """Fill ``torque`` (nv, W) with g, and ``carried`` (nv+1, 7, W) with γ × z, z × r and M.
 
-    A row of ``carried`` belongs to a joint. The symbols are explained at the top of the module.
+    ``carried`` has a row for each joint. The symbols are explained at the top of the module.
     """
     parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
@@ -144,7 +144,10 @@ def gravity_torque(
 
 @inner
 def set_gravity_stiffness(parent: Indices, carried: Array, gravity: Array, width: Width) -> None:
-    """Fill ``gravity`` (nv, nv, W), i ≤ j, with ∂g/∂θ; :func:`gravity_torque` fills ``carried``."""
+    """Fill ``gravity`` (nv, nv, W) with ∂g_i/∂θ_j for i ≤ j, from ``carried``.
+
+    :func:`gravity_torque` fills ``carried``.
+    """
     for j in range(parent.shape[0] - 1, 0, -1):
         last = np.uint64(j)
         i = last

@@ -42,7 +42,7 @@ ROUNDING = 1e-12
 
 
 class Velocities(NamedTuple):
-    """Derivatives with respect to the force f, called velocities."""
+    """Derivatives of positions and lengths with respect to the force f, called velocities."""
 
     turn: Array  # angular velocity of each joint (nv+1, 3, W)
     origin: Array  # velocity of the origin of each joint (nv+1, 3, W)
@@ -53,7 +53,10 @@ class Velocities(NamedTuple):
 
 
 class SlipRates(NamedTuple):
-    """Terms of the breakaway load of each hole, stored for the next hole that holds, or the end."""
+    """Terms of the breakaway load of the holes that hold a cable.
+
+    They are in the row of the next site at which a section ends: another hole, or the cable's end.
+    """
 
     jump: Array  # |Ṫ′ − Ṫ|/F (P, W)
     turning: Array  # μ φ̇ (P, W)
@@ -128,7 +131,8 @@ def _set_velocities(
 ) -> None:
     """Fill ``rates`` with the velocities of joints and sites for one direction e of the force.
 
-    The joint motion θ̇ is ``motion`` (nv, D, W) for direction number ``direction``.
+    ``motion`` (nv, D, W) is the joint motion θ̇ for each of D directions; e has the index
+    ``direction``.
     """
     turn, moved, d = rates.turn, rates.origin, np.uint64(direction)
     for k in range(tree.order.shape[0]):
@@ -154,7 +158,7 @@ def _set_velocity(
 ) -> None:
     """Fill ``velocity`` (3, W) with v + ω × (x − o), the velocity of the ``point`` x of a link.
 
-    o, v ``moved`` and ω ``turn`` are origin, velocity of the origin and angular velocity.
+    ``origin`` is o, ``moved`` is its velocity v, and ``turn`` the angular velocity ω, (3, W) each.
     """
     for r in range(3):
         m, n = (r + 1) % 3, (r + 2) % 3
@@ -229,10 +233,10 @@ def _store_hole(
     slips: SlipRates,
     width: Width,
 ) -> None:
-    """Store the slip rates of the last hole that holds; the section after it ends at hole p.
+    """Where hole p holds cable c, store the slip rates of the hole before, in row p of ``slips``.
 
-    If hole p holds, it becomes the last hole, and the next section starts there. v (3, W) is the
-    direction of the cable after p.
+    The hole before is the last one that holds; the section after it ends at p. Then p becomes the
+    last hole, and the next section starts there. v (3, W) is the direction of the cable after p.
     """
     set_stiffness(wire, c, section, width)
     u, mu, own = section.before, holes.friction[p], holes.wrap[p]

@@ -1,8 +1,9 @@
 """Numba kernel of the chain problem: tensions along a cable that sticks and slips in its holes.
 
-Segment j of a cable lies between two holes. At a fixed posture it has the length l_j. From one
-posture to the next it keeps its natural length a_j, except for wire that slips through its holes.
-Coulomb friction (capstan) with ρ_j = exp(μ φ_j) at the hole between segments j and j + 1 demands
+Segment j of a cable lies between two holes. At a fixed posture it has the length l_j. The natural
+length a_j of its wire is its length at zero strain. From one posture to the next it changes only by
+wire that slips through the holes. Coulomb friction at the hole between segments j and j + 1, with
+the capstan ratio ρ_j = exp(μ φ_j), demands
 
     T_j/ρ_j ≤ T_{j+1} ≤ ρ_j T_j.
 
@@ -11,9 +12,9 @@ T_j = ρ_j T_{j+1}. Under T a segment has the natural length
 
     A_j(T) = (l_j − c_j (T − T⁰_j))/(1 + ε(T)).
 
-A series spring of compliance c_j, at rest at T⁰_j, exists only in the first segment. A_j falls with
-T. Wire is conserved: A_j(T_j) = a_j − s_j + s_{j−1}. With y = ln T all this is the optimality (KKT)
-conditions of
+A series spring of compliance c_j, unstrained at T⁰_j, exists only in the first segment. A_j falls
+with T. Wire is conserved: A_j(T_j) = a_j − s_j + s_{j−1}. With y = ln T, these conditions are the
+optimality (KKT) conditions of
 
     minimize Σ_j D_j(y_j),   D_j′ = a_j − A_j(e^y),   subject to |y_{j+1} − y_j| ≤ μ φ_j,
 
@@ -22,7 +23,7 @@ one solution. If one segment of a cable is under tension, all are.
 
 Dynamic programming on the chain solves it exactly ("taut string"). Let V_j(y) be the least sum over
 the segments from j to the end of the cable if segment j has y. Let y*_j be its minimizer. The
-choice of y_{j+1} is the point z nearest to y*_{j+1} within y ± μφ_j. Therefore
+best y_{j+1} is the point z nearest to y*_{j+1} within y ± μφ_j. Therefore
 
     V_j′(y) = D_j′(y) + V_{j+1}′(z) if y*_{j+1} is beyond y ± μφ_j,   and D_j′(y) if not.
 
@@ -35,7 +36,7 @@ V_j′ has one term for each segment up to the next hole that sticks. So N segme
 few holes slide, and O(N²) where all do.
 
 In this kernel 1 + ε(T) = base + softness · T. For other laws :mod:`cdsm.friction.chain_problem`
-repeats it with the tangent of the law, which is Newton's method.
+calls the kernel repeatedly with the tangent of the law, which is Newton's method.
 """
 
 from __future__ import annotations
@@ -51,14 +52,14 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 _ROUNDING = 2.0**-52
-"""Rounding of V_j′ over the natural lengths in its sum; of a tension over itself."""
+"""Relative rounding: of V_j′, relative to the natural lengths in its sum, and of a tension."""
 
 _ITERATIONS = 200
 """Maximum number of steps to find a root. Newton's method needs 3 to 6, bisection would need 60."""
 
 
 class Wire(NamedTuple):
-    """Segments of all cables (S,), one cable after the other, each from its motor to its end."""
+    """Arrays (S,) of the segments of all cables: cable by cable, each from its motor to its end."""
 
     length: Array  # l [m]
     natural: Array  # a before the slips [m]
@@ -73,8 +74,8 @@ class Wire(NamedTuple):
 def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
     """Compute D_j′ = a_j − A_j(T) [m] of segment j, and its derivative with respect to T [m/N].
 
-    A_j(T) is the natural length that fits segment j under T; a_j is its natural length before wire
-    slips.
+    a_j is the natural length of the segment before wire slips. A_j(T) is the natural length with
+    which the segment has the tension T.
     """
     stretch = wire.base[j] + wire.softness[j] * T
     natural = (wire.length[j] - wire.spring[j] * (T - wire.rest[j])) / stretch
@@ -85,7 +86,7 @@ def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
 def _next(T: float, ratio: float, best: float) -> float:
     """Return the tension [N] nearest to ``best`` that friction allows: T/ratio to T · ratio.
 
-    T is the tension of the segment before, and ``ratio`` ρ of the hole between the two.
+    T is the tension of the segment before, and ``ratio`` is exp(μ φ) of the hole between the two.
     """
     return min(max(best, T / ratio), T * ratio)
 
@@ -94,11 +95,11 @@ def _next(T: float, ratio: float, best: float) -> float:
 def _slope(
     wire: Wire, best: Array, j: int, last: int, tension: float
 ) -> tuple[float, float, float]:
-    """Compute V_j′ [m] at a tension of segment j, ∂V_j′/∂T [m/N], and a sum of natural lengths [m].
+    """Compute V_j′ [m] at ``tension`` T of segment j, ∂V_j′/∂T [m/N], and a scale of rounding [m].
 
     V_j and y*_i are explained at the top of the module. ``best`` (S,) has exp(y*_i) of the segments
-    i after j [N]; ``last`` is the cable's last segment. The sum is over the segments up to the next
-    hole that sticks; rounding errors are compared with it.
+    i after j [N]; ``last`` is the cable's last segment. The scale is the sum of the natural lengths
+    of the segments up to the next hole that sticks.
     """
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.natural[j])
@@ -115,7 +116,7 @@ def _slope(
 
 @inner
 def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
-    """Find the tension exp(y*_j) [N] at which V_j′ is zero, or 0 if V_j′ ≥ 0 at all tensions.
+    """Find the tension exp(y*_j) [N] of segment j at which V_j′ is zero; 0 if V_j′ is never < 0.
 
     The search starts at the tension ``near`` [N]. The other arguments are as for :func:`_slope`.
     """
@@ -152,13 +153,14 @@ def solve_chains(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Solve the chain problem of all cables; see :class:`Wire` for the arrays (S,).
 
-    ``start`` (C+1,) is the first segment of each cable, and the number of segments at the end.
-    ``forced`` (C,) [N] is the tension that a motor keeps in the first segment; NaN if the motor is
-    locked. Newton's method starts at the tensions ``near`` (S,) [N].
+    ``start`` (C+1,) is the index of the first segment of each cable, and S at the end. ``forced``
+    (C,) [N] is the tension that a motor keeps in the first segment; NaN if the motor is locked.
+    Newton's method starts at the tensions ``near`` (S,) [N].
 
     Returns:
-        T (S,) [N]; the slip (S,) [m] of natural length from each segment to the next one; whether
-        the hole between the two slides (S,). A hole without friction always slides.
+        Three arrays (S,): the tension T [N] of each segment, the natural length [m] of wire that
+        slips from it to the next segment, and whether the hole between them slides. A hole without
+        friction always slides.
     """
     wire = Wire(length, natural, base, softness, spring, rest, ratio)
     size = length.shape[0]
@@ -192,19 +194,20 @@ def chain_tangent(
     gradient: Array,
     friction_gradient: Array,
 ) -> Array:
-    """Compute ∂T/∂θ (S, nv) [N/rad] of the result of :func:`solve_chains`.
+    """Compute ∂T/∂θ (S, nv) [N/rad] of the tensions from :func:`solve_chains`.
 
-    A block is a run of segments joined by sliding holes. In it T_j = T_a exp(Σ ± μ φ) and its wire
-    is conserved. With g = ∂l/∂θ, the sum ψ_j = Σ ± μ ∂φ/∂θ from the first segment of the block to
-    segment j, and the compliance −∂A/∂T of the segments,
+    A block is a run of segments joined by sliding holes; its first segment is a. In it, T_j =
+    T_a exp(Σ ± μ φ), and wire is conserved. With g = ∂l/∂θ, the sum ψ_j = Σ ± μ ∂φ/∂θ over the
+    holes from segment a to segment j, and the compliance −∂A/∂T of the segments,
 
         ∂ln T_a/∂θ = Σ_j (g_j/(1 + ε_j) − compliance_j T_j ψ_j) / Σ_j compliance_j T_j,
         ∂T_j/∂θ = T_j (∂ln T_a/∂θ + ψ_j).
 
     A motor that controls the tension keeps T_a of the first block constant. A slack cable stays
-    slack. ``start`` and ``forced`` are those of :func:`solve_chains`, ``tension`` and ``slides``
-    (S,) its result. ``stretch`` is 1 + ε (S,), ``gradient`` g (S, nv) [m/rad], and
-    ``friction_gradient`` μ ∂φ/∂θ (S, nv) [1/rad] of the hole to the next segment.
+    slack. ``start`` and ``forced`` are arguments of :func:`solve_chains`, ``tension`` and
+    ``slides`` (S,) its results. ``stretch`` is 1 + ε (S,), ``compliance`` is (S,) [m/N],
+    ``gradient`` is g (S, nv) [m/rad], and ``friction_gradient`` is μ ∂φ/∂θ (S, nv) [1/rad] of the
+    hole to the next segment.
     """
     size, nv = gradient.shape
     result = np.zeros((size, nv))

@@ -52,9 +52,9 @@ def _set_wraps(
     """Fill ``wrap`` (P,) with φ of every hole of one posture; add ∂φ/∂θ to ``gradient``.
 
     Segment s is between the sites 2 s and 2 s + 1; ``hole`` (P,) is the segment before each hole.
-    ``span`` (S, 3) are indices into ``joint``: where the joints of a segment start, where those on
-    the path to its second site start, and where they end. ``own`` (P,) is a constant angle added to
-    φ. ``gradient`` is (P, nv), zero on entry.
+    The joints of a segment follow each other in ``joint``. ``span`` (S, 3) has the index of the
+    first one, of the first one on the path to the segment's second site, and the end. ``own`` (P,)
+    is a constant angle added to φ [rad]. ``gradient`` is (P, nv), zero on entry.
     """
     u, v = before.direction.reshape(3), after.direction.reshape(3)
     normal, arm = np.empty(3), np.empty(3)
@@ -84,12 +84,12 @@ def single_chains(
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
     """Compute the segments and wrap angles of one posture at q (nv,).
 
-    ``arm`` holds the fields of its tree, ``chains`` those of the routing of the segments, then the
-    arguments ``span``, ``hole`` and ``own`` of :func:`_set_wraps`.
+    ``arm`` holds the fields of :class:`Tree`. ``chains`` holds the fields of a :class:`Routing` in
+    which each segment is a cable, then ``span``, ``hole`` and ``own`` of :func:`_set_wraps`.
 
     Returns:
-        l (S,), ∂l/∂θ (S, nv), φ (P,), ∂φ/∂θ (P, nv), and the fields of :class:`Frames`, all
-        without the last axis.
+        l (S,) [m], ∂l/∂θ (S, nv), φ (P,) [rad], ∂φ/∂θ (P, nv), and the fields of :class:`Frames`,
+        all without the axis of postures.
     """
     tree, routing, (span, hole, own) = Tree(*arm), Routing(*chains[:5]), chains[5:]
     nv, rows, count = q.shape[0], tree.parent.shape[0], routing.fixed.shape[0]
@@ -126,8 +126,9 @@ def grip_rows(
 ) -> None:
     """Fill ``grip`` (B, C) [-] with Σ μ φ over the holes of each cable at angles q (B, nv) [rad].
 
-    ``routing`` has the segments as cables. ``cable`` (P,) is the cable in each hole, and
-    ``friction`` (P,) its μ. ``hole`` and ``own`` (P,) are as for :func:`_set_wraps`.
+    In ``routing``, each segment is a cable. Each hole has the friction coefficient ``friction``
+    (P,) and is a hole of the cable ``cable`` (P,). ``hole`` and ``own`` (P,) are the segment before
+    it, and the constant angle [rad] added to its wrap angle φ.
     """
     rows, nv = q.shape
     before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)

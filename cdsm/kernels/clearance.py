@@ -16,7 +16,7 @@ from cdsm.support.values import Array
 
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _CUTS = 40
-"""Steps of the golden-section search: the nearest point is found to 4e-9 of the segment."""
+"""Steps of the golden-section search: it finds the nearest point to 4e-9 of a segment's length."""
 
 
 @inner
@@ -44,9 +44,9 @@ def _between(p: Array, q: Array, r: Array, s: Array) -> float:
 
 @inner
 def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> float:
-    """Compute the distance [m] of segment pq from a disk; negative, from its rim, if pq pierces it.
+    """Compute the distance [m] of segment pq from a disk; if pq pierces it, −distance to the rim.
 
-    The disk has its ``centre`` (3,) [m], the unit vector ``axis`` (3,) and ``radius`` [m].
+    The disk is flat, with a ``centre`` (3,) [m], a unit normal ``axis`` (3,) and a ``radius`` [m].
     """
     z0 = z1 = 0.0
     for i in range(3):
@@ -89,9 +89,10 @@ def _radius(p: Array, q: Array, centre: Array, axis: Array, t: float) -> float:
 def _off(
     p: Array, q: Array, centre: Array, axis: Array, radius: float, z0: float, z1: float, t: float
 ) -> float:
-    """Compute the squared distance [m²] from the point p + t (q − p) to a disk of :func:`_to_disk`.
+    """Compute the squared distance [m²] from the point p + t (q − p) to a disk.
 
-    z0 and z1 are the heights of p and q above the plane of the disk [m].
+    The disk is given as for :func:`_to_disk`; z0 and z1 are the heights of p and q above its plane
+    [m].
     """
     z = z0 + t * (z1 - z0)
     out = max(_radius(p, q, centre, axis, t) - radius, 0.0)
@@ -127,23 +128,25 @@ def clearance_rows(
     distance: Array,
     nearest: Indices,
 ) -> None:
-    """Fill the smallest distances of cables (B, 3) [m], and the pairs that have them (B, 3, 2).
+    """Fill the smallest distances of cables at B postures, and the pairs of bodies that have them.
 
     Args:
         tree: The joints.
         routing: Points of the arm: cable sites, ends of bones, centres of disks and points on
-            their axes.
-        segment: Cable, and both ends among the points, of each segment (S, 3).
-        bone: Both ends of each bone (n, 2).
+            their axes. Indices of points below refer to it.
+        segment: Number of the cable, and indices of both end points, of each segment (S, 3).
+        bone: Indices of both end points of each bone (n, 2).
         bone_radius: Radius of each bone (n,) [m].
-        disk: Centre, and a point on the axis 1 m from it, of each disk (D, 2).
+        disk: Indices of two points of each disk: its centre, and a point on its axis 1 m from the
+            centre (D, 2).
         disk_radius: Radius of each disk (D,) [m].
         own: 1 or 2 if the first or second end of a segment is in a hole of the disk, else 0 (S, D).
         q: Joint angles (B, nv) [rad].
-        distance: Three distances. The first is between the axes of two cables. The second is from
-            the axis of a cable to the surface of a bone. The third is from the axis of a cable to a
-            disk, or to the rim of a disk in whose hole it is.
-        nearest: Indices of two segments, of segment and bone, and of segment and disk; −1: no pair.
+        distance: To fill: three distances (B, 3) [m]. The first is between the axes of two cables.
+            The second is from the axis of a cable to the surface of a bone. The third is from the
+            axis of a cable to a disk, or to the rim of a disk in whose hole it is.
+        nearest: To fill: the pair for each distance (B, 3, 2), as indices of two segments, of
+            segment and bone, and of segment and disk; −1 if there is no such pair.
     """
     rows, nv = q.shape
     count = tree.parent.shape[0]

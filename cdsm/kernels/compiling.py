@@ -1,8 +1,8 @@
 """Compile kernels: four decorators based on numba's njit, and ranges for fast loops.
 
 Python runs the first calls of a kernel, since compiling takes half a minute. A posture of five
-joints takes 2 ms in Python, and 0.03 ms in a wide block of postures; compiled, it takes 25 µs and
-3 µs. Python and compiled kernels give the same bits.
+joints takes 2 ms in Python, or 0.03 ms as part of a wide block. Compiled, it takes 25 µs, or 3 µs
+in a block. Python and compiled kernels give the same bits.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class _Disjoint(Compiler):
-    """Compile kernels that never write to an array which overlaps another argument.
+    """Compiler of kernels that never write to an array which overlaps another argument.
 
-    LLVM then omits the loops for overlapping arrays. Kernels compile in two thirds of the time and
-    run in three quarters of it.
+    LLVM then omits code for overlapping arrays. Kernels compile in two thirds of the time, and run
+    in three quarters of the time.
     """
 
     def define_pipelines(self) -> Any:
@@ -45,9 +45,9 @@ class _Disjoint(Compiler):
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a kernel; numba caches the result on disk.
+    """Compile a kernel that Python calls; numba caches the result on disk.
 
-    fastmath is off, since it may remove NaN. Division by zero gives inf or NaN, as in numpy.
+    numba's fastmath is off, since it may remove NaN. Division by zero gives inf or NaN.
     """
     return _patient(_compile(function))
 
@@ -55,7 +55,7 @@ def compiled(function: _Function) -> _Function:
 def inner(function: _Function) -> _Function:
     """Compile a kernel that only kernels call: it has no entry for Python and compiles faster.
 
-    An array that it writes overlaps none of its other arguments.
+    An array to which it writes must not overlap another argument.
     """
     options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return _compile(function, pipeline_class=_Disjoint, **options)
@@ -64,7 +64,7 @@ def inner(function: _Function) -> _Function:
 def threaded(function: _Function) -> _Function:
     """Compile a kernel that releases the GIL, for kernels that take milliseconds.
 
-    An array that it writes overlaps none of its other arguments.
+    An array to which it writes must not overlap another argument.
     """
     return _patient(_compile(function, nogil=True, pipeline_class=_Disjoint))
 
@@ -99,15 +99,16 @@ def _compile(function: _Function, **options: Any) -> _Function:
 class CacheFile(IndexDataCacheFile):
     """Cache of one kernel on disk: an index of signatures, and a file for each.
 
-    numba numbers the files. Two processes that compile a kernel at the same time then write one
-    file for two signatures, and a third one runs the wrong machine code. Here names are unique.
+    numba numbers the files. If two processes compile a kernel for different signatures at the same
+    time, both may write the same file, and a third process runs the wrong machine code. Here names
+    are unique.
     """
 
     def _data_name(self, number: int) -> str:
         return f"{Path(self._index_name).stem}.{uuid.uuid4().hex}.nbc"
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
-        """Save the index, and remove files that it does not name: those of older sources."""
+        """Save the index, and remove the files of older sources, which it does not name."""
         super()._save_index(overloads)  # type: ignore[no-untyped-call]
         for path in Path(self._cache_path).glob(
             f"{glob.escape(Path(self._index_name).stem)}.*.nbc"
@@ -118,7 +119,10 @@ class CacheFile(IndexDataCacheFile):
 
 @cache
 def _sources(file: str) -> str:
-    """Return a digest of all sources in the folder of a file; the cache compares it."""
+    """Return a digest of all Python files in the folder of ``file``.
+
+    A cached kernel is valid only if the digest is unchanged.
+    """
     digest = hashlib.sha256()
     for path in sorted(Path(file).parent.glob("*.py")):
         digest.update(path.read_bytes())
@@ -139,13 +143,13 @@ def _own_folder() -> str:
 
 
 _NEW, _KEPT = (0.5, 2**15), (0.02, 2**12)
-"""Python runs a kernel for so many seconds in total, and on arrays of up to so many numbers.
+"""Largest total time [s] that Python runs a kernel, and largest array size in such a call.
 
 The first pair is for a new kernel, the second for one whose compiled form is on the disk.
 """
 
 _PATIENCE = 8.0
-"""Python runs a new kernel on blocks wider than :data:`WIDTH` for so many seconds in total."""
+"""Largest total time [s] that Python runs a new kernel on blocks wider than :data:`WIDTH`."""
 
 _at_once = False
 
@@ -162,7 +166,7 @@ def at_once() -> Iterator[None]:
 
 
 def _patient(function: _Function) -> _Function:
-    """Let Python run a kernel until it pays to load it from the disk or to compile it."""
+    """Return a kernel that Python runs until loading it from the disk or compiling it pays."""
     if not isinstance(function, Dispatcher):  # compilation is switched off
         return function
     kernel: Any = function
@@ -191,9 +195,9 @@ def _patient(function: _Function) -> _Function:
             spent += time.thread_time() - start
 
     def choose(*arguments: Any) -> Callable[..., Any]:
-        """Return the function that runs this call: Python, or the kernel once loaded or compiled.
+        """Return the function that runs this call: a Python function or the compiled kernel.
 
-        numba asks for it when no kernel is compiled for these types of arguments.
+        numba calls this when the kernel is not compiled for these types of arguments.
         """
         start = time.thread_time()
         wide = (dict(zip(names, arguments, strict=False)).get("width") or 1) > WIDTH
@@ -212,7 +216,7 @@ def _patient(function: _Function) -> _Function:
 
 
 def is_new(kernel: Callable[..., Any]) -> bool:
-    """Check whether Python would run the next call of ``kernel`` with a block wider than WIDTH."""
+    """Return whether Python would run the next call of ``kernel`` on a block wider than WIDTH."""
     new: Callable[[], bool] = getattr(kernel, "is_new", lambda: False)
     return new()
 
@@ -238,7 +242,7 @@ def _announce() -> None:
 
 
 WIDTH = 64
-"""Largest number of postures in a block of a compiled kernel: several vector registers."""
+"""Largest number of postures in a block of a compiled kernel: it fills several vector registers."""
 
 Index = int | np.integer[Any]
 """Index in a loop over postures. If it may be negative, numba does not vectorise the loop."""
@@ -247,24 +251,24 @@ Width = int | None
 """Number of postures side by side in a block, or None for one posture.
 
 The last axis of all arrays of a block is the posture. A loop over it is vectorised, so a block of
-32 postures takes about ten times as long as one. For None, kernels are compiled a second time,
-with a constant 1: loops over one posture then vanish. Both give the same bits.
+32 postures takes only about ten times as long as one. For None, kernels are compiled a second
+time, with the constant 1, which removes the loops over postures. Both give the same bits.
 """
 
 
 @inner
 def lanes(width: Width) -> Iterable[Index]:
-    """Return the range of the postures of a block; indices are unsigned, as in :func:`upwards`."""
+    """Return the range of the postures of a block; its indices are unsigned (:func:`upwards`)."""
     return range(np.uint64(1)) if width is None else range(np.uint64(width))
 
 
 @inner
 def axes(count: int, width: Width) -> Iterable[Index]:
-    """Return range(3), whose length LLVM knows for one posture but not for a block.
+    """Return range(3); LLVM knows its length for one posture (``width`` None), but not for a block.
 
-    LLVM unrolls loops of a known length. For one posture they then run two or three times as fast;
-    for a block they would take half as long again to compile, and run no faster. ``count`` is 3, a
-    number that LLVM does not know.
+    LLVM unrolls loops of a known length. For one posture they then run two or three times as fast.
+    For a block they would not run faster, but compile half as long again. ``count`` must be 3; LLVM
+    does not know its value.
     """
     return range(np.uint64(3)) if width is None else range(np.uint64(count))
 

@@ -2,8 +2,8 @@
 
     min ½‖F‖²   subject to   J_Lᵀ F = J_Xᵀ W − g   and   low ≤ F ≤ high.
 
-Most guesses of a block of postures are optimal. The other postures are solved in blocks of their
-own, by a kernel that is compiled when it is first needed.
+For most postures of a block, a quick guess of the tensions is optimal. The other postures are
+solved in blocks of their own, by a kernel that is compiled when it is first needed.
 """
 
 from __future__ import annotations
@@ -30,18 +30,19 @@ from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 
 OPTIMAL, INFEASIBLE, UNDECIDED = range(3)
-"""Outcome of a search: certified tensions, a proof that there are none, or neither."""
+"""Outcome of a search: OPTIMAL tensions, a proof that there are none (INFEASIBLE), or neither."""
 
 _NUMBERS = 2**17
-"""Largest count of numbers in the arrays of a searched block, so that they fit the cache."""
+"""Largest total size of the arrays of a block, so that they fit into the processor's cache."""
 
 
 @inner
 def set_torque(jacobian: Array, force: Array, opposed: Array, torque: Array, width: Width) -> None:
-    """Fill ``torque`` (nv, W) with Jᵀ f − τ: J is (m, nv, W), f ``force`` (m, W), τ ``opposed``.
+    """Fill ``torque`` (nv, W) with Jᵀ f − τ.
 
-    With J_X, W and g it is the torque J_Xᵀ W − g that the cables must balance. With J_L, F and this
-    torque it is the residual of Eq. 13.
+    ``jacobian`` is J (m, nv, W), ``force`` f (m, W) and ``opposed`` τ (nv, W). If these are J_X,
+    the wrench and g, the result is the torque that the cables must balance. If they are J_L, F and
+    that torque, the result is the residual of Eq. 13.
     """
     for i in upwards(0, torque.shape[0]):
         for w in lanes(width):
@@ -53,7 +54,7 @@ def set_torque(jacobian: Array, force: Array, opposed: Array, torque: Array, wid
 
 @inner
 def set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
-    """Copy J_L (C, nv, W); moment arms below ``smallest`` [m] are rounding and become zero."""
+    """Copy J_L ``J`` (C, nv, W) to ``arms``; moment arms below ``smallest`` [m] become zero."""
     for c in upwards(0, J.shape[0]):
         for i in upwards(0, J.shape[1]):
             for w in lanes(width):
@@ -62,7 +63,7 @@ def set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
 
 @inner
 def keep_balance(arms: Array, torque: Array, balance: Balance, row: Index, w: Index) -> None:
-    """Copy moment arms (C, nv, W) and torque (nv, W) of posture w to row ``row`` of ``balance``."""
+    """Copy ``arms`` (C, nv, W) and ``torque`` (nv, W) of posture w to a ``row`` of ``balance``."""
     for i in upwards(0, torque.shape[0]):
         balance.torque[row, i] = torque[i, w]
     for c in upwards(0, arms.shape[0]):
@@ -85,8 +86,8 @@ def distribute(
     """Fill ``tension`` (C, W) with a guess of the least tensions, and verify it.
 
     The guess is the optimum where ``certificate.certified`` is 1 and ``guess.failed`` is −1. J is
-    J_L (C, nv, W), with moment arms of rounding set to zero; b is the torque to balance (nv, W);
-    ``low`` and ``high`` are the bounds (C, W).
+    J_L (C, nv, W), where moment arms that are only rounding errors are zero. b (nv, W) is the
+    torque to balance. ``low`` and ``high`` are the bounds (C, W).
     """
     guess_tensions(blocks, J, b, low, high, guess, width)
     set_multipliers(blocks, J, guess.F, guess, guess.y, width)
@@ -112,9 +113,9 @@ def single_guess(
 ) -> tuple[Array, bool]:
     """Guess the least tensions (C,) [N] of one posture, and say whether they are optimal.
 
-    The first four arguments are the fields of :class:`Blocks`; the others are J_X, J_L, g, W and
-    the bounds. Moment arms below ``smallest`` [m] become zero. The result has the same bits as in a
-    block of postures.
+    The first four arguments are the fields of :class:`Blocks`, which are followed by J_X, J_L, g, W
+    and the bounds (C,). Moment arms below ``smallest`` [m] become zero. The result has the same
+    bits as in a block of postures.
     """
     count, nv = length_jacobian.shape
     blocks = Blocks(row, row_start, cable, cable_start)
@@ -134,11 +135,11 @@ def single_guess(
 def search_tensions(
     J: Array, b: Array, low: Array, high: Array, tension: Array, outcome: Indices
 ) -> None:
-    """Search for the least tensions of r postures whose guess is not optimal.
+    """Search for the least tensions of r postures for which the guess is not optimal.
 
-    J is (r, C, nv) and b (r, nv), as in :func:`distribute`. The bounds ``low`` and ``high`` are
-    (r, C), or (1, C) for all postures. Fills the tensions (r, C) and the outcome (r,). The tensions
-    are valid only if the outcome is OPTIMAL.
+    J is J_L (r, C, nv), and b (r, nv) the torque to balance. The bounds ``low`` and ``high`` are
+    (r, C), or (1, C) for all postures. Fills ``tension`` (r, C) and ``outcome`` (r,). Tensions are
+    valid only if the outcome is OPTIMAL.
     """
     rows, count, nv = J.shape
     width = max(1, min(WIDTH, rows, _NUMBERS // (count * (count + nv))))

@@ -38,14 +38,16 @@ def stiffness_of_draws(
     length_jacobian: Array,
     torque: Array,
 ) -> None:
-    """Fill the last five arrays: K_θ, J_v, the tip, J_L and J_Xᵀ W − g of N arms.
+    """Fill the last five arguments with results for N arms.
 
-    Their shapes are (N, nv, nv), (N, 3, nv), (N, 3), (N, C, nv) and (N, nv).
+    ``joint_stiffness`` is K_θ (N, nv, nv), ``tip_rows`` J_v (N, 3, nv), ``tips`` the tip position
+    (N, 3), ``length_jacobian`` J_L (N, C, nv) and ``torque`` J_Xᵀ W − g (N, nv).
 
-    All arms share the first arguments: ``first`` (C+1,) is the first site of each cable, ``series``
-    and ``rest`` (C,) are 1/k_series and the tension at rest of the springs, ``wrench`` is W. Each
-    arm has its own q (N, nv), tensions, EA (1 + ε) and leads (N, C), masses (N, nv+1), and sites,
-    joint origins, centres of mass and tip (N, …).
+    All arms share the arguments before ``q``: ``first`` (C+1,) is the first site of each cable,
+    ``series`` (C,) is 1/k_series, ``rest`` (C,) the tension of the unstrained springs, ``wrench``
+    W (6,). The others have an entry for each arm: q (N, nv), tensions F, ``rigidity`` EA (1 + ε)
+    and leads (N, C), masses (N, nv+1), and the positions of sites, joint origins, centres of mass
+    and tip (N, …).
     """
     row, tip_joints, count = routing.row, masses.tip_joints, tension.shape[1]
     fixed, none = np.empty(count), np.zeros(count)

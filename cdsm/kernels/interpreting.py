@@ -1,4 +1,4 @@
-"""Kernels as functions of Python, which runs the calls that are not worth compiling.
+"""Turn kernels into Python functions, which run the calls that are not worth compiling.
 
 For one posture, Python runs a kernel as it is written. For a block of postures, it runs a loop over
 them as operations of numpy on the last axis of its arrays:
@@ -26,7 +26,10 @@ from numba.core.dispatcher import Dispatcher
 
 
 def python_kernel(function: FunctionType, wide: bool) -> Callable[..., Any]:
-    """Return a kernel and those it calls as Python functions, for one posture or a wide block."""
+    """Return a kernel as a Python function, for a block of postures if ``wide``, else for one.
+
+    The kernels that it calls become Python functions too.
+    """
     kernel: Callable[..., Any] = _names(function.__module__, wide)[function.__name__]
     return kernel
 
@@ -55,12 +58,12 @@ def _names(module: str, wide: bool) -> dict[str, Any]:
 
 
 def _atan2(y: Any, x: Any) -> Any:
-    """Return angles with the bits of the C library; numpy may compute other ones."""
+    """Compute atan2(y, x) with the bits of the C library; numpy may compute other bits."""
     return np.asarray(np.frompyfunc(math.atan2, 2, 1)(y, x), dtype=np.float64)[()]
 
 
 def _max(*values: Any) -> Any:
-    """Return the largest value, with Python's rules for NaN and for zeros with a sign."""
+    """Return the elementwise maximum, with Python's rules for NaN and for signed zeros."""
     return reduce(lambda a, b: np.where(b > a, b, a), values)
 
 
@@ -87,7 +90,7 @@ _OPERATIONS = {
     "_where": np.flatnonzero,
     "_numbers": np.arange,
 }
-"""Names that the kernels use after the change, and their values."""
+"""Names that the rewritten kernels use, with the functions behind them."""
 
 
 def _call(name: str, *arguments: ast.expr) -> ast.Call:
@@ -99,7 +102,7 @@ def _found(node: ast.AST) -> set[str]:
 
 
 class _Loops(ast.NodeTransformer):
-    """Replaces each loop over postures by operations on arrays, unless its order matters."""
+    """Replace each loop over postures by operations on arrays, unless its order matters."""
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         node.decorator_list = []
@@ -124,16 +127,16 @@ class _Loops(ast.NodeTransformer):
 
 
 class _Operations(ast.NodeTransformer):
-    """Replaces operations of Python on numbers by those of numpy on arrays.
+    """Replace Python's operations on numbers by numpy's operations on arrays.
 
-    ``arrays`` are the names of values that depend on the posture; None for all names.
+    ``arrays`` are the names of the variables that have a value per posture; None for all names.
     """
 
     def __init__(self, arrays: set[str] | None) -> None:
         self.arrays = arrays
 
     def line(self, node: ast.stmt) -> ast.stmt | None:
-        """Return ``node``, a line of a loop over postures, as one operation on all postures.
+        """Rewrite ``node``, a line of a loop over postures, as one operation on all postures.
 
         Returns None if the loop must run posture by posture.
         """
@@ -163,7 +166,7 @@ class _Operations(ast.NodeTransformer):
         return node
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
-        """Make ``node`` assign copies of parts of arrays, since a view changes with its array."""
+        """Make ``node`` assign copies instead of views, since a view changes with its array."""
         self.generic_visit(node)
         if not isinstance(node.targets[0], ast.Subscript):
             copies = [

@@ -1,11 +1,12 @@
 """Numba kernels of dense linear algebra for blocks of small matrices; the last axis is the posture.
 
 LAPACK solves one matrix after the other, and its own threads compete for cores with the threads
-that run these kernels: the inverse of an 80×80 matrix then took 16 ms. Microseconds for one matrix
-alone / in a block of 32 / in LAPACK called from a kernel:
+that run these kernels: the inverse of an 80×80 matrix then took 16 ms. The table compares times in
+microseconds for one n×n matrix: alone / in a block of 32 / in LAPACK called from a kernel. The
+linear system has 10 right sides.
 
     n                                      5               10               20              40
-    linear system, 10 right  0.3 / 0.1 / 1.0  0.9 / 0.4 / 2.0  3.3 / 1.8 / 4.9     14 / 9 / 13
+    linear system            0.3 / 0.1 / 1.0  0.9 / 0.4 / 2.0  3.3 / 1.8 / 4.9     14 / 9 / 13
     smallest eigenvalue      0.6 / 0.2 / 1.5  1.5 / 0.4 / 4.5   4.8 / 1.7 / 13    21 / 11 / 54
 """
 
@@ -24,7 +25,7 @@ _STEPS = 200
 _ROUNDING = 2.0**-52
 
 _LEAST = 1e-90
-"""Smaller entries of a tridiagonal matrix count as zero."""
+"""Entries of a tridiagonal matrix below this magnitude count as zero."""
 
 _NOTHING = 1e-30
 """Off-diagonal entries below this fraction of the largest entry count as zero.
@@ -43,8 +44,8 @@ Exchanges are slow, since they are made posture by posture. K_θ of a stable arm
 def eliminate(M: Array, pivots: Array, width: Width) -> None:
     """Solve A X = B: replace the columns B, right of A (n, n) in M (n, n + k, W), by A⁻¹ B.
 
-    ``pivots`` (4, W) returns the smallest and the largest pivot in its first rows; the others are
-    scratch. If a pivot is zero, B is meaningless.
+    The first two rows of ``pivots`` (4, W) become the smallest and the largest magnitude of a
+    pivot; the other two are scratch. If a pivot is zero, the result is not valid.
     """
     n, columns = M.shape[0], M.shape[1]
     smallest, largest, factor, inverse = pivots[0], pivots[1], pivots[2], pivots[3]
@@ -138,10 +139,11 @@ def smallest_eigenvalue(A: Array, scratch: Array, x: Array, width: Width) -> Non
 def _set_derivatives(
     d: Array, e: Array, x: Array, sums: Array, scratch: Array, width: Width
 ) -> None:
-    """Fill ``sums`` (3, W): the least ratio g of leading minors of T − x, then G and H.
+    """Fill the rows of ``sums`` (3, W) with min g, G = Σ 1/(λ − x) and H = Σ 1/(λ − x)².
 
-    The matrix T has the diagonal d and the off-diagonal e, (n, W) each, and the eigenvalues λ. Each
-    g is a leading minor divided by the minor before it, G = Σ 1/(λ − x) and H = Σ 1/(λ − x)².
+    λ are the eigenvalues of the tridiagonal matrix T with diagonal d and off-diagonal e, (n, W)
+    each. A ratio g is a leading minor of T − x divided by the leading minor before it: if the
+    smallest g is positive, x (W,) is below all λ.
     """
     least, G, H = sums[0], sums[1], sums[2]
     # inverse, slope and bend are 1/g, g′/g and g″/g of the row above
@@ -172,9 +174,9 @@ def _set_derivatives(
 
 @inner
 def _tridiagonalise(A: Array, d: Array, e: Array, scratch: Array, width: Width) -> None:
-    """Fill diagonal d (n, W) and off-diagonal e (n, W) of similar tridiagonal matrices; e[0] is 0.
+    """Fill diagonal d and off-diagonal e, (n, W) each, of a tridiagonal matrix similar to A.
 
-    ``scratch`` is (2 n + 4, W).
+    A is (n, n, W) and is overwritten. e[0] is 0; ``scratch`` is (2 n + 4, W).
     """
     n = np.uint64(A.shape[0])
     v, u = scratch[4 : 4 + n], scratch[4 + n :]
@@ -229,7 +231,7 @@ def _tridiagonalise(A: Array, d: Array, e: Array, scratch: Array, width: Width) 
 
 @inner
 def _add_product(A: Array, v: Array, first: Index, u: Array, width: Width) -> None:
-    """Add A v to u (n, W) for symmetric A (n, n, W); rows and columns before ``first`` count as 0.
+    """Add A v to u (n, W) for symmetric A (n, n, W); rows and columns before ``first`` are ignored.
 
     This loop has a kernel of its own since LLVM must know that A, v and u do not overlap.
     """

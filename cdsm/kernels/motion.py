@@ -1,4 +1,4 @@
-"""Numba kernels of velocities and accelerations of one posture, along q̇ = z, q̈ = 0."""
+"""Numba kernels of velocities and accelerations at one posture, for joint motions q̇ = z, q̈ = 0."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdsm.support.values import Array
 
 
 class Motion(NamedTuple):
-    """Motion of all joint frames along q̇ = z, (nv+1, 3) each."""
+    """Motion of all joint frames if q̇ = z and q̈ = 0; arrays are (nv+1, 3)."""
 
     turning: Array  # angular velocity ω
     turning_rate: Array  # ω̇
@@ -40,8 +40,8 @@ def move(
 ) -> None:
     """Fill ``velocity`` (3,) with ω × r, and ``acceleration`` (3,) with ω̇ × r + ω × (ω × r).
 
-    r is ``arm`` (3,), from the origin of a moving frame to a point; ω is ``turning`` (3,), ω̇
-    ``turning_rate`` (3,).
+    This is the motion of a point relative to the origin of its frame. r is ``arm`` (3,), from the
+    origin to the point; ω is ``turning`` (3,), and ω̇ is ``turning_rate`` (3,), of the frame.
     """
     cross(turning, arm, velocity)
     w, e, v, r = turning, turning_rate, velocity, arm
@@ -54,9 +54,10 @@ def move(
 def set_motion(
     tree: Tree, origin: Array, axis: Array, slide: Array, z: Array, motion: Motion
 ) -> None:
-    """Fill ``motion`` of all joint frames for the joint velocities z (nv,), from the base on.
+    """Fill ``motion`` with the motion of all joint frames for the joint velocities z (nv,).
 
     ``origin``, ``axis`` and ``slide`` (nv+1, 3) are the fields of :class:`Frames` of one posture.
+    The row of the base in ``motion`` is zero on entry.
     """
     turning, rate, velocity, acceleration = motion
     arm, v, a, way = np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
@@ -82,9 +83,9 @@ def set_motion(
 
 @inner
 def to_frame(rotation: Array, vector: Array, turned: Array) -> None:
-    """Fill ``turned`` (3,) with Rᵀ v: the ``vector`` v in base axes, in the axes of a joint frame.
+    """Fill ``turned`` (3,) with Rᵀ v, which gives a vector v in the axes of a joint frame.
 
-    R is ``rotation`` (3, 3).
+    ``vector`` is v (3,) in base axes, and ``rotation`` (3, 3, 1) the rotation R of the frame.
     """
     for r in range(3):
         turned[r] = (
@@ -96,10 +97,11 @@ def to_frame(rotation: Array, vector: Array, turned: Array) -> None:
 
 @inner
 def pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
-    """Fill ``pulled`` (3,) with ∂Ψ/∂δ = X + V × ω + A × ω̇ + (A × ω) × ω, δ a point's displacement.
+    """Fill ``pulled`` (3,) with ∂Ψ/∂δ = X + V × ω + A × ω̇ + (A × ω) × ω.
 
-    δ is in a frame that moves with ω ``turning`` and ω̇ ``rate``. The rows of ``weight`` (3, 3) are
-    X, V and A: ∂Ψ by the point's position, velocity and acceleration.
+    δ displaces a point in a frame that turns with ω ``turning`` and ω̇ ``rate``. The rows X, V and
+    A of ``weight`` (3, 3) are the derivatives of a scalar Ψ with respect to the position, velocity
+    and acceleration of the point.
     """
     X, V, A = weight[0], weight[1], weight[2]
     cross(A, turning, scratch)

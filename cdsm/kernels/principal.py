@@ -7,22 +7,25 @@ import numpy as np
 from cdsm.support.values import Array
 
 RIGID = 1e-12
-"""Ratio of compliances below which the larger stiffness counts as infinite.
+"""Ratio of smallest to largest compliance below which the largest stiffness is returned as inf.
 
-An eigenvalue is accurate to 1e-16 of the largest one; below the ratio, fewer than 4 digits are
-left.
+An eigenvalue is accurate to 1e-16 of the largest one. Below the ratio, the smallest one has fewer
+than 4 correct digits.
 """
 
 
 def principal_stiffness(compliance: Array) -> dict[str, Array]:
-    """Compute the extremes of 1/(uᵀ C_vv u) over unit u: eigenvalues of the symmetric part of C_vv.
+    """Compute the smallest and the largest stiffness 1/(uᵀ C_vv u) of all unit vectors u.
+
+    They are the inverse eigenvalues of the symmetric part of C_vv.
 
     Args:
         compliance: C_vv (..., 3, 3) [m/N], positive semidefinite, as for stable arms.
 
     Returns:
-        By name: softest and stiffest [N/m], inf if rigid; their directions (..., 3); anisotropy,
-        stiffest/softest, 1 if the tip cannot move; isotropy, its inverse.
+        Values by name. ``softest`` and ``stiffest`` [N/m] are inf if the tip is rigid;
+        ``softest_direction`` and ``stiffest_direction`` are (..., 3). ``anisotropy`` is
+        stiffest/softest, or 1 if the tip cannot move; ``isotropy`` is its inverse.
     """
     values, vectors = np.linalg.eigh((compliance + compliance.swapaxes(-1, -2)) / 2.0)
     most = values[..., 2]
@@ -42,6 +45,6 @@ def principal_stiffness(compliance: Array) -> dict[str, Array]:
 
 
 def _positive(directions: Array) -> Array:
-    """Return u or −u, which mean the same direction, with the largest component positive."""
+    """Return each direction u (..., 3) with the sign that makes its largest component positive."""
     largest = np.take_along_axis(directions, abs(directions).argmax(-1)[..., None], -1)
     return np.asarray(directions * np.sign(largest))

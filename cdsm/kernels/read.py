@@ -24,14 +24,14 @@ def read(
     status: Indices,
     width: Width,
 ) -> dict[str, Array]:
-    """Compute the wanted readings of blocks of postures; set their status.
+    """Compute the wanted readings of B blocks of W postures; set the status of each posture.
 
-    UNREAD postures keep their status; their readings are meaningless. If the tip is immobile,
+    Postures of status UNREAD keep it, and their readings are not valid. If the tip is immobile,
     pseudoinverse and cartesian are NaN. If K_θ is singular, ``along`` is NaN, or infinite in
-    directions in which the tip cannot move; compliance and cartesian are meaningless.
+    directions in which the tip cannot move; compliance and cartesian are not valid.
 
     Args:
-        K: K_θ or, for the pseudoinverse, any of its terms, (B, nv, nv, W).
+        K: K_θ (B, nv, nv, W); for the pseudoinverse it may be one of its terms.
         parts: P (B, nv, nv, W), the sum of the magnitudes of the four terms.
         JX: J_X (B, 6, nv, W).
         directions: Unit vectors u (D, 3) of ``along``.
@@ -40,8 +40,9 @@ def read(
         width: W, or None for one posture.
 
     Returns:
-        margin (B, W), pseudoinverse (B, 3, 3, W), along (B, D, W), compliance (B, 6, 6, W),
-        cartesian (B, 3, 3, W); with along also ``motion`` (B, nv, D, W), K_θ⁻¹ J_vᵀu.
+        The wanted readings by name: margin (B, W), pseudoinverse (B, 3, 3, W), along (B, D, W),
+        compliance (B, 6, 6, W), cartesian (B, 3, 3, W). If ``along`` is wanted, also ``motion``
+        (B, nv, D, W), which is K_θ⁻¹ J_vᵀ u.
     """
     blocks, nv, _, side = K.shape
     found: dict[str, Array] = {}

@@ -1,8 +1,8 @@
 """Numba kernels of readings of K_θ: stability margin, compliance and Cartesian stiffness.
 
-The arrays hold blocks of postures: the first axis is the block, the last one the posture in it. One
-posture is one block of one, with the width None. :mod:`cdsm.kernels.read` calls these kernels. Each
-is compiled when it is first asked for.
+The arrays hold B blocks of W postures: the first axis is the block, the last one the posture in it.
+A single posture is a block of one, with the width None. :mod:`cdsm.kernels.read` calls these
+kernels. Each kernel is compiled when it is first needed.
 
 With the linear rows J_v of J_X, and C_vv = J_v K_θ⁻¹ J_vᵀ,
 
@@ -32,21 +32,28 @@ REGULAR = 1e-8
 FLAT = 1e-6
 """Smallest ratio of the singular values of J_v at which a 3×3 stiffness still has 4 correct digits.
 
-Its entries differ by the square of the ratio, and float64 has 16 digits.
+The entries of such a stiffness differ by the square of the ratio, and float64 has 16 digits.
 """
 
 UNMOVED = 1e-10
-"""Relative joint torque of a tip force that counts as rounding: the tip cannot move."""
+"""Entries of J_vᵀ u below this fraction of the largest entry of J_v are rounding.
+
+The tip cannot move along u if all entries are.
+"""
 
 _DOUBT = 1e5
 """Scaled motion under a probing torque above which the singular values are computed.
 
-The motion is at most the torque over the smallest singular value, and usually some tenths of that.
-1e5 is orders of magnitude below the inverse of :data:`REGULAR`.
+The motion is at most the torque divided by the smallest singular value, and usually a few tenths of
+that. 1e5 is orders of magnitude below the inverse of :data:`REGULAR`.
 """
 
 READ, SINGULAR, IMMOBILE, UNREAD = range(4)
-"""Status of the readings: all exist; K_θ⁻¹ does not exist; J_v⁺ does not exist; K_θ is unknown."""
+"""Status of the readings of a posture.
+
+READ: all exist. SINGULAR: K_θ⁻¹ does not exist. IMMOBILE: J_v⁺ does not exist. UNREAD: K_θ is not
+known.
+"""
 
 
 @threaded
@@ -72,12 +79,12 @@ def _set_symmetric(K: Array, symmetric: Array, width: Width) -> None:
 def solve(
     K: Array, parts: Array, system: Array, status: Indices, scale: Array, peak: Array, width: Width
 ) -> int:
-    """Replace the last n columns X of ``system`` by K_θ⁻¹ X, in B blocks of W postures.
+    """Replace the last n columns X of ``system`` by K_θ⁻¹ X; count the K_θ that may be singular.
 
-    The columns of ``system`` (B, nv, nv + 1 + n, W) are scratch for K_θ, a probe torque, and X. K
-    is K_θ, and ``parts`` is P, the sum of the magnitudes of its terms, (B, nv, nv, W). With the
-    diagonal D of P, ``scale`` becomes D^-½ (B, nv, W). ``peak`` (B, W) becomes the largest entry of
-    D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number of postures where it may be.
+    ``system`` (B, nv, nv + 1 + n, W) has nv columns of scratch for K_θ, one for a probe torque, and
+    X. ``K`` is K_θ, and ``parts`` is P, the sum of the magnitudes of its terms, (B, nv, nv, W).
+    With the diagonal D of P, ``scale`` (B, nv, W) becomes D^-½. ``peak`` (B, W) becomes the largest
+    entry of D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number of these postures.
     """
     rows, largest, doubtful = np.empty((4, K.shape[3])), np.empty(K.shape[3]), 0
     moved = np.empty(K.shape[3])
@@ -110,9 +117,10 @@ def _set_probe(system: Array, width: Width) -> None:
 def _equilibrate(
     K: Array, parts: Array, scale: Array, largest: Array, system: Array, width: Width
 ) -> None:
-    """Scale the system by D^-½, where D is the diagonal of ``parts`` = P.
+    """Fill the first columns of ``system`` with D^-½ K_θ D^-½, and multiply the last by D^-½.
 
-    Fills D^-½, and the largest entry of D^-½ P D^-½ (inf if D is singular).
+    D is the diagonal of P, which is ``parts``. Fills ``scale`` (nv, W) with D^-½, and ``largest``
+    (W,) with the largest entry of D^-½ P D^-½ (inf if D is singular).
     """
     nv = np.uint64(K.shape[0])
     for w in lanes(width):
@@ -135,9 +143,9 @@ def _equilibrate(
 
 @inner
 def _rescale(scale: Array, system: Array, moved: Array, width: Width) -> None:
-    """Scale the last columns of ``system`` back to K_θ⁻¹ X; see :func:`solve`.
+    """Multiply the last columns of ``system`` by ``scale`` D^-½, so that they become K_θ⁻¹ X.
 
-    Fills ``moved`` (W,), the largest scaled joint motion that the probe torque causes.
+    Fills ``moved`` (W,) with the largest scaled joint motion that the probe torque causes.
     """
     nv = np.uint64(system.shape[0])
     for w in lanes(width):
@@ -152,9 +160,10 @@ def _rescale(scale: Array, system: Array, moved: Array, width: Width) -> None:
 
 @threaded
 def set_torques(JX: Array, directions: Array, system: Array, along: Array, width: Width) -> None:
-    """Fill the columns of the system from nv + 1 on with J_vᵀ u; ``directions`` are unit u (D, 3).
+    """Fill the columns of ``system`` from nv + 1 on with J_vᵀ u for D unit vectors u.
 
-    ``along`` (B, D, W) becomes inf where a force along u has no torque at any joint, NaN elsewhere.
+    The vectors u are the rows of ``directions`` (D, 3). ``along`` (B, D, W) becomes inf where a
+    force along u causes no torque at any joint, else NaN.
     """
     scratch = np.empty((2, JX.shape[3]))
     for b in range(JX.shape[0]):
@@ -190,9 +199,9 @@ def _set_torques(
 def set_along(
     JX: Array, directions: Array, system: Array, status: Indices, along: Array, width: Width
 ) -> None:
-    """Fill ``along`` = 1/(uᵀ C_vv u) (B, D, W) where it is NaN, unless K_θ is singular there.
+    """Fill the NaN of ``along`` (B, D, W) with 1/(uᵀ C_vv u), except where K_θ is singular.
 
-    Columns nv + 1 on of the system are K_θ⁻¹ J_vᵀ u for the unit directions u (D, 3).
+    The columns of ``system`` from nv + 1 on are K_θ⁻¹ J_vᵀ u for the unit ``directions`` u (D, 3).
     """
     compliance, first = np.empty(JX.shape[3]), np.uint64(JX.shape[2] + 1)
     for b in range(JX.shape[0]):

@@ -1,7 +1,8 @@
-"""Kernels that move values between rows of postures, blocks of postures, and their records.
+"""Kernels that copy values between rows of postures, blocks of postures, and their records.
 
-A record holds the quantities of a block of W postures, one after the other: (size, W). Quantity n
-begins at index ``start[n]``. The posture is the last axis of a block, and the first one of rows.
+In rows, the posture is the first axis of an array; in a block of W postures it is the last one. A
+record (size, W) holds all quantities of a block, one after the other. Quantity number n begins at
+its row ``start[n]``.
 """
 
 from __future__ import annotations
@@ -58,13 +59,13 @@ def mirror(matrix: Array, width: Width) -> None:
 
 @inlined
 def vector(record: Array, start: Indices, quantity: int) -> Array:
-    """Return a quantity of the record as vectors of W postures, (size, W)."""
+    """Return quantity number ``quantity`` of the record as vectors of W postures, (size, W)."""
     return record[start[quantity] : start[quantity + 1]]
 
 
 @inlined
 def matrix(record: Array, start: Indices, quantity: int, rows: int, width: int) -> Array:
-    """Return a quantity of the record as matrices of W postures, (rows, columns, W)."""
+    """Return quantity number ``quantity`` of the record as matrices (rows, columns, W)."""
     part = record[start[quantity] : start[quantity + 1]]
     return part.reshape((rows, part.shape[0] // rows, width))
 
@@ -80,9 +81,10 @@ def store(
     out: Array,
     status: NDArray[np.uint8],
 ) -> None:
-    """Copy the ``stored`` quantities of a block to the rows of ``out`` from ``first`` on.
+    """Copy the quantities of a block that are ``stored`` to the rows of ``out`` from ``first`` on.
 
-    ``code`` (W,) goes to ``status``. In posture w, quantities from number ``known[w]`` on are NaN.
+    ``code`` (W,) is copied to ``status``. For posture w of the block, quantities of number
+    ``known[w]`` and above do not exist; they become NaN.
     """
     count = min(record.shape[1], out.shape[0] - first)
     for w in lanes(count):

@@ -6,16 +6,17 @@ derivative d_i = ∂(b − a)/∂θ_i,
     ∂ℓ/∂θ_i = u·d_i,    ∂²ℓ/∂θ_i∂θ_j = (d_i·d_j − (u·d_i)(u·d_j))/ℓ + u·∂²(b − a)/∂θ_i∂θ_j.
 
 Only the joints between the two links matter. They have two sides: joints on the path to b have the
-sign +, joints on the path to a have the sign −. A joint that turns about z through o has d = ±z ×
-(x − o); a joint that slides along s has d = ±s. If joint i is not after joint j and both are on the
-same side, the second derivative of b − a is z_i × d_j, with z = 0 where a joint slides.
+sign +, joints on the path to a have the sign −. Let x be the end, b or a, that a joint moves. A
+revolute joint with the axis z through o has d = ±z × (x − o), a prismatic joint with the direction
+s has d = ±s and z = 0. If joint i is not after joint j and both are on the same side, the second
+derivative of b − a is z_i × d_j.
 
 For i not after j, the second derivative of ℓ is therefore c_i·d_j with the left factor
 
     c_i = (d_i − (u·d_i) u)/ℓ + u × z_i.
 
-The last term counts only if both joints are on the same side: u·(z_i × d_j) = (u × z_i)·d_j. A left
-factor is computed once per joint, and each pair of joints needs one dot product.
+The last term is used only if both joints are on the same side: u·(z_i × d_j) = (u × z_i)·d_j. A
+left factor is computed once per joint, and each pair of joints needs one dot product.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def segment_scratch(nv: int, width: int) -> Segments:
 
 @inlined
 def set_direction(site: Array, a: Index, b: Index, scratch: Segments, width: Width) -> None:
-    """Fill ``scratch`` with u (3, W) from site a to site b, ℓ and 1/ℓ (W,)."""
+    """Fill ``scratch`` with the distance ℓ from site a to site b, 1/ℓ, and the unit vector u."""
     u = scratch.direction
     _set_direction(site[a], site[b], u[0], u[1], u[2], scratch.length, scratch.inverse, width)
 
@@ -81,9 +82,9 @@ def _set_direction(
 def set_derivative(
     frames: Frames, sign: float, site: Index, j: Index, d: Array, width: Width
 ) -> None:
-    """Fill d (3, W) = ∂(b − a)/∂θ_j of a segment from a to b: ±z × (x − o); prismatic joints: ±s.
+    """Fill d (3, W) with ∂(b − a)/∂θ_j of a segment from site a to site b.
 
-    x is the end that joint j moves, at ``site``; ``sign`` is 1 for b and −1 for a.
+    ``site`` is the end that joint j moves; ``sign`` is 1 if it is b, −1 if it is a.
     """
     point, origin, axis = frames.site[site], frames.origin[j], frames.axis[j]
     _set_derivative(point, origin, axis, sign, d[0], d[1], d[2], width)
@@ -121,9 +122,10 @@ def _add_slide(slide: Array, sign: float, d: Array, width: Width) -> None:
 def _add_rate(
     u: Array, point: Array, origin: Array, axis: Array, sign: float, rate: Array, width: Width
 ) -> None:
-    """Add u·d to ``rate`` (W,), with d = ±z × (x − o): axis z through o, end x of a segment.
+    """Add u·d to ``rate`` (W,), with d = ±z × (x − o) of a revolute joint.
 
-    u (3, W) is the direction of the segment; ``sign`` is 1 if x is its end b, −1 if it is a.
+    ``point`` is x, the end of the segment that the joint moves; ``sign`` is 1 if it is b, −1 if it
+    is a. ``origin`` is o, ``axis`` is z. Vectors are (3, W).
     """
     for w in lanes(width):
         x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])
@@ -137,7 +139,7 @@ def _add_rate(
 
 @inner
 def _add_slide_rate(u: Array, slide: Array, sign: float, rate: Array, width: Width) -> None:
-    """Add u·d to ``rate`` (W,), with d = ±s for the ``slide`` s; ``sign`` is 1 or −1."""
+    """Add u·d to ``rate`` (W,), with d = ``sign`` · s of a prismatic joint; s is ``slide``."""
     for w in lanes(width):
         rate[w] += sign * (u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w])
 
@@ -159,10 +161,10 @@ def _set_factors(
     cz: Array,
     width: Width,
 ) -> None:
-    """Fill d = ±z × (x − o), and ``weight`` (W,) times its left factor c, by components (W,).
+    """Fill the components (W,) of d = ±z × (x − o), and of ``weight`` times the left factor c.
 
-    c = (d − (u·d) u)/ℓ + u × z, with 1/ℓ ``inverse`` (W,) and z ``axis`` (3, W). The end x is
-    ``point``, and o is ``origin``.
+    c = (d − (u·d) u)/ℓ + u × z. ``inverse`` (W,) is 1/ℓ, ``axis`` is z, ``point`` is x and
+    ``origin`` is o, as at the top of the module.
     """
     for w in lanes(width):
         x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])
@@ -186,7 +188,7 @@ def _set_factors(
 def _add_slide_factor(
     slide: Array, u: Array, inverse: Array, sign: float, weight: Array, c: Array, width: Width
 ) -> None:
-    """Add ``weight`` times ±(s − (u·s) u)/ℓ to the left factor c (3, W), with the ``slide`` s."""
+    """Add ``weight`` times ±(s − (u·s) u)/ℓ to the left factor c (3, W); s is ``slide``."""
     for r in axes(c.shape[0], width):
         for w in lanes(width):
             along = u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w]
@@ -245,8 +247,8 @@ def add_length_hessian(
 ) -> None:
     """Add weight[c] ∂²L_c/∂θ_i∂θ_j to hessian[slot[c], i, j] of every cable c, for i ≤ j only.
 
-    ``weight`` is (C, W) and ``hessian`` (S, nv, nv, W). H_L·F needs the weight F and all slots 0.
-    The whole tensor needs the weight 1 and slot c for cable c.
+    ``weight`` is (C, W), ``slot`` (C,), and ``hessian`` (slots, nv, nv, W). For H_L·F, the weight
+    is F and all slots are 0. For the tensor H_L, the weight is 1 and cable c has slot c.
     """
     u, _, inverse, d, _, left = scratch
     origin, axis, slide, site = frames

@@ -5,9 +5,9 @@ All of them follow from the derivatives of one number. With a fixed joint motion
     Φ = zᵀ K_θ z = Σ_c (F_c L̈_c + k_c L̇_c²) − Σ_b m_b γ·ẍ_b − f·ẍ_tip − m·ω̇_tip,
 
 where a dot is the derivative along q̇ = z, q̈ = 0. The cables c have tensions F and stiffnesses k,
-the bodies b have masses m_b and centres x_b; γ is gravity, W = (f, m) the load at the tip. The
-smallest eigenvalue of K_θ has the gradient of Φ with z its unit eigenvector. The compliance κ = uᵀ
-J_v K_θ⁻¹ J_vᵀ u has, with z = K_θ⁻¹ J_vᵀ u kept constant,
+the bodies b have masses m_b and centres x_b; γ is gravity, W = (f, m) the load at the tip. If z is
+the unit eigenvector of the smallest eigenvalue of K_θ, this eigenvalue has the same gradient as Φ.
+For the compliance κ = uᵀ J_v K_θ⁻¹ J_vᵀ u, with z = K_θ⁻¹ J_vᵀ u kept constant,
 
     dκ = −dΨ,    Ψ = Φ − 2 u·ẋ_tip.
 
@@ -18,8 +18,8 @@ respect to
 
 - the position of a point in its link: a displacement δ changes x by δ, ẋ by ω × δ and ẍ by ω̇ × δ +
   ω × (ω × δ);
-- the origin of a joint in its parent link: all points beyond the joint are displaced so, with ω
-  and ω̇ of the parent link;
+- the origin of a joint in its parent link: all points beyond the joint are displaced in this way,
+  with ω and ω̇ of the parent link;
 - a joint angle: the points beyond the joint turn, and their motion relative to the parent link
   turns with them.
 
@@ -51,11 +51,11 @@ def _add_cable(
     point: Array,
     weight: Array,
 ) -> tuple[float, float]:
-    """Add the derivatives of F L̈ + k L̇² + p L̇ of one cable; return L̈ and L̇.
+    """Add the derivatives of F L̈ + k L̇² + p L̇ of one cable to ``weight``; return L̈ and L̇.
 
-    The cable has the sites from ``begin`` to ``end`` − 1 and the stiffness k. ``pull`` is the p of
-    :func:`single_gradient`, and ``slope`` is ∂k/∂L. ``point`` (N, 3, 3) are x, ẋ and ẍ of each
-    site, ``weight`` (N, 3, 3) the derivatives X, V and A with respect to them.
+    The cable has the sites from ``begin`` to ``end`` − 1. ``tension`` is F, ``stiffness`` k,
+    ``pull`` p, and ``slope`` ∂k/∂L. ``point`` (N, 3, 3) has x, ẋ and ẍ of each point, and
+    ``weight`` (N, 3, 3) the derivatives X, V and A with respect to them.
     """
     rate = bend = 0.0
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
@@ -110,10 +110,10 @@ def _by_joint(
 ) -> float:
     """Fill ``placement`` (3,) with ∂Ψ/∂(origin of joint i) in base axes; return ∂Ψ/∂q_i.
 
-    ``before`` is the row of its parent, ``beyond`` (nv+1,) marks the rows that joint i moves.
-    ``frames`` are origin, axis and slide of all joints. ``row``, ``point`` and ``weight`` hold the
-    joint's row, the motion, and X, V and A of all points. ``spin`` and ``spin_rate`` (3,) are the
-    derivatives with respect to ω and ω̇ of the tip.
+    ``before`` is the row of the parent of joint i, and ``beyond`` (nv+1,) is not 0 for the rows
+    that joint i moves. ``frames`` are origin, axis and slide of all joints. For each point, ``row``
+    has the row of its joint, ``point`` x, ẋ and ẍ, and ``weight`` X, V and A. ``spin`` and
+    ``spin_rate`` (3,) are ∂Ψ/∂ω and ∂Ψ/∂ω̇ of the tip, whose row is ``tip``.
     """
     origin, axis, slide = frames
     turning, rate, velocity, acceleration = motion
@@ -192,15 +192,16 @@ def single_gradient(
     With a = 1 and p = b = 0 it is zᵀ K_θ z + v·ẋ_tip. With F = k = v = a = 0, b = 1 and p the
     tensions, it is zᵀ (J_Lᵀ F + g − J_Xᵀ W), the work of the residual of Eq. 13 on the motion z.
 
-    Dots are derivatives along θ̇ = z, θ̈ = 0; γ is gravity. ``first`` (C+1,) is the first site of
-    each cable, ``velocity`` v (3,), ``stiffness`` k (C,), ``slope`` ∂k/∂L (C,), ``pull`` p (C,),
-    ``bent`` a and ``turned`` b.
+    Dots are derivatives for θ̇ = z, θ̈ = 0; γ is gravity. ``first`` (C+1,) is the first site of each
+    cable. v is ``velocity`` (3,), F ``tension`` (C,), k ``stiffness`` (C,), ∂k/∂L ``slope`` (C,), p
+    ``pull`` (C,), W ``wrench`` (6,), a ``bent`` and b ``turned``.
 
     Returns:
         Ψ, and its derivatives with respect to q (nv,), the sites in the frames of their joints (P,
         3), the origins of the joints in their parents (nv+1, 3), the centres of mass (nv+1, 3), the
         position of the tip (3,), the masses (nv+1,), the tensions at constant k (C,), and k (C,).
-        The derivative with respect to the length of a lead is ``slope`` times the last one.
+        The derivative with respect to the length of a lead is ``slope`` times the derivative with
+        respect to k.
     """
     parent, order, row = tree.parent, tree.order, routing.row
     mass, gravity, tip = masses.mass, masses.gravity, masses.tip

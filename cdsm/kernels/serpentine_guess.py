@@ -1,8 +1,8 @@
-"""Guess of the tensions of a serpentine arm.
+"""Guess the least tensions of a serpentine arm.
 
-The cables that end at a joint turn this joint and the joints before it, but none behind it. So
+The cables that end at a joint turn this joint and the joints before it, but none after it. So
 J_Lᵀ is block triangular; a block is the axes of one joint (at most two) and the cables that end
-there. From the last joint to the first, one cable per axis is raised above its lower bound to
+there. From the last joint to the first, one cable per axis gets a tension above its lower bound, to
 balance the joint. From the first joint to the last, the multipliers follow from these cables: see
 :mod:`cdsm.kernels.serpentine_multipliers`. Usually this guess is the optimum: with three cables for
 each universal joint, in all of 9000 random postures up to half the joint limits, and in three of
@@ -27,13 +27,13 @@ _MOST = 2
 
 
 class Blocks(NamedTuple):
-    """Joint axes and cables of all blocks from base to tip; empty if the guess cannot be used.
+    """Joint axes and cables of the K blocks of J_Lᵀ from base to tip; empty if J_Lᵀ has no blocks.
 
     Attributes:
-        row: Columns of J_L, block by block (nv,).
-        row_start: Index in ``row`` at which each block begins, and where the last ends.
-        cable: Rows of J_L, block by block (C,).
-        cable_start: Index in ``cable`` at which each block begins, and where the last ends.
+        row: Joint axes (columns of J_L), block by block (nv,).
+        row_start: Index in ``row`` at which each block begins, and at which the last ends (K+1,).
+        cable: Cables (rows of J_L), block by block (C,).
+        cable_start: Index in ``cable`` at which each block begins, and the last ends (K+1,).
     """
 
     row: Indices
@@ -43,7 +43,7 @@ class Blocks(NamedTuple):
 
 
 def find_blocks(routing: Routing, nv: int) -> Blocks:
-    """Find the blocks of an arm with nv joint coordinates; none if J_Lᵀ is not block triangular."""
+    """Find the blocks of J_Lᵀ of an arm with nv joints; none if it is not block triangular."""
     turned: list[set[int]] = [set() for _ in routing.fixed]
     ends = routing.segment[1:, 3]
     for (cable, _, _, first, _), end in zip(routing.segment[:-1], ends, strict=True):
@@ -77,17 +77,18 @@ _NO_BLOCKS = Blocks(*_flat([]), *_flat([]))
 
 
 class Guess(NamedTuple):
-    """Guess of a block of W postures, and its scratch.
+    """Guessed tensions of W postures, and scratch; "block" below is a block of J_Lᵀ.
 
     Attributes:
         F: Tensions (C, W) [N].
-        y: Multipliers with J_L y = F for the cables above their lower bounds (nv, W).
-        failed: The first block that no pair of its cables balances (W,), or −1.
-        lacking: Missing torque of the block that is tried (2, W).
+        y: Multipliers (nv, W): J_L y = F for the cables above their lower bounds.
+        failed: The block at which the guess fails, since no pair of its cables balances it (W,); −1
+            if none fails.
+        lacking: Missing torque of the current block (2, W).
         missing: Missing torque of the block that failed (2, W).
-        chosen: The two cables above their lower bounds, numbered within each of the K blocks (K, 2,
-            W).
-        best: Cost, tensions to add and numbers of the best pair of cables (5, W).
+        chosen: The two cables above their lower bounds in each of the K blocks, as numbers within
+            the block (K, 2, W).
+        best: Best pair of cables so far (5, W): cost, two tensions to add, two cable numbers.
         pair: Scratch of the pair that is tried (4, W).
     """
 
@@ -120,10 +121,10 @@ def empty_guess(blocks: Blocks, nv: int, cables: int, width: int) -> Guess:
 def guess_tensions(
     blocks: Blocks, J: Array, b: Array, low: Array, high: Array, guess: Guess, width: Width
 ) -> None:
-    """Fill ``guess`` with tensions that balance the arm, the fewest above their lower bounds.
+    """Fill ``guess`` with tensions that balance the arm, one cable per axis above its lower bound.
 
-    J is J_L (C, nv, W), b the torque to balance (nv, W), ``low`` and ``high`` are the bounds (C,
-    W). The search ends early if no posture of the block can be balanced.
+    J is J_L (C, nv, W), b (nv, W) the torque to balance; ``low`` and ``high`` (C, W) are the
+    bounds. The search ends early if the guess has failed for all W postures.
     """
     row, row_start, cable, cable_start = blocks
     F, failed, lacking, best = guess.F, guess.failed, guess.lacking, guess.best
@@ -170,8 +171,8 @@ def _set_best(
 ) -> None:
     """Find the pair of cables that gives the missing torque about axes i and j at the least ‖F‖².
 
-    If i is j, a single cable is found. ``own`` are the cables of the block, ``low`` and ``high``
-    the bounds (C, W). The result is stored in ``guess.best``.
+    If i is j, one cable is enough, and the best one is found. ``own`` are the cables of the block
+    of J_Lᵀ, ``low`` and ``high`` the bounds (C, W). Stores the result in ``guess.best``.
     """
     lacking, best, pair = guess.lacking, guess.best, guess.pair
     for r in range(5):
@@ -199,7 +200,7 @@ def _solve_pair(
 ) -> None:
     """Fill the tensions x and y (W,) of two cables: x (a, b) + y (c, d) = ``torque`` (2, W).
 
-    (a, b) and (c, d) are their moment arms about two axes, (W,) each.
+    The first cable has the moment arms a and b about two axes, the second c and d, (W,) each.
     """
     for w in lanes(width):
         determinant = a[w] * d[w] - b[w] * c[w]
@@ -224,10 +225,11 @@ def _keep_better(
     best_q: Array,
     width: Width,
 ) -> None:
-    """Keep the tensions x and y (W,) added to cables p and q, if they cost less than the best.
+    """Store a pair of cables, p and q, as the best where it is admissible and costs less.
 
-    They must not be negative. Their sums with the lower bounds (``least``) must not exceed the
-    upper bounds (``most``), each (W,).
+    x and y (W,) are tensions to add to the lower bounds ``least``. They are admissible if they are
+    not negative and the sums do not exceed the upper bounds ``most``. The cost is the increase of
+    ‖F‖².
     """
     for w in lanes(width):
         # cables that cannot give the torque have infinite x and y, or NaN

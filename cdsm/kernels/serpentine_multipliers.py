@@ -15,9 +15,10 @@ from cdsm.support.values import Array
 def set_multipliers(
     blocks: Blocks, J: Array, F: Array, guess: Guess, y: Array, width: Width
 ) -> None:
-    """Fill y (nv, W) so that J_L y = F (C, W) for the chosen cables of each block of ``guess``.
+    """Fill y (nv, W) so that J_L y = F for the chosen cables of each block of J_Lᵀ.
 
-    The blocks up to the one that failed keep their y.
+    J is J_L (C, nv, W), and F is (C, W). If a block of ``guess`` failed, y changes only in the
+    blocks after it.
     """
     row, row_start, cable, cable_start = blocks
     failed, chosen, p, q = guess.failed, guess.chosen, guess.best, guess.pair
@@ -60,11 +61,12 @@ def set_multipliers(
 def set_proof(
     blocks: Blocks, J: Array, guess: Guess, normal: Array, zero: Array, width: Width
 ) -> None:
-    """Fill y of ``guess`` with a vector that usually proves that the failed block has no balance.
+    """Fill ``guess.y`` with a vector y that usually proves that no tensions balance the arm.
 
-    In that block y is t + s n, with the missing torque t and n normal to t. For the chosen cables
-    of the later blocks, J_c y = 0. A proof needs J_c y ≤ 0 for all other cables; s is the number
-    nearest to 0 that gives this. ``normal`` (nv, W) is scratch, ``zero`` (C, W) are zeros.
+    In the block of J_Lᵀ that failed, y is t + s n, with the missing torque t and n normal to t. In
+    later blocks, J_c y = 0 for the chosen cables c. A proof needs J_c y ≤ 0 for all other cables; s
+    is the number nearest to 0 that gives this, if any does. ``normal`` (nv, W) is scratch, ``zero``
+    (C, W) are zeros.
     """
     row, row_start, cable, cable_start = blocks
     y, failed, missing, chosen = guess.y, guess.failed, guess.missing, guess.chosen

@@ -21,10 +21,11 @@ _ROUNDING = 2.0**-52
 
 @inner
 def singular_values(rows: Array, left: Array, values: Array, scratch: Array, width: Width) -> None:
-    """Decompose matrices of three rows (3, n, W) as U S V; ``left`` becomes U, ``rows`` becomes V.
+    """Decompose matrices ``rows`` (3, n, W) of three rows as U S V.
 
-    U is (3, 3, W), ``values`` (3, W) are the diagonal of S, not sorted. Jacobi rotations make the
-    rows orthogonal; rows of length zero stay zero. ``scratch`` is (5, W).
+    ``left`` (3, 3, W) becomes U, ``rows`` becomes V, and ``values`` (3, W) the diagonal of S, not
+    sorted. Jacobi rotations make the rows orthogonal; rows of length zero stay zero. ``scratch`` is
+    (5, W).
     """
     aa, bb, ab, cosine, sine = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     for i in upwards(0, left.shape[0]):

@@ -25,10 +25,11 @@ def set_cable_stiffness(
 ) -> None:
     """Fill ``stiffness`` (C, W) [N/m] with k = 1/(l_0/EA + 1/k_series).
 
-    It is 0 where EA is given as 0: the motor controls the force. Without the series spring, the
-    wire has the length ℓ = L − (F − F_0)/k_series, so l_0/EA = ℓ/(EA (1 + ε)). ``length`` is L,
-    ``tension`` F and ``rigidity`` EA (1 + ε), (C, W) each [m, N, N]. ``series`` is 1/k_series (C,)
-    [m/N], and ``rest`` is F_0 (C,) [N], the tension at which the springs are at rest.
+    If the motor controls the force, EA is given as 0, and k is 0. The wire alone has the length
+    ℓ = L − (F − F_0)/k_series: the rest of L is the elongation of the series spring. So l_0/EA is
+    ℓ/(EA (1 + ε)). ``length`` is L [m], ``tension`` F [N] and ``rigidity`` EA (1 + ε) [N], (C, W)
+    each. ``series`` is 1/k_series (C,) [m/N], and ``rest`` is F_0 (C,) [N], the tension at which
+    the spring is unstrained.
     """
     for c in upwards(0, length.shape[0]):
         for w in lanes(width):
@@ -41,9 +42,10 @@ def set_cable_stiffness(
 def add_passive_stiffness(
     length_jacobian: Array, cable_stiffness: Array, passive: Array, scratch: Array, width: Width
 ) -> None:
-    """Add J_Lᵀ K_L J_L to ``passive`` (nv, nv, W), for i ≤ j; scratch is (6, W).
+    """Add J_Lᵀ K_L J_L to the entries i ≤ j of ``passive`` (nv, nv, W).
 
     It adds three cables to two rows of the matrix at a time, which needs fewer memory accesses.
+    ``scratch`` is (6, W).
     """
     J, k = length_jacobian, cable_stiffness
     count, nv, one = np.uint64(J.shape[0]), np.uint64(J.shape[1]), np.uint64(1)
@@ -75,10 +77,10 @@ def add_passive_stiffness(
 def _add_rows(
     p: Array, rows: _Rows, first: Index, end: Index, upper: Array, lower: Array, width: Width
 ) -> None:
-    """Add p·(x, y, z) to the entries ``first`` to ``end`` − 1 of ``upper`` and ``lower`` (nv, W).
+    """Add p₀ x + p₁ y + p₂ z to ``upper``, and p₃ x + p₄ y + p₅ z to ``lower``, both (nv, W).
 
-    ``rows`` are three rows x, y and z (nv, W) of J_L. p (6, W) has three factors for ``upper`` and
-    three for ``lower``.
+    ``rows`` are three rows x, y and z (nv, W) of J_L, and p is (6, W). Only the entries ``first``
+    to ``end`` − 1 change.
     """
     x, y, z = rows
     for j in upwards(first, end):
@@ -100,14 +102,14 @@ def _moves(J: Array, c: Index, d: Index, e: Index, i: Index, width: Width) -> bo
 def set_load_stiffness(
     jacobian: Array, wrench: Array, tip_joints: Indices, load: Array, scratch: Array, width: Width
 ) -> None:
-    """Fill ``load`` (nv, nv, W) with −∂(J_Xᵀ W)/∂θ of constant wrenches W (6, W).
+    """Fill ``load`` (nv, nv, W) with −∂(J_Xᵀ w)/∂θ for constant wrenches w = ``wrench`` (6, W).
 
     Its rows are torques, its columns angles.
 
-    Column i of J_X is v_i above z_i. ∂v_i/∂θ_j = z_a × v_b, where a is the earlier and b the later
-    of the joints i and j. ∂z_i/∂θ_j = z_j × z_i if joint j is before joint i, else 0.
-    ``tip_joints`` are the joints that move the tip, base first. Entries of other joints stay as
-    they are. ``scratch`` is (6, W).
+    Column i of J_X has the linear part v_i and the angular part z_i. ∂v_i/∂θ_j = z_a × v_b, where a
+    is the earlier and b the later of the joints i and j. ∂z_i/∂θ_j = z_j × z_i if joint j is before
+    joint i, else 0. ``tip_joints`` are the joints that move the tip, from the base on. Entries of
+    other joints do not change. ``scratch`` is (6, W).
     """
     J = jacobian
     for s in upwards(0, tip_joints.shape[0]):
@@ -145,10 +147,10 @@ def sum_terms(
     parts: Array,
     width: Width,
 ) -> None:
-    """Fill K_θ ``K``, and ``parts`` with the sum of the magnitudes of its terms, (nv, nv, W) each.
+    """Fill ``K`` with K_θ, and ``parts`` with |active| + |passive| + |gravity| + |load|.
 
-    An empty ``parts`` is not filled. Of all terms but ``load`` (which is not symmetric), only the
-    entries with i ≤ j are read.
+    All arrays are (nv, nv, W), but an empty ``parts`` is not filled. Of the terms, only the entries
+    with i ≤ j are read, except for ``load``, which is not symmetric.
     """
     for i in upwards(0, K.shape[0]):
         for j in upwards(0, K.shape[0]):
@@ -181,7 +183,8 @@ def single_stiffness(
 
     An entry of P is |active| + |passive| + |gravity| + |load|, the scale of the rounding errors of
     K_θ; ``gravity`` (nv, nv) is the gravity term. ``segment`` and ``joint`` are fields of
-    :class:`Routing`, the next four are those of :class:`Frames`. Arrays have no axis of postures.
+    :class:`Routing`, the next four arguments are the fields of :class:`Frames`. No array has an
+    axis of postures.
     """
     count, nv = length_jacobian.shape
     J, JX = length_jacobian.reshape(count, nv, 1), jacobian.reshape(6, nv, 1)
@@ -212,8 +215,8 @@ def single_length_hessian(
 ) -> Array:
     """Compute Σ w_c ∂²L_c/∂θ_i∂θ_j (slots, nv, nv) of one posture over the cables of each slot.
 
-    ``weight`` w and ``slot`` are (C,); for the whole tensor they are 1 and c. The cables may also
-    be segments. The arrays have no axis of postures.
+    ``weight`` w and ``slot`` are (C,). For the tensor H_L, cable c has the weight 1 and the slot c.
+    ``segment``, ``joint`` and the next four arguments are as for :func:`single_stiffness`.
     """
     nv, F = origin.shape[0] - 1, weight.reshape(weight.shape[0], 1)
     hessian, frames = np.zeros((slots, nv, nv, 1)), one_frames(origin, axis, slide, site)
@@ -239,7 +242,8 @@ def single_cable_stiffness(
 ) -> Array:
     """Compute the stiffness k of each cable (C,) [N/m]; see :func:`set_cable_stiffness`.
 
-    EA (1 + ε) is ``rigidity``, or rigidity + tension (EA + F) where ``linear`` (C,) is one.
+    EA (1 + ε) is ``rigidity`` where ``linear`` (C,) is 0. Where it is 1, the law is linear,
+    ``rigidity`` is EA, and EA (1 + ε) = EA + F. No array has an axis of postures.
     """
     count = length.shape[0]
     stretched, stiffness = np.empty((count, 1)), np.empty((count, 1))

@@ -25,7 +25,7 @@ from cdsm.support.values import Array
 
 
 class Holes(NamedTuple):
-    """Holes and leads of all cables; the P sites of all cables follow each other, as in Routing.
+    """Holes and leads of all C cables; the P sites are in the order of :class:`Routing`.
 
     Attributes:
         first: Index of the first site of each cable, and P at the end (C+1,).
@@ -49,7 +49,7 @@ class Holes(NamedTuple):
 
 
 class Sticking(NamedTuple):
-    """Scratch of the section of a cable whose segments are being added up, in W postures."""
+    """Scratch for the current section of a cable, whose segments are being added, in W postures."""
 
     length: Array  # l without the spring (W,) [m]
     soft: Array  # compliance of the spring (W,) [m/N]
@@ -136,9 +136,9 @@ def add_stuck_stiffness(
 def open_first_section(
     holes: Holes, c: Index, tension: Array, section: Sticking, width: Width
 ) -> None:
-    """Set length, spring compliance and motor mode of ``section`` to the first one of cable c.
+    """Begin the first section of cable c: set length, spring compliance and motor mode.
 
-    The length (W,) [m] is the lead minus the elongation of the series spring.
+    The length (W,) [m] starts as the lead minus the elongation of the series spring.
     """
     for w in lanes(width):
         section.length[w] = holes.lead[c] - holes.series[c] * (tension[c, w] - holes.rest[c])
@@ -162,7 +162,7 @@ def set_lead(
 def set_vector(site: Array, p: Index, scratch: Segments, width: Width) -> None:
     """Fill ``scratch`` with the vector (3, W) from site p to the next one, and its length (W,).
 
-    The vector replaces u: only its direction matters, and a division is saved.
+    The vector takes the place of the unit vector u: only its direction matters here.
     """
     across, length = scratch.direction, scratch.length
     far = p + np.uint64(1)
@@ -200,9 +200,9 @@ def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> N
 
 @inner
 def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> None:
-    """Fill k (W,) of the sections that end at the current hole; 0 where this hole does not hold.
+    """Fill ``section.stiffness`` (W,) with the k of sections that end at the current hole.
 
-    ``wire`` is EA (1 + ε) (C, W) [N].
+    It is 0 where the hole does not hold the cable. ``wire`` is EA (1 + ε) (C, W) [N].
     """
     length, soft, locked, holds = section.length, section.soft, section.locked, section.holds
     for w in lanes(width):
@@ -211,7 +211,7 @@ def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> Non
 
 @inner
 def open_next_section(section: Sticking, width: Width) -> None:
-    """Where the current hole holds, start the next section, without series spring and motor."""
+    """Begin the next section where the current hole holds; it has no series spring or motor."""
     length, soft, locked, holds = section.length, section.soft, section.locked, section.holds
     for w in lanes(width):
         length[w] = 0.0 if holds[w] > 0.0 else length[w]

@@ -27,13 +27,13 @@ DISTANCE = 1e-6
 """Largest accepted distance from the optimum, bounded by the duality gap, relative to max F."""
 
 _PROOF = 1e-8
-"""Smallest margin of a proof of infeasibility, relative to the terms of its sum."""
+"""Smallest vᵀb − vᵀJ_Lᵀ F that proves infeasibility, relative to the magnitudes of its terms."""
 
 _MISSING = 10.0 * OPTIMALITY
-"""A proof needs a missing torque above this fraction of the largest arm times the largest force."""
+"""A proof needs a missing torque above this fraction of the largest moment arm × largest force."""
 
 _ROUNDING = 1e-11
-"""Torque, relative to the largest, that counts as zero for a cable without upper bound."""
+"""J_c v below this fraction of the largest is rounding, for a cable c without upper bound."""
 
 
 class Scaled(NamedTuple):
@@ -124,9 +124,10 @@ def _power_of_two(value: float) -> float:
 def single_optimality(
     A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
 ) -> tuple[float, float, float]:
-    """Measure how far one point x is from the optimum; arguments as for :func:`set_violations`.
+    """Measure how far one point x is from the optimum of the problem of :func:`set_violations`.
 
-    A is Jᵀ (m, n). No array has an axis of postures. Returns the first three violations.
+    A is Jᵀ (m, n). No array has an axis of postures. Returns the largest violation of balance and
+    bounds, the largest violation of stationarity, and the duality gap.
     """
     m, n = A.shape
     J, violations = np.ascontiguousarray(A.T).reshape(n, m, 1), np.empty((5, 1))
@@ -209,8 +210,8 @@ def set_optimal(
 ) -> None:
     """Set ``scratch.certified`` (W,) to 1 where F (C, W) is the optimum within the bounds, else 0.
 
-    v (nv, W) satisfies J_L v = F for cables between their bounds. The multipliers are y = −v, and z
-    = J_L v − F at a bound, elsewhere 0.
+    J is J_L (C, nv, W), b the torque to balance (nv, W). v (nv, W) satisfies J_L v = F for cables
+    between their bounds. The multipliers are y = −v, and z = J_L v − F at a bound, elsewhere 0.
     """
     y, z, violations, force, certified = scratch
     for w in lanes(width):
@@ -243,7 +244,7 @@ def set_infeasible(
 ) -> None:
     """Set ``scratch.certified`` (W,) to 1 where v (nv, W) proves infeasibility, else to 0.
 
-    It does if vᵀb > vᵀJ_Lᵀ F for all low ≤ F ≤ high.
+    It does if vᵀb > vᵀJ_Lᵀ F for all low ≤ F ≤ high; J is J_L, and b the torque to balance.
     """
     _, work, sums, force, certified = scratch
     left, size, steepest = sums[0], sums[1], sums[2]

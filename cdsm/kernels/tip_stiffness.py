@@ -1,6 +1,7 @@
-"""Numba kernels of matrices at the tip; arrays are as in :mod:`cdsm.kernels.readings`.
+"""Numba kernels of compliance, Cartesian stiffness and pseudo-inverse at the tip.
 
-With the linear rows J_v of J_X, and C = J_X K_θ⁻¹ J_Xᵀ with its linear part C_vv,
+Arrays hold B blocks of W postures. With the linear rows J_v of J_X, and C = J_X K_θ⁻¹ J_Xᵀ with its
+linear part C_vv,
 
     compliance = C,    cartesian = (C_vv)⁻¹,    pseudoinverse = J_v⁺ᵀ K_θ J_v⁺.
 
@@ -51,7 +52,7 @@ def decompose(JX: Array, left: Array, right: Array, status: Indices, width: Widt
 def set_pseudoinverses(
     K: Array, left: Array, right: Array, status: Indices, out: Array, width: Width
 ) -> None:
-    """Fill ``out`` (B, 3, 3, W) with J_v⁺ᵀ K J_v⁺ = O (V K Vᵀ) Oᵀ, NaN where the tip is immobile.
+    """Fill ``out`` (B, 3, 3, W) with J_v⁺ᵀ K J_v⁺ = O (V K Vᵀ) Oᵀ; NaN where the tip is immobile.
 
     ``left`` is O and ``right`` is V of :func:`decompose`.
     """
@@ -78,7 +79,7 @@ def _set_product(K: Array, right: Array, image: Array, width: Width) -> None:
 def set_compliances(JX: Array, system: Array, first: int, out: Array, width: Width) -> None:
     """Fill ``out`` (B, 6, 6, W) with the compliance J_X K_θ⁻¹ J_Xᵀ.
 
-    Six columns of the system, from ``first`` on, are K_θ⁻¹ J_Xᵀ.
+    The six columns of ``system`` from ``first`` on are K_θ⁻¹ J_Xᵀ.
     """
     for b in range(JX.shape[0]):
         _project(JX[b], system[b], first, out[b], width)
@@ -88,7 +89,7 @@ def set_compliances(JX: Array, system: Array, first: int, out: Array, width: Wid
 def set_cartesians(
     left: Array, right: Array, system: Array, status: Indices, out: Array, width: Width
 ) -> None:
-    """Fill ``out`` (B, 3, 3, W) with (C_vv)⁻¹ = O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ, NaN where the tip is immobile.
+    """Fill ``out`` (B, 3, 3, W) with (C_vv)⁻¹ = O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ; NaN if the tip is immobile.
 
     ``left`` is O and ``right`` is V of :func:`decompose`. K_θ⁻¹ Vᵀ are the last three columns of
     the system. Where V K_θ⁻¹ Vᵀ is singular, the ``status`` (B, W) becomes SINGULAR.
@@ -116,7 +117,7 @@ def _set_unit(both: Array, width: Width) -> None:
 
 @inner
 def _project(A: Array, B: Array, first: Index, out: Array, width: Width) -> None:
-    """Set out (m, m) to A (m, nv) times the m columns of B from ``first`` on, in each posture."""
+    """Fill out (m, m, W) with A (m, nv, W) times the m columns of B from ``first`` on."""
     m = A.shape[0]
     for a in upwards(0, m):
         for c in upwards(0, m):

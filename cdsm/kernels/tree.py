@@ -48,8 +48,8 @@ class Tree(NamedTuple):
     ) -> Tree:
         """Build a tree from the joint frames at q = 0.
 
-        ``rotation`` (nv+1, 3, 3) and ``translation`` place each joint frame in its parent's frame;
-        ``axis`` and ``slide`` are in the joint frame. Shapes are those of the attributes.
+        ``rotation`` (nv+1, 3, 3) and ``translation`` (nv+1, 3) [m] place each joint frame in its
+        parent's frame. ``axis`` and ``slide`` (nv+1, 3) are unit vectors in the joint frame.
         """
         along = axis[:, :, None] * axis[:, None, :]
         along[~axis.any(axis=1)] = np.eye(3)  # a sliding joint: the rotation is constant
@@ -66,17 +66,18 @@ class Tree(NamedTuple):
 
 
 class Routing(NamedTuple):
-    """All cable sites, and the cable segments that joints can change; rows as in :class:`Tree`.
+    """All cable sites, and the cable segments that joints can change.
 
-    The number of arrays is small: each array passed from Python takes as much time as a segment.
+    There are few arrays, since to pass one from Python takes as long as to compute a segment.
 
     Attributes:
-        row: Row of the joint that moves each site, (P,).
+        row: Row, in :class:`Tree`, of the joint that moves each site, (P,).
         point: Position of each site in the frame of this joint, (P, 3) [m].
-        segment: Five integers per segment (S+1, 5): cable, site a, site b, start of its joints in
-            ``joint``, start of its joints on the path to b. The last row only marks the end.
-        joint: Rows of the joints between a and b: first the joints on the path to a, then the
-            joints on the path to b, ancestors first.
+        segment: Five integers for each segment from site a to site b, (S+1, 5): cable, a, b, index
+            in ``joint`` of its first joint, and of its first joint on the path to b. The last row
+            only marks the end.
+        joint: For each segment, the rows of the joints between a and b: first the joints on the
+            path to a, then those on the path to b, both from the base on.
         fixed: Length that joints do not change, (C,) [m]: segments within one link and the lead
             (the straight cable between its actuator and the base disk).
     """
@@ -89,7 +90,7 @@ class Routing(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """Joint axes and cable sites of a block of postures, in base axes; the posture is last.
+    """Joint axes and cable sites of W postures, in base axes; the last axis is the posture.
 
     Attributes:
         origin: A point on each joint axis, (nv+1, 3, W) [m].
@@ -119,7 +120,7 @@ def empty_frames(tree: Tree, routing: Routing, width: int) -> Frames:
 
 @inlined
 def one_frames(origin: Array, axis: Array, slide: Array, site: Array) -> Frames:
-    """Return the :class:`Frames` of one posture from arrays without an axis of postures."""
+    """Return the :class:`Frames` of one posture from arrays that lack the axis of postures."""
     return Frames(
         origin.reshape(origin.shape[0], 3, 1),
         axis.reshape(axis.shape[0], 3, 1),

@@ -16,13 +16,13 @@ _FAR = 1e5
 """Angle [rad] above which the C library computes; the reduction is exact up to 1e6."""
 
 _TO_WHOLE = 1.5 * 2.0**52
-"""A sum with this number is rounded to a whole number."""
+"""Adding this number and subtracting it again rounds to a whole number."""
 
 _INVERSE = 6.36619772367581382433e-01
 """2/π."""
 
 _RIGHT, _REST = 1.57079632673412561417e00, 6.07710050650619224932e-11
-"""First 33 bits of π/2, so that small multiples are exact; the rest of it."""
+"""π/2 as a sum: its first 33 bits, whose small multiples are exact, and the rest."""
 
 
 _S6, _C6 = 1.58969099521155010221e-10, -1.13596475577881948265e-11
@@ -31,7 +31,7 @@ _S6, _C6 = 1.58969099521155010221e-10, -1.13596475577881948265e-11
 
 @inner
 def set_cosine_sine(angle: Array, cosine: Array, sine: Array, width: Width) -> None:
-    """Fill ``cosine`` and ``sine`` of ``angle`` [rad], (W,) each."""
+    """Fill ``cosine`` and ``sine`` (W,) with the cosine and sine of ``angle`` (W,) [rad]."""
     for w in lanes(width):
         # the angle is that many right angles, and x + tail
         turns = (angle[w] * _INVERSE + _TO_WHOLE) - _TO_WHOLE

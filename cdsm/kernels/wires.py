@@ -1,7 +1,7 @@
 """Kernels of the rigidity EA(F) of wires: linear laws, polynomials on intervals, and tables.
 
-The results have the bits of :mod:`cdsm.wires.quadrature` and :mod:`cdsm.wires.rising_curve`, which
-take one law at a time and twice as long.
+:mod:`cdsm.wires.quadrature` and :mod:`cdsm.wires.rising_curve` give the same bits, but take one law
+at a time and twice as long.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 
 AT_ONCE = 4
-"""The number of rows of coefficients is a multiple of this."""
+"""Number of powers in a step of Horner's rule; the number of coefficients is a multiple of it."""
 
 POLYNOMIAL, CURVE = range(2)
-"""What the coefficients of a piece are: of a polynomial EA(F), or of a curve of strain."""
+"""Kinds of pieces of a law: the coefficients are of a polynomial EA(F), or of a curve ε(F)."""
 
 _, _LEAST, _MOST = RANGES["rigidity"]
 
 
 class Wires(NamedTuple):
-    """Laws of all cables; the pieces of one law follow those of another.
+    """Laws EA(F) of all C cables as arrays. Laws that are not linear consist of pieces, P in all.
 
     Attributes:
         constant: Constant part of EA (1 + ε) of linear laws (C,) [N]; 0 for other laws and
@@ -33,13 +33,13 @@ class Wires(NamedTuple):
         linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
         pieces: First and last piece of the law of each cable, and its kind, POLYNOMIAL or CURVE (C,
             3). If the law is linear or a function of Python, last is below first.
-        ends: Six numbers for each cable (C, 6): least and largest tension of its law [N]; end of
-            the slack branch, below which EA is constant, or −inf [N]; least tension of the pieces
-            [N]; EA at that tension [N]; 1 if the original length is the unstrained one, 0 if it is
-            the stretched one.
+        ends: Six numbers for each cable (C, 6). 0 and 1: least and largest tension of its law [N].
+            2: tension below which the cable is slack and EA is constant, or −inf [N]. 3: least
+            tension of the pieces [N]. 4: EA at that tension [N]. 5: 1 if the original length is the
+            unstrained one, 0 if it is the stretched one.
         edges: Start and end of each piece [N], and the strain at its start (3, P).
-        coefficients: A column for each piece (rows, P): coefficients of the polynomial, lowest
-            power first; or slope and rise of the chord, then a and b of
+        coefficients: A column for each piece (rows, P). POLYNOMIAL: coefficients, lowest power
+            first. CURVE: slope and rise of the chord, then a and b of
             :class:`~cdsm.TabulatedElasticity`.
         nodes: Nodes and weights of the Gauss rule on (0, 1), (2, N).
     """
@@ -154,7 +154,7 @@ def _set_integral(nodes: Array, scratch: WireScratch, width: Width) -> None:
 
 @inner
 def _set_polynomial(coefficients: Array, x: Array, value: Array, width: Width) -> None:
-    """Fill ``value`` (W,) with polynomials at x (W,) by Horner's rule, four powers at a time."""
+    """Fill ``value`` (W,) with polynomials at x (W,): Horner's rule, four powers at a time."""
     for w in lanes(width):
         value[w] = 0.0
     for r in range(coefficients.shape[0] - AT_ONCE, -1, -AT_ONCE):
@@ -175,9 +175,9 @@ def single_rigidity(
     nodes: Array,
     tension: Array,
 ) -> Array:
-    """Compute EA (1 + ε) (C,) at tensions F (C,) of one posture; of linear laws its constant part.
+    """Compute EA (1 + ε) (C,) [N] at tensions F (C,) [N] of one posture; EA for linear laws.
 
-    The arguments before the tensions are fields of :class:`Wires`; see :func:`set_rigidity`.
+    The arguments before ``tension`` are the fields of :class:`Wires`; see :func:`set_rigidity`.
     """
     count = tension.shape[0]
     linear, rigidity = np.zeros(count), np.empty((count, 1))

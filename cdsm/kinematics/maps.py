@@ -80,9 +80,9 @@ def inverse_kinematics(
 ) -> KinematicSolution:
     """Find joint angles for a tip target: min ½‖θ − guess‖² with tip(θ) = target (Eq. 7).
 
-    The angles are within the joint limits. A redundant arm has many solutions. This one is nearest
-    to the guess, at least locally: except for joints at a limit, θ − guess has no component in the
-    null space of the tip Jacobian.
+    The angles are within the joint limits. A redundant arm has many solutions. The one that is
+    returned is nearest to the guess, at least locally: except for joints at a limit, θ − guess has
+    no component in the null space of the tip Jacobian.
 
     Args:
         arm: The arm.

@@ -47,11 +47,11 @@ _LONGEST, _ATTEMPTS = 0.2, 60
 """Longest Newton step [rad], since the quadratic model is local; largest number of steps."""
 
 _CONVERGED = 1e-11
-"""Newton's method has converged below this residual and gradient. It usually reaches 1e-15."""
+"""Newton's method has converged if residual and gradient are below this; 1e-15 is usual."""
 
 
 class _NewtonStep(NamedTuple):
-    """Step of Newton's method for the free joints."""
+    """Step of Newton's method for the free joints, which are not at an active limit."""
 
     move: Array  # step (free,) [rad]
     # gradient of the objective (or Lagrangian) with respect to all joint angles (nv,)
@@ -90,7 +90,7 @@ def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, 
 
 
 class _Search:
-    """Search for the joint angles of :func:`nearest`; counts the evaluations of r."""
+    """Searches for the joint angles of :func:`nearest`, and counts the evaluations of r."""
 
     def __init__(self, residual: Residual, guess: Array) -> None:
         self.residual = residual
@@ -115,7 +115,7 @@ class _Search:
     def fit(self, start: Array, weight: float, tolerance: float) -> tuple[Array, Limits]:
         """Minimise ½‖r‖² + ½ weight ‖q − guess‖² within the limits; return q and active limits.
 
-        The search begins at ``start`` (nv,); ``tolerance`` is scipy's ftol, xtol and gtol.
+        scipy's search begins at ``start`` (nv,); ``tolerance`` is its ftol, xtol and gtol.
         """
         root = math.sqrt(weight)
         regularisation = root * np.eye(start.size)
@@ -165,10 +165,11 @@ class _Search:
     def _active_set(
         self, newton: _Newton, q: Array, at_limit: Limits
     ) -> tuple[Array | None, Limits]:
-        """Find the optimum by Newton's method, with joints at active limits fixed.
+        """Find the optimum within the joint limits from q (nv,) by an active-set method.
 
-        The active limits are ``at_limit`` at first. Returns the joint angles (None if it fails) and
-        the active limits.
+        ``newton`` computes Newton steps, for which the joints at active limits are fixed. The first
+        set of active limits is ``at_limit``. Returns the joint angles, None if the search fails,
+        and the active limits.
         """
         at_limit = at_limit.copy()
         for _ in range(2 * q.size + 5):
@@ -190,7 +191,10 @@ class _Search:
     def _iterate(
         self, newton: _Newton, q: Array, free: NDArray[np.bool_]
     ) -> tuple[Array, Array | None]:
-        """Iterate Newton's method for the free joints; return q and gradient, or None instead."""
+        """Iterate Newton's method for the ``free`` joints, from q; return q and the gradient.
+
+        The gradient is None if the iteration does not converge.
+        """
         least = math.inf
         for _ in range(_ATTEMPTS):
             step = newton(q, free)

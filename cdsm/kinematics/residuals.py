@@ -84,10 +84,9 @@ class TipResidual(Residual):
         return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Compute the Hessian (nv, nv) of weight · r, exact where r = 0: ∂(J_Xᵀ W)/∂θ.
+        """Compute the Hessian (nv, nv) of weight · r as ∂(J_Xᵀ W)/∂θ; it is exact where r = 0.
 
-        The force of the wrench W is the weights of the position divided by the arm length, its
-        moment the weights of the rotation.
+        The wrench W has the force weight[:3]/arm length and the moment weight[3:].
         """
         # at r = 0, ∂r/∂q is J_X up to the length
         wrench = np.zeros(6)

@@ -81,9 +81,10 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
 
     Cables are straight between their sites, with round sections; leads are ignored. Links are bars
     from joint to joint, as the URDF draws them: their radius is a fifth of the hole radius. In an
-    arm from a URDF they are lines. Disks are plates without thickness. A cable in a hole of a disk
-    has, as distance from this disk, the distance between its surface and the outer rim. If a cable
-    pierces a disk elsewhere, the distance is negative. It is inf if the arm has no such pair.
+    arm from a URDF they are lines. Disks are plates without thickness. If a cable is in a hole of a
+    disk, its distance from this disk is the distance between its surface and the outer rim. If a
+    cable pierces a disk elsewhere, the distance is negative. A distance is inf if the arm has no
+    such pair.
 
     Args:
         pose: The posture.

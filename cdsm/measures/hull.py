@@ -65,9 +65,10 @@ def hull_of(loads: Loads) -> Hull | None:
 
 
 def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[float]]:
-    """Return points (k,) that span a polytope; for directions of width zero, normals and offsets.
+    """Return points (k,) that span a polytope, then normals and offsets of its flat directions.
 
-    ``farthest(u)`` returns the largest u·x in the polytope, and a point x with it.
+    In a flat direction the polytope has the width zero. ``farthest(u)`` returns the largest u·x of
+    all points x of the polytope, and such an x.
     """
     found: list[Array] = []
     normals: list[Array] = []

@@ -186,8 +186,9 @@ def _until_unstable(
     """Return direction, force [N] and reason at which an arm becomes unstable under a load along u.
 
     The reason is ``"buckling"`` (K_θ is not positive definite) or ``"elasticity"`` (a least tension
-    leaves the domain of its law). The force is inf if neither happens up to ``most`` [N]. If
-    ``worst``, u and 26 other directions are examined, and the one of least force is returned.
+    leaves the domain of its law). If neither happens up to ``most`` [N], the reason is ``"none"``
+    and the force inf. If ``worst``, u and 26 other directions are examined, and the one of least
+    force is returned.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

@@ -44,7 +44,10 @@ class Loads(NamedTuple):
     def scaled(
         cls, J: Array, motion: Array, torque: Array, low: Array, high: Array, length: float
     ) -> Self:
-        """Build the balance from J_L, ``motion`` J_vᵀ U (nv, k), torque and bounds (C,) [N]."""
+        """Build the balance from J_L, ``motion`` J_vᵀ U (nv, k), torque and bounds (C,) [N].
+
+        ``length`` is the length of the arm [m].
+        """
         A, b, low, high, arm, force = tension_kernels.scaled_balance(J, torque, low, high, length)
         columns = np.hstack([A, -motion / arm])
         # HiGHS drops entries below 1e-9, so each column is scaled by its own largest entry
@@ -53,11 +56,11 @@ class Loads(NamedTuple):
         return cls(columns / lever, b, low, high, lever, force)
 
     def largest(self, along: Array, *, positive: bool = False) -> tuple[float, Array] | None:
-        """Compute the largest a·x, a = ``along`` (k,), over all balanced loads x, and one such x.
+        """Compute the largest a·x of all balanced loads x (k,), and an x that has it.
 
-        If ``positive``, only x ≥ 0 is allowed. The value is inf, and x is NaN, if a·x is
-        unbounded. Return None if no load is balanced; SolverError if the solver stops for another
-        reason.
+        a is ``along`` (k,). If ``positive``, only x ≥ 0 is allowed. If a·x is unbounded, the value
+        is inf and x is NaN. Returns None if no load is balanced. Raises SolverError if the solver
+        stops for another reason.
         """
         count = self.low.size
         tensions, loads = self.lever[:count], self.lever[count:]

@@ -122,8 +122,8 @@ def payloads(
 ) -> Array:
     """Compute the largest forces (B, D) [N] along unit directions (D, 3) that the bounds allow.
 
-    A force is 0 if no tensions balance any. Each of the postures q (B, nv) has a wrench (B, 6). The
-    bounds are (), (B,) or (B, C) [N].
+    A force is 0 if tensions balance no force in its direction. Each of the postures q (B, nv) has a
+    wrench (B, 6). The bounds are (), (B,) or (B, C) [N].
     """
     JX, J, torque, low, high = _balances(arm, q, wrench, minimum, maximum, threads)
     motion = np.einsum("nij,di->ndj", JX[:, :3], directions)
@@ -145,8 +145,8 @@ def capacity_margins(
 ) -> Array:
     """Compute :meth:`ForcePolytope.margin` (B,) [N] of the zero force at postures q (B, nv).
 
-    The other arguments are those of :func:`payloads`. The margin is 0 if no force is balanced. A
-    posture takes milliseconds.
+    Wrenches and bounds are given as for :func:`payloads`. The margin is 0 if no force is balanced.
+    A posture takes milliseconds.
     """
     margin = np.empty(len(q))
     rows = zip(*_balances(arm, q, wrench, minimum, maximum, None), strict=True)
@@ -165,9 +165,9 @@ def _balances(
     maximum: ArrayLike,
     threads: int | None,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Return J_X (B, 6, nv), J_L (B, C, nv), J_Xᵀ W − g (B, nv) and both bounds (B, C).
+    """Return J_X (B, 6, nv), J_L (B, C, nv), J_Xᵀ W − g (B, nv) and both bounds (B, C) [N].
 
-    The arguments are those of :func:`payloads`.
+    The arguments are as for :func:`payloads`.
     """
     names = ("jacobian", "length_jacobian", "gravity_torque")
     found = evaluate(arm, q, outputs=names, check_limits=False, threads=threads)

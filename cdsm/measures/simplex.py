@@ -126,9 +126,9 @@ def _proved(
 ) -> bool:
     """Correct x so that A x = b up to rounding; return whether x is then proved to be a maximum.
 
-    The proof: x meets A x = b and its bounds, and by the ``price`` of each equation no variable can
-    move so that cost · x rises. ``state``, ``basis``, ``inverse`` and ``price`` are those of
-    :func:`single_largest` when it ends.
+    The proof: x meets A x = b and its bounds, and no variable can move so that cost · x increases:
+    this follows from ``price``, the multipliers of the equations. ``state``, ``basis``, ``inverse``
+    and ``price`` are the values with which :func:`single_largest` ends.
     """
     m, n = A.shape
     left, size = b.copy(), np.abs(b)

@@ -33,7 +33,7 @@ class WireUse(ReadOnlyState):
         largest: Largest tension along each cable (C,) [N]: F, or more with ``worst_friction``.
         strain: ε(F) of each cable (C,) [-].
         safety: Breaking load divided by the largest tension (C,) [-].
-        bend_ratio: D/d: diameter of the bend divided by that of the wire [-].
+        bend_ratio: D/d, the diameter of the bend divided by the diameter of the wire [-].
         life_margin: 0.001 divided by the ratio of bearing pressure to strength (C,) [-]; a long
             life needs at least 1.
     """

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _UNMOVED: Final = 1e-9
-"""A buckling mode's tip motion below this part of the arm's length [1/rad] is taken as zero."""
+"""A buckling mode moves the tip if its tip motion/arm length is above this [1/rad]."""
 
 _AROUND: Final = frozen(np.linspace(0.8, 1.3, 26))
 """Default lower bounds of tension as multiples of the critical bound."""
@@ -44,7 +44,7 @@ class Bifurcation(ReadOnlyState):
         push: The push (6,) in the direction in which buckling moves the tip: force [N], then moment
             [N m], which is zero.
         bounds: Lower bounds of tension (n,) [N], ascending.
-        rests: Equilibrium under the push at each bound.
+        rests: Equilibrium of the pushed arm at each bound.
     """
 
     critical: CriticalTension

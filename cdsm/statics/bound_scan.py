@@ -1,7 +1,7 @@
 """Examine a fixed posture at many lower bounds of the tensions, or under many load factors.
 
-A ``place`` is one lower bound [N] or one load factor [-]. The stiffness at a place is that of the
-least tensions there; the functions below get it from their argument ``at``.
+A ``place`` is one lower bound [N] or one load factor [-]. The functions below have an argument
+``at``: a function that returns the stiffness under the least tensions at a place.
 """
 
 from __future__ import annotations
@@ -34,7 +34,10 @@ StiffnessAt = Callable[[float], Stiffness]
 
 
 def failure_at(at: StiffnessAt, place: float) -> Limit:
-    """Return why the arm fails at ``place``, a lower bound [N] or load factor; else ``"none"``."""
+    """Return why the arm fails at a lower bound [N] or load factor ``place``.
+
+    The reason is ``"buckling"``, ``"infeasible"`` or ``"elasticity"``; ``"none"`` if it is stable.
+    """
     try:
         return "none" if at(place).is_stable else "buckling"
     except (InfeasibleTension, SolverError):  # a solver may fail on the very edge
@@ -61,7 +64,10 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
 
 
 def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
-    """Narrow the interval from a, where ``true`` holds, to b, where it does not, by bisection."""
+    """Bisect an interval from a, where ``true`` is True, to b, where it is False.
+
+    Returns both ends of an interval of the relative width :data:`PRECISION`.
+    """
     nothing = PRECISION**2 * b  # a may be zero, and the condition false right above it
     while b - a > max(PRECISION * b, nothing):
         middle = (a + b) / 2.0
@@ -118,8 +124,8 @@ def stable_ranges(
 ) -> tuple[Array, Array, tuple[tuple[float, float], ...]]:
     """Scan lower bounds from ``low`` to ``high`` [N]; return bounds, margins and stable ranges.
 
-    The margins (N,) [N m/rad] are the smallest eigenvalues of K_θ at the N bounds. A range is
-    (low, high) [N].
+    The margins (N,) [N m/rad] are the smallest eigenvalues of K_θ at the N bounds. In a stable
+    range (low, high) [N] they are positive.
     """
 
     def margin(place: float) -> float:

@@ -45,7 +45,7 @@ def critical_tension(
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
     :func:`~cdsm.stiffness` computes K_θ at the tensions of :func:`~cdsm.distribute_tension` with
-    the lower bound F_min on all cables. Its symmetric part decides.
+    the lower bound F_min on all cables. The symmetric part of K_θ is examined.
 
     Args:
         pose: The posture, which stays fixed.

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 _IMMOBILE = 1e-14
-"""A compliance along a direction below this part of the largest compliance is rounding."""
+"""Compliance along a direction, divided by the largest compliance, below which it is rounding."""
 
 
 @final

@@ -53,9 +53,9 @@ def follow_load(
 def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
     """Find the equilibrium that continues ``before`` under another ``wrench`` (6,), or None.
 
-    It is None if no path of stable postures was found from ``before``: a smaller change of the
-    wrench may have one. The search starts at the joint angles ``start`` (nv,) [rad], by default
-    those of ``before``. Errors are those of :func:`~cdsm.equilibrium`.
+    Returns None if no path of stable postures was found from ``before``; there may be one for a
+    smaller change of the wrench. The search starts at the joint angles ``start`` (nv,) [rad], by
+    default at the angles of ``before``. Raises the errors of :func:`~cdsm.equilibrium`.
     """
     loaded = LoadedArm(before.reference, before.reference_tension, wrench)
     iterate = loaded.at(before.pose, before.tension)

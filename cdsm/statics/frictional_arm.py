@@ -25,7 +25,8 @@ from cdsm.support.values import Array
 class Settled(NamedTuple):
     """State of an arm at one posture, after its cables have slipped to the limit of friction.
 
-    The arm need not be balanced. It is a state of :func:`~cdsm.statics.trust_region.find_rest`.
+    The arm need not be balanced: :func:`~cdsm.statics.trust_region.find_rest` searches for the
+    equilibrium among such states.
     """
 
     pose: Posture
@@ -42,12 +43,15 @@ class Settled(NamedTuple):
         return self.pose.q
 
     def holding_back(self, torque: Array | float) -> Settled:
-        """Return this state with r − ``torque`` (nv,) [N m] as its torque, to solve r = torque."""
+        """Return this state with ``self.torque`` = r − ``torque`` (nv,) [N m].
+
+        A search for a state of zero ``self.torque`` then solves r = ``torque``.
+        """
         return self._replace(torque=self.residual - torque)
 
 
 class FrictionalArm(NamedTuple):
-    """Arm with friction under a wrench: computes its state after a move to other joint angles."""
+    """Arm with friction under a wrench; its methods compute its state at other joint angles."""
 
     problem: ChainProblem
     limits: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]
@@ -81,7 +85,7 @@ class FrictionalArm(NamedTuple):
         return np.asarray(torque + pose.gravity_torque - self.wrench @ pose.jacobian)
 
     def at(self, pose: Posture, near: Array) -> Settled:
-        """Compute the arm at a posture. The search for its tensions starts at ``near`` (S,) [N]."""
+        """Compute the state at a posture; the search for tensions starts at ``near`` (S,) [N]."""
         chain, segments = self.settled(pose, near), pose.segments
         holes, nv, T = segments.chains, pose.q.size, chain.tension
         lengths, J = segments.lengths, segments.length_jacobian

@@ -102,7 +102,7 @@ def load_cycle(
 def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:
     """Return the :class:`SlowLoading` of an arm at its reference, from checked arguments.
 
-    Its cables have tensions (C,) [N] under ``wrench`` (6,). ``accuracy`` is that of
+    Its cables have tensions (C,) [N] under ``wrench`` (6,). ``accuracy`` is as for
     :func:`load_cycle`. Raises InvalidInput if ``pose`` is beyond a joint limit.
     """
     require_between_stops(pose)

@@ -35,8 +35,8 @@ _SHOWN = 24
 class LoadHistory(ReadOnlyState):
     """States of an arm with friction, load by load; made by :func:`~cdsm.load_cycle`.
 
-    n loads, S segments and P holes, in the order of :attr:`Posture.segments`. All arrays are
-    read-only.
+    There are n loads. The S segments and P holes are in the order of :attr:`Posture.segments`. All
+    arrays are read-only.
 
     Attributes:
         reference: Posture at which the motors were locked.
@@ -111,7 +111,7 @@ class LoadHistory(ReadOnlyState):
         return self.reference.arm.at(self.angles[self._index(load)], check_limits=False)
 
     def stiffness(self, load: int) -> Stiffness:
-        """Compute the tangent stiffness at load number ``load``, from 0, as in :meth:`pose`.
+        """Compute the tangent stiffness at load number ``load``, from 0; −1 is the last load.
 
         It is valid as long as cables continue to slide in the same holes.
         """
@@ -204,7 +204,7 @@ class LoadHistory(ReadOnlyState):
     def plot(self) -> Figure:
         """Plot force against tip displacement, and the tensions of the segments of one cable.
 
-        It is the cable whose segments differ most in tension.
+        The cable is the one whose segments differ most in tension.
         """
         return cdsm.plots.plot_load_history(self)
 

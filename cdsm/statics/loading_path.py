@@ -1,10 +1,10 @@
-"""How the tip of a slowly loaded arm with friction moves at each load, if loads or arm change.
+"""Tip positions of a slowly loaded arm with friction, and their change if loads or arm change.
 
 A "rest" is an equilibrium on the way: at a load, or between two loads. The natural length of a
 segment is its length without tension. At a rest, the joint angles q solve r(q, a) = 0: r is the
 residual torque, and a are the natural lengths of the segments at the rest before. Wire that slips
-through holes then changes the natural lengths to A(q, T), with the segment tensions T. A is the a
-of the next rest.
+through holes then changes the natural lengths to A(q, T), with the segment tensions T. They are
+the natural lengths a for the next rest.
 
 A small change of loads or arm is followed from rest to rest. It changes r by δr, q by δq = −K⁻¹ δr
 with K = ∂r/∂q, and A by δA. Holes that slide continue to slide, others continue to stick. So the
@@ -106,7 +106,7 @@ class LoadingPath:
 
     @property
     def tips(self) -> Array:
-        """Tip at each load (n, 3) [m]."""
+        """Position of the tip at each load (n, 3) [m]."""
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
 
     def motion(self, i: int, load: int, part: float) -> Array | None:
@@ -122,7 +122,7 @@ class LoadingPath:
     def _responses(self) -> list[tuple[Array, Array]]:
         """Return −K⁻¹ (nv, nv) and ∂A/∂q (S, nv) [m/rad] of each rest.
 
-        −K⁻¹ is 0 for joints at stops, ∂A/∂q for slack segments.
+        In −K⁻¹ the entries of joints at stops are 0, in ∂A/∂q the rows of slack segments.
         """
         responses = []
         for state, _, _ in self.rests:

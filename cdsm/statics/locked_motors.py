@@ -28,7 +28,7 @@ _BEYOND = 1e-9  # a tension outside the domain of a law by at most this part is 
 
 
 class Iterate(NamedTuple):
-    """Arm at one posture, balanced or not: a state of the equilibrium search."""
+    """State of an arm at one posture, balanced or not, in the search for equilibrium."""
 
     K: Stiffness  # with the original lengths of the reference; its residual is r(q)
     torque: Array  # r minus the torque of holding_back (nv,) [N m]
@@ -45,7 +45,10 @@ class Iterate(NamedTuple):
         return self.K.joint
 
     def holding_back(self, torque: Array | float) -> Iterate:
-        """Return this state with r − ``torque`` (nv,) [N m] as its torque, to solve r = torque."""
+        """Return this state with ``self.torque`` = r − ``torque`` (nv,) [N m].
+
+        A search for a state of zero ``self.torque`` then solves r = ``torque``.
+        """
         return self._replace(torque=self.K.residual - torque)
 
 
@@ -82,7 +85,7 @@ class LoadedArm:
                 raise laws.naming(error, cables) from None
 
     def at(self, pose: Posture, near: Array) -> Iterate:
-        """Compute the arm at a posture. The search for its tensions starts at ``near`` (C,) [N]."""
+        """Compute the state at a posture; the search for tensions starts at ``near`` (C,) [N]."""
         F, k = self.tension.copy(), np.zeros(near.size)
         for law in self._laws:
             cables = law.cables
@@ -176,8 +179,8 @@ def rounding(K: Stiffness) -> Array:
 def tilt_torque(pose: Posture, tension: Array) -> Array:
     """Compute the error of joint torques (nv,) [N m] per relative error of the site positions.
 
-    Such an error rotates the segments, short ones most. ``tension`` [N] has an entry for each
-    segment whose length depends on the joints.
+    An error of a position rotates the segments at the site, the short ones most. ``tension`` [N]
+    has an entry for each segment whose length depends on the joints.
     """
     start, end, over, joint = pose.arm._model.moving
     site, origin = pose._frames.site, pose._frames.origin

@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 _MASSLESS = 1e-12  # a motion has no mass if its eigenvalue of M is below this part of the largest
 
 _STAND_IN = 0.02
-"""Largest share of placeholder masses in the kinetic energy; it changes a frequency by 1 %."""
+"""Largest part of a mode's kinetic energy that placeholder masses of links without mass may have.
+
+It changes the frequency by 1 %.
+"""
 
 
 @final
@@ -40,7 +43,7 @@ class Modes(ReadOnlyState):
 
     S of the nv modes vibrate. The other modes grow; a stable arm has none of them. All arrays are
     read-only. Shapes are columns of joint angles, mass-normalised and orthogonal in M and K_θ:
-    φᵀMφ = 1 and φᵀK_θφ = ω². Their unit is rad/(√kg m). The largest entry is positive.
+    φᵀMφ = 1 and φᵀK_θφ = ω². A shape has the unit rad/(√kg m); its largest entry is positive.
 
     Attributes:
         stiffness: K_θ with its posture, tensions and wrench.
@@ -65,7 +68,7 @@ class Modes(ReadOnlyState):
         return not self.growth_rates.size
 
     def plot(self) -> Figure:
-        """Plot the arm in mm, deflected by its growing modes if it has any, else by its lowest."""
+        """Plot the arm in mm, deflected by a few modes: growing modes first, then the lowest."""
         return cdsm.plots.plot_modes(self)
 
     def to_dict(self) -> dict[str, object]:
@@ -113,7 +116,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     """Compute natural frequencies and mode shapes at a posture: K_θ φ = ω² M φ.
 
     The symmetric part of K_θ is used; only a moment at the tip adds a skew part. The modes describe
-    a small vibration about the posture, without friction and damping. They require that the
+    a small vibration about the posture, without friction and damping. They are valid only if the
     tensions balance the arm there, see :attr:`Stiffness.residual <cdsm.Stiffness.residual>`.
 
     Args:
@@ -214,7 +217,8 @@ class Carried(NamedTuple):
 def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
     """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies ``carried`` by links.
 
-    M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω), with J_v of the centre of mass and J_ω of the rotation.
+    M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω). J_v and J_ω are the Jacobians of the velocity of the centre of
+    mass and of the angular velocity of a body.
     """
     arm, frames = pose.arm, pose._frames
     M = np.zeros((arm.nv, arm.nv))

@@ -94,7 +94,7 @@ class Passage(NamedTuple):
 
 
 class SlowLoading(NamedTuple):
-    """Arm with friction that is loaded slowly; its fields are the same for all loads."""
+    """Arm with friction that is loaded slowly; the fields do not depend on the load."""
 
     problem: ChainProblem
     start: Indices  # first segment of each cable, and the number of segments (C+1,)
@@ -104,7 +104,7 @@ class SlowLoading(NamedTuple):
     accuracy: float  # largest part of the work of a step that may stay unaccounted for
 
     def begin(self, tension: Array, wrench: Array) -> State:
-        """Return the arm at its reference; all segments of a cable have its tension (C,) [N]."""
+        """Return the state at the reference; all segments of a cable have its tension (C,) [N]."""
         pose = self.reference
         T = tension[pose.segments.chains.cable]
         natural = self.problem.natural(pose.segments.lengths, T)
@@ -157,7 +157,7 @@ class SlowLoading(NamedTuple):
             require_domains(cables, known, extreme.reduceat(T, self.start[:-1]), f"after {what}")
 
     def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
-        """Return the arm under a wrench and motor commands.
+        """Return the :class:`FrictionalArm` under a wrench (6,) and motor commands (C,).
 
         ``natural`` (S,) [m] are the natural lengths of its segments before wire slips.
         """
@@ -167,7 +167,7 @@ class SlowLoading(NamedTuple):
     def rest(
         self, before: State, load: Load, motion: Array | None = None
     ) -> tuple[State | None, RestSearch[Settled]]:
-        """Find the equilibrium after ``before`` under a new load; also return the search.
+        """Find the equilibrium that follows ``before`` under a new load; also return the search.
 
         The equilibrium is None if the search fails. The search starts at the angles of ``before``,
         plus ``motion`` (nv,) [rad] if it is given.
@@ -219,7 +219,10 @@ class SlowLoading(NamedTuple):
 
 
 def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> Settled | None:
-    """Return the arm after a joint motion (nv,) [rad] from ``old``; None if two sites coincide."""
+    """Return the state after a joint ``motion`` (nv,) [rad] from ``old``; None if sites coincide.
+
+    Its torque is r − ``holding``.
+    """
     try:
         return arm.moved(np.clip(old.q + motion, *arm.limits), old).holding_back(holding)
     except CdsmError:
@@ -227,9 +230,9 @@ def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> S
 
 
 def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Array) -> Settled:
-    """Return the arm after a Newton step with the tangent of ``old`` and the torque of ``start``.
+    """Return the state after a Newton step with the tangent of ``old`` and the torque of ``start``.
 
-    Returns ``start`` if the step does not reduce the torque.
+    Returns ``start`` if the step does not reduce the torque, which is r − ``holding``.
     """
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
@@ -250,8 +253,8 @@ def _work(force: list[Array], place: list[Array]) -> float:
 def _dissipated(jump: list[Array], half: Array, other: Array) -> float:
     """Compute the dissipation [J] of a sub-step: the sum of ∫ (P_{j+1} − P_j) ds_j over its holes.
 
-    ``jump`` are the differences of P at start, middle and end, ``half`` and ``other`` the slips in
-    the two halves. Every term is ≥ 0.
+    ``jump`` are the differences P_{j+1} − P_j [N] at start, middle and end. ``half`` and ``other``
+    are the slips [m] in the two halves. Every term is ≥ 0.
     """
     start, middle, end = jump
     whole, again = half + other, half * other > 0.0

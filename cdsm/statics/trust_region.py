@@ -41,7 +41,7 @@ a step is accepted above the third (Nocedal and Wright, Numerical Optimization, 
 
 
 class Iterate(Protocol):
-    """What :func:`find_rest` needs of a state: an arm at one posture, balanced or not."""
+    """State of an arm at one posture, balanced or not, as :func:`find_rest` needs it."""
 
     @property
     def q(self) -> Array:
@@ -60,14 +60,17 @@ class Iterate(Protocol):
         """Derivative ∂r/∂q of the residual torque r (nv, nv) [N m/rad]."""
 
     def holding_back(self, torque: Array | float) -> Self:
-        """Return this state with r − ``torque`` (nv,) [N m] as its torque, to solve r = torque."""
+        """Return this state with ``self.torque`` = r − ``torque`` (nv,) [N m].
+
+        A search for a state of zero ``self.torque`` then solves r = ``torque``.
+        """
 
 
 State = TypeVar("State", bound=Iterate)
 
 
 class Loaded(Protocol[State]):
-    """What :func:`find_rest` needs of a loaded arm: its state at joint angles, and its stops."""
+    """Loaded arm as :func:`find_rest` needs it: its state at any joint angles, and its stops."""
 
     def moved(self, q: Array, near: State) -> State:
         """Compute the state at joint angles ``q`` (nv,) [rad]; ``near`` is a state close to it.
@@ -91,7 +94,7 @@ class RestSearch(NamedTuple, Generic[State]):
 
 
 class _Free(NamedTuple):
-    """Joints of an iterate that are not at a stop."""
+    """Free joints of an iterate, which are not at a stop, with their balance and eigenvalues."""
 
     at_stop: NDArray[np.bool_]  # which joints a stop holds (nv,)
     indices: NDArray[np.intp]  # indices of the free joints
@@ -123,9 +126,10 @@ class _Free(NamedTuple):
 def find_rest(
     loaded: Loaded[State], start: State, holding: Array | float = 0.0
 ) -> RestSearch[State]:
-    """Find the posture near ``start`` where the residual torque r is ``holding`` (nv,) [N m].
+    """Find the stable posture near ``start`` at which the residual torque r is ``holding``.
 
-    A joint at a stop need not be balanced: the stop gives the missing torque.
+    ``holding`` is (nv,) [N m]. A joint at a stop need not be balanced: the stop gives the missing
+    torque.
     """
     stops = loaded.stops()
     state, radius = start.holding_back(holding), _FIRST
@@ -198,7 +202,7 @@ def _descend(
     radius: float,
     sign: float,
 ) -> Array:
-    """Return joint angles (nv,) that decrease the quadratic model; a joint stays at its stop.
+    """Return joint angles (nv,) that decrease the quadratic model; a joint halts at its stop.
 
     The path from ``state`` is at most ``radius`` [rad] long. ``torque`` is r at ``state``; if it is
     zero, ``sign`` (±1) chooses between the two opposite ways down.

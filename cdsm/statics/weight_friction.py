@@ -25,7 +25,7 @@ _SETTLED, _MOST_CYCLES = 0.01, 64
 relative to the stiffness. The second is the largest number of cycles that is tried."""
 
 _GROWTH, _MOST = 1.25, 100.0
-"""Ratio of each trial load to the one before; largest trial load, divided by the breakaway load."""
+"""Ratio of each trial load to the one before, and of the largest one to the breakaway load."""
 
 _HALVINGS = 6  # number of bisections of the load from which the arm slides; they reach 0.4 %
 
@@ -45,8 +45,10 @@ class WeightFriction(ReadOnlyState):
     Attributes:
         breakaway: Load in the direction of the weight below which no cable slides, and the hole
             that slides first.
-        frictionless: Tangent stiffness along the weight without friction, before the weight [N/m].
-        frictionless_secant: Weight divided by tip displacement along it, without friction [N/m].
+        frictionless: Tangent stiffness in the direction of the weight, computed without friction
+            and without the weight [N/m].
+        frictionless_secant: Weight divided by tip displacement along it, computed without friction
+            [N/m].
         history: The states while the weight is applied in steps; entry 0 is the arm without the
             weight.
     """
@@ -115,8 +117,8 @@ class WeightFriction(ReadOnlyState):
         """Weight divided by displacement [N/m] after dither, a load of alternating sign that fades.
 
         The amplitude falls linearly from :attr:`sliding_load` to zero in :attr:`dither_cycles`
-        cycles. NaN if the arm does not slide, no equilibrium is found on the way, or 64 cycles are
-        too few.
+        cycles. The value is NaN if the arm does not slide, if no equilibrium is found on the way,
+        or if 64 cycles are too few.
         """
         return self._dither[1]
 
@@ -148,7 +150,7 @@ class WeightFriction(ReadOnlyState):
         return 0, math.nan
 
     def _dithered_stiffness(self, size: float, cycles: int) -> float:
-        """Compute weight/displacement [N/m] after dither ``cycles`` that begin with ±size [N]."""
+        """Compute weight/displacement [N/m] after dither: ``cycles`` from ±``size`` [N] to zero."""
         history, u = self.history, np.append(self.breakaway.direction, np.zeros(3))
         last, added = history.wrenches[-1], fading(size, cycles)[:, None] * u
         path = np.vstack([history.wrenches, last + added, last])
@@ -157,7 +159,7 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def _deviation(self) -> float:
-        """Deviation of the dithered stiffness from the frictionless one of the same weight [%]."""
+        """Difference of :attr:`dithered` from :attr:`frictionless_secant`, relative to it [%]."""
         return 100.0 * (self.dithered / self.frictionless_secant - 1.0)
 
     @property

@@ -62,7 +62,7 @@ class LinearPrediction(ReadOnlyState):
 class WeightTest(ReadOnlyState):
     """States of an arm while a weight at its tip is increased in equal steps.
 
-    If the arm has friction in its holes, tips, displacements and stiffness are those with friction.
+    If the arm has friction in its holes, tips, displacements and stiffness are computed with it.
 
     Attributes:
         force: ΔF (3,) [N], the dead force at the full load, base axes.

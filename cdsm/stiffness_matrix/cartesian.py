@@ -118,8 +118,9 @@ class CartesianReadings(ReadOnlyState):
     def pseudoinverse(self, term: Term = "joint") -> Array:
         """Compute J⁺ᵀ K J⁺ (3, 3) [N/m], J the linear rows of J_X: the paper's K_R, read literally.
 
-        The paper's figures use this formula, but it overestimates stiffness. It is larger than
-        :attr:`cartesian` by 4 % to over 100 %, since it allows only the joint motion of least norm.
+        The paper's figures use this formula, but it overestimates stiffness. The result is larger
+        than :attr:`cartesian` by 4 % to over 100 %, since J⁺ allows only the joint motion of least
+        norm.
 
         Args:
             term: Part of K_θ: ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, or the sum
@@ -145,7 +146,7 @@ class CartesianReadings(ReadOnlyState):
             )
 
     def _along(self, u: Array) -> tuple[float, Array]:
-        """Return stiffness along a unit direction [N/m] and joint motion per unit force (nv,)."""
+        """Return stiffness along a unit vector u [N/m] and joint motion per force along u (nv,)."""
         status, found = self._read(self.joint, "along", u[None])
         stiffness = float(found["along"][0, 0, 0])
         if math.isnan(stiffness):

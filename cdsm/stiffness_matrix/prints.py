@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def table(K: Stiffness) -> list[tuple[str, ...]]:
-    """Return the rows of the printed table [N/mm]: a header, then a name and three numbers each."""
+    """Return the rows of the printed table: a header, then a name and three numbers [N/mm] each."""
     axes = np.eye(3)
     shares: Callable[[int], Shares] = cache(lambda i: K.shares(axes[i]))
     lines: dict[str, Callable[[int], float]] = {
@@ -89,7 +89,7 @@ def model_of(K: Stiffness) -> str:
 
 
 def numbers(K: Stiffness) -> dict[str, object]:
-    """Return the numbers of ``K`` by name, as in :meth:`Stiffness.to_dict`."""
+    """Return the entries of :meth:`Stiffness.to_dict` for ``K``: numbers and texts by name."""
 
     def read(reading: Callable[[], object]) -> object:
         try:

@@ -74,8 +74,8 @@ class Stiffness(CartesianReadings):
         """Original lengths l_0 (C,) [m] of the wires, as used in :attr:`cable_stiffness`.
 
         The locked motors keep l_0 = (L − ΔF/k_series)/(1 + ε(F)) constant; symbols as in
-        :class:`Cable`. It is negative if the series spring stretches by more than the length of the
-        cable. For a force-controlled cable it is L.
+        :class:`Cable`. l_0 is negative if the series spring stretches by more than the length of
+        the cable. For a force-controlled cable it is L.
         """
         if self.free_length is not None:
             return self.free_length
@@ -116,8 +116,9 @@ class Stiffness(CartesianReadings):
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
         If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity and load. Argument and errors are those of :meth:`along`. Raises
-        SingularStiffness even if the stiffness along u is infinite.
+        sum over cables, gravity and load. ``direction`` is u, an axis or (3,), as for
+        :meth:`along`. Raises the errors of :meth:`along`, and SingularStiffness also if the
+        stiffness along u is infinite.
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)
@@ -146,9 +147,10 @@ class Stiffness(CartesianReadings):
         """Changes that would make an unstable arm stable, each alone; empty for a stable arm.
 
         They are stiffer wires, stiffer series springs, other lower bounds of the tensions, or other
-        disk offsets. Bracketing finds the factor of each at which the smallest eigenvalue of K_θ is
-        zero. The posture and the wrench stay the same. Tensions of your own are not distributed
-        again: for them only wires and springs are tried. This takes a few tenths of a second.
+        disk offsets. For each, a root search finds the factor at which the smallest eigenvalue of
+        K_θ is zero. The posture and the wrench stay the same. Tensions of your own are not
+        distributed again: for them only wires and springs are tried. This takes a few tenths of a
+        second.
         """
         from cdsm.instability import find_remedies  # here, since a stable arm does not need it
 
@@ -165,8 +167,8 @@ class Stiffness(CartesianReadings):
         """Check this stiffness; return facts, warnings and a second derivation of K_θ.
 
         The second derivation uses central differences of the potential and the torque at this
-        posture. It takes a few tenths of a second. Problems are not raised as errors; the report
-        lists them.
+        posture. The check takes a few tenths of a second. Problems are not raised as errors; the
+        report lists them.
 
         Raises:
             InvalidInput: The stiffness is not frictionless.

@@ -20,8 +20,8 @@ def explain(
 ) -> NoReturn:
     """Find by linear programs why ``solver`` did not solve ``problem``; raise the error.
 
-    Only bounds of ``free`` cables (C,) may widen: those without a fixed tension. ``fault`` is the
-    solver's result, as text.
+    ``free`` (C,) marks the cables without a fixed tension; only their bounds may widen. ``fault``
+    is the solver's result, as text.
 
     Raises:
         InfeasibleTension: No tensions within the bounds balance the arm.
