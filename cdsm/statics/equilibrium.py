@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 _IMMOBILE = 1e-14
-"""Compliance along a direction, divided by the largest compliance, below which it is rounding."""
+"""Compliance along a direction, divided by the norm of C_vv, below which it is rounding."""
 
 
 @final
