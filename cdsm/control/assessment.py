@@ -27,14 +27,17 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
 _CYCLES: Final = 4
-"""Number of cycles in which the shaking fades, as in :class:`~cdsm.WeightTest`."""
+"""Number of cycles in which the shaking of a hung weight fades out."""
 
 _SHAKEN: Final = 3.0  # amplitude of the shaking over the breakaway load; with it all cables slide
 _DISPLACED: Final = 1e-3  # displacement that the weight causes, over the length of the arm
 
 
 class Assessment(NamedTuple):
-    """True stiffness and band of one state of a plant; NaN for values that do not exist."""
+    """True stiffness of a plant in one state, and the band in which friction lets its tip rest.
+
+    Values that do not exist are NaN.
+    """
 
     tip: Array  # tip (3,) [m] at the equilibrium without friction
     stiffness: list[float]  # stiffness along each direction (D,) [N/m] there
@@ -44,9 +47,9 @@ class Assessment(NamedTuple):
 
 
 def assess(state: PlantState, wrench: Array, directions: Array, *, banded: bool) -> Assessment:
-    """Compute the true stiffness of a state under ``wrench`` (6,), and its band if ``banded``.
+    """Compute the true stiffness of a state under ``wrench`` (6,) along each of D ``directions``.
 
-    The stiffness is along each of ``directions`` (D, 3), the band along the first.
+    If ``banded`` is True, also compute the proved band along the first direction.
     """
     nan = math.nan
     try:
@@ -69,7 +72,7 @@ def _along(K: Stiffness, u: Array) -> float:
 
 
 def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
-    """Return K_θ at the equilibrium without friction, with the wire of a state and a load (6,).
+    """Return K_θ at the equilibrium without friction, with the wire of ``state`` under ``wrench``.
 
     Raises:
         EquilibriumError: There is no equilibrium: the arm buckles.
@@ -91,10 +94,10 @@ def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
 
     ``state`` is the state of the plant before the weight is hung.
 
-    The load is shaken along u, first without the weight and then with it: its amplitude is three
-    breakaway loads and fades in four cycles. The weight moves the tip by about 0.1 % of the arm's
-    length. NaN if no equilibrium is found on the way or the arm is about to buckle; inf if the tip
-    cannot move along u.
+    The load is shaken along u, first without the weight and then with it. Its first amplitude is
+    three times the breakaway load; it fades in four cycles. The weight moves the tip by about 0.1 %
+    of the arm's length. The result is NaN if no equilibrium is found on the way or the arm is about
+    to buckle, and inf if the tip cannot move along u.
     """
     arm, load, tips = plant.arm, state.state.load, []
     try:

@@ -60,9 +60,9 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """Estimator of joint angles, rigidity factor s and tip force from :class:`Reading` values.
+    """Estimator of joint angles, rigidity factor s and tip force from the readings of sensors.
 
-    ``arm`` is the controller's model. ``sensors`` give the errors of the readings.
+    ``arm`` is the controller's model. ``sensors`` say how large the errors of the readings are.
     """
 
     arm: Manipulator
@@ -126,8 +126,8 @@ class Observer:
     ) -> Estimate:
         """Return the estimate at a new posture, after the wire has slid through the holes.
 
-        ``F`` (C,) [N] are the tensions at the motors. ``softness`` and ``variance`` go into the new
-        estimate.
+        ``before`` is the previous estimate, with the wire in each segment. ``F`` (C,) [N] are the
+        tensions at the motors. The new estimate stores ``softness`` and ``variance``.
         """
         segments = pose.segments
         chains, near = segments.chains, before.shares * F[segments.chains.cable]

@@ -2,8 +2,8 @@
 
 A force f at the tip causes the joint torques J_vᵀ f. Changes x of the tensions cause the same
 torques if −J_Lᵀ x = J_vᵀ f. Motors that pay out the wire −x/κ, with κ = −∂F/∂l_0 of each cable,
-move the joints as f does. Wire and tension give the posture before and after. So the controller
-measures the stiffness with its own sensors.
+move the joints as f does. The controller estimates the posture before and after from wire and
+tension, and so measures the stiffness with its own sensors.
 
 Without friction the result is the stiffness. With friction the result is too high: friction reduces
 the effect of the motors on the joints, and the estimated posture does not include all of this
@@ -60,8 +60,8 @@ def felt_stiffness(
     ``state`` does not change, since the plant moves a copy. The tip moves by 0.5 % of the arm's
     length. It moves less if a tension would otherwise cover more than half of the distance to one
     of its ``bounds`` (lower, upper). ``observer`` updates ``estimate`` with readings, whose noise
-    comes from ``random``. NaN if no equilibrium is found, if the estimated arm is unstable, or if a
-    tension is at its bound.
+    comes from ``random``. The result is NaN if no equilibrium is found, if the estimated arm is
+    unstable, or if a tension is at its bound.
     """
     wire, F = observer.sensors.read([state.true], random)
     gain = observer.gain(estimate, Reading(wire, F))

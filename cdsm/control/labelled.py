@@ -1,4 +1,4 @@
-"""Convert a closed-loop run to a Dataset, a table over time, numbers for JSON, printed lines."""
+"""Convert a closed-loop run to a Dataset, a table over time, numbers for JSON, or printed lines."""
 
 from __future__ import annotations
 

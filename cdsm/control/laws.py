@@ -60,7 +60,8 @@ class Command(NamedTuple):
     Attributes:
         wire: l_0 to pay out (C,) [m].
         tension: The tension that corresponds to ``wire`` (C,) [N], within the bounds.
-        saturated: Whether the clamp changed the command of each motor (C,).
+        saturated: Whether the command of each motor was changed to keep its tension within the
+            bounds (C,).
     """
 
     wire: Array
@@ -69,7 +70,7 @@ class Command(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """Arguments of a motor law at one step of control.
+    """Arguments of a motor law at one step of control: a moment of time, not a torque.
 
     Attributes:
         reference: Reference of this step.
@@ -97,10 +98,10 @@ Law = Callable[[Moment], Command]
 
 
 def limited(moment: Moment, wire: Array) -> Command:
-    """Return the command to pay out ``wire`` (C,) [m], clamped to keep tensions in their bounds.
+    """Return the command to pay out ``wire`` (C,) [m], changed where a tension would leave a bound.
 
-    The commanded tensions follow from the measured ones and the change of wire at constant posture.
-    InvalidInput if ``wire`` is not one number per cable.
+    The commanded tensions follow from the measured tensions and the change of wire at constant
+    posture. Raises InvalidInput if ``wire`` is not one number per cable.
     """
     reading, k = moment.reading, moment.reference.stiffness
     wire = vector("wire of the law", wire, k.size, "one length [m] per cable")
@@ -109,9 +110,10 @@ def limited(moment: Moment, wire: Array) -> Command:
 
 
 def checked_command(command: object, moment: Moment, names: Sequence[str]) -> Command:
-    """Return the ``command`` of a law; InvalidInput if the motors ``names`` (C,) cannot follow it.
+    """Check and return the ``command`` of a law to the motors ``names`` (C,).
 
-    Each commanded length of wire must be positive, and each tension within the bounds.
+    Raises InvalidInput unless each commanded length of wire is positive, and each tension is within
+    the bounds.
     """
     if not isinstance(command, Command):
         raise InvalidInput(
@@ -138,7 +140,7 @@ def feedforward(moment: Moment) -> Command:
 
 
 def tension_control(moment: Moment) -> Command:
-    """Control all cable tensions to the planned ones: PI control, plus the planned change of l_0.
+    """Keep all cable tensions at their planned values by PI control, plus planned changes of l_0.
 
     In each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the error e = F planned − F measured. P
     and I are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length,
@@ -150,8 +152,8 @@ def tension_control(moment: Moment) -> Command:
 def mixed(moment: Moment) -> Command:
     """Control the tension of some cables, and pay out the wire of the plan for all others.
 
-    In the paper's arm, each pair has one cable of each kind. Every cable needs a load cell, since
-    the clamps follow from the measured tensions.
+    In the paper's arm, the tension of one cable of each pair is controlled. Every cable needs a
+    load cell, since the law keeps the tensions of all cables within their bounds.
     """
     return limited(moment, np.where(moment.forced, _regulated(moment), moment.reference.wire))
 
@@ -166,7 +168,7 @@ LAWS: Final[dict[str, Law]] = {
 
 
 def _regulated(moment: Moment) -> Array:
-    """Return the wire (C,) [m] to pay out by a PI control of all tensions, in incremental form."""
+    """Return the wire (C,) [m] to pay out: incremental PI control of the tension of each cable."""
     now, before, k = moment.reference, moment.reference_before, moment.reference.stiffness
     error = now.tension - moment.reading.tension
     last = before.tension - moment.reading_before.tension

@@ -44,7 +44,7 @@ class MuJoCoPlant:
     Attributes:
         arm: The true arm, without friction in its holes.
         period: Time of a step [s].
-        damping_ratio: Damping of the least damped mode [-], as for :func:`~cdsm.to_mjcf`.
+        damping_ratio: Damping ratio of the least damped mode [-]; see :func:`~cdsm.to_mjcf`.
 
     Raises:
         MissingExtra: mujoco is not installed.
@@ -106,7 +106,7 @@ class MuJoCoPlant:
         return MuJoCoState(model, pose, Reading(command.wire, frozen(F)), data.qvel.copy())
 
     def _set_motors(self, model: Any, lengths: Array, command: Command) -> None:
-        """Set each actuator of ``model`` to the force F + k (L' − L) at a tendon length L'.
+        """Set each actuator of ``model`` so that it has the force F + k (L' − L) at a length L'.
 
         L (C,) is ``lengths`` [m], without the leads. F is the tension at L with the commanded wire,
         and k is the tangent stiffness of the cable.

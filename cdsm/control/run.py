@@ -59,14 +59,15 @@ class TrackingRun(ReadOnlyState):
         commanded_wire: Commanded wire to pay out (n, C) [m].
         measured_tension: Readings of the load cells before each step (n, C) [N].
         tension: True tensions at the motors (n, C) [N].
-        saturated: Whether a clamp changed the command of each motor (n, C).
+        saturated: Whether the command of each motor was changed to keep its tension within the
+            bounds (n, C).
         stiffness: True stiffness along each direction (n, D) [N/m].
         margin: Smallest eigenvalue of the true K_θ (n,) [N m/rad].
-        felt: Stiffness measured with the motors along each direction (n, D) [N/m]; NaN where it was
-            not measured, or could not be.
+        felt: Stiffness measured with the motors along each direction (n, D) [N/m]; NaN at steps
+            without such a measurement, or if it failed.
         banded: Whether a band was computed (n,).
         band: Least and largest proved displacement along the first direction (n, 2) [m], from the
-            equilibrium without friction; NaN where none was computed or proved.
+            equilibrium without friction; NaN where no band was computed or proved.
         displacement: Displacement of the tip from the equilibrium without friction along the first
             direction (n,) [m].
         wrench: Load (n, 6): force [N], then moment [N m].
@@ -75,9 +76,9 @@ class TrackingRun(ReadOnlyState):
         short: Whether the outer loop found no tensions within the bounds that give the target (n,).
         refused: The reason, by number of the step, if the outer loop could not plan tensions and
             kept the previous ones.
-        outcome: ``"completed"``; ``"lost"``: the tip left its path or the plant diverged, since the
-            loop is unstable; ``"no rest"``: the arm buckled; ``"wire"``: a tension left the domain
-            of its law.
+        outcome: ``"completed"``; ``"lost"``: the loop is unstable, so the tip left its path or the
+            plant diverged; ``"no rest"``: the arm buckled; ``"wire"``: a tension left the domain of
+            its law.
         reason: What stopped the loop, in words; or empty.
         states: State of the plant after each step; :meth:`hung_weight` starts from one of them.
     """
@@ -124,13 +125,13 @@ class TrackingRun(ReadOnlyState):
 
     @cached_property
     def tip_error(self) -> Array:
-        """Distance of the tip from the path (n,) [m]."""
+        """Distance of the tip from its planned position at each step (n,) [m]."""
         off = self.tips - self.goals
         return frozen(np.sqrt((off**2).sum(axis=1, dtype=np.float64)))
 
     @cached_property
     def stiffness_error(self) -> Array:
-        """Error of the stiffness: true stiffness/target − 1 (n, D) [-]; NaN if there is none."""
+        """Relative error of the true stiffness, stiffness/target − 1 (n, D) [-]; NaN if unknown."""
         return frozen(self.stiffness / self.target - 1.0)
 
     @cached_property
@@ -140,7 +141,7 @@ class TrackingRun(ReadOnlyState):
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """Whether the tip is inside its proved band (B,), for the B steps that have one."""
+        """Whether the tip is inside the proved band (B,), for the B steps that have such a band."""
         low, high = self.band[self.proved].T
         moved = self.displacement[self.proved]
         return frozen(np.asarray((low - _ROUNDING <= moved) & (moved <= high + _ROUNDING)))
@@ -149,12 +150,12 @@ class TrackingRun(ReadOnlyState):
         """Hang a weight on the true arm as it was after a step; return the stiffness [N/m].
 
         The motors stand still. The load is shaken with fading amplitude before and after the weight
-        is hung, so that friction hardly affects the result. NaN if no equilibrium is found or the
-        arm is about to buckle; inf if the tip cannot move along the direction.
+        is hung, so that friction hardly affects the result. The result is NaN if no equilibrium is
+        found or the arm is about to buckle, and inf if the tip cannot move along the direction.
 
         Args:
             step: Number of the step; negative numbers count from the last.
-            direction: Number of the direction.
+            direction: Number of the direction among :attr:`directions`, from 0.
 
         Raises:
             InvalidInput: There is no such step or direction, or the plant is not a
@@ -224,7 +225,7 @@ class TrackingRun(ReadOnlyState):
 
     @property
     def saturated_motors(self) -> tuple[str, ...]:
-        """Names of the cables whose command a clamp changed at some step."""
+        """Names of the cables whose command was changed at some step because of a tension bound."""
         names = self.plan.arm.cables.names
         return tuple(names[c] for c in np.flatnonzero(self.saturated.any(axis=0)))
 

@@ -32,7 +32,7 @@ class Sensors:
         delay: Steps of control by which all readings are late.
 
     Raises:
-        InvalidInput: A size is negative or not a number, or the delay is not a whole number.
+        InvalidInput: A value is negative or not a number, or the delay is not a whole number.
     """
 
     encoder: float = 1e-5

@@ -31,10 +31,10 @@ class Replanned(NamedTuple):
 
 @dataclass(eq=False)
 class StiffnessLoop:
-    """Planner of tensions: the nearest to the previous ones that give the target stiffness.
+    """Planner of the tensions that give the target stiffness and are nearest to the previous ones.
 
-    If the rate does not allow these tensions, it plans those that come nearest to the target within
-    the rate.
+    If the rate does not allow these tensions, it plans the tensions within the rate whose stiffness
+    is nearest to the target.
     """
 
     arm: Manipulator  # the arm of the controller
@@ -54,8 +54,8 @@ class StiffnessLoop:
         """Plan the tensions of the next step.
 
         Args:
-            wanted: The reference of the plan at this step. Tension, wire and stiffness are
-                replaced, the angles are kept.
+            wanted: Reference values of the plan at this step. Their tension, wire and stiffness are
+                replaced in the result; the angles are kept.
             target: Wanted stiffness [N/m] along the directions, () or (n,).
             estimate: Estimated posture, load, wire and friction.
             before: Mean tensions of the previous step (C,) [N].
@@ -90,7 +90,7 @@ class StiffnessLoop:
     def _with_softness(self, softness: float) -> Manipulator:
         """Return the arm with the rigidity of its wires divided by the estimated ``softness``.
 
-        InvalidInput if the softness is not positive.
+        Raises InvalidInput if the softness is not positive.
         """
         if softness <= 0.0:  # far from the posture of the plan, readings fit no wire
             raise InvalidInput(

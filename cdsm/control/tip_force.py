@@ -68,10 +68,10 @@ def tip_force(
 ) -> TipForce:
     """Bound the force on the tip along a direction from motor tensions; the load has no moment.
 
-    The bounds hold for each state of the cables that friction admits, if posture, friction and
-    masses are those of the arm. Measure the posture by joint encoders or a camera. A posture that
+    The bounds hold for each state of the cables that friction admits, if ``pose`` has the true
+    posture, friction and masses. Measure the posture by joint encoders or a camera. A posture that
     :func:`track` estimates proves nothing: friction changes the strain between the holes, which the
-    motors do not measure. So ``estimated_force`` of its result has no bounds.
+    motors do not measure. So ``estimated_force`` of :class:`TrackingRun` has no bounds.
 
     Args:
         pose: The true posture.
@@ -82,7 +82,7 @@ def tip_force(
     Raises:
         InvalidInput: An argument is invalid; or no force at the tip and no friction balance these
             tensions, so that posture, tensions or error are wrong.
-        SolverError: The linear program is not solved.
+        SolverError: The solver fails on a linear program.
     """
     segments = instance("pose", pose, Posture).segments
     chains, size = segments.chains, len(segments.lengths)
@@ -129,4 +129,4 @@ def tip_force(
 
 
 _ROUNDING = 1e-12
-"""Reduced costs below this are taken as zero: ``_WIDEST`` would multiply their rounding by 1e6."""
+"""Reduced costs below this are rounding and taken as zero, since ``_WIDEST`` multiplies them."""

@@ -35,7 +35,7 @@ from cdsm.tension import checked_bounds
 _MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
 
 _LOST: Final = 0.1
-"""If the tip error divided by the length of the arm [-] is larger, the loop is called unstable."""
+"""Tip error, divided by the length of the arm [-], above which the loop counts as unstable."""
 
 
 def track(
@@ -82,15 +82,16 @@ def track(
         payload_from: Part of the path [-], from 0 to 1, after which the payload hangs at the tip.
         steps: Steps of control from one sample of the path to the next.
         period: Time between two steps [s].
-        rate: Largest change of a tension that the outer loop plans per step [N], or (C,).
+        rate: Largest change of a tension per step that the outer loop plans [N], for all cables or
+            (C,).
         replan: Whether the outer loop runs; default: for ``"stiffness"`` only.
         tension_controlled: Names of the cables whose tension a mixed law controls. Default: C − nv
             cables, chosen so that the lengths of the others determine the posture best.
         bands: A proved band is computed every ``bands`` steps, which takes about 20 ms; 0: never.
             An arm without friction has no band.
         felt: The stiffness is measured with the motors every ``felt`` steps
-            (:mod:`cdsm.control.felt`); 0: never. A copy of the arm is moved, so that the run stays
-            the same.
+            (:mod:`cdsm.control.felt`); 0: never. The measurement moves a copy of the plant, so it
+            does not change the run.
         seed: Seed of the noise; the same seed gives the same run, bit for bit.
 
     Raises:

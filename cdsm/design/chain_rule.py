@@ -24,7 +24,7 @@ from cdsm.uncertainties.inputs import Inputs, Places, inputs_of
 
 
 class Chain:
-    """Chain rule for the arm of a design.
+    """Derivatives with respect to the n variables of a problem, at one design, by the chain rule.
 
     Args:
         problem: The problem; its variables are continuous.
@@ -50,7 +50,7 @@ class Chain:
         self._moved = still.moved(self.inputs.displaced(by_variable))
 
     def at(self, tension: Tension, loss: Array) -> Posed:
-        """Return the chain rule at the posture of ``tension``.
+        """Return the chain rule at the posture and load of the least tensions ``tension``.
 
         ``loss`` (C,) [-] is exp(Σ μ φ) of each cable, or 1 if ``worst_friction`` is False.
         """
@@ -63,8 +63,8 @@ class Chain:
     def apply(self, by_input: dict[str, Array]) -> Array:
         """Compute a quantity's derivatives (n,) with respect to the variables, at constant bounds.
 
-        ``by_input`` has its derivatives with respect to the inputs of the arm, by source, such as
-        ``link_mass``.
+        ``by_input`` has an array for each kind of input, such as ``link_mass``: the derivatives of
+        the quantity with respect to these inputs of the arm.
         """
         return np.array(
             [
@@ -82,9 +82,9 @@ class Chain:
 
 
 class Posed(NamedTuple):
-    """Chain rule at a posture under a load, where the least tensions follow the design.
+    """Chain rule at a posture under a load; the least tensions change with the variables.
 
-    The derivatives are with respect to the n variables.
+    All derivatives are with respect to the n variables.
     """
 
     chain: Chain  # of the arm
@@ -94,11 +94,11 @@ class Posed(NamedTuple):
     bound: Array  # derivatives (C, n) of the lower bounds at constant φ
 
     def slopes(self, by_input: dict[str, Array], by_tension: Array) -> Array:
-        """Return the derivatives (n,) of a quantity.
+        """Return the derivatives (n,) of a quantity with respect to the variables.
 
-        ``by_input`` has its derivatives with respect to the inputs of the arm at constant tensions,
-        by source; it is empty for a quantity of the tensions alone. ``by_tension`` (C,) are its
-        derivatives with respect to the tensions.
+        ``by_input`` has an array for each kind of input, such as ``link_mass``: the derivatives of
+        the quantity with respect to these inputs at constant tensions. It is empty for a quantity
+        of the tensions alone. ``by_tension`` (C,) are the derivatives with respect to the tensions.
         """
         followed = self.balance.gradient(self.chain.inputs, by_tension)
         total = {name: by_input.get(name, 0.0) + g for name, g in followed.items()}
@@ -116,7 +116,10 @@ def _joints(arm: Manipulator, variable: Variable) -> list[int]:
 
 
 def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
-    """Return (dλ/dx)/λ (nv,) of joint limits λ = 2 atan(h/R) for a variable x; 0 for given λ."""
+    """Return (dλ/dx)/λ (nv,) of the joint limits λ for a variable x.
+
+    λ is 2 atan(h/R), unless the geometry gives it; then the result is 0.
+    """
     geometry, joints = arm.geometry, _joints(arm, variable)
     found = []
     for k, (joint, limit) in enumerate(zip(geometry.joints, geometry.joint_limits, strict=True)):
@@ -132,7 +135,7 @@ def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
 
 
 def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, Array]:
-    """Return the derivatives of the arm's inputs, by source, with respect to a variable."""
+    """Return the derivatives of the inputs with respect to a variable, by kind of input."""
     geometry, of, joints = arm.geometry, variable.of, _joints(arm, variable)
     labels = inputs.labels
     disks = [disk.joint - 1 for disk in geometry.disks]

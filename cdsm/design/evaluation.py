@@ -88,7 +88,7 @@ class Designs(ReadOnlyState, Named):
         return csv_text(["design", *columns], ([i, *row] for i, row in rows))
 
     def _columns(self) -> dict[str, Sequence[Any]]:
-        """Return a column for each variable and quantity, by its heading: name, margin, unit."""
+        """Return a column for each variable and quantity, by its heading (name, margin, unit)."""
         rows = [self.problem.values(each) for each in self.designs]
         found: dict[str, Sequence[Any]] = {}
         for variable, column in zip(self.problem.variables, zip(*rows, strict=True), strict=True):
@@ -173,7 +173,10 @@ Compute = Callable[[Array], Iterable[Found]]
 
 @contextmanager
 def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[Compute]:
-    """Yield a function that evaluates designs (D, n) in order, in processes or on a cluster."""
+    """Yield a function that evaluates designs (D, n), in ``jobs`` processes or on a cluster.
+
+    It returns the results in the order of the designs.
+    """
     whole_number("jobs", jobs, 1)
     if client is not None:
         yield _on_cluster(problem, client)

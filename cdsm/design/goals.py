@@ -115,7 +115,7 @@ class Measure:
 
     @property
     def key(self) -> str:
-        """Name of the column of the quantity: ``mass``, ``stiffness (0, 0, 1)``."""
+        """Name of the column of the quantity, such as ``mass`` or ``stiffness (0, 0, 1)``."""
         if self.direction is None:
             return self.of
         return f"{self.of} {coordinates(self.direction, '.3g')}"  # type: ignore[arg-type]
@@ -148,19 +148,20 @@ class Objective(Measure):
             ``"motor_force"``, ``"payload"``, ``"capacity_margin"``, ``"tension_factor"``,
             ``"cable_clearance"``, ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``,
             ``"held"``, ``"mass"``, ``"length"``, ``"cables"``, ``"joint_range"``,
-            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. If the value
-            depends on posture or load, it is the worst one over all that are held. ``stiffness``,
-            ``softest``, ``isotropy`` and ``margin`` are computed with the least tensions under the
-            load.
-            ``deflection`` is |C_vv f| with the force f of the load, to first order. Its C_vv is
-            computed with the least tensions without the load, since the motors are locked before
-            the load acts, as in :func:`~cdsm.payload` and :func:`~cdsm.weight_test`. The deflection
-            is inf if the arm is not held without load. ``payload`` is the largest force along u
-            that tensions within the bounds balance in addition to the load; ``capacity_margin`` is
-            the largest force that they balance in every direction. ``workspace`` is the volume of
-            the convex hull of the tips of held postures, ``held`` the fraction of pairs of posture
-            and load that are held. :func:`~cdsm.clearance` and :func:`~cdsm.wire_use` define
-            clearances and quantities of wires.
+            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. A posture is
+            held under a load if tensions within the bounds balance it and the arm is stable. If the
+            value depends on posture or load, it is the worst one over all that are held.
+            ``stiffness``, ``softest``, ``isotropy`` and ``margin`` are computed with the least
+            tensions under the load. ``deflection`` is |C_vv f| with the force f of the load, to
+            first order. Its C_vv is computed with the least tensions without the load, since the
+            motors are locked before the load acts, as in :func:`~cdsm.payload` and
+            :func:`~cdsm.weight_test`. The deflection is inf if the arm is not held without load.
+            ``payload`` is the largest force along u that tensions within the bounds balance in
+            addition to the load; ``capacity_margin`` is the largest force that they balance in
+            every direction. ``workspace`` is the volume of the convex hull of the tips of held
+            postures, ``held`` the fraction of pairs of posture and load that are held.
+            :func:`~cdsm.clearance` and :func:`~cdsm.wire_use` define clearances and quantities of
+            wires.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` to maximise, ``"least"`` to minimise; None: the usual one, e.g. the most
             stiffness, the least mass.
@@ -190,8 +191,8 @@ class Constraint(Measure):
     """A quantity that must stay above or below a limit at all postures and loads.
 
     Attributes:
-        of: As for :class:`Objective`.
-        direction: As for :class:`Objective`.
+        of: Name of the quantity; :class:`Objective` lists the names.
+        direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
         at_least: Smallest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
         at_most: Largest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
 
@@ -222,7 +223,7 @@ class Constraint(Measure):
 
     @property
     def _scale(self) -> float:
-        """Size of the limit, by which violations are divided; negative for ``at_most``."""
+        """Magnitude of the limit, by which violations are divided; negative for ``at_most``."""
         size = abs(self.limit) or self.unit[1]
         return size if self.at_most is None else -size
 

@@ -2,8 +2,8 @@
 
 The kernel of sensitivities gives the derivatives of a stiffness with respect to every hole, disk,
 link, lead and mass at constant tensions, and with respect to the tensions. The least tensions
-depend on the design, and so do their bounds, which friction narrows. The derivatives of both are
-added. All these derivatives are exact.
+depend on the design, and so do their bounds, which friction narrows. The chain rule adds the
+effects of both. All these derivatives are exact.
 
 The margin for tolerances contains such derivatives, so its own derivatives are second derivatives.
 They are central differences of exact first derivatives, or one-sided ones at an end of a range; the
@@ -37,7 +37,7 @@ _STEP = 1e-4
 _CENTRAL = {-1.0: -0.5, 1.0: 0.5}
 _ONE_SIDED = {1.0: -2.5, 2.0: 4.0, 3.0: -1.5}
 """Weights in a one-sided difference of second order, by the number of steps from the design. The
-design itself has no weight: at the end of a range it may be special, such as one without lead.
+design itself has no weight: at the end of a range it may be special, such as an arm without lead.
 """
 
 
@@ -46,11 +46,12 @@ def rows_and_gradients(
 ) -> tuple[Array, Array]:
     """Compute the quantity ``measure`` of a design (n,) in R cases, and its derivatives (R, n).
 
-    The cases are all combinations of postures and loads; ``motor_force`` has one case per cable for
-    each, ``mass`` and ``length`` have one case only. A constrained quantity includes its margin for
-    tolerances, ± coverage · u. If ``worst_friction`` is True, the bounds of the tensions,
-    minimum · exp(Σ μ φ) and maximum · exp(−Σ μ φ), depend on the wrap angles φ; see
-    :mod:`cdsm.design.grip`.
+    The cases are all combinations of postures and loads. For ``motor_force``, they are all
+    combinations of postures, loads and cables; ``mass`` and ``length`` have one case only. A
+    constrained quantity includes its margin for tolerances, ± coverage · u, where u is the standard
+    uncertainty. If ``worst_friction`` is True, the bounds of the tensions are
+    minimum · exp(Σ μ φ) and maximum · exp(−Σ μ φ). Their derivatives contain the change of the wrap
+    angles φ (:mod:`cdsm.design.grip`).
 
     Raises:
         InvalidInput: The quantity has no exact derivatives, or the tensions have none for this
@@ -111,7 +112,7 @@ def _margins(problem: DesignProblem, design: Array, measure: Measure) -> Array:
 
 
 def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> Array:
-    """Compute the derivatives (R, n) of :func:`_margins` by differences."""
+    """Compute the derivatives (R, n) of :func:`_margins` by finite differences."""
     found = []
     for n, (low, high) in enumerate(problem.bounds):
         step, weights = _STEP * (high - low), _CENTRAL
@@ -127,9 +128,10 @@ def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> A
 
 
 def _reading(K: Stiffness, measure: Measure, posed: Posed, force: Array) -> tuple[float, Array]:
-    """Return the quantity ``measure`` of a stiffness, and its derivatives by the variables (n,).
+    """Return the quantity ``measure`` of K, and its derivatives (n,) with respect to the variables.
 
-    ``force`` (3,) [N] is the force of the load, which only the deflection needs.
+    ``posed`` is the chain rule at the posture of K. ``force`` (3,) [N] is the force of the load,
+    which only the deflection needs.
     """
     if measure.of == "deflection":
         value, partial = _displacement(K, force)
@@ -141,10 +143,11 @@ def _reading(K: Stiffness, measure: Measure, posed: Posed, force: Array) -> tupl
 
 
 def _displacement(K: Stiffness, force: Array) -> tuple[float, dict[str, Array]]:
-    """Return |C_vv f| and its derivatives by the arm's inputs and by the tensions, by source.
+    """Return the displacement |C_vv f| [m] of the tip by a force f (3,) [N], and its derivatives.
 
-    With unit vectors n of the displacement and f̂ of the force f, and c(u) = uᵀ C_vv u,
-    |C_vv f| = |f| nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.
+    There is an array of derivatives for each kind of input, such as ``link_mass``, and for
+    ``tension``. With the unit vectors n of the displacement and f̂ of the force, and
+    c(u) = uᵀ C_vv u, |C_vv f| = |f| nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.
     """
     size = float(np.linalg.norm(force))
     moved = K.compliance[:3, :3] @ force

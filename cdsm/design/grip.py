@@ -26,7 +26,7 @@ def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> 
 
     Args:
         pose: The posture.
-        inputs: The inputs of its arm.
+        inputs: The inputs of the arm.
         moved: Derivatives (n, …, 3) of all points with respect to the variables, in the frames of
             their joints.
         turned: Derivatives (nv, n) of the joint angles with respect to the variables.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _DPI = 110  # resolution of the pictures [1/inch]: some 50 kB each
 
 _SHOWN = 60
-"""Number of designs of a front that a page shows, evenly spread over it; each has a picture."""
+"""Largest number of designs on a page, evenly spread over the front; each has a picture."""
 
 _STYLE = """
 body{font:14px/1.4 system-ui,sans-serif;margin:1em;color:#1b1b1b}

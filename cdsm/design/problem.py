@@ -52,8 +52,8 @@ class DesignProblem(ReadOnlyState):
             [N m]; default: no load.
         minimum: Lower bound of all tensions [N], unless it is a variable.
         maximum: Upper bound of all tensions [N].
-        worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
-            within the bounds, whatever loads came before. ``motor_force`` and the quantities of
+        worst_friction: Whether all segments of the cables stay within the bounds, whatever loads
+            came before; see :func:`~cdsm.distribute_tension`. ``motor_force`` and the quantities of
             wires then belong to the largest tension that friction can cause along each cable.
         diameter: Diameter of the cables [m], for clearances and the life of wires.
         breaking_load: Breaking load of the wire [N], for ``wire_safety``.
@@ -144,7 +144,7 @@ class DesignProblem(ReadOnlyState):
     def in_full(self) -> DesignProblem:
         """Return the problem with every other quantity added as an objective.
 
-        Left out are quantities that need a direction, or data that are missing.
+        Quantities that need a direction, or data that the problem does not have, are not added.
         """
         full, asked = self, {each.of for each in self.measures}
         for of in get_args(MeasureName):
@@ -164,7 +164,7 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def bounds(self) -> Array:
-        """Smallest and largest number of each variable (n, 2); for choices, of their indices."""
+        """Smallest and largest value of each variable (n, 2) in SI; for choices, their indices."""
         return frozen(
             np.array(
                 [
@@ -183,8 +183,8 @@ class DesignProblem(ReadOnlyState):
     def values(self, design: ArrayLike) -> tuple[Value, ...]:
         """Return the value of each variable in a design, which has one number per variable (n,).
 
-        A number is a value in SI, or the index of a choice. InvalidInput if one is outside its
-        range.
+        Each number is a value in SI, or the index of a choice. Raises InvalidInput if a number is
+        outside its range.
         """
         x = number_array("design", design)
         low, high = self.bounds.T
@@ -206,7 +206,7 @@ class DesignProblem(ReadOnlyState):
         """Build the arm of a design (n,), see :meth:`values`; its cables get the problem's bounds.
 
         Raises:
-            InvalidInput: As for :meth:`values`.
+            InvalidInput: A number of the design is outside its range.
             GeometryError: No valid arm has these values; the error lists every fault.
         """
         new = changed(self.arm.geometry, self.variables, self.values(design))
@@ -239,7 +239,7 @@ class DesignProblem(ReadOnlyState):
         )
 
     def minimum_of(self, design: ArrayLike) -> float:
-        """Return the lower bound of the tensions [N] of a design (n,), as for :meth:`values`."""
+        """Return the lower bound of the tensions [N] in a design (n,); see :meth:`values`."""
         for variable, value in zip(self.variables, self.values(design), strict=True):
             if variable.of == "minimum":
                 return float(value)
@@ -252,7 +252,7 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def start(self) -> Array | None:
-        """The given arm as a design (n,) [m, rad, N, -]; None if it is outside the variables."""
+        """:attr:`arm` as a design (n,) [m, rad, N, -]; None if a variable is outside its range."""
         found = []
         for variable, (low, high) in zip(self.variables, self.bounds.tolist(), strict=True):
             value: Value | None = present(variable, self.arm.geometry, self.minimum)

@@ -88,8 +88,8 @@ class ProblemFile(NamedTuple):
     Attributes:
         problem: The problem.
         generations: Number of generations.
-        population: Number of designs in each.
-        seed: Seed.
+        population: Number of designs in each generation.
+        seed: Seed of the search.
     """
 
     problem: DesignProblem

@@ -36,7 +36,7 @@ _SURE: dict[str, tuple[Reading, float]] = {
     "margin": ("margin", -1.0),
     "motor_force": ("tension", 1.0),
 }
-"""Reading whose uncertainty gives the margin of a quantity, and the sign of this margin."""
+"""For each quantity with a margin: the reading with this uncertainty, and the margin's sign."""
 
 
 class Found(NamedTuple):
@@ -100,7 +100,10 @@ class _Arm:
             self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter, 1)
 
     def _evaluated(self, loads: Array) -> tuple[Batch, NDArray[np.bool_]]:
-        """Evaluate the R postures under ``loads`` (R, 6); also return which are stable."""
+        """Evaluate the R pairs of posture and load; also return which are stable (R,).
+
+        ``loads`` (R, 6) [N, N m] replaces the loads of the problem.
+        """
         found = evaluate(
             self.arm,
             self.q,
@@ -118,7 +121,7 @@ class _Arm:
         return np.array([self._value(each) for each in self.problem.measures])
 
     def rows(self, each: Measure) -> Array:
-        """Return a quantity that depends on tensions, for each held posture and load."""
+        """Return a quantity that depends on tensions, for each posture and load that is held."""
         held, problem = self.held, self.problem
         C = self.found["compliance"][held][:, :3, :3]
         if each.of == "stiffness":
@@ -200,7 +203,7 @@ def has_margin(problem: DesignProblem, each: Measure) -> bool:
 
 
 def with_margin(problem: DesignProblem, each: Measure, words: str) -> str:
-    """Return ``words`` for a quantity with its margin, if it has one: ``stiffness - 2 u``."""
+    """Return ``words`` for a quantity, followed by its margin, if any: ``stiffness - 2 u``."""
     if not has_margin(problem, each):
         return words
     return f"{words} {'+' if _SURE[each.of][1] > 0.0 else '-'} {problem.coverage:g} u"
@@ -209,7 +212,7 @@ def with_margin(problem: DesignProblem, each: Measure, words: str) -> str:
 def margin(
     problem: DesignProblem, each: Measure, tension: Tension, loss: Array, cable: int | None
 ) -> float:
-    """Compute the margin ± coverage · u of a quantity, towards its worse side.
+    """Compute the margin ± coverage · u of a quantity; adding it makes the quantity worse.
 
     ``cable`` is the index of a cable for ``motor_force``, else None. ``loss`` (C,) is exp(Σ μ φ).
     """

@@ -46,9 +46,9 @@ def refine_design(
     derivatives.
 
     Args:
-        problem: The problem; its variables are continuous, it has one objective, and all quantities
-            are of ``stiffness``, ``margin``, ``deflection``, ``motor_force``, ``mass`` and
-            ``length``. The objective has its default ``goal``.
+        problem: The problem. Its variables are continuous. It has one objective, with the default
+            ``goal``. All its quantities are among ``stiffness``, ``margin``, ``deflection``,
+            ``motor_force``, ``mass`` and ``length``.
         start: Design (n,) [m, rad, N] to begin with; None: the given arm.
         iterations: Maximum number of iterations.
 
@@ -106,7 +106,7 @@ def refine_design(
 
 
 class _PostureNotHeld(Exception):
-    """Raised if SLSQP tries a design that does not hold all postures."""
+    """SLSQP tries a design that does not hold all postures."""
 
 
 class _SmoothProblem:
@@ -146,14 +146,14 @@ class _SmoothProblem:
         return found
 
     def conditions(self, z: Array) -> Array:
-        """Compute c + a t (R,) at z = (y, t); far below 0 if a posture is not held."""
+        """Compute c + a t (R,) at z = (y, t); −10 if the design does not hold all postures."""
         try:
             return np.asarray(self.rows(z[:-1])[0] + z[-1] * self._raised)
         except _PostureNotHeld:  # the line search then takes a smaller step
             return np.full(self._raised.size, -_FAR)
 
     def slopes(self, z: Array) -> Array:
-        """Compute the derivatives (R, n + 1) of :meth:`conditions`."""
+        """Compute the derivatives (R, n + 1) of :meth:`conditions` with respect to z = (y, t)."""
         return np.column_stack([self.rows(z[:-1])[1], self._raised])
 
     def _rows(self, design: Array) -> tuple[Array, Array] | None:
@@ -186,7 +186,7 @@ def _finished(problem: DesignProblem, visited: list[Array]) -> DesignSearch:
 
 
 def require_smooth(problem: DesignProblem) -> None:
-    """Raise InvalidInput if a problem cannot be refined."""
+    """Raise InvalidInput if :func:`refine_design` cannot treat a problem."""
     for variable in problem.variables:
         if not variable.is_continuous:
             raise InvalidInput("problem", f"{variable.name} is not continuous; use search_designs.")

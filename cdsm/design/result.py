@@ -100,11 +100,11 @@ class DesignSearch(ReadOnlyState):
         return np.asarray(self.evaluated.designs[self.front[self._number(number)]])
 
     def arm(self, number: int | None = None) -> Manipulator:
-        """Build the arm of a design of the front; ``number`` as for :meth:`design`."""
+        """Build the arm of design ``number`` of the front, from 0; None: the compromise."""
         return self.problem.arm_of(self.design(number))
 
     def values(self, number: int | None = None) -> dict[str, float]:
-        """Return all quantities of a design by name, in SI; ``number`` as for :meth:`design`."""
+        """Return all quantities, by name in SI, of a design of the front; None: the compromise."""
         row = self.evaluated.values[self.front[self._number(number)]]
         keys = [each.key for each in self.problem.measures]
         return dict(zip(keys, row.tolist(), strict=True))
@@ -151,7 +151,7 @@ class DesignSearch(ReadOnlyState):
         ``evaluated.to_csv()`` is the table of all designs, with the quantities of the problem only.
 
         Args:
-            jobs: Number of processes, as for :func:`evaluate_designs`.
+            jobs: Number of processes; :func:`evaluate_designs` says what a script then needs.
             client: Client of a dask cluster, instead of processes.
             progress: Show a bar, if there is a terminal.
 
@@ -194,7 +194,7 @@ class DesignSearch(ReadOnlyState):
         return plain(numbers)
 
     def plot(self) -> Figure:
-        """Plot two or three objectives of all designs, with the front and :attr:`compromise`.
+        """Plot two or three objectives of feasible designs, with the front and :attr:`compromise`.
 
         If there is one objective, its best value is plotted against the number of designs.
         """
@@ -203,7 +203,7 @@ class DesignSearch(ReadOnlyState):
     def to_html(self) -> Document:
         """Return a page with the front: a click on a design shows its arm and its numbers.
 
-        It needs no other file. A notebook shows it in a frame.
+        The page needs no other file. A notebook shows it in a frame.
         """
         from cdsm.design.page import page_of  # matplotlib imports slowly
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _FAR = 1e3
-"""Violation of a design from which no arm can be built, and of a quantity that does not exist."""
+"""Number that stands for a violation or an objective that does not exist."""
 
 
 def search_designs(
@@ -51,7 +51,7 @@ def search_designs(
     Args:
         problem: The problem.
         generations: Number of generations, including the first, random one.
-        population: Number of designs in each.
+        population: Number of designs in each generation.
         seed: Seed of all random numbers.
         store: File that keeps each evaluated design. A new search with the same arguments resumes
             from it; one with more generations begins with the same designs.

@@ -35,7 +35,7 @@ class Store:
     Args:
         path: The file; None keeps them in memory.
         problem: The problem.
-        search: What else the designs of a search depend on, such as its seed.
+        search: Other numbers on which the designs of a search depend, such as its seed.
 
     Raises:
         FileError: The file cannot be read or written.

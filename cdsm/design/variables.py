@@ -122,7 +122,7 @@ class Variable:
 
     @property
     def name(self) -> str:
-        """Name of the variable: ``hole_radius``, ``hole_radius of joint 2``."""
+        """Name of the variable, such as ``hole_radius`` or ``hole_radius of joint 2``."""
         if self.at is None:
             return self.of
         return f"{self.of} of {f'joint {self.at}' if isinstance(self.at, int) else self.at}"
@@ -143,7 +143,7 @@ class Variable:
 
 
 def _whole(name: str, value: float) -> int:
-    """Return a variable as a whole number; files may hold it as a float such as 3.0."""
+    """Return the value of variable ``name`` as a whole number; a float such as 3.0 is allowed."""
     return whole_number(name, round(value) if float(value).is_integer() else value, 1)
 
 

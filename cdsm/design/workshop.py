@@ -59,8 +59,8 @@ def cable_table(arm: Manipulator) -> str:
 def _extremes(arm: Manipulator, c: int) -> tuple[float, float]:
     """Return the shortest and the longest length [m] of cable ``c`` within the joint limits.
 
-    A segment crosses at most one joint, so the length is a sum of a term for each joint. For each
-    joint alone, the best of its limits and zero is chosen; from there, a gradient search follows.
+    A segment crosses at most one joint, so the length is a sum with a term for each joint. The
+    search starts with each joint at the best of its limits and zero, and then follows the gradient.
     """
     from scipy.optimize import minimize  # slow to import
 

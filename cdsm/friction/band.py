@@ -24,7 +24,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 _ROOM = 1.1
-"""``room`` of the first neighbourhood; also its factor of growth, while it is too small."""
+"""``room`` of the first neighbourhood; a neighbourhood that is too small grows by this factor."""
 
 _WIDENINGS = 8  # largest number of neighbourhoods that are tried; then the band is not proved
 _INSIDE = 0.999  # a band that reaches this part of its neighbourhood needs a larger neighbourhood
@@ -35,12 +35,13 @@ _INSIDE = 0.999  # a band that reaches this part of its neighbourhood needs a la
 class RestBand(ReadOnlyState):
     """Range of tip positions at which an arm with locked motors may rest, after any earlier loads.
 
-    The reference is the posture of ``stiffness``, with one tension in all segments of each cable.
-    If ``proved``, ``low`` and ``high`` bound all states of rest in a neighbourhood of the
-    reference. This neighbourhood is the set of all states that are at rest to first order, scaled
-    by ``room``. The bounds ``tensions``, ``end_tensions`` and ``loads`` also hold for all these
-    states; they raise SolverError or ElasticityRangeError if they cannot be proved. A simulation
-    may come near to the bounds, but never exceeds them.
+    The reference is the posture of ``stiffness``, with one tension in all segments of each cable. A
+    state of rest is an equilibrium that friction allows. If ``proved`` is True, ``low`` and
+    ``high`` bound all states of rest in a neighbourhood of the reference. This neighbourhood is the
+    set of all states that are at rest to first order, scaled by ``room``. The bounds ``tensions``,
+    ``end_tensions`` and ``loads`` also hold for all these states; they raise SolverError or
+    ElasticityRangeError if they cannot be proved. A simulation may come near to the bounds, but
+    never exceeds them.
 
     Attributes:
         stiffness: Frictionless K of the reference, with its posture, tensions and wrench.
@@ -87,7 +88,10 @@ class RestBand(ReadOnlyState):
 
     @cached_property
     def end_tensions(self) -> Array:
-        """Least and largest tension (C, 2) [N] of each cable's last segment over these states."""
+        """Least and largest tension (C, 2) [N] of each cable's last segment, in any state of rest.
+
+        It is the segment farthest from the motor.
+        """
         start = self.stiffness.posture.segments.chains.start
         return self._tensions((start[1:] - 1).tolist())
 
@@ -118,7 +122,7 @@ def rest_band(
     direction: Direction,
     wrench: ArrayLike | None = None,
 ) -> RestBand:
-    """Compute where along a direction the tip may rest, for any earlier loads.
+    """Compute between which points along a direction the tip may rest, whatever loads came before.
 
     The reference is the posture with the given tension in all segments of each cable. The motors
     are locked there, or control force. Any other loads may have acted before ``wrench``. The band
@@ -127,12 +131,15 @@ def rest_band(
 
     Args:
         pose: The posture of the reference.
-        tension: As for :func:`~cdsm.stiffness`. A residual torque is kept as a constant load.
+        tension: A :class:`~cdsm.Tension` or your own tensions (C,) [N], as for
+            :func:`~cdsm.stiffness`. A residual torque is kept as a constant load.
         direction: u (3,) in base axes, any length, or an axis such as ``"-z"``.
-        wrench: W (6,), the load that acts now, as for :func:`~cdsm.stiffness`.
+        wrench: W (6,) at ``tool0`` in base axes, the load that acts now: force [N], then moment
+            [N m]; only with your own tensions.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is not a direction.
+        InvalidInput: An argument is invalid for :func:`~cdsm.stiffness`, or ``direction`` is not a
+            direction.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
         SingularStiffness: K_θ is singular.
     """

@@ -35,9 +35,9 @@ _CONVERGED = 1e-10
 """Relative change of the load that ends the search: the remaining error is its square."""
 
 _ROUNDING = 1e-5
-"""Largest relative change of the load that counts as rounding if the changes no longer fall. It is
-large because tensions are EA times a difference of lengths, and an almost straight hole has almost
-no friction."""
+"""Newton's method has ended if the relative changes of the load are at most this and no longer get
+smaller. Rounding is large because tensions are EA times a difference of lengths, and a hole through
+which the cable goes almost straight has almost no friction."""
 
 
 @final
@@ -48,8 +48,8 @@ class Breakaway(ReadOnlyState):
     Attributes:
         stiffness: Stiffness that loads below ``load`` measure; see :func:`stuck_stiffness`.
         direction: Unit direction u (3,) of the force, base axes.
-        load: The breakaway load [N], in addition to the wrench of ``stiffness``; inf if no cable
-            ever slides, as the force moves no joint; 0 without friction.
+        load: The breakaway load [N], in addition to the wrench of ``stiffness``; 0 without
+            friction; inf if no cable ever slides because the force moves no joint.
         first_order: The breakaway load in closed form [N], to first order in the load.
         hole_loads: First-order load at which the cable begins to slide in each hole (P,) [N]; inf
             for holes in which it never begins to slide, or cannot stick.
@@ -90,13 +90,16 @@ def breakaway(
 
     Args:
         pose: The posture.
-        tension: As for :func:`~cdsm.stiffness`. If they do not balance the arm, the residual torque
-            is kept as a constant load.
+        tension: A :class:`~cdsm.Tension` or your own tensions (C,) [N], as for
+            :func:`~cdsm.stiffness`. If they do not balance the arm, the residual torque is kept as
+            a constant load.
         direction: u (3,) of the force in base axes, any length, or an axis such as ``"-z"``.
-        wrench: As for :func:`~cdsm.stiffness`.
+        wrench: W (6,) at ``tool0`` in base axes before the force acts: force [N], then moment
+            [N m]; only with your own tensions.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.stiffness`, or ``direction`` is not a direction.
+        InvalidInput: An argument is invalid for :func:`~cdsm.stiffness`, or ``direction`` is not a
+            direction.
         ElasticityRangeError: A tension leaves the domain of its cable's elasticity.
         SingularStiffness: The stuck arm is about to buckle.
         EquilibriumError: The stuck arm buckles below the load found.
@@ -126,9 +129,10 @@ def breakaway(
 
 
 def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
-    """Compute the first-order loads W_i (P,) [N] of all holes, and dθ/dW (nv,) [rad/N].
+    """Compute the load W_i (P,) [N] at which each hole begins to slide, and dθ/dW (nv,) [rad/N].
 
-    ``K`` is the stuck stiffness, ``u`` (3,) the unit direction of the force.
+    Both are of first order in the load. ``K`` is the stuck stiffness, ``u`` (3,) the unit direction
+    of the force.
     """
     T, gradient = segment_state(K)
     motion = K._along(u)[1]
@@ -138,9 +142,9 @@ def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
 def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
     """Return the load [N] at which the stuck arm first reaches a friction bound, and the hole.
 
-    ``motion`` (nv,) is dθ/dW [rad/N] for a force along ``u`` (3,). Newton's method for joints and
-    load starts at the first-order result. If another hole is beyond its friction bound at the
-    solution, the search is repeated for that hole.
+    ``motion`` (nv,) is dθ/dW [rad/N] for a force along ``u`` (3,). Newton's method for joint angles
+    and load starts at the first-order result. If another hole is beyond its friction bound at the
+    solution, the search is repeated for that hole. Raises EquilibriumError if it does not converge.
     """
     pose, arm = K.posture, K.posture.arm
     chains, sticks = pose.segments.chains, holding(pose)

@@ -19,7 +19,7 @@ _ITERATIONS = 60
 """Largest number of Newton steps. Arms with linear laws need one, with strands 3 to 6."""
 
 _UNDAMPED = 20
-"""Number of full Newton steps; later steps are shortened: at kinks of a law full ones may cycle."""
+"""Number of full Newton steps. Later steps are shortened, since full ones may cycle at a kink."""
 
 _HALVINGS = 5
 """Number of bisections that find the length of a shortened Newton step."""
@@ -36,7 +36,7 @@ The remaining error is about ten times its square. The relative rounding of a te
 
 
 class Chain(NamedTuple):
-    """State of all cables at a posture, after the slips; arrays are over the segments (S,)."""
+    """State of all cables at a posture, after wire has slipped; a value for each segment (S,)."""
 
     tension: Array  # T [N]
     natural: Array  # a: natural length of the wire in the segment, its length at zero strain [m]
@@ -134,7 +134,7 @@ class ChainProblem:
         return Chain(new, after, slip, slides, stretch, compliance)
 
     def natural(self, length: Array, tension: Array) -> Array:
-        """Compute the natural lengths a (S,) [m] of segments of length l under T (S,) [N]."""
+        """Compute the natural lengths (S,) [m] from lengths (S,) [m] and tensions (S,) [N]."""
         base, softness = self._strain(tension)
         wire = length - self._spring * (tension - self._rest)
         return np.asarray(wire / (base + softness * tension))
@@ -144,9 +144,9 @@ class ChainProblem:
     ) -> Array:
         """Compute ∂T/∂θ (S, nv) [N/rad] of the cables in the state ``chain``.
 
-        ``forced`` is as in :meth:`settle`. ``gradient`` (S, nv) [m/rad] is ∂l/∂θ of the lengths,
-        ``friction_gradient`` (S, nv) [1/rad] is μ ∂φ/∂θ of the hole to the next segment. See
-        :func:`~cdsm.kernels.chain_problem.chain_tangent`.
+        ``forced`` (C,) [N] is the tension of force-controlled motors, NaN for others. ``gradient``
+        (S, nv) [m/rad] is ∂l/∂θ of the lengths, ``friction_gradient`` (S, nv) [1/rad] is μ ∂φ/∂θ of
+        the hole to the next segment. See :func:`~cdsm.kernels.chain_problem.chain_tangent`.
         """
         return chain_tangent(
             self._start,
@@ -162,7 +162,8 @@ class ChainProblem:
     def _shortened(self, T: Array, new: Array, length: Array, natural: Array) -> Array:
         """Return tensions (S,) [N] between ``T`` and ``new`` with about the least Σ D_j(ln T_j).
 
-        :mod:`cdsm.kernels.chain_problem` defines D_j. The sum is convex on a line in ln T.
+        :mod:`cdsm.kernels.chain_problem` defines D_j. The sum is a convex function along the
+        straight line from ln ``T`` to ln ``new``. ``length`` and ``natural`` (S,) are in [m].
         """
         T = np.maximum(T, _SLACK)
         step = np.log(np.maximum(new, _SLACK) / T)
@@ -185,9 +186,9 @@ class ChainProblem:
     def potential(self, tension: Array) -> Array:
         """Compute P = T (1 + ε) − ∫ T dε (S,) [N] at ``tension`` T.
 
-        P is the work per natural length of wire that a motor takes in. Wire that moves from one
-        segment to another dissipates the difference of their P per natural length. To first order
-        in the strain this is the difference of the tensions.
+        P is the work of a motor that takes in wire, per natural length. Wire that slips from one
+        segment to another dissipates the difference of P of the two segments, per natural length.
+        To first order in the strain this is the difference of their tensions.
         """
         base, softness = self._strain(tension)
         return np.asarray(tension * (base + softness * tension) - self._energy(tension))

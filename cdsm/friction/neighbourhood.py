@@ -11,7 +11,7 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
 _NEAR = 1e-9
-"""Smallest change of an angle [rad], a position [m] or a tension [N] in a neighbourhood."""
+"""Least bound of a neighbourhood for changes of an angle [rad], a position [m], a tension [N]."""
 
 
 class Neighbourhood:
@@ -53,7 +53,10 @@ class Neighbourhood:
         self._set_tensions(apart, F[cable])
 
     def _set_tensions(self, apart: Array, F: Array) -> None:
-        """Set :attr:`tensions` and :attr:`falls` from bounds ``apart`` (S,) of |ln T/F|."""
+        """Set :attr:`tensions` and :attr:`falls` from bounds ``apart`` (S,) of |ln T/F|.
+
+        F (S,) [N] are the tensions at the reference.
+        """
         self.tensions = np.maximum(np.expm1(apart) * F, _NEAR)
         self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
@@ -78,7 +81,7 @@ class Neighbourhood:
     def curved(self, forms: Array) -> Array:
         """Compute a bound (…,) of |δᵀ A δ|/2 for ``forms`` A (…, nv, nv), over the neighbourhood.
 
-        The bound is a sum over pairs of holes, whose joint motions may cancel.
+        The bound is a sum over pairs of holes. It neglects that their joint motions may cancel.
         """
         both = self._steps.T @ forms @ self._steps
         return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)

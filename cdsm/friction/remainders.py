@@ -32,16 +32,18 @@ class Remainders:
     """Bounds of the remainders of Taylor expansions in the neighbourhood |δ| ≤ ρ.
 
     δ is the change of the joint angles. A motion ρ of a prismatic joint is treated as a rotation by
-    ρ/r about an axis at the distance r, which moves points as far. Each attribute bounds the
-    difference between a quantity and its expansion.
+    ρ/r about an axis at the distance r, which moves points by the same distance. Each attribute is
+    a bound of the difference between a quantity and its expansion.
 
     Attributes:
-        length: Length of each segment, expanded to second order (S,) [m].
-        gradient: Gradient ∂l/∂θ of each length, expanded to first order (S, nv) [m/rad].
-        turn: Each wrap angle, taken as constant (P,) [rad].
-        wrap: Each wrap angle, expanded to first order (P,) [rad]; inf where it may be zero.
-        tip: Displacement of the tip, expanded to third order [m].
-        body: Torques of weight and wrench, expanded to second order (nv,) [N m].
+        length: Bound for the length of each segment, expanded to second order (S,) [m].
+        gradient: Bound for the gradient ∂l/∂θ of each length, expanded to first order (S, nv)
+            [m/rad].
+        turn: Bound for each wrap angle, taken as constant (P,) [rad].
+        wrap: Bound for each wrap angle, expanded to first order (P,) [rad]; inf where the angle may
+            be zero.
+        tip: Bound for the displacement of the tip, expanded to third order [m].
+        body: Bound for the torques of weight and wrench, expanded to second order (nv,) [N m].
     """
 
     def __init__(self, K: Stiffness, within: Array) -> None:

@@ -6,10 +6,11 @@ A state of rest near a reference has joint angles θ_0 + δ and segment tensions
     Σ_j l_j(θ)/(1 + ε(T_j)) = the same at the reference               (wire of a locked motor)
     exp(−μ φ_i(θ)) ≤ T_{j+1}/T_j ≤ exp(μ φ_i(θ))                      (friction at each hole)
 
-To first order in δ and ΔT this is a polyhedron, and the largest and smallest displacement of the
-tip in it are two linear programs. All neglected terms, also those of nonlinear laws, are bounded in
-a neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T and added to the right-hand sides. The polyhedron then
-contains all states of rest in the neighbourhood (outer correction):
+To first order in δ and ΔT these conditions describe a polyhedron. The largest and the smallest
+displacement of the tip in it follow from two linear programs. All neglected terms, including terms
+of nonlinear laws, are bounded in a neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T, and the bounds are
+added to the right-hand sides. With this outer correction, the polyhedron contains all states of
+rest in the neighbourhood:
 
 - δ is a sum of one motion per hole. So quadratic and cubic forms of δ are sums over two and three
   holes, bounded term by term. This bounds the terms of second and third order of lengths, tip
@@ -52,10 +53,11 @@ class End(NamedTuple):
 
 
 class RestStates:
-    """Polyhedron of states of rest with joint changes |δ| ≤ ρ and tension changes |ΔT| ≤ ρ_T.
+    """Polyhedron that contains all states of rest with |δ| ≤ ρ and |ΔT| ≤ ρ_T.
 
-    ``near`` contains ρ and ρ_T. The variables are δ/ρ, ΔT/ρ_T, and one slack per equation, whose
-    bounds are the outer correction.
+    δ are the changes of the joint angles, ΔT the changes of the segment tensions from a reference.
+    ``near`` gives ρ and ρ_T. The variables are δ/ρ, ΔT/ρ_T, and one slack per equation. A slack
+    stands for the neglected terms of its equation, within proved bounds.
     """
 
     def __init__(self, K: Stiffness, near: Neighbourhood, bends: Bends) -> None:
@@ -150,7 +152,7 @@ class RestStates:
         return self._largest(np.append(np.zeros(low.size), 1.0), widened).bound
 
     def _largest(self, cost: Array, program: tuple[Any, ...] | None = None) -> End:
-        """Maximise cost · x over the polyhedron, or subject to another linear ``program``."""
+        """Maximise cost · x over the polyhedron, or over the constraints of another ``program``."""
         scale = float(abs(cost).max())
         if scale == 0.0:
             return End(0.0, 0.0, 0.0)
@@ -172,8 +174,8 @@ def _locked(
     The sums are over the segments of the cable. At the reference, a segment has the length l with
     the gradient g. ΔT is the change of its tension. ΔT_1, of the first segment, also stretches the
     series spring. b = 1/(1 + ε) is taken at the reference tension F; b′ is its mean slope over the
-    range of tensions. The slack stands for the terms that are neglected. δ, ρ and ρ_T are those of
-    the module.
+    range of tensions. The slack stands for the terms that are neglected. The docstring of the
+    module defines δ, ρ and ρ_T.
 
     Args:
         K: Stiffness at the reference.
@@ -260,7 +262,7 @@ class _Wire(NamedTuple):
 
     @classmethod
     def of(cls, cable: Cable, F: float, fall: float, rise: float, unstrained: bool) -> _Wire:
-        """Bound b for tensions of a locked cable from F − fall to F + rise [N].
+        """Bound b = 1/(1 + ε) for tensions of a locked cable from F − fall to F + rise [N].
 
         If ``unstrained`` is False, ε is the strain minus the strain under F.
         """

@@ -30,7 +30,7 @@ def stuck_stiffness(
     :func:`~cdsm.stiffness`. With the same tensions, the result minus this stiffness is positive
     semidefinite.
 
-    Arguments and errors are those of :func:`~cdsm.stiffness`. All segments of a cable have its
+    :func:`~cdsm.stiffness` explains the arguments and the errors. All segments of a cable have its
     tension, as after shaking the arm.
     """
     F, W = checked_tension(pose, tension, wrench)
@@ -90,7 +90,8 @@ def sliding_stiffness(
 def _require_friction(pose: Posture, tension: Array, signs: Array) -> None:
     """Raise InvalidInput unless friction allows the ratio of tensions at both sides of each hole.
 
-    ``tension`` is (S,) [N]; ``signs`` (P,) are those of :func:`sliding_stiffness`.
+    ``tension`` is (S,) [N]. ``signs`` (P,) is the argument ``sliding`` of
+    :func:`sliding_stiffness`.
     """
     chains = pose.segments.chains
     before, after = tension[chains.hole], tension[chains.hole + 1]

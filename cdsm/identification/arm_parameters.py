@@ -44,10 +44,10 @@ class ArmParameters:
     """Arm as a function of some of its parameters; use it as ``model_of`` of :func:`identify`.
 
     A parameter belongs to all joints or links (``"hole_radius"``), or to one, counted from the base
-    (``"hole_radius@2"``). ``lead``, ``friction``, ``rigidity`` and ``spring`` with a number belong
-    to the cables of that joint. ``friction`` is μ, ``rigidity`` a factor on the EA of the arm's
-    laws [-], ``spring`` the stiffness in series with each cable [N/m], the others are in SI. A call
-    passes names with @ in a dict: ``parameters(**{"hole_radius@2": 0.025})``.
+    (``"hole_radius@2"``). With a number, ``lead``, ``friction``, ``rigidity`` and ``spring`` belong
+    to the cables of that joint. ``friction`` is μ [-]. ``rigidity`` [-] multiplies EA of the arm's
+    laws. ``spring`` [N/m] is the stiffness in series with each cable. All others are lengths [m] or
+    masses [kg]. A call passes names with @ in a dict: ``parameters(**{"hole_radius@2": 0.025})``.
 
     Attributes:
         arm: The arm; parameters that are not named keep their values.
@@ -55,8 +55,8 @@ class ArmParameters:
 
     Raises:
         UnknownName: There is no such parameter.
-        InvalidInput: The arm has no such joint or no geometry, or a name is given twice, or both
-            for all joints and for one joint.
+        InvalidInput: The arm has no such joint, no geometry, or other cables than its geometry; or
+            a name is given twice, or both for all joints and for one joint.
     """
 
     arm: Manipulator
@@ -95,7 +95,7 @@ class ArmParameters:
 
     @property
     def present(self) -> dict[str, float]:
-        """Value of each parameter in :attr:`arm`, in SI; the median if joints differ."""
+        """Value of each parameter in :attr:`arm`, in SI; the median if its joints differ."""
         return {name: float(np.median(self._values(name))) for name in self.names}
 
     def __call__(self, **values: float) -> Manipulator:

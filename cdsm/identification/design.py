@@ -1,11 +1,12 @@
 """Optimal design of experiments: which tests determine parameters best, and how far from best.
 
 Test i has the Fisher information M_i = J_iᵀ J_i (r, r). J_i are the derivatives of its readings, in
-standard deviations, with respect to the r parameters. Tests made n_i times give the information
-M = M_0 + Σ n_i M_i, where M_0 is the prior information, and the covariance C = M⁻¹ of the
-parameters. The matrix L (s, r) selects the s wanted parameters. (Elsewhere L is a cable length.)
-The criterion of a design is f = det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C Lᵀ) (A-optimal).
-Both are concave and homogeneous in the information, so no design of N tests has a larger f than
+standard deviations, with respect to the r parameters. If each test i is made n_i times, the
+information is M = M_0 + Σ n_i M_i, where M_0 is the prior information. The covariance of the
+parameters is C = M⁻¹. The matrix L (s, r) selects the s wanted parameters; elsewhere L is a cable
+length. The criterion of a design is f = det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C Lᵀ)
+(A-optimal). Both are concave and homogeneous in the information, so no design of N tests has a
+larger f than
 
     f · (tr M_0 G + N max_i tr M_i G) / tr M G,   G = C Lᵀ (L C Lᵀ)⁻¹ L C (D) or C Lᵀ L C (A):
 
@@ -60,7 +61,7 @@ class Design(NamedTuple):
         """Compute tr M_i G (n,), and a proved lower bound of the efficiency f/f_best of a design.
 
         The gain of one more test i is proportional to tr M_i G. ``M`` (r, r) is the information of
-        the design; the top of the module gives G. The bound is between 0 and 1.
+        the design; the docstring of the module defines G. The bound is between 0 and 1.
         """
         C = np.linalg.inv(M)
         right = C @ self.wanted.T
@@ -85,7 +86,7 @@ class Design(NamedTuple):
         return np.asarray(counts)
 
     def whole(self, shares: Array) -> Array:
-        """Round the repetitions ``shares`` (n,), then exchange single tests while ln f rises."""
+        """Round the repetitions ``shares`` (n,), then exchange single tests as long as f rises."""
         counts = np.floor(shares)
         left = self.tests - int(counts.sum())
         counts[np.argsort(counts - shares)[:left]] += 1.0

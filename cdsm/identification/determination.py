@@ -52,12 +52,12 @@ class Determination:
 
     @property
     def dependent(self) -> Any:
-        """Index of one parameter per undetermined combination; fix them to determine the others."""
+        """Indices of parameters, one per undetermined combination: fixing them determines all."""
         return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
 
     @property
     def coordinates(self) -> Array:
-        """Matrix A (P, rank) with p = A c: c (rank,) are coordinates that are determined."""
+        """Matrix A (P, rank): changes A c of the parameters are determined, for every c (rank,)."""
         scaled = self._svd[1][self.determined].T
         return np.asarray(scaled / self._column_norms[:, None])
 
@@ -88,7 +88,7 @@ class Determination:
 
     @cached_property
     def _svd(self) -> tuple[Array, Array]:
-        """Singular values and right vectors of J, with columns scaled to unit length.
+        """Singular values and right singular vectors of J, with columns scaled to unit length.
 
         Columns that are zero to rounding are set to zero.
         """
@@ -97,7 +97,10 @@ class Determination:
 
     @cached_property
     def determined(self) -> Any:
-        """Whether each singular value is above rounding: its combination is then determined."""
+        """Whether the combination of parameters of each singular value of J is determined.
+
+        It is if the singular value is above rounding.
+        """
         values = self._svd[0]
         return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
 

@@ -20,7 +20,7 @@ _UNLIKELY = 1e-3
 
 
 _LEFT = 1e-2
-"""With loops, χ² has kinks, which stop a search early: this further fall of χ² is tolerated."""
+"""Fall of χ² that a search with loops may leave undone: kinks of χ² stop such a search early."""
 
 
 def warnings_of(result: Identification) -> list[str]:
@@ -64,7 +64,7 @@ def _at_bound(result: Identification, i: int) -> list[str]:
 
 
 def _open_ends(result: Identification, i: int) -> list[str]:
-    """Return a warning if the measurements do not limit the interval of parameter ``i``."""
+    """Return a warning, in a list, if the measurements do not limit the interval of parameter i."""
     name, profile, limits = result.names[i], result.profiles[i], result.bounds[i]
     interval = result.confidence()[name]
     ends = [k for k in (0, 1) if math.isinf(interval[k])]
@@ -92,8 +92,8 @@ def _open_ends(result: Identification, i: int) -> list[str]:
 def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str]:
     """Return a warning, in a list, if χ² can still fall from ``point``, where a search ended.
 
-    This happens, for example, if the model does not exist beyond ``point`` (P,), a point in the
-    unit cube of ``problem``. ``jacobian`` (n, P) is ∂r/∂point there.
+    This happens, for example, if the model does not exist beyond ``point``. ``point`` (P,) is in
+    the unit cube of ``problem``. ``jacobian`` (n, P) is ∂r/∂point there.
     """
     r = problem.residuals(point)
     gradient = r @ jacobian
@@ -120,7 +120,7 @@ def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str
 def ambiguous(
     problem: LeastSquares, best: Array, result: Identification, starts: Sequence[Array]
 ) -> list[str]:
-    """Return a warning, in a list, if a search from ``starts`` finds a minimum that fits as well.
+    """Return a warning, in a list, if a search from ``starts`` finds another good minimum of χ².
 
     This minimum is outside the 95 % intervals of ``result``, although its χ² is so low that they
     should contain it. ``best`` is the optimum of ``result``. All points (P,) are in the unit cube

@@ -104,9 +104,10 @@ def plan_tests(
     criterion: Criterion = "D",
     progress: bool = True,
 ) -> ExperimentPlan:
-    """Choose among the loops ``candidates`` as :func:`plan_experiment` does.
+    """Choose the tests that determine parameters best among the loops ``candidates``.
 
-    Their labels must differ. The other arguments and errors are those of :func:`plan_experiment`.
+    The labels of the loops must differ. :func:`plan_experiment` explains the criterion, the other
+    arguments and the errors.
     """
     values = _checked_parameters(parameters)
     check_call("model_of", model_of, 0, tuple(values))
@@ -188,7 +189,7 @@ def _wanted(
 
 
 def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
-    """Return prior information as rows (P, P): diagonal |p|/σ for known parameters p, else 0."""
+    """Return the prior knowledge (P, P) [-]: on the diagonal |p|/σ if p is known to σ, else 0."""
     weights = dict.fromkeys(values, 0.0)
     for name, std in known.items():
         if not (sigma := scalar(f"known[{name!r}]", std)) > 0.0:

@@ -32,18 +32,20 @@ class ExperimentPlan(ReadOnlyState):
     Attributes:
         names: Names of the parameters, in the order of every (P,) array.
         values: Expected values (P,) [m, kg, N/m, …].
-        wanted: Names of the parameters that matter.
-        criterion: ``"D"`` or ``"A"``.
+        wanted: Names of the parameters that the tests are to determine well.
+        criterion: ``"D"`` or ``"A"``, see :func:`plan_experiment`.
         candidates: The candidates that can be tested.
         counts: Number of repetitions of each candidate (n,).
         even: Repetitions (n,) in a reference plan: as many tests, evenly spaced over the
             candidates.
         jacobians: Derivatives [-] of the readings of each candidate, in standard deviations, with
-            respect to relative parameters: a row (P,) for each reading.
+            respect to relative parameters, which are divided by their expected values: a row (P,)
+            for each reading.
         known: Prior knowledge (P, P) [-]: 1/σ of relative parameters on the diagonal.
-        efficiency: Proved lower bound of f/f_best [-], 1 for the best plan; f is the criterion. The
-            variances, averaged as in the criterion, are at most 1/efficiency times those of the
-            best plan. 0 if the tests are too few to determine what is wanted.
+        efficiency: Proved lower bound of f/f_best [-], 1 for the best plan. With the covariance C
+            of the s wanted parameters, f is det(C)^(−1/s) for ``"D"`` and 1/tr C for ``"A"``. So
+            the mean variance (geometric or arithmetic) is at most 1/efficiency times as large as in
+            the best plan. 0 if the tests are too few to determine the wanted parameters.
         sensitivities: Gain of one more test of each candidate, relative to the largest gain (n,)
             [-].
         open_combinations: Combinations of relative parameters that no candidate determines.

@@ -4,8 +4,8 @@ The profile of a parameter p_i is the rise of χ² as p_i leaves its best value:
 
     Δχ²(p_i) = min over the other parameters of χ² − least χ²
 
-Bates and Watts, Nonlinear Regression Analysis, 1988, chapter 6. It gives the same interval whether
-the search uses the parameter or its logarithm.
+The interval of p_i contains all values with a small Δχ². It is the same whether the search uses the
+parameter or its logarithm. Source: Bates and Watts, Nonlinear Regression Analysis, 1988, chapter 6.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from cdsm.identification.least_squares import METHODS, Box, LeastSquares
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 RANK_TOLERANCE = 1e-6
-"""Singular values of J, scaled to unit columns, below this are zero; J is accurate to 1e-10."""
+"""Smaller singular values of J, with columns scaled to length 1, are zero; J is exact to 1e-10."""
 
 NEGLIGIBLE = 1e-3
 """Difference of χ² that is neglected. A difference of 1 is one standard deviation."""
@@ -36,7 +36,8 @@ _LONGEST = 0.25  # step at most, as a share of the range of the parameter
 _HALVINGS = 8  # of a step from which the model does not exist; then the profile ends
 
 _NEAR, _REFINEMENTS = 0.25, 4
-"""A knot is near a wanted Δχ² within this part of it; up to so many knots are added for that."""
+"""A knot counts as near a wanted Δχ² if it differs by less than this part of it; the second number
+is the largest number of knots that are added to come so near."""
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8)
 """ftol, xtol and gtol of the fit at a knot: as accurate as the cubic between knots."""
@@ -79,8 +80,8 @@ class Profile(ReadOnlyState):
 
         ``side`` is −1 for values below the best one, 1 for values above. Between the values, Δχ² is
         a cubic in the searched parameter (or its logarithm). If Δχ² stays below ``rise`` up to the
-        bound or the end of the model, the result is −inf or inf. None: the profile has no such end,
-        but was computed only for smaller Δχ².
+        bound or the end of the model, the result is −inf or inf. It is None if the profile was
+        computed only for values of Δχ² below ``rise``.
         """
         outward = slice(self.best, None, side)
         values, height = self.values[outward], self.rise[outward]
@@ -108,10 +109,10 @@ def other_minimum(
 ) -> Array | None:
     """Search for another minimum of χ², within ``rise`` of the least χ² and outside ``intervals``.
 
-    Such a point refutes the intervals (P, 2) of all parameters, since they belong to one of several
-    minima. Searches begin at those of ``starts`` that are outside the intervals. Returns None if no
-    search finds such a minimum. Points are in the unit cube. Raises LowerOptimumError if χ² is
-    lower at the minimum than at ``best``.
+    Such a minimum refutes the intervals (P, 2) of all parameters, since they belong to only one of
+    several minima. Searches begin at the points of ``starts`` outside the intervals. All points are
+    in the unit cube. Return None if no search finds such a minimum. Raises LowerOptimumError if χ²
+    is lower at the minimum than at ``best``.
     """
 
     def outside(point: Array) -> bool:
@@ -174,8 +175,9 @@ class Profiler:
     def _falls(self, knots: list[_Knot], side: Side) -> list[Array]:
         """Return a list of at most one point: the lowest knot at which the profile falls again.
 
-        ``knots`` are those on one ``side``, from the optimum outward. It falls again at a knot if
-        Δχ² was above ``exact[0]`` at the knot before, and is lower here or has a falling slope.
+        ``knots`` is the profile on one ``side``, from the optimum outward. The profile falls again
+        at a knot if Δχ² was above ``exact[0]`` at the knot before, and is lower here or has a
+        falling slope.
         """
         falling = [
             knot
@@ -185,7 +187,10 @@ class Profiler:
         return [min(falling, key=lambda knot: knot.rise).point] if falling else []
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
-        """Compute the knots on one side, from the optimum outward; return also why they end."""
+        """Compute the knots on one side, from the optimum outward, and the reason why they end.
+
+        The reason is empty if Δχ² reaches ``far``.
+        """
         knots = [self._knot(self.best, self.jacobian[:, self.i], self.jacobian[:, self.others])]
         for goal in (*self.exact, self.far):
             while knots[-1].rise < goal:
@@ -233,7 +238,7 @@ class Profiler:
             knots.insert(last + 1, between)
 
     def _moved(self, here: _Knot, step: float) -> _Knot | str:
-        """Compute the knot one ``step`` of u along the tangent; if there is none, return why."""
+        """Compute the knot one ``step`` of u along the tangent; if it cannot exist, return why."""
         problem, others = self.problem, self.others
         point = np.clip(here.point + step * here.tangent, 0.0, 1.0)
         if (failure := problem.failure(point)) is not None:

@@ -21,7 +21,7 @@ from cdsm.errors import CdsmError, InvalidInput
 from cdsm.support.values import Array
 
 _DECADES = 100.0
-"""If the ratio of positive bounds is at least this, the logarithm of the parameter is scaled."""
+"""Least ratio of positive bounds with which the logarithm of a parameter is searched instead."""
 
 _ONE_SIDED, _CENTRAL = 1e-7, 1e-5
 """Steps of the finite differences in the unit cube. They balance rounding and truncation."""
@@ -62,7 +62,7 @@ class Box:
         self._size = self._scaled(self.high) - self._start
 
     def _scaled(self, values: Array) -> Array:
-        """Return the searched values: the parameters or their logarithms."""
+        """Return the parameters, or the logarithms of those that are searched logarithmically."""
         return np.asarray(np.log(values, out=values.copy(), where=self._by_log))
 
     def parameters(self, point: Array) -> Array:
@@ -78,7 +78,7 @@ class Box:
         return np.asarray(np.clip((self._scaled(values) - self._start) / self._size, 0.0, 1.0))
 
     def derivative(self, point: Array) -> Array:
-        """Compute the derivative (P,) of each parameter by its entry of ``point`` (P,)."""
+        """Compute the derivative (P,) of each parameter with respect to its entry of ``point``."""
         return np.where(self._by_log, self.parameters(point) * self._size, self._size)
 
 
@@ -109,7 +109,7 @@ class LeastSquares:
 
     @property
     def followed(self) -> bool:
-        """Whether differences use ``beside``, whose residuals are exact to first order only."""
+        """Whether finite differences use ``beside``, whose residuals are of first order only."""
         return self._beside is not None
 
     def parameters(self, point: Array) -> dict[str, float]:
@@ -201,9 +201,9 @@ class LeastSquares:
             start: First point of the search.
             method: One of :data:`METHODS`.
             tolerances: scipy's ftol, xtol and gtol.
-            most: Largest number of evaluations, without those of the differences.
+            most: Largest number of evaluations; evaluations for finite differences are not counted.
             over: Indices of the parameters that move; all if not given.
-            central: Whether the differences are central.
+            central: Whether the finite differences are central.
         """
         moving = list(range(start.size)) if over is None else list(over)
 

@@ -24,16 +24,16 @@ class WeightLoop:
 
     The arm is shaken at the posture, so that each cable has one tension along its length, and its
     motors are locked. Then the forces act one after the other, as in :func:`~cdsm.load_cycle`. A
-    reading is the position of the tip along the direction, or in x, y and z. Its offset does not
-    matter.
+    reading is the position of the tip along the direction, or in x, y and z, from an arbitrary
+    zero.
 
     Attributes:
         direction: Direction of the forces: an axis such as ``"-z"``, kept as its vector, or (3,) in
             base axes, any length.
         angles: Joint angles (nv,) [rad] before the first force.
         forces: Forces along the direction (n,) [N], in their order; 0 where nothing hangs.
-        displacements: Readings (n,) along the direction or (n, 3) in base axes [m]. None: the test
-            is planned, and has not been made.
+        displacements: Readings (n,) along the direction or (n, 3) in base axes [m]; None if the
+            test is only planned.
         displacement_std: Standard deviation of a reading [m].
         force_std: Standard deviation of a force [N].
         tension: Cable tensions (C,) [N] before the first force. Give ``tension`` or ``minimum``.
@@ -151,14 +151,14 @@ def measured(measurement: Measurement | WeightLoop) -> Array:
 class Weights:
     """Statistical weights of the readings of a loop; each axis has an unknown offset.
 
-    e are the errors predicted − measured, and V is their covariance. Z z adds the offset z of each
-    axis. χ² is the least (e + Z z)ᵀ V⁻¹ (e + Z z) over all z: a quadratic form in e. R is the
-    symmetric root of its matrix, so χ² = |R e|². An entry of R e is the residual of one reading, in
-    standard deviations.
+    e (m,) are the errors predicted − measured of the m readings, and V (m, m) is their covariance.
+    Z z adds the offset z of each axis. χ² is the least (e + Z z)ᵀ V⁻¹ (e + Z z) over all z. It is a
+    quadratic form in e; R is the symmetric square root of its matrix, so χ² = |R e|². An entry of
+    R e is the residual of one reading, in standard deviations.
 
     Attributes:
-        root: R (m, m) [1/m] for the m readings, sorted by force, then axis.
-        zero: Matrix (k, m) that gives the offsets −z (k,) from errors e (m,).
+        root: R (m, m) [1/m]; the readings are sorted by force, then axis.
+        zero: Matrix (k, m) that gives the offsets of the k axes from the errors: −z = ``zero`` e.
     """
 
     def __init__(

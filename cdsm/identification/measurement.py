@@ -81,7 +81,7 @@ class Measurement:
 def checked_conditions(given: Measurement | WeightLoop) -> dict[str, object]:
     """Check direction, wrench, angles and tensions of a measurement; return them by field name.
 
-    Values are tuples of numbers, as the fields store them; ``minimum`` may be one number.
+    The values are tuples of numbers, as the fields store them; ``minimum`` may be one number.
     """
     if (given.tension is None) == (given.minimum is None):
         raise InvalidInput(

@@ -34,8 +34,8 @@ _STORED = 8  # sets of parameters whose paths are stored
 class UserFaultError(Exception):
     """A user-defined function has failed; its first argument is the :class:`InvalidInput` to raise.
 
-    It is not a CdsmError, so that a search stops instead of treating these parameters as having no
-    model.
+    It is not a CdsmError. A search stops at it, while a CdsmError only means that the model does
+    not exist for these parameters.
     """
 
 
@@ -84,10 +84,10 @@ class Model:
     def weighted(self, parameters: Parameters) -> Model:
         """Return the same model, whose weights contain all errors of the loops.
 
-        The covariance of the readings is V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ. A and B are their
-        derivatives with respect to the forces and tensions, at ``parameters``; σ, σ_f and σ_F are
-        the standard deviations of readings, forces and tensions. With friction, a force also
-        changes all later readings.
+        The covariance of the readings is V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ. A and B are the
+        derivatives of the readings with respect to forces and tensions, at ``parameters``. σ, σ_f
+        and σ_F are the standard deviations of readings, forces and tensions. With friction, a force
+        also changes all later readings.
         """
         arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
@@ -106,8 +106,8 @@ class Model:
     def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
         """Compute the residuals (n,) for slightly changed parameters ``moved``, to first order.
 
-        The residuals of loops follow from their equilibria at ``here``. No other equilibria are
-        searched for, so this is ten times as fast.
+        The residuals of loops follow from their equilibria for the parameters ``here``. No other
+        equilibria are searched for, so this is ten times as fast as :meth:`residuals`.
         """
         return self.weigh(self.predict(moved, here)[1])
 
@@ -150,7 +150,7 @@ class Model:
         return np.concatenate(rows)
 
     def as_read(self, predicted: list[Array]) -> Array:
-        """Add the fitted offsets of the loops to the result of :meth:`predict`; (n,) [N/m, m]."""
+        """Return the numbers (n,) [N/m, m] of :meth:`predict`, plus the fitted offsets of loops."""
         rows = []
         for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
             if weights is not None:
@@ -170,9 +170,9 @@ class Model:
     def _paths_at(
         self, parameters: Parameters, arm: Manipulator | None = None
     ) -> list[LoadingPath | None]:
-        """Return the path of each loop for ``parameters``, or None for a stiffness.
+        """Return the equilibria of each loop for ``parameters``; None for a measured stiffness.
 
-        The paths of the last few parameters are stored.
+        The equilibria for the last 8 sets of parameters are stored.
         """
         key = tuple(parameters.values())
         if key not in self._paths:
@@ -217,11 +217,11 @@ class Model:
         return tension, None if isinstance(tension, Tension) else measurement.wrench
 
     def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
-        """Compute the derivatives of the readings of ``loop``, whose equilibria are ``path``.
+        """Compute the derivatives of the readings of ``loop`` from its equilibria ``path``.
 
         The first array (m, n) [m/N] has the derivatives with respect to the forces, the second one
-        (m, C) [m/N] with respect to the tensions. An array has no columns if the forces or tensions
-        are exact.
+        (m, C) [m/N] with respect to the tensions. The first has no columns if the forces are exact,
+        the second none if the tensions are exact.
         """
         u, axes, pose = unit_direction("direction", loop.direction), loop.axes, path.start.pose
         by_forces = np.zeros((len(loop.forces) * len(axes), 0))

@@ -179,7 +179,7 @@ class Identification(ReadOnlyState):
         )
 
     def plot(self) -> Figure:
-        """Plot predicted against measured stiffness [N/mm], and residuals in units of σ."""
+        """Plot predicted and measured stiffnesses [N/mm] and loops [mm], and residuals in σ."""
         from cdsm.plots.measured import plot_identification  # matplotlib imports slowly
 
         return plot_identification(self, self._labels, self._verdict)
@@ -198,7 +198,7 @@ class Identification(ReadOnlyState):
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
 
     def _nonlinear_rows(self) -> list[str]:
-        """Return a line that names the parameters whose interval is not about ±1.96 std."""
+        """Return a line, in a list, that names the parameters whose interval is not ±1.96 std."""
         low, high = np.array(list(self.confidence().values())).T
         ratio = (high - low) / (2.0 * math.sqrt(self._rise(0.95, scaled=False)) * self.std)
         chosen = np.isfinite(ratio) & ((ratio > _LINEAR) | (ratio < 1.0 / _LINEAR))
@@ -236,7 +236,7 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def _rows(self) -> list[Measurement | WeightLoop]:
-        """The measurement to which each of the n measured numbers belongs."""
+        """For each of the n measured numbers, the measurement to which it belongs."""
         return [each for each in self.measurements for _ in measured(each)]
 
     @property
@@ -269,9 +269,9 @@ class Identification(ReadOnlyState):
         )
 
     def _rise(self, level: float, *, scaled: bool) -> float:
-        """Compute the Δχ² [-] at the limits of a confidence interval of this ``level``.
+        """Compute Δχ² [-] at the limits of the confidence intervals of this ``level``.
 
-        ``scaled`` is the argument of :meth:`confidence`.
+        :meth:`confidence` explains ``scaled``.
         """
         half = (1.0 + level) / 2.0
         if not scaled:

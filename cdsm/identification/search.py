@@ -31,7 +31,8 @@ _log = logging.getLogger("cdsm")
 _ON_BOUND = 1e-9  # a parameter this near to a bound (share of the range) counts as on the bound
 
 _CANDIDATES, _STARTS = 24, 3
-"""Number of points evaluated over the bounds, and number of best points that start a search."""
+"""Number of points within the bounds that are evaluated, and number of the best of them from which
+searches start."""
 
 _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
 """ftol, xtol and gtol of the searches with one-sided and with central differences."""
@@ -39,7 +40,7 @@ _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
 _OF_LOOPS = (1e-6, 1e-8, 1e-8)  # ftol, xtol and gtol of searches with loops, whose χ² is less exact
 
 _REWEIGHINGS = 2
-"""Number of times that the weights of loops are computed again from the model found so far."""
+"""Number of times that the weights of loops are computed again with the parameters found so far."""
 
 _EVALUATIONS = 200  # largest number in a search, without those of the differences
 
@@ -90,8 +91,8 @@ def identify(
             spread over the bounds (always the same points), and the best result is returned.
         tension_of: Function ``tension_of(posture, measurement, **p)`` that returns the tensions
             (C,) [N] or a :class:`~cdsm.Tension`, for example with the offset of a load cell as a
-            parameter. It and ``model_of`` get all free parameters. The default is the tensions of
-            the measurement.
+            parameter. Both ``tension_of`` and ``model_of`` get all free parameters. The default is
+            the tensions of the measurement.
         progress: Show a bar on the standard error, if that is a terminal.
 
     Raises:
@@ -180,8 +181,8 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
 def check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
     """Raise UnknownName or InvalidInput if ``function`` does not take these arguments.
 
-    The arguments are ``positional`` positional ones, and one by keyword for each of ``names``. The
-    text of the error calls the function ``name``.
+    The arguments are ``positional`` positional ones, and one keyword argument for each of
+    ``names``. The error calls the function ``name``.
     """
     if not callable(function):
         raise InvalidInput(name, f"{function!r} given; a function is needed.")

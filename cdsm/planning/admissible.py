@@ -66,16 +66,17 @@ class Admissible:
         return low, high
 
     def imbalance(self, F: Array) -> Array:
-        """Return the imbalance of tensions F (C,) [N]: ``rows`` · (``least`` − F) (r,) [N].
+        """Return how far tensions F (C,) [N] are from balancing the arm (r,) [N]; zero if they do.
 
-        It is zero if F balances the arm.
+        It is the least tensions minus F, projected onto the row space of J_Lᵀ.
         """
         return np.asarray(self.rows @ (self.least.values - F))
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
-        """Return the tensions (C,) [N] nearest to ``wanted`` that balance the arm within bounds.
+        """Return the tensions (C,) [N] nearest to ``wanted`` that balance the arm.
 
-        None if there are no such tensions.
+        They are within the bounds ``low`` and ``high`` (C,) [N]. The result is None if no tensions
+        within these bounds balance the arm.
         """
         size = max(self.scale, float(abs(wanted).max()))
         found = solve(
@@ -95,7 +96,7 @@ class Admissible:
         return replace(self, least=replace(self.least, values=frozen(least)), low=low, high=high)
 
     def tension(self, F: Array) -> Tension:
-        """Convert F (C,) [N] to a :class:`Tension`; correct its rounding so that it balances."""
+        """Convert F (C,) [N] to a :class:`Tension`; correct rounding errors of its balance."""
         exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
         values = frozen(F if exact is None else exact)
         return replace(self.least, values=values, least=False)
@@ -104,7 +105,9 @@ class Admissible:
 def admissible(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike
 ) -> Admissible:
-    """Find the admissible tensions at a posture; arguments as for :func:`~cdsm.distribute_tension`.
+    """Find the admissible tensions at a posture.
+
+    :func:`~cdsm.distribute_tension` explains the arguments.
 
     Raises:
         InfeasibleTension: No tensions within the bounds and domains balance the arm.
@@ -145,8 +148,8 @@ def solve(
 ) -> Optimum | None:
     """Solve min ½xᵀPx + qᵀx with A x = b, low ≤ x ≤ high and G x ≤ h; return None on failure.
 
-    ``equations`` are A and b, ``cuts`` G and h. P is positive definite. DAQP is called directly:
-    through qpsolvers a plan takes a quarter longer.
+    ``equations`` are A and b, ``bounds`` are low and high, ``cuts`` are G and h. P is positive
+    definite. DAQP is called directly: through qpsolvers a plan would take a quarter longer.
     """
     (A, b), (low, high) = equations, bounds
     G, h = cuts if cuts is not None else (A[:0], b[:0])

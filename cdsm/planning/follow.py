@@ -33,7 +33,7 @@ class Sample:
 
 @dataclass(eq=False)
 class Follower:
-    """Planner of a path, sample by sample, with a record of the planned samples."""
+    """Planner of a path, sample by sample; it keeps the planned samples."""
 
     rate: Array  # largest change of a tension per step (C,) [N]; may hold inf
     starts: int  # number of starting tensions of a search from scratch
@@ -68,7 +68,10 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Return the part of ``region`` that the rate allows if ``other`` keeps its tensions."""
+        """Restrict ``region``, of ``sample``, to tensions within the rate from those of ``other``.
+
+        If ``other`` is None, ``region`` is returned. The result is None if no tensions remain.
+        """
         if region is None or other is None:
             return region
         return region.within(self.rate * abs(other.index - sample.index), other.F)
@@ -76,22 +79,30 @@ class Follower:
     def _search(
         self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
     ) -> Sample | None:
-        """Plan a sample by one search of ``region``; None if the result misses the target."""
+        """Plan a sample by one search of ``region`` from ``start``; None if it misses the target.
+
+        The search finds the tensions on target that are nearest to ``centre`` (C,) [N].
+        """
         found = _search(sample.model, region, sample.constraints, start, centre)
         return replace(sample, F=found[0]) if found and found[1] else None
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
-        """Plan a sample as if it were the only one; None if the tensions miss a target."""
+        """Plan a sample as if it were the only one.
+
+        Return None if no search hits all of several targets. Raises UnreachableStiffness if none
+        hits a single target.
+        """
         found = Planner(sample.model, sample.constraints, self.starts, self.seed).least()
         if found is None:
             return None
         return replace(sample, F=sample.model.region.tension(found.evaluation.F).values)
 
     def _replan_towards(self, goal: Sample) -> bool:
-        """Plan the last samples again, backwards, to lead to ``goal``; return whether it succeeds.
+        """Plan the last samples again so that the rate allows ``goal``; return whether it succeeds.
 
-        Each sample stays within the rate of its successor and comes as near as possible to its
-        predecessor. The loop ends when a sample is within the rate of both.
+        The loop runs backwards. The tensions of each sample are within the rate from the tensions
+        of its successor, and as near as possible to the tensions of its predecessor. The loop ends
+        at the first sample whose tensions are within the rate from both.
         """
         later = [goal]
         for k in reversed(range(max(len(self.planned) - _BACK, 0), len(self.planned))):
@@ -127,8 +138,9 @@ def least_change(
     """Search once for the tensions (C,) [N] nearest to ``before`` that meet ``constraints``.
 
     No tension changes by more than ``rate`` (C,) [N]. Also return whether the constraints are met;
-    if not, the tensions are those of the smallest violation found. None if no tensions within
-    ``rate`` balance the arm, or if the arm is unstable under the nearest of them to ``before``.
+    if not, the tensions have the smallest violation that was found. The search begins at the
+    balanced tensions nearest to ``before``. Return None if no tensions within ``rate`` balance the
+    arm, or if the arm is unstable where the search begins.
     """
     return _search(model, model.region.within(rate, before), constraints, before, before)
 
@@ -142,8 +154,9 @@ def _search(
 ) -> tuple[Array, bool] | None:
     """Search ``region`` once for the tensions nearest to ``centre`` that meet ``constraints``.
 
-    The search begins at the tensions nearest to ``start``. All tensions are (C,) [N]. Return the
-    result, and whether it meets the constraints; None if there is no stable point to begin with.
+    The search begins at the tensions of ``region`` nearest to ``start``. All tensions are (C,) [N].
+    Return the tensions found, and whether they meet the constraints. Return None if there is no
+    ``region``, or if the arm is unstable where the search begins.
     """
     F = None if region is None else region.nearest(start, region.low, region.high)
     if region is None or F is None:

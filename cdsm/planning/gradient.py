@@ -23,13 +23,14 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StiffnessGradient(ReadOnlyState):
-    """Derivatives with respect to tensions, named as the readings of :class:`~cdsm.Stiffness`.
+    """Derivatives of a stiffness with respect to the cable tensions.
 
+    Each has the name of the attribute or method of :class:`~cdsm.Stiffness` that it differentiates.
     Posture and wrench are fixed. A change of one tension alone breaks the balance (Eq. 13), so
     multiply the derivatives by changes ΔF that keep it: J_Lᵀ ΔF = 0.
 
     Attributes:
-        stiffness: K, at whose tensions the derivatives are taken.
+        stiffness: K; the derivatives are taken at its tensions.
         cable_stiffness: dk_c/dF_c (C,) [1/m] of each cable; 0 under force control.
     """
 
@@ -65,8 +66,9 @@ class StiffnessGradient(ReadOnlyState):
     def margin(self) -> Array:
         """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], where v is the critical direction.
 
-        A multiple eigenvalue has no gradient. Then this is computed for one v of its eigenspace,
-        and bounds the change of λ_min from above.
+        If λ_min is a multiple eigenvalue, it has no gradient. The result is then computed with one
+        v of the eigenspace. Its product with ΔF is an upper bound of the change of λ_min, to first
+        order.
         """
         v = self.stiffness.critical_direction[:, None]
         return frozen(self._projected(v, v)[:, 0, 0])
@@ -76,15 +78,15 @@ class StiffnessGradient(ReadOnlyState):
         """∂(C_vv)⁻¹/∂F (C, 3, 3) [1/m].
 
         Raises:
-            SingularStiffness: As for :attr:`~cdsm.Stiffness.cartesian`.
+            SingularStiffness: K_θ is singular, or the tip hardly moves in some direction.
         """
         return frozen(self._through(self.stiffness.posture.jacobian[:3], self.stiffness.cartesian))
 
     def along(self, direction: Direction) -> Array:
         """Return ∂s/∂F = s² wᵀ ∂K_θ/∂F w (C,) [1/m] of s = ``K.along(u)``, with w = K_θ⁻¹ J_vᵀ u.
 
-        Argument and errors are those of :meth:`cdsm.Stiffness.along`. Also raises SingularStiffness
-        if s is inf.
+        Raises InvalidInput if ``direction`` is not an axis or a nonzero (3,), and SingularStiffness
+        if K_θ is singular or the tip cannot move along u.
         """
         u = unit_direction("direction", direction)
         self.stiffness._require_mobile(u)
@@ -112,7 +114,7 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
     ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ, with the gradient J_c and the Hessian H_c of the length of
     cable c and k′_c = dk_c/dF_c. k′_c includes dEA/dF and the series spring. For example,
     ``stiffness_gradient(K).along(u)`` is the gradient of ``K.along(u)``. At a kink of an
-    elasticity, the slope is that below the kink.
+    elasticity, the slope below the kink is used.
 
     Raises:
         InvalidInput: ``stiffness`` is not a frictionless ``Stiffness``, or the slope of a

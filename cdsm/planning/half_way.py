@@ -19,7 +19,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 class HalfWay(ReadOnlyState):
     """Arm half-way between a planned sample and the next sample.
 
-    A position-controlled cable has the mean of its two unstretched lengths l_0. A force-controlled
+    A position-controlled cable has the mean of its two original lengths l_0. A force-controlled
     cable has the mean of its two tensions. The mean of the two wrenches acts. The arm is in
     equilibrium, r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13), near the mean of the two postures. The
     misfit is of second order in the step between the samples.
@@ -28,7 +28,7 @@ class HalfWay(ReadOnlyState):
         index: Number of the first sample, from 0.
         target: Mean of the two targets [N/m]: (), (n,) or (3, 3).
         stiffness: K_θ at the equilibrium; None without equilibrium.
-        achieved: ``along`` or ``cartesian`` [N/m], (), (n,) or (3, 3); or None.
+        achieved: ``along`` or ``cartesian`` [N/m], (), (n,) or (3, 3); None without equilibrium.
         misfit: ‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``; inf
             without equilibrium.
         reason: Why no equilibrium was found; otherwise empty.
@@ -73,7 +73,8 @@ def half_way(
 def _at_rest(ends: tuple[Stiffness, Stiffness], unstrained: Array) -> Stiffness:
     """Compute K_θ at the equilibrium near the mean of two postures.
 
-    ``ends`` are the stiffnesses at both postures; ``unstrained`` is as for :func:`half_way`.
+    ``ends`` are the stiffnesses at both postures. ``unstrained`` (H,) [m] are the original lengths
+    of the position-controlled cables.
     """
     one, other = ends
     q = (one.posture.q + other.posture.q) / 2.0

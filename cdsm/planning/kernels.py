@@ -23,8 +23,8 @@ def stiffness_at(
 ) -> tuple[Array, Array, Array]:
     """Return K_θ = constant + Σ (F_c H_c + k_c J_c J_cᵀ), and its eigenvalues and eigenvectors.
 
-    The eigenvalues are those of the symmetric part. ``constant`` (nv, nv) are the terms of gravity
-    and load.
+    Eigenvalues and eigenvectors belong to the symmetric part of K_θ. ``constant`` (nv, nv) is the
+    sum of the terms of gravity and load, ``tension`` (C,) [N] contains F.
     """
     K = constant.copy()
     count, nv = length_jacobian.shape
@@ -129,7 +129,10 @@ def constraint_hessian(
     left: Array,
     right: Array,
 ) -> Array:
-    """Return ∂²(Σ Y_ij X_ij)/∂F² (C, C) for weights Y (r, r) and X of :func:`tip_stiffness`."""
+    """Return ∂²(Σ Y_ij X_ij)/∂F² (C, C) for weights Y (r, r) and the tip stiffness X (r, r).
+
+    ``left``, ``right`` and ``inverse`` come from :func:`tip_stiffness` with the same ``rows``.
+    """
     left_torques = _torques_by_tension(hessian, length_jacobian, slope, left)
     right_torques = _torques_by_tension(hessian, length_jacobian, slope, right)
     count, nv, r = right_torques.shape
@@ -158,10 +161,12 @@ def constraint_hessian(
 
 @compiled
 def convex(W: Array, null: Array, normals: Array) -> Array:
-    """Return W (C, C) made positive definite; on admissible steps, a positive definite W is kept.
+    """Return a positive definite matrix (C, C) that replaces the curvature W.
 
-    Admissible steps keep the balance (columns of ``null`` (C, p) are an orthonormal basis) and, to
-    first order, the constraints with the gradients ``normals`` (n, C).
+    On admissible steps w, wᵀ W w stays the same, except that small and negative curvatures are
+    raised. All other steps get a positive curvature. Admissible steps keep the balance, so they are
+    combinations of the orthonormal columns of ``null`` (C, p). To first order, they also keep the
+    constraints with the gradients ``normals`` (n, C).
     """
     count, p = null.shape
     inner = np.dot(np.ascontiguousarray(null.T), np.dot(W, null))

@@ -53,7 +53,8 @@ def along_constraints(model: StiffnessModel, directions: Array, targets: Array) 
 def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
     """Build the constraints (cartesian − target)/‖target‖ for a target (3, 3) [N/m].
 
-    These are 6 values; their norm is the norm of the symmetric part of that matrix (3, 3).
+    There are 6 constraints, one for each entry of the symmetric part of this matrix. Entries off
+    the diagonal have a factor √2, so the norm of the 6 values is the norm of the symmetric part.
     """
     k, (i, j), E = np.arange(6), np.triu_indices(3), np.zeros((6, 3, 3))
     E[k, i, j] = E[k, j, i] = np.where(i == j, 1.0, np.sqrt(0.5))
@@ -63,7 +64,7 @@ def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
 
 
 def achieved(K: Stiffness, directions: Array | None) -> Array:
-    """Return ``along`` [N/m], () or (n,), for ``directions``; ``cartesian`` (3, 3) if None."""
+    """Return ``K.along`` [N/m] of ``directions``, () or (n,); ``K.cartesian`` (3, 3) for None."""
     if directions is None:
         return K.cartesian
     along = [K.along(u) for u in directions.reshape(-1, 3)]
@@ -73,7 +74,8 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
 def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
     """Return ‖achieved/target − 1‖ [-].
 
-    If ``directions`` is None, return ‖S − target‖/‖target‖, S the symmetric part of ``achieved``.
+    If ``directions`` is None, return ‖S − target‖/‖target‖ [-] instead, where S is the symmetric
+    part of ``achieved``.
     """
     if directions is None:
         off = (achieved + achieved.T) / 2.0 - target
@@ -93,7 +95,7 @@ def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
 
 
 def checked_targets(directions: Array | None, target: ArrayLike) -> Array:
-    """Check and return the wanted stiffness [N/m]: one per direction, or (3, 3) without any."""
+    """Check and return the targets [N/m]: one per direction, or (3, 3) if there is no direction."""
     targets = number_array("target", target)
     if directions is None and targets.shape != (3, 3):
         raise InvalidInput(
@@ -113,7 +115,8 @@ def checked_targets(directions: Array | None, target: ArrayLike) -> Array:
 def check_positive(directions: Array | None, targets: Array) -> None:
     """Raise InvalidInput unless all targets of stiffness [N/m] are positive.
 
-    Without ``directions`` they are matrices (…, 3, 3), symmetric and positive definite.
+    If ``directions`` is None, the targets are matrices (…, 3, 3), which must be symmetric and
+    positive definite.
     """
     if directions is not None:
         if not (targets >= SMALLEST).all():

@@ -60,9 +60,9 @@ def plan_path(
 ) -> PathPlan:
     """Plan tensions for a wanted stiffness along a path: min ‖F_i‖² with along(u) = target_i.
 
-    Each of S samples is planned as by :func:`~cdsm.planning.plan.plan_stiffness`, starting from the
-    tensions of the sample before, or from scratch if that fails. An infeasible sample does not stop
-    the path: ``infeasible`` of the result lists it with its reason.
+    Each of S samples is planned as :func:`~cdsm.planning.plan.plan_stiffness` does. The search
+    starts from the tensions of the sample before, or from scratch if that fails. An infeasible
+    sample does not stop the path: ``infeasible`` of the result lists it with its reason.
 
     The rate limits the change of every tension between a planned sample and the planned sample
     before it: k·rate if they are k samples apart. If no tensions within this limit hit the target
@@ -87,7 +87,7 @@ def plan_path(
             [N m].
         angles: The path as joint angles (S, nv) [rad]. Give either ``angles`` or ``tips``.
         tips: The path as tip positions (S, 3) [m]. :func:`~cdsm.inverse_kinematics` finds the joint
-            angles nearest to those of the sample before.
+            angles of each sample that are nearest to the angles of the sample before.
         guess: Joint angles (nv,) [rad] from which the first of ``tips`` is solved. Default: the
             straight arm.
         rate: Largest change of a tension per step [N], for all cables or (C,); inf for no limit.

@@ -1,4 +1,4 @@
-"""Result of :func:`plan_path`: tensions, stiffness, lengths for motors, infeasible samples."""
+"""Result of :func:`plan_path`: tensions, stiffness, lengths of wire, infeasible samples."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class InfeasibleSample:
             ``"balance"`` (no tensions within the bounds), ``"elasticity"`` (no tensions within the
             domains), ``"singular"`` (no tensions make the arm stable, or the tip cannot move along
             u), ``"stiffness"`` (no tensions hit the target) or ``"rate"`` (tensions hit the target,
-            but differ too much from those of the samples before).
+            but the rate does not allow them after the samples before).
         reason: The reason in words, with the remedy.
         error: The error that the plan of this sample raised, with its data; or None.
     """
@@ -94,7 +94,10 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def steps(self) -> Array:
-        """Largest tension change per step since the last planned sample (P,) [N]; first is 0."""
+        """Largest change of a tension per step since the planned sample before (P,) [N].
+
+        The first entry is 0.
+        """
         changes = np.zeros(len(self.planned))
         moved = abs(np.diff(self.tensions, axis=0)).max(axis=1, initial=0.0)
         changes[1:] = moved / np.diff(self.planned)
@@ -108,10 +111,11 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def unstrained_lengths(self) -> Array:
-        """Lengths l_0 (P, H) [m] without strain of the H position-controlled cables: paid-out wire.
+        """Original lengths l_0 (P, H) [m] of the H position-controlled cables: the paid-out wire.
 
-        l_0 + Δl(F, l_0) = L, with Δl of :meth:`~cdsm.Cable.elongation`. With given
-        tensions F they do not depend on ``original_length`` of the arm, which only affects K_θ.
+        l_0 is the length without strain. It solves l_0 + Δl(F, l_0) = L with the planned tension F
+        and the elongation Δl of :meth:`~cdsm.Cable.elongation`. ``original_length`` of the arm has
+        no effect on it.
         """
         motors = CableLaws(self.arm.cables, "unstrained")
         pairs = zip(self.cable_lengths, self.tensions, strict=True)
@@ -120,10 +124,10 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def between(self) -> tuple[HalfWay, ...]:
-        """Arm half-way between any two neighbouring samples that are both planned.
+        """Arm half-way between each pair of neighbouring samples that are both planned.
 
-        The motors move at constant speed. With half the step between samples, the misfit falls to a
-        quarter. The first use takes a few milliseconds per pair.
+        The motors are assumed to move at constant speed. With half the step between samples, the
+        misfit falls to a quarter. The first use takes a few milliseconds per pair.
         """
         pairs = list(zip(self.planned, self.planned[1:], strict=False))
         l_0, targets = self.unstrained_lengths, self.target

@@ -73,21 +73,22 @@ class StiffnessPlan(ReadOnlyState):
 
     @property
     def reached(self) -> bool:
-        """Whether :attr:`misfit` is at most 1e-6, relative to the target.
+        """Whether :attr:`misfit`, which is relative to the target, is at most 1e-6.
 
-        With one direction, :func:`plan_stiffness` raises an error if it is not.
+        It is always True for one direction: otherwise :func:`plan_stiffness` raises an error.
         """
         return self.misfit <= REACHED
 
     @property
     def spread(self) -> float:
-        """(Largest − least)/least of ``efforts`` [-]: 0 if all searches end at the same effort."""
+        """(Largest − least)/least of ``efforts`` [-]; 0 if all searches end at the same ‖F‖."""
         return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
 
     def plot(self, attainable: StiffnessRange | None = None) -> Figure:
-        """Plot the planned tensions [N]; with ``attainable``, also the softest and stiffest ones.
+        """Plot the planned tensions [N] of each cable.
 
-        InvalidInput if ``attainable`` is the range of another posture or direction.
+        If ``attainable`` is given, the tensions of the softest and of the stiffest arm are plotted
+        too. Raises InvalidInput if ``attainable`` is the range of another posture or direction.
         """
         return cdsm.plots.plot_stiffness_plan(self, attainable)
 
@@ -143,15 +144,16 @@ def plan_stiffness(
     """Plan least tensions for a wanted stiffness: min ‖F‖², along(u) = target (Eqs. 13, 17, 20).
 
     The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
-    position-controlled cables, and that the smallest eigenvalue λ_min of K_θ (symmetric part) is
-    not below ``margin``. The target of one direction is hit within 1e-6 of its value; otherwise an
-    error is raised. The targets of several directions or of ``cartesian`` are hit if possible. If
-    not, the tensions have the least sum of squared relative misses that was found, and ``reached``
-    is false.
+    position-controlled cables, and the limit of the smallest eigenvalue λ_min of K_θ (symmetric
+    part) that follows from ``margin``. The target of one direction is hit within 1e-6 of its value;
+    otherwise an error is raised. The targets of several directions or of ``cartesian`` are hit if
+    possible. If not, the tensions have the least sum of squared relative misses that was found, and
+    ``reached`` is False.
 
     The searches are local. With the laws of this library they usually end at the same effort ‖F‖.
     With one user-defined law, the effort found was 3.6 % above the least. A ``spread`` above zero
-    warns of this. A ``spread`` of zero does not exclude it. More ``starts`` help.
+    shows that the searches ended at different efforts. A ``spread`` of zero does not prove that the
+    least effort was found. More ``starts`` help.
 
     Args:
         pose: The posture.

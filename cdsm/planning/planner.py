@@ -1,6 +1,7 @@
 """Search from several starts for the least tensions that hit a target.
 
-The search is local: :func:`~cdsm.planning.plan.plan_stiffness` tells how near it ends to the least.
+The search is local, so the tensions found may exceed the least ones;
+:func:`~cdsm.planning.plan.plan_stiffness` says by how much.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from cdsm.support.progress import track
 from cdsm.support.values import Array
 
 REACHED: Final = 1e-6
-"""Largest relative miss of a target that counts as hit. Most searches end much nearer to it."""
+"""Largest relative miss with which a target counts as hit; most searches come much nearer."""
 
 _CORNERS = 1e3  # bound of otherwise unbounded starting tensions, over the least tensions
 _RANGE_STARTS = 24  # number of starts of the range search before a target is rejected
@@ -62,7 +63,10 @@ class Planner:
         return found
 
     def nearest(self) -> ConstraintValues:
-        """Return the constraint values where the sum of squared misses, then ‖F‖, is least."""
+        """Return the constraint values at the tensions with the least sum of squared misses found.
+
+        Among tensions with this sum, those of least ‖F‖ are chosen.
+        """
         program = replace(self.program, objective=NEAREST)
 
         def misses(place: ConstraintValues) -> float:
@@ -108,7 +112,10 @@ class Planner:
         return found
 
     def _best(self, points: Iterable[Evaluation]) -> ConstraintValues | None:
-        """Search from all ``points``; return the hit of least ‖F‖, or None if all searches miss."""
+        """Search from all ``points``; return the best result that hits the targets, or None.
+
+        The best result has the least ‖F‖. It is given as its constraint values.
+        """
         begin = list(points)
         near = [
             float(point.F.max())
@@ -126,7 +133,10 @@ class Planner:
         return hits[0]
 
     def _nearly_hit(self, seen: list[ConstraintValues]) -> ConstraintValues | None:
-        """Return the point of least ‖F‖ in ``seen`` with a relative miss up to 1e-6, or None."""
+        """Return the point of ``seen`` nearest to the target; None if it misses by more than 1e-6.
+
+        Misses are relative. Of the points that miss by at most 1e-8, the one of least ‖F‖ is taken.
+        """
         least = min(float(abs(place.values[0])) for place in seen)
         if least > REACHED:
             return None
@@ -136,9 +146,10 @@ class Planner:
         return best
 
     def _starts(self) -> Iterator[Evaluation]:
-        """Yield up to ``starts`` stable points: least tensions, hits, the anchor, random points.
+        """Yield up to ``starts`` stable points from which searches begin.
 
-        A hit is a point on target; hits are sought only if there is a single target.
+        They are the least tensions; points that hit the target, if it is a single one; the anchor
+        of :class:`StartPoints`, which is well inside the admissible tensions; and random points.
         """
         anchor = self.begin.anchor
         least = anchor.backtracked(self.model.region.least.values)
@@ -152,10 +163,10 @@ class Planner:
     def _crossings(
         self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
     ) -> list[Evaluation]:
-        """Find stable points that hit the target, on lines from ``hub`` to ``others``.
+        """Find stable points that hit the target, on the straight lines from ``hub`` to ``others``.
 
-        The point of least ‖F‖ is first. ``precision`` is the relative error of the points' places
-        on the lines.
+        The point of least ‖F‖ is first. ``precision`` is the largest relative error of the distance
+        of a point from ``hub``.
         """
         at_hub, guesses = self._miss(hub), []
         for other in others:
@@ -176,14 +187,14 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find stable points on target, on lines from points below target to points above."""
+        """Find stable points on target, on lines between points of ``seen`` below and above it."""
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]
         return [place for one in below for place in self._crossings(one, above, 1e-15)]
 
     def _miss(self, point: Evaluation) -> float:
-        """Return along/target − 1 [-] of the single target; −1 (zero stiffness) if unstable."""
+        """Return along/target − 1 [-] for a single target; −1 if the arm is unstable there."""
         return float(self.constraints.at(point).values[0]) if point.reserve >= 0.0 else -1.0
 
     def _search(self, program: Program, point: Evaluation) -> ConstraintValues:

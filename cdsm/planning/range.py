@@ -38,7 +38,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARGIN = 1e-4
-"""Default of ``margin``: λ_min/λ_max of K_θ that counts as stable. Arms of 40 joints have 3e-4."""
+"""Default of ``margin``: least λ_min/λ_max of K_θ with which an arm counts as stable.
+
+Stable arms of 40 joints come down to 3e-4.
+"""
 
 _UPWARD = 4  # starts for the upper end if rigidities rise: there is mostly one maximum
 _LAW_SAMPLES = 257  # number of tensions at which a law is sampled to check that its rigidity rises
@@ -138,14 +141,14 @@ def stiffness_range(
     or levels off, ``along`` is a concave function of F: it has one maximum, and many minima in the
     corners of the set of admissible tensions. So the search for ``low`` needs many starts. With
     other laws the search for ``high`` needs them too. ``high_found`` shows how often ``high`` was
-    found. The starts of a smaller number are among those of a larger one. If tension can buckle the
-    arm, the arm is softest just before it buckles, and ``low`` depends on ``margin``.
+    found. A larger number of ``starts`` adds starting tensions and keeps the others. If tension can
+    buckle the arm, the arm is softest just before it buckles, and ``low`` depends on ``margin``.
 
     From the softest corner found, one cable after the other is moved to its other bound, until no
     softer corner is found. This does not prove that ``low`` is the smallest. With the default
-    number of starts, it was too high by up to 0.3 % in 47 of 48 random arms (Eq. 19 or constant
-    rigidity, up to 20 cables), by 1.9 % in one that tension can buckle, and by up to 5.5 % with a
-    user-defined law whose rigidity has a hump.
+    number of starts, it was at most 0.3 % too high in 47 of 48 random arms (Eq. 19 or constant
+    rigidity, up to 20 cables). It was 1.9 % too high in the other arm, which tension can buckle. It
+    was up to 5.5 % too high with a user-defined law whose rigidity rises and falls again.
 
     Args:
         pose: The posture.
@@ -162,7 +165,7 @@ def stiffness_range(
     Raises:
         InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero;
             ``minimum`` exceeds ``maximum``; another argument is invalid; or ``maximum`` is inf and
-            the stiffness does not stop changing with the tension.
+            an end of the range needs unlimited tension.
         InfeasibleTension: No tensions within the bounds and domains balance the arm.
         ElasticityRangeError: The bounds and the domain of an elasticity do not overlap.
         SingularStiffness: The tip cannot move along u, or no admissible tensions make the arm
@@ -209,8 +212,8 @@ def range_ends(
     """Find the lowest and the highest stiffness of ``model`` along a unit direction ``u`` (3,).
 
     Tensions without bound are capped at 1e2 times the largest of the least tensions, then at 1e4
-    and 1e6 times, until the tensions at both ends lie below the cap. ``starts`` and ``seed`` are as
-    for :func:`stiffness_range`.
+    and 1e6 times, until the tensions at both ends lie below the cap. :func:`stiffness_range`
+    explains ``starts`` and ``seed``.
     """
     region = model.region
     if np.isfinite(region.high).all():
@@ -274,7 +277,11 @@ def _bounded_ends(
 
 
 def _beside(region: Admissible, anchor: Evaluation, F: Array) -> Iterator[Evaluation]:
-    """Yield stable tensions near F (C,) [N] with one cable moved to the bound farther from it."""
+    """Yield stable tensions near F (C,) [N], each with one tension moved to its farther bound.
+
+    The nearest tensions that balance the arm are taken. If the arm is unstable under them, they are
+    moved back towards ``anchor``.
+    """
     for c, (low, high) in enumerate(zip(region.low, region.high, strict=True)):
         wanted = F.copy()
         wanted[c] = high if 2.0 * F[c] < low + high else low
@@ -285,7 +292,7 @@ def _beside(region: Admissible, anchor: Evaluation, F: Array) -> Iterator[Evalua
 
 
 def _rigidities_rise(region: Admissible) -> bool:
-    """Return whether no rigidity falls within the bounds; False for user-defined laws."""
+    """Return whether no rigidity EA(F) falls within the bounds; False for user-defined laws."""
     cables = region.least.posture.arm.cables
     for cable, low, high in zip(cables, region.low, region.high, strict=True):
         law = cable.elasticity

@@ -41,13 +41,13 @@ class Saturation(ReadOnlyState):
         bound: The lower bound [N] at which the slope has fallen to ``fraction`` of the largest
             slope. It is inf if the slope stays above this value, and the first bound if the
             stiffness never rises.
-        tension: The least tensions with ``bound``, or with the last bound of the curve if it is
-            inf.
+        tension: The least tensions with the lower bound ``bound`` or, if that is inf, with the last
+            bound of the curve.
         stiffness: K_θ under these tensions.
         steepest: The lower bound [N] with the largest slope.
         steepest_slope: Derivative of the stiffness with respect to the bound at ``steepest`` [1/m].
         stiffest: The lower bound [N] with the largest stiffness: an end of the curve, or a maximum
-            between, above which tension softens the arm.
+            between the ends, above which tension softens the arm.
         limit: Why the curve ends: ``"buckling"``, ``"maximum"`` (the upper bound of the tensions),
             ``"elasticity"`` (a tension leaves the domain of its cable), ``"infeasible"`` (no
             tensions balance the arm) or ``"none"`` (the curve goes on).
@@ -71,7 +71,7 @@ class Saturation(ReadOnlyState):
         return float(self.curve[-1, 0])
 
     def plot(self) -> Figure:
-        """Plot stiffness [N/mm] and its gain [N/m per N] against the lower bound of tension [N]."""
+        """Plot stiffness [N/mm] and slope [N/mm per N] against the lower bound of tension [N]."""
         return cdsm.plots.plot_saturation(self)
 
     def to_dict(self) -> dict[str, object]:

@@ -62,7 +62,11 @@ _AT_KINK = 1e-6  # relative distance from a kink that counts as zero
 
 
 class Objective(NamedTuple):
-    """Objective f: linear·Σc + square·½‖c‖²; if ``effort``, ½‖(F − centre)/unit‖² with c = 0."""
+    """Objective f = linear·Σc + square·½‖c‖², where c are the values of the constraints.
+
+    If ``effort`` is True, f is ½‖(F − centre)/unit‖² instead, subject to c = 0. :class:`Program`
+    has ``centre`` and ``unit``.
+    """
 
     linear: float = 0.0
     square: float = 0.0
@@ -87,7 +91,7 @@ class Program:
     centre: Array | float = 0.0  # tensions (C,) [N] at which the effort is zero, or 0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return f at a point; for the effort, plus ``price`` times ‖c‖₁ + ½ ‖c‖²."""
+        """Return the merit of a point: f; if f is the effort, f + ``price`` · (‖c‖₁ + ½ ‖c‖²)."""
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit
@@ -95,11 +99,14 @@ class Program:
         return self.objective.linear * float(c.sum()) + 0.5 * self.objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
-        """Return whether |c| ≤ 1e-9 [-] for all c at a point; True for objectives without c = 0."""
+        """Return whether all |c| ≤ 1e-9 [-] at a point; True if the objective is not the effort."""
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
-        """Return whether ``one`` alone meets c = 0 or, if both or none do, has less merit."""
+        """Return whether ``one`` is better than ``other``.
+
+        It is better if it alone meets c = 0, or if both or neither meet it and its merit is lower.
+        """
         if self.met(one) != self.met(other):
             return self.met(one)
         price = 0.0 if self.met(one) else _LARGEST_PRICE
@@ -123,7 +130,7 @@ def search(program: Program, start: Evaluation) -> ConstraintValues:
 
 
 def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
-    """Yield F (C,) [N] moved across the kinks at which it lies: all at once, then one by one."""
+    """Yield F (C,) [N] moved beyond the kinks at which it lies: beyond all, then beyond each."""
     at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
     for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
         beyond = F.copy()
@@ -133,7 +140,7 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 
 
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
-    """Find a local optimum of ``program``; if ``in_piece``, only in the piece of ``start``."""
+    """Find a local optimum of ``program``; if ``in_piece``, between the kinks around ``start``."""
     region, iterate = program.region, program.constraints.at(start)
     multipliers = np.zeros(iterate.values.size if program.objective.effort else 0)
     step, radius = _Step(np.zeros_like(start.F), multipliers, 0.0, 0.0, _FIRST_PRICE), _FIRST_RADIUS
@@ -183,9 +190,10 @@ class _Step(NamedTuple):
 
 
 class _LocalModel:
-    """Quadratic model of the program at an iterate, as a function of d = ΔF/size.
+    """Quadratic model of the program at an iterate, as a function of the scaled step d = ΔF/size.
 
-    ``before`` is the previous step, ``bounds`` limit the tensions [N], ``radius`` limits all |d_c|.
+    ``before`` is the previous step. ``bounds`` (low, high) limit the tensions [N], and ``radius``
+    limits |d_c| of each cable.
     """
 
     def __init__(
@@ -219,7 +227,10 @@ class _LocalModel:
         self.W = kernels.convex(W, program.region.null, normals)
 
     def step(self, price: float, c: Array) -> _Step:
-        """Solve the quadratic program for values ``c`` (n,); raise the price until c is met."""
+        """Solve the quadratic program for constraint values ``c`` (n,).
+
+        ``price`` is the first weight of the violation; it is raised until c is met.
+        """
         region, evaluation, size = self.program.region, self.iterate.evaluation, self.size
         count, rank, m = self.g.size, len(region.rows), c.size
         low, high = ((bound - evaluation.F) / size for bound in self.bounds)
@@ -265,7 +276,7 @@ class _LocalModel:
         return _Step(d, best.y[rank:], float(best.z[0]), predicted, price)
 
     def take(self, step: _Step) -> tuple[ConstraintValues | None, float]:
-        """Evaluate a step; return the new point (None if not stable) and the fall of the merit."""
+        """Take a step; return the new point (None if it is unstable) and the fall of the merit."""
         candidate, fall = self._after(step.d, step.price)
         if candidate is not None and fall < 0.75 * step.predicted and self.c.size:
             # second-order correction: use the value of c after the step, not of its tangent

@@ -21,13 +21,14 @@ _NO_GAIN = 1e-9  # a gain of reserve below this part of the scale of K_θ is not
 class StartPoints:
     """Stable tensions in a bounded region, from which searches start.
 
-    Corners of the region are searched in the directions of the cables and in a number of random
-    directions. SingularStiffness if no stable tensions are found.
+    Corners of the region are searched in the directions of higher and of lower tension of each
+    cable, and in ``directions`` random directions. Raises SingularStiffness if no stable tensions
+    are found.
 
     Attributes:
         anchor: A stable point well inside.
-        points: The anchor, and stable points towards the corners. More random directions add points
-            and keep the others.
+        points: The anchor, and stable points at the corners or near them. More random directions
+            add points and keep the others.
     """
 
     def __init__(
@@ -64,7 +65,10 @@ class StartPoints:
         self.points = [*self._known, *(point for point in drawn[known:] if point is not None)]
 
     def between(self, count: int) -> Iterator[Evaluation]:
-        """Return up to ``count`` random stable points between the corners found for the cables."""
+        """Yield up to ``count`` stable points, which are random means of :attr:`points`.
+
+        Points found in random directions are not used for these means.
+        """
         shares = np.random.default_rng(self._seed).dirichlet(np.ones(len(self._known)), count)
         for F in shares @ np.array([point.F for point in self._known]):
             point = self.anchor.backtracked(F)

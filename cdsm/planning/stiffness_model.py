@@ -35,7 +35,7 @@ def checked_margin(margin: float) -> float:
 
 
 class StiffnessModel:
-    """K_θ(F) over the admissible tensions at a posture; every planner builds one.
+    """K_θ as a function of the admissible tensions F at a posture; every planner builds one.
 
     Attributes:
         pose: The posture.
@@ -151,7 +151,10 @@ class Evaluation:
 
 
 class Constraint(NamedTuple):
-    """Constrained sums Σ_ab E_j,ab X_ab [-], j ≤ n, of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹."""
+    """The n weighted sums Σ_ab E_j,ab X_ab [-] of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ (r, r) [N/m].
+
+    :class:`Constraints` requires a target value of each sum.
+    """
 
     rows: Array  # R (r, nv) [m/rad]
     weights: Array  # E (n, r, r) [m/N]

@@ -50,17 +50,19 @@ def saturation(
     """Find the lower bound of tension above which more tension hardly stiffens an arm.
 
     F*(b) are the least tensions with the lower bound b (Eq. 17). The slope of the stiffness is
-    d along/db = ∂along/∂F · dF*/db, where dF*/db follows from the cables at their bounds. The
-    result is the first b, beyond the b of largest slope, at which the slope has fallen to
-    ``fraction`` of the largest. A strand starts soft, so its largest slope is large (Section IV-C).
-    Where its rigidity has levelled off, tension acts only through the active part of K_θ (Eq. 16).
-    Then more tension softens the arm if springs or leads (straight cables between actuators and
-    base disk) keep the wires from stiffening as they stretch.
+    d along/db = ∂along/∂F · dF*/db. Tensions at the lower bound rise with b, and tensions between
+    the bounds keep the balance. The result is the first b, beyond the b of largest slope, at which
+    the slope has fallen to ``fraction`` of the largest. A strand starts soft, so its largest slope
+    is large (Section IV-C). Where the rigidity of the strand has levelled off, tension acts only
+    through the active part of K_θ (Eq. 16). Then more tension softens the arm if springs or leads
+    (straight cables between actuators and base disk) keep the wires from stiffening as they
+    stretch.
 
     Args:
         pose: The posture, which stays fixed.
         direction: u: an axis such as ``"z"``, or (3,) in base axes, any length.
-        minimum: First lower bound [N]; the low end of the elasticities if that is higher.
+        minimum: First lower bound [N]. If the domains of the elasticities begin higher, the first
+            lower bound is their low end.
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         fraction: Part of the largest slope, from 0 to below 1 [-].
@@ -122,7 +124,11 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """Return the first range of lower bounds [N] of a stable arm, without ends where it buckles."""
+    """Return the first interval of lower bounds [N], low and high, under which the arm is stable.
+
+    An end at which the arm buckles is moved inward by 1e-6 of the interval. Raises
+    SingularStiffness if the arm is stable at no lower bound.
+    """
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
         best = at(float(places[int(margins.argmax())]))
@@ -174,7 +180,11 @@ def _active(K: Stiffness) -> Array:
 
 
 def _slope(K: Stiffness, u: Array) -> float:
-    """Compute d along/db [1/m]: cables at the bound b rise with b, free cables keep the balance."""
+    """Compute d along/db [1/m], where b is the lower bound of the least tensions.
+
+    Tensions at the lower bound rise with b, tensions at the upper bound stay, and the others change
+    so that the arm stays in balance.
+    """
     A, active = K.posture.length_jacobian.T, _active(K)
     rate, free = np.maximum(active, 0.0), active == 0.0
     rate[free] = np.linalg.lstsq(A[:, free], -A[:, active > 0.0].sum(axis=1), rcond=None)[0]

@@ -1,10 +1,12 @@
 """Derivatives of the least tensions, and of the critical tension, by the inputs of an arm.
 
-The aim is the change Σ y_c dF_c of a weighted sum of the least tensions F (Eq. 17), with constant
-weights y, for small changes of the arm. The cables balance the torque τ = J_Xᵀ W − g (Eq. 13). Free
-cables (index f) are between their bounds, the others (index b) at a bound. B and B_b are the
-columns of J_Lᵀ of free and other cables. The tensions of the free cables are F_f = Bᵀ λ, where λ
-(nv,) solves B Bᵀ λ = τ − B_b F_b. With μ = (B Bᵀ)⁻¹ B y_f and r = y_f − Bᵀ μ,
+The critical tension is the lower bound of the tensions at which the arm buckles.
+
+This module computes the change Σ y_c dF_c of a weighted sum of the least tensions F (Eq. 17), with
+constant weights y, for small changes of the arm. The cables balance the torque τ = J_Xᵀ W − g
+(Eq. 13). Free cables (index f) are between their bounds, the others (index b) at a bound. B and B_b
+are the columns of J_Lᵀ of free and other cables. The tensions of the free cables are F_f = Bᵀ λ,
+where λ (nv,) solves B Bᵀ λ = τ − B_b F_b. With μ = (B Bᵀ)⁻¹ B y_f and r = y_f − Bᵀ μ,
 
     Σ y_c dF_c = r·dBᵀ λ + μ·(dτ − dJ_Lᵀ F).
 
@@ -32,7 +34,7 @@ from cdsm.uncertainties.inputs import Inputs, Places
 _NO_VELOCITY = np.zeros(3)
 
 _DETERMINED = 1e-12
-"""Smallest ratio of singular values of B Bᵀ with which the free cables can balance the arm."""
+"""Smallest over largest singular value of B Bᵀ: below this, free cables cannot balance the arm."""
 
 
 class Balance(NamedTuple):
@@ -46,7 +48,7 @@ class Balance(NamedTuple):
     def of(cls, tension: Tension) -> Balance:
         """Find the free cables of ``tension``.
 
-        Raises InvalidInput if ``tension`` is not the least, or B Bᵀ is singular.
+        Raises InvalidInput if ``tension`` are not the least tensions, or if B Bᵀ is singular.
         """
         F = tension.values
         near = OPTIMALITY * F.max(initial=0.0)
@@ -77,10 +79,10 @@ class Balance(NamedTuple):
         return np.asarray((weights - J @ self.multipliers(weights))[~self.free] @ moved)
 
     def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
-        """Compute the derivatives of Σ y_c F_c by ``inputs``, as an array for each source.
+        """Compute the derivatives of Σ y_c F_c with respect to ``inputs``; y are ``weights`` (C,).
 
-        y are the ``weights`` (C,). The derivatives by inputs of wires, such as rigidity and lead,
-        are 0.
+        There is an array for each source, such as ``hole_radius``. The derivatives with respect to
+        inputs of wires, such as rigidity and lead, are 0.
         """
         F, free = self.tension.values, self.free
         B = self.tension.posture.length_jacobian[free].T
@@ -95,10 +97,11 @@ class Balance(NamedTuple):
     def _work(
         self, inputs: Inputs, motion: Array, weights: Array, loaded: float
     ) -> dict[str, Array]:
-        """Compute the derivatives of the power Σ p_c L̇_c with respect to ``inputs``, by source.
+        """Compute the derivatives of the power Σ p_c L̇_c with respect to ``inputs``.
 
-        p is ``weights`` (C,) [N], ``motion`` (nv,) the joint velocity. With ``loaded`` = 1 the
-        power includes that of gravity and load, with 0 it does not.
+        There is an array for each source, such as ``hole_radius``. p is ``weights`` (C,) [N],
+        ``motion`` (nv,) is the joint velocity. ``loaded`` is 1 to add the power of gravity and
+        load, otherwise 0.
         """
         pose, none = self.tension.posture, np.zeros_like(weights)
         model = pose.arm._model
@@ -115,12 +118,13 @@ class Balance(NamedTuple):
 def buckling_gradient(
     balance: Balance, inputs: Inputs, margin: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Compute the derivatives of the critical tension F_min, at which λ_min(K_θ) = 0, by source.
+    """Compute the derivatives of the critical tension F_min, at which λ_min(K_θ) = 0.
 
-    ``balance`` belongs to the tensions at F_min. ``margin`` are the derivatives of λ_min at
-    constant tensions: ∂λ with respect to ``inputs``, by source, and y = ∂λ/∂F under the key
-    ``tension``. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The derivative with respect
-    to measured tensions is 0.
+    There is an array for each source of ``inputs``, such as ``hole_radius``. ``balance`` belongs to
+    the tensions at F_min. ``margin`` has the derivatives ∂λ of λ_min at constant tensions, in
+    arrays by source, and y = ∂λ/∂F under the key ``tension``. Then
+    dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The derivative with respect to measured
+    tensions is 0.
     """
     weights = margin["tension"]
     moved, every = balance.gradient(inputs, weights), np.ones((len(weights), 1))

@@ -43,13 +43,12 @@ class Uncertainty(ReadOnlyState):
     """Standard uncertainty of a reading and its contributions; made by :func:`uncertainty`.
 
     Attributes:
-        question: The reading: its name, its stiffness, and its direction or cable.
+        question: The reading: its name, its direction or cable, and the stiffness of the arm.
         tolerances: The tolerances.
-        value: The reading of the arm as described [N/m], [N m/rad], [m] or [N].
-        standard_uncertainty: u_c = √Σ u_i² over the sources, as the value [N/m], [N m/rad], [m] or
-            [N].
-        contributions: u_i of each source that has a tolerance, largest first, as the value [N/m],
-            [N m/rad], [m] or [N].
+        value: The reading of the arm without errors [N/m], [N m/rad], [m] or [N].
+        standard_uncertainty: u_c = √Σ u_i² over the sources [N/m], [N m/rad], [m] or [N].
+        contributions: u_i of each source that has a tolerance, largest first [N/m], [N m/rad], [m]
+            or [N].
         sensitivities: Partial derivatives (n,) of the value with respect to the n inputs of each
             source, in the unit of the value per [-], [rad], [m], [N] or [kg].
     """
@@ -63,7 +62,7 @@ class Uncertainty(ReadOnlyState):
 
     @cached_property
     def parts(self) -> Mapping[str, tuple[Part, ...]]:
-        """Inputs of each source, grouped by their tolerances."""
+        """Groups of inputs that share a tolerance, by source such as ``hole_radius``."""
         return self.question.parts(self.tolerances)
 
     @property
@@ -171,12 +170,12 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences if the arm is UNSTABLE, or if first-order error propagation is not enough."""
+        """Warnings if the arm is UNSTABLE, or if first-order error propagation is insufficient."""
         return self._unstable + self._nonlinear
 
     @property
     def _unstable(self) -> tuple[str, ...]:
-        """A sentence if the reading is a stiffness of an unstable arm, which no weight measures."""
+        """Warning if the reading is a stiffness of an unstable arm, which no weight can measure."""
         K = self.question.stiffness
         read = self.question.of in ("along", "stuck", "margin")
         return (verdict(K),) if read and not K.is_stable else ()
@@ -222,10 +221,10 @@ def uncertainty(
 
     Args:
         pose: The posture.
-        tension: As for :func:`~cdsm.stiffness`; a :class:`Tension` if ``of`` is ``"tension"`` or
-            ``"critical_tension"``.
-        tolerances: Tolerances of the arm, the angles and the tensions. None: those of the arm, as
-            in the table ``[tolerances]`` of its file.
+        tension: A :class:`~cdsm.Tension` or, unless ``of`` is ``"tension"`` or
+            ``"critical_tension"``, your own tensions (C,) [N].
+        tolerances: Tolerances of the arm, the angles and the tensions; None: the tolerances of the
+            arm, as in the table ``[tolerances]`` of its file.
         direction: u (3,) in base axes, any length: for ``"along"``, ``"stuck"``, ``"tip"`` only.
         of: ``"along"``: the stiffness along u [N/m], without friction. ``"stuck"``: the same while
             all cables stick in their holes, see :func:`~cdsm.stuck_stiffness`; it does not depend
@@ -234,7 +233,8 @@ def uncertainty(
             ``"tension"``: the distributed tension of a cable [N]. ``"critical_tension"``: the lower
             bound of tension at which the arm buckles [N]; see :func:`~cdsm.critical_tension`.
         cable: Name of the cable, for ``"tension"`` only.
-        wrench: As for :func:`~cdsm.stiffness`.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; only with your own
+            tensions.
 
     Raises:
         InvalidInput: An argument has the wrong type or shape; ``direction`` or ``cable`` is missing

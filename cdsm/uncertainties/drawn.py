@@ -34,7 +34,10 @@ class Drawn(NamedTuple):
 
 
 class DrawnArms:
-    """N arms drawn at random: the arm of K, with ``errors`` (N, inputs) of the inputs by source."""
+    """N arms drawn at random around the arm of K.
+
+    ``errors`` has an array (N, inputs) for each source, such as ``hole_radius``.
+    """
 
     def __init__(self, K: Stiffness, errors: Mapping[str, Array]) -> None:
         pose, model, inputs = K.posture, K.posture.arm._model, inputs_of(K.posture.arm)
@@ -65,7 +68,10 @@ class DrawnArms:
         )
 
     def evaluate(self, tension: Array | None = None) -> Drawn:
-        """Compute all arms at tensions (N, C) [N]; by default the measured ones with errors."""
+        """Compute stiffness, tip and torques of all arms under tensions (N, C) [N].
+
+        The default tensions are the tensions of K with the drawn errors.
+        """
         F = self._tension if tension is None else tension
         rigidity, strain = laws_at(self._K, F)
         locked = self._K.cable_stiffness > 0.0
@@ -88,8 +94,8 @@ class DrawnArms:
     def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
         """Compute the least tensions (N, C) [N] that balance the arms.
 
-        ``minimum`` (N,) [N] is the lower bound of all cables of each arm; None: the bounds of the
-        nominal arm's tensions. ``drawn`` is the result of :meth:`evaluate`; None: computed here.
+        ``minimum`` (N,) [N] is the lower bound of all cables of each arm; None: the lower bounds of
+        the nominal arm. ``drawn`` is the result of :meth:`evaluate`; None: it is computed here.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.
@@ -149,9 +155,10 @@ def margins(joint: Array) -> Array:
 
 
 def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
-    """Return EA [N] and ε of each cable at ``tension`` (…, C) [N], by the laws of the arm of ``K``.
+    """Return EA [N] and ε [-] (…, C) of each cable at ``tension`` (…, C) [N].
 
-    ε is 0 if ``original_length`` of the arm is not ``"unstrained"``.
+    The laws are those of the cables of the arm of ``K``. ε is 0 if ``original_length`` of this arm
+    is not ``"unstrained"``.
     """
     arm = K.posture.arm
     laws = arm._model.laws

@@ -79,15 +79,19 @@ def inputs_of(arm: Manipulator) -> Inputs:
 
 
 class Inputs:
-    """Inputs of an arm, the numbers that can have a tolerance, by source such as ``hole_radius``.
+    """Inputs of an arm: all numbers that can have a tolerance.
+
+    Inputs of one kind belong to one *source*; for example, all hole radii belong to
+    ``hole_radius``.
 
     Attributes:
         places: Points of the arm without errors; they have n coordinates.
         first: Index of the first site of each cable, then the number of sites, (C+1,).
-        link_rows: Row of the joint that moves each link with a mass, (links,).
+        link_rows: Index of the joint that moves each link with a mass (links,); 0 is the base.
         labels: Names of the inputs of each source.
         columns: Columns of :attr:`map` of each source that moves points.
-        map: Derivatives of the n coordinates by the inputs of these sources (n, inputs), sparse.
+        map: Sparse matrix (n, inputs) of the derivatives of the n coordinates with respect to the
+            inputs of these sources.
     """
 
     def __init__(self, arm: Manipulator) -> None:
@@ -127,13 +131,13 @@ class Inputs:
         self._transposed = csr_matrix(self.map.T)
 
     def zeros(self) -> dict[str, Array]:
-        """Return a zero for each input, as arrays by source."""
+        """Return an array of zeros for each source, with an entry for each of its inputs."""
         return {source: np.zeros(len(names)) for source, names in self.labels.items()}
 
     def by_source(self, by_place: Places) -> dict[str, Array]:
-        """Return derivatives of a quantity with respect to the inputs, as an array by source.
+        """Return the derivatives of a quantity with respect to the inputs, an array per source.
 
-        ``by_place`` are its derivatives with respect to the coordinates of the points of the arm.
+        ``by_place`` has the derivatives with respect to the coordinates of the arm's points.
         """
         by_input = self._transposed @ by_place.stacked()
         return {source: by_input[columns] for source, columns in self.columns.items()}
@@ -141,8 +145,8 @@ class Inputs:
     def displaced(self, errors: Mapping[str, Array]) -> Array:
         """Convert errors of the inputs of N arms to displacements (N, n) [m] of their points.
 
-        ``errors`` has an array (N, inputs) by source; a source that is missing has no errors. The n
-        coordinates are in the order of :meth:`Places.stacked`.
+        ``errors`` has an array (N, inputs) for each source; a source that is missing has no errors.
+        The n coordinates are in the order of :meth:`Places.stacked`.
         """
         count = len(next(iter(errors.values())))
         every = np.zeros((count, self.map.shape[1]))
@@ -152,7 +156,7 @@ class Inputs:
         return np.asarray((self.map @ every.T).T)
 
     def require(self, tolerances: Tolerances, arm: Manipulator) -> None:
-        """Raise InvalidInput if the arm lacks a source of the tolerances, or one is too large."""
+        """Raise InvalidInput if the arm lacks a source of ``tolerances``, or one is too large."""
         for name, parts in tolerances.given.items():
             if not self.labels.get(name):
                 lacks = {
@@ -173,7 +177,7 @@ class Inputs:
                 )
 
     def _disks(self, arm: Manipulator, sites: list[str]) -> dict[str, csr_matrix]:
-        """Label the inputs of holes, disks and links; return their parts of :attr:`map`.
+        """Add the names of the inputs of holes, disks and links; return their parts of :attr:`map`.
 
         ``sites`` has an entry for each cable site of the arm.
         """

@@ -74,7 +74,7 @@ class MonteCarlo(ReadOnlyState):
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
         """Return the interval (low, high) that contains the part ``probability`` of the values.
 
-        As many values are below it as above (JCGM 101, 7.7). Raises InvalidInput if
+        As many values are below the interval as above it (JCGM 101, 7.7). Raises InvalidInput if
         ``probability`` is not between 0 and 1.
         """
         p = checked_probability(probability)
@@ -165,22 +165,24 @@ def monte_carlo(
 
     Args:
         pose: The posture.
-        tension: As for :func:`~cdsm.stiffness`.
-        tolerances: As for :func:`~cdsm.uncertainty`.
-        direction: As for :func:`~cdsm.uncertainty`.
-        of: As for :func:`~cdsm.uncertainty`.
-        cable: As for :func:`~cdsm.uncertainty`.
-        wrench: As for :func:`~cdsm.stiffness`.
+        tension: A :class:`~cdsm.Tension` or, unless ``of`` is ``"tension"`` or
+            ``"critical_tension"``, your own tensions (C,) [N].
+        tolerances: Tolerances of the arm, the angles and the tensions; None: those of the arm.
+        direction: u (3,) in base axes, any length: for ``"along"``, ``"stuck"``, ``"tip"`` only.
+        of: The reading; :func:`~cdsm.uncertainty` explains the names.
+        cable: Name of the cable, for ``"tension"`` only.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; only with your own
+            tensions.
         draws: Number of arms, 100 to 10⁸.
         seed: Seed of the random numbers, from 0.
         store: Folder that keeps the values of finished blocks, so that an interrupted run resumes.
         progress: Show a progress bar on a terminal.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.uncertainty`, or ``draws`` or ``seed`` is out of range, or
-            no tensions balance a drawn arm (``"tension"``, ``"critical_tension"``), or a drawn arm
-            does not buckle (``"critical_tension"``).
-        UnknownName: As for :func:`~cdsm.uncertainty`.
+        InvalidInput: An argument is invalid for :func:`~cdsm.uncertainty`; ``draws`` or ``seed`` is
+            out of range; no tensions balance a drawn arm (``"tension"``, ``"critical_tension"``);
+            or a drawn arm does not buckle (``"critical_tension"``).
+        UnknownName: ``of`` or ``cable`` is unknown.
         ElasticityRangeError: A drawn tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.
         FileError: The folder cannot be used, or contains another run.
@@ -217,7 +219,7 @@ def _blocks(count: int) -> Iterator[tuple[int, int]]:
 
 
 def _errors(budget: Uncertainty, seed: int, block: int, count: int) -> dict[str, Array]:
-    """Draw the errors (count, inputs) by source of the first ``count`` arms of a block."""
+    """Draw errors of the first ``count`` arms of a block: an array (count, inputs) per source."""
     errors = budget._drawn(np.random.default_rng([seed, block]), _BLOCK)
     return {source: drawn[:count] for source, drawn in errors.items()}
 
@@ -236,9 +238,9 @@ def _block(budget: Uncertainty, seed: int, folder: Path | None, block: int, coun
 
 
 def _open_store(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Path:
-    """Create the folder ``store``; raise FileError if it contains a run of other arguments.
+    """Create the folder ``store``; raise FileError if it has a run with other arguments.
 
-    A run is identified by its ``budget`` and ``seed``.
+    ``budget`` and ``seed`` identify a run.
     """
     folder = make_folder(store)
     parts = [budget.question.of, repr(budget.value), repr(budget.standard_uncertainty), str(seed)]

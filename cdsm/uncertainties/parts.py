@@ -56,15 +56,15 @@ class Part(NamedTuple):
 def parts_of(
     tolerances: Tolerances, labels: Mapping[str, Sequence[str]], tension: Array
 ) -> dict[str, tuple[Part, ...]]:
-    """Find the inputs of each tolerance by name, and their standard uncertainties, by source.
+    """Find the inputs of each tolerance by name, and their standard uncertainties.
 
-    ``labels`` are the names of the inputs of each source. A standard uncertainty may depend on the
-    ``tension`` (C,) [N].
+    The keys are the sources, such as ``hole_radius``. ``labels`` are the names of the inputs of
+    each source. A standard uncertainty may depend on the ``tension`` (C,) [N].
 
     Raises:
-        InvalidInput: No input has such a name, two tolerances are of one input, or a tension is
-            outside the range for which a tolerance is given, or so near to slack that its rigidity
-            is not known.
+        InvalidInput: No input has the name that a tolerance gives, or two tolerances belong to one
+            input; or a tension is outside the range for which a tolerance is given, or so near to
+            slack that its rigidity is not known.
     """
     found: dict[str, tuple[Part, ...]] = {}
     for source, given in tolerances.given.items():
@@ -96,7 +96,7 @@ def parts_of(
 def variance(parts: Sequence[Part], sensitivity: Array) -> float:
     """Compute the variance of a reading that the inputs of one source cause.
 
-    ``sensitivity`` (n,) are its partial derivatives with respect to these inputs.
+    ``sensitivity`` (n,) are the partial derivatives of the reading with respect to these inputs.
     """
     return sum(part.variance(sensitivity[part.inputs]) for part in parts)
 

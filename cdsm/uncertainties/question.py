@@ -23,7 +23,7 @@ READINGS = get_args(Reading)
 
 
 def chosen_tolerances(pose: Posture, tolerances: Tolerances | None) -> Tolerances:
-    """Return ``tolerances``, or those of the arm if None; raise InvalidInput if it has none."""
+    """Return ``tolerances`` or, if None, the arm's own; raise InvalidInput if it has none."""
     if tolerances is not None:
         return instance("tolerances", tolerances, Tolerances)
     own = instance("pose", pose, Posture).arm.tolerances
@@ -44,7 +44,7 @@ def checked_question(
     cable: str | None,
     wrench: ArrayLike | None,
 ) -> Question:
-    """Check the arguments of :func:`uncertainty` and return the reading that they ask for."""
+    """Check the arguments of :func:`uncertainty`, and return the reading that they describe."""
     one_of("reading", of, READINGS)
     K = stiffness(pose, tension, wrench)
     for name, value, wanted in (

@@ -32,15 +32,15 @@ _NOWHERE = np.zeros(3)
 
 @dataclass(frozen=True, eq=False)
 class Question(ReadOnlyState):
-    """A reading of an arm whose uncertainty is wanted, in SI.
+    """A number read off an arm, in SI; its uncertainty is wanted.
 
     Attributes:
-        of: ``"along"``, ``"stuck"``, ``"margin"``, ``"tip"``, ``"tension"`` or
-            ``"critical_tension"``, as for :func:`~cdsm.uncertainty`.
-        stiffness: The stiffness; for ``critical_tension`` that at the critical tension, for
-            ``stuck`` that of the equivalent arm (:mod:`cdsm.uncertainties.stuck`).
-        direction: The unit direction (3,) of ``along``, ``stuck`` and ``tip``; else None.
-        cable: Index of the cable of ``tension``; else None.
+        of: Name of the reading: ``"along"``, ``"stuck"``, ``"margin"``, ``"tip"``, ``"tension"`` or
+            ``"critical_tension"``; :func:`~cdsm.uncertainty` explains them.
+        stiffness: The stiffness of the arm; for ``critical_tension``, under the critical tension;
+            for ``stuck``, the stiffness of the equivalent arm (:mod:`cdsm.uncertainties.stuck`).
+        direction: Unit direction (3,) of the readings ``along``, ``stuck`` and ``tip``; else None.
+        cable: Index of the cable whose ``tension`` is the reading; else None.
         ties: For ``stuck``, which inputs of the equivalent arm belong to which input of the arm;
             else None.
     """
@@ -106,7 +106,7 @@ class Question(ReadOnlyState):
         return float(self.direction @ K.posture.tip[:3, 3])
 
     def gradient(self) -> dict[str, Array]:
-        """Compute the derivatives of the reading by its inputs, as an array (n,) by source."""
+        """Compute the derivatives of the reading: an array (n,) for the n inputs of each source."""
         K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
         if self.of in ("along", "stuck"):
             assert self.direction is not None
@@ -125,7 +125,7 @@ class Question(ReadOnlyState):
         return buckling_gradient(Balance.of(K.distribution), inputs, margin)
 
     def at(self, errors: Mapping[str, Array]) -> Array:
-        """Compute the reading for N arms (N,), with errors (N, inputs) by source.
+        """Compute the reading of N arms (N,); ``errors`` has an array (N, inputs) for each source.
 
         Raises:
             ElasticityRangeError: A tension leaves the domain of its cable's law.
@@ -150,7 +150,7 @@ class Question(ReadOnlyState):
 def _along_gradient(
     K: Stiffness, inputs: Inputs, u: Array, along: float, motion: Array
 ) -> dict[str, Array]:
-    """Compute the derivatives of ``along`` = 1/(uᵀ C_vv u) with respect to ``inputs``, by source.
+    """Compute the derivatives of ``along`` = 1/(uᵀ C_vv u): an array for each source of ``inputs``.
 
     ``motion`` (nv,) is K_θ⁻¹ J_vᵀ u.
     """
@@ -167,7 +167,7 @@ def _along_gradient(
 
 
 def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> dict[str, Array]:
-    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z with respect to ``inputs``, by source.
+    """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z: an array for each source of ``inputs``.
 
     z is ``motion`` (nv,), u is ``direction`` (3,); both are constant. For z = K_θ⁻¹ J_vᵀ u the
     derivatives are those of −uᵀ C_vv u.
@@ -219,7 +219,7 @@ def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
 
 
 def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, Array]:
-    """Compute the derivatives of the tip's coordinate along ``direction`` (3,), by source."""
+    """Compute the derivatives of the tip's coordinate along ``direction``: an array per source."""
     pose, tree, masses = K.posture, K.posture.arm._model.tree, K.posture.arm._model.masses
     # a point that moves by δ in a frame of rotation R moves the tip by R δ
     along = direction @ rotations(pose)

@@ -1,8 +1,10 @@
-"""Equivalent arm of a stuck arm: each "block", a cable between two sticking holes, is its cable.
+"""Equivalent arm of an arm whose cables stick in their holes.
 
-While all cables stick, K_θ is the stiffness of the equivalent arm ("arm of blocks"). Several of its
-inputs may belong to one input of the arm: the blocks of a cable have one rigidity and one tension,
-and the two blocks at a hole share this hole.
+A *block* is a part of a cable between two holes in which the cable sticks, or between such a hole
+and an end of the cable. In the *arm of blocks*, each block is a cable of its own. While all cables
+stick, K_θ of the arm is K_θ of the arm of blocks. Several inputs of the arm of blocks may belong to
+one input of the arm: the blocks of a cable have one rigidity and one tension, and the two blocks at
+a hole share this hole.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from cdsm.uncertainties.inputs import inputs_of
 
 
 class Ties(NamedTuple):
-    """Correspondence between the inputs of an arm and those of its arm of blocks."""
+    """Correspondence between the inputs of an arm and the inputs of its arm of blocks."""
 
     labels: Mapping[str, Sequence[str]]  # names of the inputs of the arm, by source
     tension: Array  # tensions of the cables of the arm (C,) [N]
@@ -33,7 +35,7 @@ class Ties(NamedTuple):
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
-        """Convert derivatives by the inputs of the arm of blocks to those by the arm's inputs."""
+        """Convert derivatives by inputs of the arm of blocks to derivatives by the arm's inputs."""
         found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
         for source, at in self.inputs.items():
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
@@ -93,10 +95,10 @@ def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
 def _matching_inputs(
     arm: Manipulator, stuck: Manipulator, names: Mapping[str, str], behind: Sequence[bool]
 ) -> dict[str, Indices]:
-    """Find the input of the arm for each input of the arm of blocks, ``stuck``, by its name.
+    """Find the index of the arm's input for each input of the arm of blocks ``stuck``, by name.
 
     ``names`` maps names of blocks and of their sites to names in the arm. ``behind`` marks the
-    blocks that begin at a sticking hole, and so have no lead.
+    blocks that begin at a sticking hole. They have no lead; its index is −1.
     """
     theirs, found = inputs_of(arm).labels, {}
     for source, labels in inputs_of(stuck).labels.items():

@@ -8,7 +8,10 @@ from cdsm.support.values import Array
 
 
 def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
-    """Write ``value ± uncertainty``, the uncertainty with two digits, in a unit of SI ``size``."""
+    """Write ``value ± uncertainty``, both given in SI, in a unit that is ``size`` in SI.
+
+    The uncertainty has two digits.
+    """
     u, places = uncertainty / size, 4
     if 0.0 < u < math.inf:
         places = min(max(1 - math.floor(math.log10(u)), 0), 12)
@@ -28,7 +31,7 @@ _SHOWN = {
 
 
 def shown(source: str, standards: Array) -> str:
-    """Write the smallest and largest of ``standards`` (n,) in the unit of this ``source``."""
+    """Write the range of standard uncertainties ``standards`` (n,) in the unit of ``source``."""
     size, unit = _SHOWN.get(source, (1e-3, " mm"))
     low, high = (f"{each / size:.3g}" for each in (standards.min(), standards.max()))
     return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
