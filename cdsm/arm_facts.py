@@ -31,7 +31,7 @@ CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
 """One or more cables, or the path of their file."""
 
 _FARTHEST = 5.0
-"""A lead or site farther than this [m], and than ten arms, is probably in millimetres."""
+"""Longest plausible lead, and distance of a site from its link [m]; or ten arm lengths, if more."""
 
 ANOTHER_ARM = (
     "another arm; distribute it for this one. with_cables, with_friction, with_gravity and "
@@ -71,8 +71,8 @@ class ArmFacts(Printed):
     def length(self) -> float:
         """Length of the path from the base through the joints to the tip, all joints at zero [m].
 
-        For a robot from a URDF it is at least the largest distance of a cable site from its joint:
-        tolerances scale with the length, so it must not be zero.
+        For a robot from a URDF the length is at least the largest distance of a cable site from its
+        joint. It is never zero, since numerical tolerances are multiples of it.
         """
         if self.is_serpentine:
             return self.geometry.length
@@ -101,7 +101,7 @@ class ArmFacts(Printed):
 
     @property
     def original_length(self) -> OriginalLength:
-        """Which length of a wire is l_0 in EA/l_0: ``"unstrained"``, or ``"stretched"`` (paper)."""
+        """Which length is l_0 in a wire's EA/l_0: ``"unstrained"``, or ``"stretched"`` (paper)."""
         return self._parts.original_length
 
     @cached_property

@@ -83,7 +83,7 @@ class ArmModel:
         self.laws.require_continuity()
 
     def with_laws(self, cables: tuple[Cable, ...]) -> ArmModel:
-        """Return the model with other cable laws; the cables have the same sites as before."""
+        """Return the model with the laws of ``cables``, whose sites are the same as before."""
         model = type(self).__new__(type(self))
         same = "body", "tree", "masses", "routing", "blocks", "arrays", "lowest", "highest"
         model.__dict__.update({name: self.__dict__[name] for name in same})
@@ -103,7 +103,7 @@ class ArmModel:
 
     @cached_property
     def chain_arrays(self) -> tuple[Any, ...]:
-        """Arguments of the kernel ``single_chains``: routing, spans, holes, wraps of segments."""
+        """Arguments of the kernel ``single_chains``, which computes the segments between holes."""
         chains, routing = self.chains, route(self.body, self.tree, self.chains.segments)
         span = np.zeros((len(chains.segments), 3), dtype=np.intp)
         moving = routing.segment[:-1, 0]
@@ -112,11 +112,11 @@ class ArmModel:
 
     @cached_property
     def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
-        """Segments whose length the joints change, and these joints: (a, b, segment, joint).
+        """The n segments whose length depends on joints, as (a, b, segment, joint).
 
-        Segment i of these n segments lies between the sites ``a[i]`` and ``b[i]``. Each of the m
-        pairs ``segment[j]``, ``joint[j]`` is a segment, as an index into ``a``, and a joint between
-        its sites, as a row of :attr:`tree`.
+        Segment i lies between the sites ``a[i]`` and ``b[i]``. Each of the m entries of ``segment``
+        and ``joint`` is a pair: the length of segment number ``segment[j]`` depends on the joint in
+        row ``joint[j]`` of :attr:`tree`.
         """
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
@@ -126,7 +126,7 @@ class ArmModel:
     def wire_laws(self) -> CableLaws:
         """Elasticities of the cables; cables with friction are taken as position-controlled.
 
-        A motor that controls force keeps no constant tension behind a hole where its cable sticks.
+        A motor that controls force cannot keep the tension behind a hole in which its cable sticks.
         """
         forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
         if not any(any(self._cables[c].friction) for c in forced):
@@ -156,7 +156,7 @@ class ArmModel:
         )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
-        """Return for each joint angle (nv,) [rad] whether it is beyond its limits, (nv,)."""
+        """Return whether each joint angle of q (nv,) [rad] is beyond its limits (nv,)."""
         return np.asarray((q < self.lowest) | (q > self.highest))
 
 

@@ -41,9 +41,9 @@ class CableLaws:
         held: Each distinct law of the position-controlled cables, with the indices of its cables.
         series: 1/k_series of all cables (C,) [m/N].
         rest: Tension (C,) [N] at which wire strain and spring elongation are zero.
-        constant: EA of linear laws (C,) [N]; 0 for other laws and force-controlled cables.
-        linear: 1 for cables with a linear law and unstrained l_0, so that EA (1 + ε) = EA + F; else
-            0 (C,).
+        constant: EA (C,) [N] of position-controlled cables with a linear law; 0 for all others.
+        linear: Factor b (C,) [-] in EA (1 + ε) = EA + b F of these cables: 1 if l_0 is unstrained;
+            0 if it is stretched, and for all other cables.
         nonlinear: The entries of ``held`` whose law is not linear; their EA is computed at each
             tension.
         without_kernel: The laws of ``nonlinear`` that no compiled kernel can evaluate.
@@ -93,7 +93,7 @@ class CableLaws:
 
     @cached_property
     def wires(self) -> Wires:
-        """The laws that kernels can evaluate, for all cables."""
+        """The laws of the cables in the form that kernels evaluate."""
         count = len(self._cables)
         of_cable, ends = np.tile([0, -1, 0], (count, 1)), np.zeros((count, 6))
         edges, coefficients = [np.zeros((3, 0))], [np.zeros((0, 0))]
@@ -219,9 +219,9 @@ class CableLaws:
     def naming(
         self, error: ElasticityRangeError, held: slice | NDArray[np.intp]
     ) -> ElasticityRangeError:
-        """Return the error of a law anew, with names and indices of the cables outside its domain.
+        """Return a copy of a law's error that also names the cables whose tension caused it.
 
-        ``held`` selects the cables that have this law.
+        ``held`` selects the cables that have this law from all cables.
         """
         outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
@@ -241,10 +241,10 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
 
 
 def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | None:
-    """Return a law without its slack branch, the kind of its pieces, and their arrays.
+    """Return a law without its slack branch, and its pieces in the form that kernels evaluate.
 
-    The kind is POLYNOMIAL or CURVE; the arrays are edges and coefficients. Returns None if no
-    kernel can evaluate the law, or if its polynomials are not positive on its whole domain.
+    The pieces are a kind, POLYNOMIAL or CURVE, and two arrays, their edges and coefficients. Return
+    None if no kernel can evaluate the law, or if its polynomials are not positive on its domain.
     """
     inside = law.law if isinstance(law, SlackBelow) else law
     if isinstance(inside, TabulatedElasticity):
@@ -255,13 +255,13 @@ def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | No
 
 
 def _joined(tables: list[Array]) -> Array:
-    """Join tables of coefficients side by side; zeros fill up the rows to a multiple of AT_ONCE."""
+    """Join tables of coefficients side by side, each padded by zeros to k·AT_ONCE rows."""
     rows = AT_ONCE * -(-max(map(len, tables)) // AT_ONCE)
     return np.hstack([np.pad(each, ((0, rows - len(each)), (0, 0))) for each in tables])
 
 
 def key(law: Elasticity) -> object:
-    """Return a key that is equal for equal laws; a user-defined law may not be hashable."""
+    """Return a hashable key of a law: the law, or its identity if a user's law is not hashable."""
     try:
         hash(law)
     except TypeError:

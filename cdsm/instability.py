@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 Change = Literal["wire", "spring", "tension", "disk offset"]
 
 _STIFFER: Final = tuple(np.geomspace(1.0, 1e3, 31)[1:].tolist())
-"""Factors s that are tried on wires and springs: λ rises with s, so the steps may be wide."""
+"""Factors s that are tried on wires and springs, in wide steps, since λ increases with s."""
 
 _MORE: Final = tuple(np.geomspace(1.0, 1e2, 61)[1:].tolist())
 _LESS: Final = tuple(np.geomspace(1.0, 1e-3, 91)[1:].tolist())
-"""Factors s that are tried on tensions and disk offsets: λ may also fall, so steps are 8 %."""
+"""Factors s that are tried on tensions and disk offsets, in steps of 8 %, since λ may also fall."""
 
 _STEP = 1e-5
 """Step of ln s in the central difference of λ; truncation and rounding stay below 1e-9 of λ."""
@@ -57,10 +57,11 @@ class Remedy(ReadOnlyState):
     Attributes:
         change: ``"wire"`` (EA of all wires), ``"spring"`` (all series springs), ``"tension"`` (the
             lower bounds of the tensions) or ``"disk offset"``.
-        now: Current values: EA(F) (n,) [N] of the position-controlled cables, k_series (n,) [N/m]
-            of cables with a series spring, lower bounds (C,) [N], or disk offsets (joints,) [m].
-        factor: Factor of all these values, nearest to 1, at which the arm becomes stable [-]; None
-            if no factor that was tried makes it stable.
+        now: Current values of this quantity: EA(F) (n,) [N] of the position-controlled cables,
+            k_series (n,) [N/m] of those with a spring, lower bounds (C,) [N], or disk offsets
+            (joints,) [m].
+        factor: Factor [-] nearest to 1 that makes the arm stable if all these values are multiplied
+            by it; None if no factor that was tried does.
         slope: dλ/d ln(factor) at the current values [N m/rad], λ the smallest eigenvalue of K_θ.
             An increase by 1 % changes λ by 0.01 times the slope. None if a small change is not
             admissible.
@@ -85,12 +86,12 @@ class Remedy(ReadOnlyState):
 
 
 def find_remedies(K: Stiffness) -> tuple[Remedy, ...]:
-    """Return the remedies of an unstable arm, each for one change alone; empty if it is stable."""
+    """Return the remedies of an unstable arm, one for each quantity; empty if the arm is stable."""
     return () if K.is_stable else tuple(_remedies(K))
 
 
 def verdict(K: Stiffness) -> str:
-    """Return a line that says that the arm is unstable: the joint that moves most, and λ."""
+    """Return a sentence that an arm is unstable, with the joint that moves most and the margin."""
     arm, motion = K.posture.arm, abs(K.critical_direction)
     return (
         f"UNSTABLE: the arm buckles, {arm.joint_names[int(motion.argmax())]} most; the smallest "
@@ -172,7 +173,7 @@ def _remedy(
 
 
 def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) -> float | None:
-    """Return the factor at which ``margin(factor)`` rises through 0; None if none is found.
+    """Return the factor s at which margin(s) becomes positive; None if none is found.
 
     ``factors`` are tried in order, until the margin is positive or cannot be computed.
     """
@@ -190,7 +191,7 @@ def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) ->
 
 
 def _is_in_holes(K: Stiffness) -> bool:
-    """Check whether the cables run through the holes of the arm's disks, as its geometry says."""
+    """Return whether the cables run through the holes of the disks, as in the arm's geometry."""
     arm = K.posture.arm
     if not arm.is_serpentine or len(arm.cables) != len(arm.geometry.cables):
         return False

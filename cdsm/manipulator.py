@@ -128,9 +128,10 @@ class Manipulator(ArmFacts):
     def read(cls, path: str | os.PathLike[str], wire: Wire | None = None) -> Manipulator:
         """Read an arm from an ARM.toml: robot, cables, wires, gravity.
 
-        The file has a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]`` with
-        ``tip``, and ``file`` (a path, from the folder of this file) or ``text``; optional are
-        ``joint_names`` and ``check_inertia`` (see :meth:`from_urdf`). All other keys are optional:
+        The file has a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]``. This
+        table has ``tip``, and ``file`` (a path, relative to the folder of the ARM.toml) or ``text``
+        (the URDF). It may have ``joint_names`` and ``check_inertia`` (see :meth:`from_urdf`). All
+        other keys are optional:
 
         - ``wire``: the wire of all cables: a name such as ``"1x19-1.2mm"``, a constant EA [N], a
           table in the form of :func:`~cdsm.read_elasticity`, or the NAME of a table
@@ -152,7 +153,7 @@ class Manipulator(ArmFacts):
             MissingWire: The file has no wire for some cables, and ``wire`` is not given.
             UrdfError: The URDF is not a supported robot; lists every fault.
             CableError: A cable is on an unknown link.
-            UnknownName: No link is called ``tip``, or no wire like ``wire``.
+            UnknownName: No link is called ``tip``, or no wire has the name ``wire``.
             InvalidInput: ``joint_names`` does not name each moving joint once.
         """
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import

@@ -131,9 +131,9 @@ class Posture(ReadOnlyState):
         return tuple(lines)
 
     def _stick_figure(self, without: Collection[int]) -> tuple[list[Array], list[Array]]:
-        """Return :attr:`bones` and :attr:`brackets`, but leave out the lines of some joints.
+        """Return :attr:`bones` and :attr:`brackets`, but not the lines of the links ``without``.
 
-        ``without`` has the numbers of these joints, from 1; 0 is the base.
+        A link has the number of the joint that carries it, from 1; the base has 0.
         """
         rows = self.arm._model.routing.row.tolist()
         brackets = zip(rows, self.brackets, strict=True)
@@ -144,7 +144,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def _bones(self) -> tuple[tuple[Array, ...], ...]:
-        """Bones (lines) from the base and from each joint to the next joints or the tip."""
+        """Bones of the base and of each joint: lines (2, 3) [m] to the next joints or the tip."""
         origin, parent = self._frames.origin, self.arm._model.tree.parent
         ends = [*zip(parent[1:], origin[1:], strict=True)]
         bones: list[list[Array]] = [[] for _ in origin]
@@ -199,8 +199,8 @@ class Posture(ReadOnlyState):
     def _joint_stiffness(self, tension: Array, cable_stiffness: Array, wrench: Array) -> Array:
         """Compute five matrices (5, nv, nv) [N m/rad]: active, passive and load term, P, and K_θ.
 
-        P is the sum of the magnitudes of the four terms of K_θ. ``tension`` (C,) [N],
-        ``cable_stiffness`` (C,) [N/m] and ``wrench`` (6,) are checked already.
+        Each entry of P is the sum of the magnitudes of this entry in the four terms of K_θ.
+        ``tension`` (C,) [N], ``cable_stiffness`` (C,) [N/m] and ``wrench`` (6,) must be checked.
         """
         model = self.arm._model
         terms = stiffness_kernels.single_stiffness(
@@ -223,10 +223,11 @@ class Posture(ReadOnlyState):
 class MomentArms(ReadOnlyState):
     """Moment arm of each cable about each joint, −J_L: torque per tension, τ = −J_Lᵀ F (Eq. 13).
 
-    A positive arm turns the joint to positive angles. ``arms["cable1_1", "joint1_1"]`` is one arm.
+    A cable with a positive moment arm turns the joint to positive angles. The moment arm of one
+    cable about one joint is ``arms["cable1_1", "joint1_1"]``.
 
     Attributes:
-        values: The arms (C, nv) [m]; the force per tension [-] for prismatic joints.
+        values: Moment arms (C, nv) [m]; force per tension [-] for prismatic joints.
         cables: Names of the cables.
         joints: Names of the joints.
         slides: Whether each joint is prismatic (nv,).

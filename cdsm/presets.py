@@ -43,10 +43,10 @@ STEEL_WIRE_200GPA: Final = SOLID
 """Solid wire of the strand's diameter with the paper's 200 GPa (Section IV-B): EA = 226 kN."""
 
 ELASTIC_STAGE: Final = LinearElasticity(48e3)
-"""Constant EA [N] of the strand in its elastic stage; assumed, from Eq. 19 at 600 N."""
+"""Law with the constant EA of the strand in its elastic stage: assumed, from Eq. 19 at 600 N."""
 
 TEN_DEGREES: Final = np.deg2rad(10.0)
-"""All joint angles of the virtual prototype in Sections IV-A, B and D of the paper [rad]."""
+"""Angle of every joint of the virtual prototype in Sections IV-A, B and D of the paper [rad]."""
 
 
 def virtual_prototype_geometry(

@@ -205,11 +205,11 @@ class RigidBody:
         return Shapes(lambda q: drawn.display(q[self._ours]), rows)
 
     def _path(self, joint: int) -> list[int]:
-        """Return the indices in Pinocchio of the joints from the base up to and including one."""
+        """Return the indices in Pinocchio of the joints from the base to ``joint``, it included."""
         return list(self._model.supports[joint])[1:]
 
     def _row(self, joint: int) -> int:
-        """Return the row in :class:`Tree` of the joint with this index in Pinocchio; 0: base."""
+        """Return the row in :class:`Tree` of a joint with an index of Pinocchio; 0 is the base."""
         return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:
@@ -224,7 +224,7 @@ class RigidBody:
 
 
 def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:
-    """Return the wanted order of joint names; raise InvalidInput unless each joint occurs once."""
+    """Check and return the wanted order of joints; InvalidInput unless it has each joint once."""
     wanted = sequence_of("joint_names", wanted, str)
     if sorted(wanted) != sorted(names):
         missing = [name for name in names if name not in wanted]

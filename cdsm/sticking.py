@@ -7,9 +7,10 @@ by
 
     δT_j = k_j g_j·δθ − κ_j δa_j,   g_j = ∂l_j/∂θ.
 
-No wire passes a hole in which the cable sticks. Neighbouring segments between which the cable
-slides form a block: Σ δa_j of a block is zero. :func:`~cdsm.kernels.chain_problem.chain_tangent`
-computes its δT_j. Without friction, each cable is one block: this gives the frictionless stiffness.
+No wire passes a hole in which the cable sticks. If the cable slides in a hole, the segments before
+and after it belong to one block. No wire leaves a block, so Σ δa_j over its segments is zero.
+:func:`~cdsm.kernels.chain_problem.chain_tangent` computes the δT_j of a block. Without friction,
+each cable is one block: this gives the frictionless stiffness.
 
 A force of 1 N at the tip of a stuck arm moves the joints by θ̇ (nv,) [rad/N]. Hole i is between the
 segments j and j + 1, with the friction coefficient μ and the wrap angle φ_i. To first order, the

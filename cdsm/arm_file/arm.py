@@ -136,7 +136,7 @@ def _tolerances(given: object) -> Tolerances:
 
 
 def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
-    """Return the cables of the tables [[cables]], or of the geometry with its [cables.NAME]."""
+    """Return the cables in [[cables]], or those of the geometry with settings in [cables.NAME]."""
     if geometry is None or isinstance(cables, list):
         return read_routed(cables)
     tables = {} if cables is None else cables
@@ -195,7 +195,7 @@ def _geometry_lines(geometry: Geometry) -> list[str]:
 
 
 def _urdf_lines(parts: ArmParts) -> list[str]:
-    """Return the TOML lines of a table [urdf]; the URDF is a literal text where TOML allows it."""
+    """Return the TOML lines of a table [urdf]; the URDF is a literal string if TOML allows it."""
     urdf, lines = parts.urdf, ["[urdf]", f"tip = {toml_value(parts.tip)}"]
     lines.append(f"joint_names = {toml_value(parts.joint_names)}")
     try:

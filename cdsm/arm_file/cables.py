@@ -85,15 +85,17 @@ def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
 def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple[Cable, ...]:
     """Read the cables of an arm from a TOML file.
 
-    The file has one table ``[[cables]]`` per cable with ``name`` and ``sites`` (two or more
-    ``{link = "…", xyz = [x, y, z]}``, [m]). Its ``wire`` is a name such as ``"1x19-1.2mm"``, a
-    constant rigidity [N], or the NAME of a table ``[wires.NAME]`` in the form of
-    :func:`~cdsm.read_elasticity`. Optional are ``lead`` [m] (the straight cable between the
-    actuator and the first site), ``series_stiffness`` [N/m], ``control`` (``"position"`` or
-    ``"force"``), ``minimum`` and ``maximum`` [N]. ``wire`` and the optional keys except ``lead``
-    may also stand once at the top, for all cables. ``friction`` of a cable is the coefficient in
-    all holes that it passes. A site may have ``friction`` and ``wrap`` [rad] of its own, as in
-    :class:`~cdsm.Site`.
+    The file has one table ``[[cables]]`` per cable. Its keys are:
+
+    - ``name``; ``sites``: two or more ``{link = "…", xyz = [x, y, z]}``, [m]. A site may also have
+      ``friction`` and ``wrap`` [rad], as in :class:`~cdsm.Site`.
+    - ``wire``: a name such as ``"1x19-1.2mm"``, a constant rigidity [N], or the NAME of a table
+      ``[wires.NAME]`` in the form of :func:`~cdsm.read_elasticity`.
+    - Optional: ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``),
+      ``minimum`` and ``maximum`` [N]. These keys and ``wire`` may also stand at the top of the
+      file, for all cables without their own.
+    - Optional: ``lead`` [m], the straight cable between the actuator and the first site, and
+      ``friction``, the coefficient in all holes that the cable passes.
 
     Args:
         path: The file.
@@ -161,7 +163,7 @@ def read_routed(cables: object) -> list[Routed]:
 
 
 def _sites(entry: _Entry) -> tuple[Site, ...]:
-    """Build the sites of the cable ``entry``; the cable's friction is the default of its holes."""
+    """Build the sites of the cable ``entry``; its friction is that of all holes that give none."""
     passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
     sites = []
     for i, site in enumerate(entry.sites):
@@ -174,7 +176,7 @@ def _sites(entry: _Entry) -> tuple[Site, ...]:
 def build_cables(
     routed: Iterable[Routed], settings: CableSettings, wires: Wires, path: str | os.PathLike[str]
 ) -> tuple[Cable, ...]:
-    """Build cables with ``wires``; ``settings`` apply to every cable without its own.
+    """Build cables with ``wires``; ``settings`` apply to all cables without such a setting.
 
     Raises GeometryError, which lists every fault, or MissingWire if wires are missing and nothing
     else is wrong.
@@ -215,7 +217,7 @@ def setting_lines(cable: Cable) -> list[str]:
 def cable_lines(
     cables: Sequence[Cable], wires: Sequence[str], settings: Sequence[Sequence[str]]
 ) -> list[str]:
-    """Return the TOML lines of [[cables]], each with its wire (``""``: none) and its settings."""
+    """Return the TOML of cables, with the wire of each (``""``: none) and lines of its settings."""
     lines = []
     for cable, wire, given in zip(cables, wires, settings, strict=True):
         lines += ["[[cables]]", f"name = {toml_value(cable.name)}"]

@@ -18,7 +18,7 @@ from cdsm.wires.files import from_table, table_of
 
 @record
 class CableSettings:
-    """Settings of all cables or of one cable in a file; None for a key that the file lacks."""
+    """Settings in a file, of all cables or of one cable; a setting that is not given is None."""
 
     wire: Any = None
     series_stiffness: SpringStiffness | None = None
@@ -60,7 +60,7 @@ class Wires(NamedTuple):
 
 
 def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
-    """Read the wires of a file, or raise GeometryError; ``forced`` replaces them for all cables."""
+    """Read the wires of a file, or raise GeometryError; a law ``forced`` replaces all of them."""
     if not isinstance(keys.wires, dict):
         raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
     named, usual, faults = {}, None, []
@@ -81,7 +81,7 @@ def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
 
 
 def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire") -> Elasticity:
-    """Return the law ``given`` by name, as EA [N] or as a table; GeometryError names ``key``."""
+    """Return the law that a name, EA [N] or a table gives; errors (GeometryError) name ``key``."""
     try:
         if isinstance(given, dict):
             return from_table(given)
@@ -101,7 +101,7 @@ def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire")
 
 
 def wire_entries(cables: Sequence[Cable]) -> tuple[list[str], list[str]]:
-    """Return the value of the key ``wire`` of each cable, and the lines of tables [wires.NAME]."""
+    """Return the value of the key ``wire`` for each cable, and the lines of the wires' tables."""
     values: dict[str, str] = {}
     lines: list[str] = []
     keys = []

@@ -36,7 +36,7 @@ _Given = Annotated[
 ]
 
 _ALONG: dict[str, Direction] = {"x": "x", "y": "y", "z": "z"}
-"""Directions along which every answer has the stiffness, by name."""
+"""Directions by name; every answer has the stiffness along them."""
 
 
 def urdf(
@@ -97,9 +97,9 @@ def stiffness(
 def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[str, cdsm.Breakaway]:
     """Compute the breakaway load in each direction of ``along``, by name of the direction.
 
-    The result has no entry for a direction in which the arm buckles or a tension leaves the domain
-    of its law before a cable slides, a cable slides without a load, or no cable slides at any load.
-    It is empty if the arm has no friction.
+    A direction has no entry if the arm buckles, or a tension leaves the domain of its law, before a
+    cable slides; nor if a cable slides without a load, or none slides at any load. The result is
+    empty if the arm has no friction.
     """
     found = {}
     if tension.posture.arm.has_friction:
@@ -114,9 +114,9 @@ def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[s
 def _sticking(
     breakaways: dict[str, cdsm.Breakaway], along: Mapping[str, Direction]
 ) -> tuple[list[str], Json]:
-    """Compute the stuck stiffness of each of ``breakaways``, as lines of text and for JSON.
+    """Return stuck stiffness and breakaway load in each direction, as lines of text and for JSON.
 
-    Both are empty if there are no ``breakaways``. They also hold the breakaway loads.
+    ``breakaways`` are those of :func:`_breakaways`. If there are none, text and JSON are empty.
     """
     from cdsm.stiffness_matrix.prints import model_of
 

@@ -40,7 +40,7 @@ def as_command(function: Callable[..., None]) -> Callable[..., None]:
     """Return a function as typer needs it: one parameter per option, and errors as messages.
 
     typer reads options only from the signature. Options that several commands share are the fields
-    of a dataclass. In the signature, these fields replace the parameter annotated with it.
+    of a dataclass. In the signature, these fields replace the parameter of this dataclass.
     """
     groups: dict[str, Any] = {}
     options: list[inspect.Parameter] = []

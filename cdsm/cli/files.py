@@ -15,7 +15,7 @@ import cdsm
 from cdsm.cli.values import misuse
 
 _WRITTEN = "cdsm.cli.files"
-"""Key in a command's context under which it has its files to write, by parameter name."""
+"""Key of the context of a command: paths of the files that it will write, by parameter name."""
 
 
 def file_option(

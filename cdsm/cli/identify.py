@@ -95,7 +95,7 @@ def identify(
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:
-    """Return the bounds, in units of the command line, of each parameter of ``--free``, or None."""
+    """Return the bounds of each parameter in ``--free``, in its unit there; None if not given."""
     ranges: dict[str, Range | None] = {}
     for each in free:
         name, _, given = each.partition("=")
@@ -114,7 +114,7 @@ def _ranges(free: list[str]) -> dict[str, Range | None]:
 
 
 class _Shown:
-    """Parameters of an arm in the units of the command line, which their labels name."""
+    """Parameters of an arm in units of the command line, by labels such as ``lead [mm]``."""
 
     def __init__(self, parameters: ArmParameters) -> None:
         self._parameters = parameters

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cdsm.support.values import Array
 
 DEFAULT_SOLVER: Final = "daqp"
-"""Copy of the default of :mod:`cdsm.tension`; an import of that would delay the help pages."""
+"""Default solver, as in :mod:`cdsm.tension`; to import that module would delay the help pages."""
 
 _arm_option = partial(typer.Option, rich_help_panel="The arm")
 _tension_option = partial(typer.Option, rich_help_panel="Tensions and load")
@@ -217,7 +217,7 @@ class TensionOptions:
     def conditions(
         self, of: cdsm.Manipulator | cdsm.Posture, *, friction: bool = False
     ) -> Conditions:
-        """Return the assumptions of a result with these options, of an arm or a posture."""
+        """Return the assumptions to print above a result for an arm or a posture."""
         return Conditions(of, (self.min_tension,), friction)
 
     def distribute(self, pose: cdsm.Posture, wrench: Array) -> cdsm.Tension:

@@ -58,7 +58,7 @@ def answer(
 ) -> None:
     """Print an answer, its warnings first: ``parts`` as text, or ``as_dict()`` as strict JSON.
 
-    If there are warnings, the command ends here with exit code 3. So write files before.
+    If there are warnings, the command ends here with exit code 3, so write its files before.
     """
     if as_json:
         numbers: Json = {"warnings": warnings}
@@ -89,7 +89,7 @@ def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
 
 
 def write(path: Path | None, fill: Callable[[Path], object]) -> None:
-    """If a path is given, write the file by ``fill(path)`` and tell the path on standard error."""
+    """If a path is given, write the file by ``fill(path)``; print its path on standard error."""
     if path is not None:
         fill(path)
         typer.echo(f"written: {path}", err=True)
@@ -124,9 +124,9 @@ def misuse_reported(as_json: bool) -> Iterator[None]:
 
 @contextmanager
 def reported(as_json: bool) -> Iterator[None]:
-    """Turn an error into an exit code and a message, or JSON if ``as_json``; --debug raises it.
+    """Turn an error into a message (JSON if ``as_json``) and an exit code.
 
-    A warning of cdsm is printed in one line.
+    With --debug, the error is raised. A warning of cdsm is printed in one line.
     """
     try:
         with misuse_reported(as_json), warnings.catch_warnings():

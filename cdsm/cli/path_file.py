@@ -42,10 +42,10 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     found = named_columns(table, (*arm.joint_names, *"xyz", "target"), refuse)
 
     def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
-        """Return n columns (S, n) in SI; None if the table has none of them.
+        """Return the n columns that ``wanted`` names, (S, n) in SI; None if all are missing.
 
-        ``wanted`` has the names of the n columns, with the units of each and their sizes in SI. If
-        only some columns are missing, they are zero if ``some`` is True, otherwise an error.
+        For each column, ``wanted`` has its allowed units with their sizes in SI. If only some
+        columns are missing, they are zero if ``some`` is True, otherwise FileError is raised.
         """
         if not wanted.keys() & found.keys():
             return None

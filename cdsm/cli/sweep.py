@@ -238,9 +238,10 @@ def _answer(
     conditions: Conditions | None = None,
     mapped: str | None = None,
 ) -> None:
-    """Print which file was written; warn if no entry is ok, or has the ``mapped`` quantity.
+    """Print which file was written, and warn if the quantity ``mapped`` exists at no entry.
 
-    For a new sweep, ``conditions`` are given; they and the counts of all statuses are printed, too.
+    For a new sweep, ``conditions`` are given. They and the number of entries with each status are
+    then printed too, and a warning if no entry is ok.
     """
     from cdsm.support.tidy import status_names
 

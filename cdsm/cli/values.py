@@ -51,8 +51,9 @@ def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:
     """Return the text after each ``JOINT=`` in an option, by joint.
 
-    Commas or spaces separate the entries; names may contain them, and ``=``. Raises BadParameter,
-    which says that ``form`` is needed, or UnknownName if there is no such joint.
+    Commas or spaces separate the entries, but joint names may contain them and ``=``. Raises
+    BadParameter, which says that ``form`` is needed, if the text does not begin with a joint or
+    names one twice; UnknownName if the arm has no such joint.
     """
     from cdsm.support.validation import one_of
 

@@ -96,7 +96,7 @@ def _pair(option: str, text: str | None) -> list[str] | None:
 
 
 def _as_options(message: str) -> str:
-    """Write the keywords of a message as options: ``units=('mm', 'N')`` as ``--units mm,N``."""
+    """Replace keywords in a message by options, e.g. ``units=('mm', 'N')`` by ``--units mm,N``."""
     message = message.replace("gauge_length= [m]", "--gauge-length [mm]")
     message = re.sub(r"(displacement|force)_unit= or ", "", message)
     message = re.sub(r"as (displacement|force)_unit=", "by --units", message)

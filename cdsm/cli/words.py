@@ -24,7 +24,7 @@ _OPTIONS: Final = {name: f"--{name.replace('_', '-')}" for name in _ALIKE} | {
     "q": "--angles",
     "store": "--resume",
 }
-"""Option in place of each argument of the library that a message may name."""
+"""Name of the option for each argument of the library that a message may name."""
 
 _PYTHON: Final = (
     (", or, in Python, pass check_limits=False to compute beyond them.", "."),
@@ -38,11 +38,11 @@ _PYTHON: Final = (
     ("`cdsm fit`, or cdsm.read_tensile_csv and cdsm.fit_tensile_test.", "`cdsm fit`."),
     (", or start from a guess= nearer to it.", "."),
 )
-"""Remedies that the command line does not have, and the text in their place."""
+"""Remedies in messages that only Python has, each with the text that replaces it."""
 
 _NAMES: Final = "|".join(_OPTIONS)
 _ARGUMENT: Final = re.compile(rf"^({_NAMES})(?=: )|\b({_NAMES})=(?!\w)")
-"""An argument as messages name it: ``minimum=``, or at the beginning, ``minimum: ``."""
+"""Pattern of an argument in a message: ``minimum=`` anywhere, or ``minimum: `` at its beginning."""
 
 OLDER: Final[dict[str, dict[str, str]]] = {
     "urdf": {"--output": "--out"},

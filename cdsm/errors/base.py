@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def listed(faults: Sequence[str], most: int | None = None) -> str:
-    """Return the faults as one line each; ``most`` limits their number."""
+    """Return one line for each of at most ``most`` faults, and the number of the others."""
     more = "" if most is None or len(faults) <= most else f"\n  and {len(faults) - most} more"
     return "".join(f"\n  - {fault}" for fault in faults[:most]) + more
 

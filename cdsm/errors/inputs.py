@@ -94,7 +94,7 @@ class MissingWire(CdsmError, LookupError):
 
     Attributes:
         path: Path of the file.
-        cables: Names of the cables without a wire; empty if no cable has one.
+        cables: Names of the cables without a wire; empty if no cable has a wire.
     """
 
     def __init__(self, path: object, cables: Sequence[str] = ()) -> None:

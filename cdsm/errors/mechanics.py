@@ -44,13 +44,13 @@ class InfeasibleTension(CdsmError):
     """No cable tension within the bounds balances the arm at this posture.
 
     Attributes:
-        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] for prismatic joints). Its
-            tensions are chosen within the bounds so that the sum of its magnitudes is least.
+        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] for prismatic joints). It
+            belongs to those tensions within the bounds that minimise the sum of its magnitudes.
         joint: Name of the joint with the largest missing torque.
         relaxation: Least amount by which the bounds of all cables without a fixed tension must be
             widened to make the problem feasible [N]; inf if this is not possible.
         binding: Names of the cables without a fixed tension that are at a bound under the tensions
-            of ``missing``.
+            to which ``missing`` belongs.
         fixed: Names of the cables with fixed tensions, if these make the problem infeasible; else
             empty.
     """

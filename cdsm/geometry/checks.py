@@ -19,7 +19,7 @@ WIDEST = 1.0
 """A hole radius or disk offset larger than this [m] is probably in millimetres."""
 
 _WIDEST_ANGLE = 8.0 * math.pi
-"""A hole angle larger than this [rad] is probably in degrees; angle and phase may add up to 4 π."""
+"""A larger hole angle [rad] is probably in degrees. It is the sum of an angle and a phase."""
 
 _SHORTEST = 1e-3  # an arm shorter than this [m] was probably given in metres where mm are taken
 

@@ -108,8 +108,8 @@ class Geometry(Description):
             hole_angles: φ of the cables of a joint [rad]: one list for all joints, or a list of
                 lists, one for each joint.
             phase: Added to φ of the cables of each joint [rad].
-            spread: Angle [rad] between the holes of g cables that would share one hole: the hole of
-                cable i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: they share it.
+            spread: Angle [rad] between the holes of g cables whose angles φ are equal: the hole of
+                cable i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: not turned.
             name: Name of the robot.
 
         Raises:
@@ -216,8 +216,8 @@ class Geometry(Description):
     def replace(self, **changes: Any) -> Geometry:
         """Return this geometry with other attributes, e.g. ``replace(hole_radius=0.02)``.
 
-        A ``hole_radius`` without ``joints`` is that of all joints. Raises GeometryError, which
-        lists every fault, if the changed geometry is invalid.
+        If ``hole_radius`` is given without ``joints``, all joints get it. Raises GeometryError,
+        which lists every fault, if the changed geometry is invalid.
         """
         if "hole_radius" in changes and "joints" not in changes:
             changes["joints"] = tuple(replace(joint, hole_radius=None) for joint in self.joints)

@@ -30,9 +30,9 @@ def hinge_hole_angles(rolls: Sequence[float], cables: int) -> list[list[float]]:
 
 
 def spread_out(cables: Sequence[CableRoute], spread: float) -> tuple[CableRoute, ...]:
-    """Return the cables, with ``spread`` [rad] between the holes of cables that would share one.
+    """Return the cables; those with the same hole angle are moved apart by ``spread`` [rad].
 
-    The hole of cable i = 0…g−1 of g cables at one angle is turned by (i − (g−1)/2)·spread.
+    Of g cables at one angle, the hole of cable i = 0…g−1 is turned by (i − (g−1)/2)·spread.
     """
     moved = list(cables)
     for group in same_angle(cables) if spread else ():

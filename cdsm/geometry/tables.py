@@ -56,7 +56,7 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 
 
 def build_only(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
-    """Build a geometry as :func:`build` does, but ignore all other keys of an ARM.toml."""
+    """Build the geometry in the parsed TOML of an arm as :func:`build` does; ignore other keys."""
     described, rest = split_geometry(data)
     if "urdf" in rest and not described:
         raise GeometryError(
@@ -110,7 +110,7 @@ def text_of(geometry: Geometry) -> str:
 
 
 def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
-    """Return the TOML lines of a geometry; ``prefix`` (``geometry.``) precedes names of tables."""
+    """Return the TOML lines of a geometry; ``prefix``, e.g. ``geometry.``, precedes table names."""
     lines = toml_lines(geometry, ("name", "base_length", "hole_radius"))
     for joint in geometry.joints:
         lines += ["", f"[[{prefix}joints]]", *toml_lines(joint)]

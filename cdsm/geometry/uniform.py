@@ -45,12 +45,11 @@ def uniform(
     usual_angles: Callable[[int], list[list[float]]],
     keywords: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return the attributes of the Geometry of a uniform arm; GeometryError if one is invalid.
+    """Return the attributes of a Geometry from keywords of its constructors.
 
     ``axes`` has the axes of each joint. ``keywords`` are the arguments of
-    :meth:`Geometry.universal` by name.
-    ``usual_angles`` is a function that returns the default hole angles of each joint for a number
-    of cables per joint.
+    :meth:`Geometry.universal` by name. ``usual_angles`` returns the default hole angles of each
+    joint for a number of cables per joint. GeometryError if an argument is invalid.
     """
     cables_per_joint, hole_angles = keywords["cables_per_joint"], keywords["hole_angles"]
     sizes = {key: keywords[key] for key in _SIZES}

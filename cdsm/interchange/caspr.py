@@ -133,7 +133,7 @@ def _read_cables(
 
 
 def _unique(name: str, used: dict[str, int]) -> str:
-    """Return the name, with the next number (``#2``) if it is in ``used``; enter it there."""
+    """Return a name that is not in ``used``, ``name`` or ``name #2`` and so on; add it to them."""
     label, count = name, used.get(name, 1)
     while label in used:
         count += 1
@@ -182,7 +182,7 @@ def _cable(
 
 
 def _urdf(name: str, bodies: Sequence[Body]) -> str:
-    """Return the URDF text of a robot with these bodies. ``tool0`` is at the end of the last."""
+    """Return the URDF text of a robot; ``tool0`` is at the end of the last of ``bodies``."""
     links, joints = [E.link(name=BASE)], []
     names = [BASE, *(body.name for body in bodies)]
     for body in bodies:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lxml import etree
 
 _TEMPLATE: Final = r"(\.\./)*templates/{}\.dtd"
-"""DTD named by CASPR's files (a regular expression). It is not read."""
+"""Pattern of the DTD that CASPR's files name; the DTD is not read."""
 
 BASE: Final = "base"
 """Name of link 0."""
@@ -41,7 +41,7 @@ _JOINTS: Final = {
 """Coordinates of each CASPR joint type: x, y, z are rotations, X, Y, Z translations."""
 
 _OBLIQUE: Final = {"R_AXIS": ("turn", "revolute"), "P_AXIS": ("slide", "prismatic")}
-"""Joint types with any axis: suffix of the name, and URDF type, of the single joint."""
+"""Name suffix and URDF type of the joint for each CASPR joint type that has any axis."""
 
 
 class SingleJoint(NamedTuple):

@@ -229,7 +229,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
 
 
 def _without_motors(K: Stiffness) -> Stiffness:
-    """Return the stiffness under the same tensions if all motors control force: no passive part."""
+    """Return the stiffness that K becomes if all motors control force: it has no passive part."""
     arm = K.posture.arm
     free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
     return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.wrench)
@@ -241,7 +241,10 @@ def _without_motors(K: Stiffness) -> Stiffness:
 def _cables(
     root: etree._Element, arm: Manipulator, K: Stiffness | None, actuators: str, damping: Array
 ) -> list[float]:
-    """Add tendons with damping (C,) [N s/m] and actuators; return ``ctrl`` at the posture."""
+    """Add a tendon for each cable to ``root``, and actuators; return ``ctrl`` at the posture.
+
+    ``damping`` is that of the tendons (C,) [N s/m].
+    """
     tendon, motors = etree.SubElement(root, "tendon"), etree.Element("actuator")
     at_start = []
     for c, cable in enumerate(arm.cables):

@@ -21,7 +21,7 @@ _MASS, _INERTIA = 1e-6, 1e-9
 _SMALLEST = 1e-12  # a smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero
 
 _ROUNDING = 1e-9
-"""Relative margin: MuJoCo refuses a moment of inertia above the sum of the other two."""
+"""Relative margin, since MuJoCo refuses a moment of inertia above the sum of the other two."""
 
 _JOINTS = {"revolute": "hinge", "prismatic": "slide"}
 _SITE = 1e-3  # radius [m] of a drawn hole
@@ -91,9 +91,9 @@ def _axis(joint: etree._Element) -> Array:
 
 
 def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Write the mass of a link, or a tiny one if it moves without mass, to its body.
+    """Write the mass and inertia of a link to its body; a massless moving link gets tiny ones.
 
-    Returns the mass that was written, in a list that is empty if there is none.
+    Returns what was written, in a list that is empty if a fixed link has no mass.
     """
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
@@ -131,7 +131,7 @@ def _inertia(inertia: etree._Element, R: Array) -> Array:
 
 
 def _shape(body: etree._Element, visual: etree._Element) -> bool:
-    """Draw a cylinder, box or sphere of a URDF; return False for meshes, which are other files."""
+    """Draw a cylinder, box or sphere of a URDF; return False for another shape, such as a mesh."""
     shape = visual.find("geometry/*")
     if shape is None or shape.tag not in ("cylinder", "box", "sphere"):
         return False
@@ -148,7 +148,7 @@ def _shape(body: etree._Element, visual: etree._Element) -> bool:
 def _sticks(
     body: etree._Element, ends: list[Array], sites: list[tuple[float, ...]], radius: float
 ) -> None:
-    """Draw a body as sticks to the next joints, at ``ends``, and thin sticks to its sites."""
+    """Draw a body as sticks: to the next joints, at ``ends``, and thinner ones to its sites."""
     lines = [np.array([np.zeros(3), end]) for end in ends if np.linalg.norm(end) > radius]
     bones = [(line, radius) for line in lines]
     for site in map(np.asarray, dict.fromkeys(sites)):

@@ -28,7 +28,7 @@ EXPLANATION = (
 @final
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """A number of the paper, or one for each of x, y and z, beside the computed numbers.
+    """A number of the paper, or one for each of x, y and z, and the computed numbers.
 
     Attributes:
         figure: Name of the figure.
@@ -71,7 +71,7 @@ class Figure(ABC):
     Attributes:
         name: ``"fig3"``, ``"lead"`` and so on.
         title: Title above the figure.
-        claims: Numbers of the paper beside computed numbers.
+        claims: Numbers of the paper, each with the computed numbers.
     """
 
     name: str

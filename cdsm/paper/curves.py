@@ -28,7 +28,7 @@ Part = Literal["active", "passive"]
 Swept = Literal["young_modulus", "tension"]
 
 FROM_FIG_6: Final = "prototype searched for Fig. 6"
-"""Text of ``Claim.searched``: the virtual prototype was chosen to meet the number of Fig. 6."""
+"""Text of ``Claim.searched`` where the virtual prototype was chosen to meet Fig. 6."""
 
 
 @final
@@ -44,7 +44,7 @@ class Curve:
         pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].
         pseudoinverse_part: Diagonal of K_R from the figure's ``part`` of K_θ alone (N, 3) [N/m].
         along: Stiffness that a small weight measures along x, y, z (N, 3) [N/m].
-        along_part: Share of the figure's ``part`` of K_θ in ``along`` (N, 3) [N/m].
+        along_part: Contribution of the figure's ``part`` of K_θ to ``along`` (N, 3) [N/m].
     """
 
     label: str
@@ -64,7 +64,7 @@ class StiffnessFigure(Figure):
 
     Attributes:
         swept: ``"young_modulus"`` or ``"tension"``: the quantity on the horizontal axis.
-        part: ``"active"`` or ``"passive"``: the term of K_θ that is shown beside the total.
+        part: ``"active"`` or ``"passive"``: the term of K_θ that is shown in addition to the total.
         curves: Curves computed with the cable stiffness EA/L, L the stretched length, as in the
             paper.
         original: The same curves computed with EA/l_0, l_0 the original length.
@@ -110,10 +110,10 @@ class Pair(NamedTuple):
     def claim(
         self, measure: Callable[[Array, Array], Array], searched: str = FROM_FIG_6, **texts: Any
     ) -> Claim:
-        """Build a claim; ``measure`` computes its numbers, once for each of the three readings.
+        """Build a claim whose numbers ``measure`` computes from each of the three readings.
 
-        ``measure`` takes a stiffness (N, 3) and its active or passive part (N, 3), both [N/m].
-        ``searched`` and ``texts`` are fields of the claim.
+        The arguments of ``measure`` are a stiffness (N, 3) and its active or passive part (N, 3),
+        both [N/m]. ``searched`` and ``texts`` are fields of the claim.
         """
         paper, original = self.stretched, self.original
         return Claim(
@@ -128,10 +128,11 @@ class Pair(NamedTuple):
 def over_cases(
     label: str, q: Array, cases: Sequence[tuple[Elasticity, float]], swept: Array, part: Part
 ) -> Pair:
-    """Compute the stiffness at a posture q (nv,) [rad] for N cases: laws with lower bounds [N].
+    """Compute the stiffness at a posture q (nv,) [rad] for N cases.
 
-    ``swept`` (N,) is the abscissa of the curves [Pa or N]. ``part`` is the term of K_θ whose
-    stiffness is computed in addition to the total.
+    A case is a law of the cables, and a lower bound of all tensions [N]. ``swept`` (N,) is the
+    abscissa of the curves [Pa or N]. ``part`` is the term of K_θ whose stiffness is computed in
+    addition to the total.
     """
 
     def curve(length: OriginalLength) -> Curve:

@@ -29,8 +29,10 @@ HALF_UNITS: Final = (
     frozen(np.array([5e-3, 5e-3, 5e-3, 5e-3, 5e-3, 5e-5, 5e-5])),
     frozen(np.array([5e-2, 5e-3, 5e-3, 5e-5, 5e-9, 5e-12, 5e-15])),
 )
-"""Half a unit of the last printed digit of each coefficient, lowest power first, for the lower and
-the upper branch."""
+"""Half a unit of the last printed digit of each coefficient, lowest power first.
+
+The first array belongs to the lower branch of Eq. 19, the second to the upper branch.
+"""
 
 _SAMPLES = 200  # number of tensions at which the lower branch is sampled
 
@@ -54,9 +56,10 @@ def least_bend() -> tuple[float, float]:
 
 
 def band(tension: ArrayLike) -> tuple[Array, Array]:
-    """Find least and largest EA [N] of all laws of the printed digits, for each ``tension`` [N].
+    """Find the least and the largest EA [N] that the printed digits allow at each ``tension`` [N].
 
-    Both have the shape of ``tension``. The laws are continuous at 31 N, and positive below it.
+    Both have the shape of ``tension``. All laws are allowed that round to the printed digits, are
+    continuous at 31 N, and are positive below it.
 
     Raises:
         InvalidInput: ``tension`` is not finite numbers.
@@ -78,10 +81,10 @@ def powers(tension: ArrayLike, slope: bool = False) -> Array:
 
 
 def _branches(rows: Array) -> tuple[Array, Array]:
-    """Place rows (..., 7) among the 14 coefficients of both branches of Eq. 19, as (lower, upper).
+    """Return rows (..., 7) as rows (..., 14) of the lower branch and of the upper branch.
 
-    Columns 0 to 6 are of the lower branch, columns 7 to 13 of the upper one. In each result
-    (..., 14), the columns of the other branch are zero.
+    A row multiplies the coefficients of Eq. 19: columns 0 to 6 those of the lower branch, columns 7
+    to 13 those of the upper branch. In each result, the columns of the other branch are zero.
     """
     none = np.zeros_like(rows)
     return np.hstack([rows, none]), np.hstack([none, rows])
@@ -90,9 +93,10 @@ def _branches(rows: Array) -> tuple[Array, Array]:
 def _least(
     cost: Array, positive: Array, bounds: Sequence[tuple[float | None, float | None]]
 ) -> Array:
-    """Find the coefficients c (14,) of a continuous law with least cost·c, so that positive·c ≥ 0.
+    """Minimise cost·c over the coefficients c (14,) of continuous laws with positive·c ≥ 0.
 
-    ``bounds`` are those of d; None: no bound.
+    Returns c. ``cost`` has the shape (14,), ``positive`` (n, 14). ``bounds`` has the least and
+    largest value of each d; None for no bound.
     """
     lower, upper = _branches(powers(JOIN)[0])
     join = lower - upper

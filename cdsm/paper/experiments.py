@@ -79,10 +79,10 @@ class ExperimentFigure(Figure):
 
 
 def figure_10() -> ExperimentFigure:
-    """Compute stiffness in x, y and z against tension with the 1×19 strand, and Table II.
+    """Compute stiffness in x, y and z against tension with the 1×19 strand; compare with Table II.
 
-    Three prototypes are shown. The first is fitted to Section V as printed. The second takes Table
-    II with x and y exchanged in rows 2 to 4 (evidence:
+    Three prototypes are shown. The first is fitted to Section V as printed. The second is fitted to
+    Section V with x and y exchanged in rows 2 to 4 of Table II (evidence:
     :data:`~cdsm.paper.section_v.TABLE_II_SWAPPED`). The third is fitted to the exchanged Table II
     alone, with unevenly spaced tensions and finite weights: 14 parameters for 15 numbers. No fit is
     a proof.
@@ -160,7 +160,7 @@ def figure_13() -> ExperimentFigure:
 
 
 def _over_tension(fit: PrototypeFit) -> list[Trace]:
-    """Compute stiffness in x, y and z as a function of tension, with Table II as fitted."""
+    """Compute stiffness in x, y and z as a function of tension, beside the fitted Table II."""
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS)
     curves = prototype.weigh(prototype.arm().at(prototype.configurations[0]), tensions)

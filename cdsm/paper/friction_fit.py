@@ -64,7 +64,7 @@ class RoughPrototype:
     """A prototype of Section V with friction, bearings and another rigidity of the strand.
 
     Attributes:
-        prototype: All other parameters.
+        prototype: All parameters other than the three below.
         friction: μ [-] in all holes.
         bearing: Stiffness of each bearing [N m/rad].
         rigidity: Factor [-] on the rigidity of Eq. 19, common to all cables.
@@ -110,7 +110,10 @@ class RoughPrototype:
         ]
 
     def tips_to_first_order(self, paths: Sequence[LoadingPath]) -> Array:
-        """Compute the tips (15, 3) [m] to first order from the ``paths`` of a similar prototype."""
+        """Compute the tips (15, 3) [m] under the weights from the ``paths`` of a similar prototype.
+
+        The tips are correct to first order in the differences of the two prototypes.
+        """
         pose = self.arm().at(POSTURE)
         tensions = np.repeat(self._tensions(pose), 3, axis=0)
         pairs = zip(paths, tensions, strict=True)
@@ -127,7 +130,7 @@ class RoughPrototype:
         return np.asarray(((weights**2).sum(axis=1) / work).reshape(5, 3))
 
     def _tensions(self, pose: Posture) -> Array:
-        """Return the tensions (5, C) [N] of each row; the springs of a bearing cause no torque."""
+        """Return the tensions (5, C) [N] for the rows of Table II; bearings cause no torque."""
         names = pose.arm.cables.names
         springs = [c for c, name in enumerate(names) if name.startswith("bearing")]
         fixed = dict[str, float]()
@@ -165,8 +168,9 @@ def identify_rough_prototype(added: Sequence[str] = tuple(ADDED)) -> RoughFit:
     """Fit Table II as printed with friction, bearings and a factor on Eq. 19 as parameters.
 
     The search varies the 11 parameters on which Table II depends (dimensions, weights, tension
-    offset), within :data:`~cdsm.paper.BOUNDS`, and the named parameters of :data:`ADDED`. The
-    tensions of the rows are evenly spaced. With all three, 14 parameters are fitted to 15 numbers.
+    offset), within :data:`~cdsm.paper.BOUNDS`, and the parameters of :data:`ADDED` that ``added``
+    names. With all three of these, 14 parameters are fitted to 15 numbers. The tensions of the rows
+    are evenly spaced.
 
     Raises:
         UnknownName: A name is not in :data:`ADDED`.

@@ -83,7 +83,10 @@ def figure_lead() -> LeadFigure:
 
 
 def _changes(lead: float, length: OriginalLength) -> Array:
-    """Compute how K_R and the stiffness for a weight change between :data:`MINIMA` (2, 3) [%]."""
+    """Compute the change from the first to the second bound of :data:`MINIMA` (2, 3) [%].
+
+    Row 0 is for K_R, row 1 for the stiffness that a small weight measures; columns are x, y, z.
+    """
     arm = presets.virtual_prototype(presets.ELASTIC_STAGE, lead=lead, original_length=length)
     q = np.full(arm.nv, presets.TEN_DEGREES)
     first, last = (readings(at_minimum(arm, q, F)) for F in MINIMA)
@@ -91,7 +94,7 @@ def _changes(lead: float, length: OriginalLength) -> Array:
 
 
 def _first_fall(changes: Array, length: OriginalLength, reading: int) -> tuple[float, ...]:
-    """Find the lead [mm] above which stiffness falls, for x, y and z; 0 if it always falls."""
+    """Find the lead [mm] above which tension softens the arm in x, y and z; 0: with every lead."""
 
     def crossing(axis: int) -> float:
         if changes[0, axis] < 0.0:

@@ -120,7 +120,11 @@ class Prototype:
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
-        """Compute stiffness (N, 3) [N/m] in x, y, z: secant for a weight, tangent for weight 0."""
+        """Compute stiffness (N, 3) [N/m] in x, y, z at N reported tensions [N].
+
+        ``weights`` (3, 3) [N] has the force of the test in each row. The stiffness is the secant
+        under this force; if it is zero, the tangent.
+        """
         forced = [cable.name for cable in pose.arm.cables if cable.control == "force"]
         rows = []
         for tension in np.atleast_1d(np.asarray(tensions, dtype=np.float64)).tolist():
@@ -165,7 +169,7 @@ class Prototype:
 def arm_of(
     one: Prototype, law: Elasticity, series_stiffness: float, friction: float = 0.0
 ) -> Manipulator:
-    """Build the arm of a prototype: cables of a law, each with a spring [N/m] in series."""
+    """Build the arm of a prototype; each cable has the ``law`` and a spring [N/m] in series."""
     return presets.experimental_prototype(
         law,
         series_stiffness=series_stiffness,

@@ -1,9 +1,9 @@
 """Identify one prototype from all measurements of Section V.
 
 The paper prints 20 numbers of its prototype and none of its dimensions. Every unknown is a
-parameter within :data:`BOUNDS`. A search finds the parameters that explain the numbers best, in
-steps that free more and more parameters. The residual of a stiffness is ln(model/paper), because
-its errors are factors. The residual of a drop or a rise is (model − paper)/paper.
+parameter within :data:`BOUNDS`. For each of four interpretations of Section V (:data:`STEPS`), a
+search finds the parameters that explain the numbers best. The residual of a stiffness is
+ln(model/paper), because its errors are factors. That of a drop or a rise is (model − paper)/paper.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ BOUNDS: Final = {name: (low, high) for name, (low, high, *_) in _PARAMETERS.item
 START, UNEVEN_START, TABLE_START = (
     Prototype(**{name: row[column] for name, row in _PARAMETERS.items()}) for column in (2, 3, 4)
 )
-"""Starts for evenly and for unevenly spaced tensions, and for Table II alone.
+"""First guesses of the searches: with evenly and unevenly spaced tensions, and Table II alone.
 
-They are near the results of searches over all of :data:`BOUNDS`, so the search is short.
+They are near the results of searches over all of :data:`BOUNDS`, so the searches are short.
 """
 
 
@@ -72,7 +72,7 @@ class Step:
         label: Name in tables and figures.
         table: Table II (5, 3) [N/m], as printed or with exchanged entries.
         free: Names of the searched parameters.
-        start: Start of the search. Parameters that are not free keep these values.
+        start: First guess of the search. Parameters that are not free keep these values.
         table_alone: Whether only Table II is fitted, without Figs. 12, 13 and Section V-B.
     """
 
@@ -119,7 +119,7 @@ STEPS: Final = (
         table_alone=True,
     ),
 )
-"""Interpretations of Section V, each freer than the previous. A good fit proves none of them."""
+"""Interpretations of Section V to which a prototype is fitted. A good fit proves none of them."""
 
 
 @final

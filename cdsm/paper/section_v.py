@@ -29,8 +29,9 @@ TABLE_II_SWAPPED: Final = frozen(
 """Table II with x and y exchanged in rows 2 to 4 (5, 3) [N/m].
 
 By the caption of Fig. 10 and Section V-C, y is the least of the three. The printed table
-contradicts this in exactly these rows: 7.45 > 4.86, 7.24 > 5.76, 9.94 > 8.21. Also y falls there
-from 7.45 to 7.24. Exchanged, y is the least in every row and always rises. The increments stay.
+contradicts this in exactly these rows: 7.45 > 4.86, 7.24 > 5.76, 9.94 > 8.21. In these rows y also
+falls, from 7.45 to 7.24. With the exchange, y is the least in every row and always rises. The
+increments from the first to the last row do not change.
 """
 
 TENSIONS: Final = frozen(np.linspace(3.0, 86.0, 5))

@@ -1,7 +1,7 @@
 """Recompute Figs. 3, 4, 6, 7 and 8 of the paper.
 
-Where the paper is silent, :mod:`cdsm.presets` and this module assume values: see
-``Claim.assumption``. ``Claim.searched`` names those that were chosen to meet the paper's number.
+Where the paper is silent, :mod:`cdsm.presets` and this module assume values, which
+``Claim.assumption`` names. ``Claim.searched`` names assumptions chosen to meet the paper's number.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _POINTS = 25
 
 
 def figure_3() -> StiffnessFigure:
-    """Compute stiffness and its passive part at Young's moduli of 160 to 320 GPa, for 2 bounds."""
+    """Compute stiffness and its passive part at 160 to 320 GPa, for 2 lower bounds of tension."""
     moduli = np.linspace(160e9, 320e9, _POINTS)
     laws = [LinearElasticity.of_wire(modulus, presets.STRAND_DIAMETER) for modulus in moduli]
     pairs = [
@@ -146,7 +146,7 @@ def figure_7() -> StiffnessFigure:
 
 
 def figure_8() -> StiffnessFigure:
-    """Compute stiffness as a function of the whole range of tension, at three postures."""
+    """Compute stiffness as a function of tension, over its whole range, at three postures."""
     arm = presets.virtual_prototype()
     pairs, claims = [], []
     for label, q in FIGURE_8_POSTURES.items():
@@ -198,7 +198,7 @@ def _figure(
 
 
 def _highest_minimum(pose: Posture) -> float:
-    """Find the lower bound [N] of all tensions at which the largest is just :data:`STRAND_END`."""
+    """Find the lower bound [N] at which the largest of the tensions is just :data:`STRAND_END`."""
 
     def excess(minimum: float) -> float:
         return float(distribute_tension(pose, minimum).values.max()) - STRAND_END

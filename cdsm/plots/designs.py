@@ -31,7 +31,7 @@ _WIDEST = 34  # characters of a label beside an axis of 2.4 inches
 def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
     """Plot the objectives of all designs that meet the constraints, and their Pareto front.
 
-    With one objective: its best value against the number of designs.
+    For a single objective, plot its best value against the number of designs.
 
     Args:
         found: The result of :func:`cdsm.search_designs` or :func:`cdsm.refine_design`.

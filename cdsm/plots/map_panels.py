@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _MOST_PANELS = 9
 
 _FLAT = 1e-9
-"""The tips are in a plane if their extent along one axis is below this part of the largest one."""
+"""The tips are in a plane if one extent of them is below this fraction of the largest extent."""
 
 _SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
 _THIN = 0.15  # least ratio of the sides of a map
@@ -76,9 +76,9 @@ def cases_of(
 ) -> Iterator[Case]:
     """Yield the values of ``quantity`` for each case.
 
-    A case is one combination of indices of all dimensions except ``poses``, the dimensions of the
-    postures. ``words`` has the word of each status code. Values of unstable entries become NaN,
-    except those of the margin.
+    A case is one entry of the dimensions that are not ``poses``, the dimensions of the postures:
+    for example one lower bound of tension. ``words`` has the word of each status code. Values of
+    unstable entries become NaN, except those of the margin.
     """
     status = dataset["status"]
     allowed = {*map(str, status.dims), "direction"}
@@ -122,10 +122,11 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
 def slices_of(
     points: Array, section: tuple[str, float, float] | None, path: bool
 ) -> tuple[list[Slice], bool]:
-    """Return the slabs of tips (N, 3) [mm] to show, and whether they are slices of a cloud.
+    """Return the slab of tips that each panel shows, and whether the slabs are slices of a cloud.
 
-    ``section`` is an axis, a position [m] and a half thickness [m], or None. All tips of a ``path``
-    are shown three times, seen along each axis.
+    ``points`` (N, 3) [mm] are the tips. ``section`` is an axis, a position [m] and a half thickness
+    [m], or None. If ``path`` is True, three panels show all tips, each along another axis, unless
+    the tips are in a plane.
     """
     if section is not None:
         return [_slab(section)], False

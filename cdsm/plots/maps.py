@@ -52,13 +52,13 @@ _UNITS: Final = {
 _WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
 
 _EQUAL = 1e-9
-"""All values are equal if they differ by less than this fraction of the largest.
+"""Values that differ by less than this fraction of the largest are drawn as equal.
 
-Their colour scale then extends 5 % to either side.
+The colour scale then extends 5 % to either side of them.
 """
 
 _MIDDLE = (0.05, 0.95)
-"""Two quantiles, d apart. A value more than d below the first or above the second is an outlier."""
+"""Probabilities of two quantiles. If these are d apart, values more than d outside are outliers."""
 
 _TALLEST = 4.0  # largest height of a panel [inch]
 _NARROWEST = 1.2  # least width of a title, and of a panel without its ticks [inch]
@@ -193,7 +193,7 @@ def plot_map(
 
 
 def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Return the colour scale of the values without outliers, and at which ends outliers lie.
+    """Return a colour scale for ``values`` without outliers, and the ends that have outliers.
 
     The ends are ``"neither"``, ``"min"``, ``"max"`` or ``"both"``.
     """
@@ -263,7 +263,10 @@ def _draw(
 def _legend(
     figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
-    """Draw the legend of the statuses: marker, word, and share of the entries ``counted``."""
+    """Draw the legend of the statuses: marker, word, and percentage of all entries of ``counted``.
+
+    Entries with a value are not in the legend.
+    """
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)
     handles = []

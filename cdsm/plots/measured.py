@@ -66,7 +66,7 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
 
 
 def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: str = "x") -> None:
-    """Shade stages of the tension: name, lower and upper end [N]. Axis ``along`` shows tension."""
+    """Shade ``stages``, each a name and two tensions [N]; the axis ``along`` shows the tension."""
     whole = stages[-1][2] - stages[0][1]
     for (name, low, high), shade in zip(stages, cycle(("0.93", "0.98", "0.88")), strict=False):
         middle, shown = (low + high) / 2.0, {"fontsize": SMALL, "color": "0.3"}
@@ -82,7 +82,7 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Plot predicted and measured values, and residuals divided by σ, named by ``labels``."""
+    """Plot predicted and measured values, and residuals divided by σ with a label for each."""
     rows = fit._rows
     loops: list[Any] = [each for each in fit.measurements if hasattr(each, "forces")]
     stiff = [k for k, each in enumerate(rows) if not hasattr(each, "forces")]
@@ -127,7 +127,7 @@ def _plot_stiffnesses(axes: Any, fit: Identification, rows: Sequence[int]) -> No
 def _plot_loop(
     axes: Any, fit: Identification, loop: WeightLoop, rows: Sequence[int], colour: Any
 ) -> None:
-    """Plot ``loop`` relative to its first measured reading; ``rows`` are its rows in ``fit``."""
+    """Plot displacements of a loop, less its first reading; ``rows`` are its rows in ``fit``."""
     u = np.array(loop.direction) / np.linalg.norm(loop.direction)
     along = loop.axes @ u
     read, model = (
@@ -140,7 +140,7 @@ def _plot_loop(
 def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
     """Plot the expected 95 % interval of each parameter, and the gain of repeating each candidate.
 
-    The intervals are shown for the planned tests, and for as many evenly spaced ones.
+    The intervals are shown for the planned tests, and for an equal number of evenly spaced tests.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
     place, width = np.arange(len(plan.names)), 0.38

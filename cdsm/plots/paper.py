@@ -74,7 +74,7 @@ def plot_paper(result: paper.Figure) -> Figure:
 def _grid(
     result: paper.StiffnessFigure, height: float, rows: int, **options: Any
 ) -> tuple[Figure, Any]:
-    """Build a figure of two columns' width and a ``height`` [inch]; a row has panels x, y and z."""
+    """Build a figure as wide as two columns, ``height`` [inch]; each row has panels x, y and z."""
     figure, grid = panels(TWO_COLUMNS, height, 3, rows, sharex=True, **options)
     for axes, axis in zip(grid[0], XYZ, strict=True):
         caption(axes, axis)

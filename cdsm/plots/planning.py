@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 _SAME = 1e-9  # largest entry of a unit direction outside a plane in which it lies
 
 _JUMP = 3.0
-"""A change of the target is drawn as a step if it exceeds neighbouring changes of equal sign by
-this factor."""
+"""A change of the target is drawn as a step if it is more than this factor times the change before
+and the change after it. Changes of the other sign do not matter."""
 
 
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
@@ -55,7 +55,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
     is ``along(u)``.
 
     Args:
-        ranges: Lists of ranges by label, such as the bound of the tensions; a range for each
+        ranges: For each label, such as a bound of the tensions, a list of ranges, one for each
             direction. All directions are in one plane of two base axes, from 0° to below 180°.
 
     Raises:
@@ -175,7 +175,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
 
 
 def _stepped(values: Array) -> tuple[Array, Array]:
-    """Build a line through samples (S,); a large change becomes a step between two samples."""
+    """Return x and y of a line through samples (S,); a large change becomes a vertical step."""
     changes = np.diff(values)
     around = np.pad(changes, 1)
     # only neighbouring changes of equal sign make a ramp; up and back down is two steps

@@ -61,7 +61,7 @@ ROOM: Final = 1.15
 """Upper limit of an axis that begins at zero, divided by the largest value drawn."""
 
 NAMED: Final = 24
-"""Largest number of cables whose lines differ and have names. With more cables, all look alike."""
+"""Largest number of cables with names and different lines. More cables all have equal lines."""
 
 _GAP: Final = 0.06  # free space around a picture [inch]
 
@@ -94,10 +94,10 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
 
 
 def expect(name: str, value: object, kind: str) -> None:
-    """Raise :class:`InvalidInput` for argument ``name`` unless its value is of the class ``kind``.
+    """Raise :class:`InvalidInput` for argument ``name`` unless its class is called ``kind``.
 
-    The names of the classes are compared. An import of the class would be circular, because the
-    modules of the results import this package.
+    A class derived from one called ``kind`` is also allowed. The class itself cannot be imported
+    here: its module imports this package.
     """
     if kind not in (base.__name__ for base in type(value).__mro__):
         raise InvalidInput(name, f"{value!r} given; a {kind} is needed.")
@@ -178,9 +178,10 @@ def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> Non
 
 
 def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line: Any) -> None:
-    """Draw values (N, C) against x (N,), a line per cable, with a legend of up to 24 ``names``.
+    """Draw values (N, C) against x (N,) as a line per cable.
 
-    ``line`` has further options of the lines.
+    Up to 24 cables have lines of their own and a legend with ``names``. ``line`` has further
+    options of the lines.
     """
     named = len(names) <= NAMED
     for c, name in enumerate(names):
@@ -202,9 +203,9 @@ def equal_axes(axes: Any, zoom: float = 0.75) -> None:
 
 
 class _Picture(Axes3D):  # type: ignore[misc]
-    """3D axes that report a box close around the drawing, to which notebooks crop a figure.
+    """3D axes without the empty margin that matplotlib adds to a drawing.
 
-    Axes of matplotlib report the whole square around the drawing.
+    Notebooks crop a figure to the box that its axes report, here a box close around the drawing.
     """
 
     def get_tightbbox(self, renderer: Any = None, **options: Any) -> Bbox:
@@ -236,7 +237,7 @@ def finish_picture(figure: Figure, axes: Any, title: str, right: float = 1.0) ->
 
 
 def fill_canvas(axes: Any, right: float = 1.0) -> None:
-    """Enlarge a 3D picture to the fraction ``right`` of its figure's width, and fit the height."""
+    """Enlarge a 3D picture up to the fraction ``right`` of its figure's width; fit its height."""
     figure = axes.figure
     legends, titles = figure.legends, [figure._suptitle] if figure._suptitle else []
     for _ in range(4):  # text keeps its size, so the right scale is found step by step

@@ -55,7 +55,7 @@ def plot_cables(cables: Mapping[str, Cable] | Sequence[Cable], free_length: floa
     """Plot the stiffness of cables [N/mm] against the tension [N], on a logarithmic scale.
 
     Args:
-        cables: Cables, with labels if they come as a mapping.
+        cables: Cables, or a mapping from labels to cables.
         free_length: Original length of every wire [m].
 
     Raises:

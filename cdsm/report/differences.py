@@ -1,7 +1,7 @@
 """Compute derivatives by extrapolated central differences, with error estimates.
 
-Hessian of a function of the virtual prototype's ten joints: ``scipy.differentiate.hessian`` (order
-4) needs 22 500 evaluations and 2.7 s. This module needs 1 200 evaluations and 0.2 s for three
+For the Hessian of a function of ten joints (the virtual prototype), SciPy's ``hessian`` of order 4
+needs 22 500 evaluations and 2.7 s. This module needs 1 200 evaluations and 0.2 s for three
 functions at once. The errors are similar: 1.5e-9 of the largest entry, with SciPy 1.7e-9. SciPy
 also does not consider the rounding of a function or a domain that must not be left.
 """
@@ -16,7 +16,7 @@ from cdsm.errors import CdsmError
 from cdsm.support.values import Array
 
 Estimates = tuple[Array, Array]
-"""Derivatives of T functions, and the error bound of the entries of each (T,)."""
+"""Derivatives (T, …) of T functions, and for each function (T,) one error bound of all entries."""
 
 Sampled = Callable[[Array], Array]
 """Function from points (P, n) to the values (P, T, ...) of T functions."""
@@ -28,11 +28,11 @@ _LEVELS = 16  # maximum number of step sizes; each is half the previous one
 _CONVERGING = 0.05  # two extrapolations have not converged if their relative difference is larger
 
 _AMPLIFIED = np.array([6.7, 99.0])
-"""Rounding errors of the extrapolated derivatives, first and second, in noise/h and noise/h².
+"""Rounding errors of an extrapolated first derivative, in noise/h, and of a second, in noise/h².
 
-The noise is the rounding error of the function f. The extrapolation uses differences of the steps
-h, h/2 and h/4. It weighs those of step h/4 by 64/45 and those of step h/2 by 20/45. The numerator
-of a second difference, f(h) − 2 f(0) + f(−h), has an error of up to four times the noise.
+The noise is the rounding error of the function f. The extrapolation uses differences with the steps
+h, h/2 and h/4. The difference with h/4 has the weight 64/45, that with h/2 the weight −20/45. The
+numerator of a second difference, f(h) − 2 f(0) + f(−h), has an error of up to four times the noise.
 """
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 RANK = 1e-9
-"""Singular values below this part of the largest one are taken as zero."""
+"""Singular values below this fraction of the largest one are taken as zero."""
 
 
 @final
@@ -143,7 +143,7 @@ def balance_error(K: Stiffness) -> tuple[float, str, float]:
 
 
 def torque_size(K: Stiffness) -> float:
-    """Return the largest entry of |J_L|ᵀ F + |J_X|ᵀ |W| + |g| [N m], the size of the torques."""
+    """Return the torque size, the largest entry of |J_L|ᵀ F + |J_X|ᵀ |W| + |g| [N m]."""
     pose = K.posture
     parts = K.tension @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
     return float(((parts + abs(pose.gravity_torque)) * joint_unit(pose.arm)).max())
@@ -170,7 +170,7 @@ def cable_states(K: Stiffness) -> tuple[CableState, ...]:
 
 
 def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
-    """Return the number that ``answer()`` computes by the law of ``cable``; None on a CdsmError."""
+    """Return ``answer()``, a number by the law of ``cable``; None if it raises a CdsmError."""
     try:
         return float(evaluate_law(cable, answer))
     except CdsmError:
@@ -193,9 +193,10 @@ class Sticking(ReadOnlyState):
 
 
 def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
-    """Compute the tip stiffnesses while all cables stick; ``readings`` are the frictionless ones.
+    """Compute the tip stiffnesses while all cables stick; None if there are none.
 
-    None if no cable sticks, ``readings`` is None, or a tension is outside the domain of its law.
+    ``readings`` are the frictionless tip stiffnesses. None if they are None, no cable can stick, or
+    a tension is outside the domain of its law.
     """
     pose, sticks = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]

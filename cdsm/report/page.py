@@ -36,7 +36,7 @@ li.fault{color:#b3261e}
 
 
 Section = tuple[str, Sequence[tuple[str, ...]], Sequence[str]]
-"""Heading, rows of a table (the first is the head, the first column holds names), sentences."""
+"""Heading, rows of a table, and sentences. Row 0 has the titles of columns, column 0 names."""
 
 
 def to_text(report: Report) -> str:

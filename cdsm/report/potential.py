@@ -38,7 +38,10 @@ _BESIDE = 1e-6
 
 
 class LockedCable(NamedTuple):
-    """Cable with a locked motor; strain and energy of its law give its tension and energy."""
+    """Cable with a locked motor: its tension and energy as functions of its length.
+
+    The tension follows from the strain of its law, the energy from the energy of the law.
+    """
 
     number: int  # index among the cables of the arm
     cable: Cable
@@ -46,7 +49,7 @@ class LockedCable(NamedTuple):
     free_length: float  # original length l_0, which the motor keeps [m]
 
     def tensions(self, longer: Array) -> Array:
-        """Compute the tensions (P,) [N] if all cables are ``longer`` by (P, C) [m]."""
+        """Compute the tension (P,) [N] of this cable if the cables are longer by (P, C) [m]."""
         cable, start = self.cable, self.free_length
         more = longer[:, self.number]
         return evaluate_law(
@@ -54,7 +57,7 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute the gain of energy less F ΔL (P,) [J] if cables are ``longer`` by (P, C) [m]."""
+        """Compute gain of energy minus F ΔL (P,) [J] if the cables are longer by ΔL (P, C) [m]."""
         cable, F, start = self.cable, self.tension, self.free_length
         tensions = self.tensions(longer)
         more = evaluate_law(cable, lambda: cable.energy(tensions, start) - cable.energy(F, start))
@@ -150,9 +153,10 @@ class Neighbourhood:
         return self.work(places, np.zeros(3))
 
     def work(self, places: Array, moment: Array | None = None) -> Array:
-        """Compute the active, gravity and load part of U (P, 3) [N m], with a moment at the tip.
+        """Compute the active, gravity and load part of U (P, 3) [N m], with the work of a moment.
 
-        The work of ``moment`` (3,) [N m] is exact to first order. None: the moment of the wrench.
+        ``moment`` (3,) [N m] acts at the tip; None: the moment of the wrench. Its work is exact to
+        first order in the displacement.
         """
         moment = self._wrench[3:] if moment is None else moment
         pose, arm = self._pose, self._pose.arm
@@ -185,7 +189,7 @@ class Neighbourhood:
     # --- torques and lengths ------------------------------------------------------------------
 
     def kinematic_torques(self, places: Array) -> Array:
-        """Compute the torques J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m]; F stays as at the posture."""
+        """Compute the torques J_Lᵀ F, g and −J_Xᵀ W (P, 3, nv) [N m], with F as at the posture."""
         torques = []
         for q in self._angles(places):
             pose = self._pose.arm.at(q, check_limits=False)
@@ -194,7 +198,7 @@ class Neighbourhood:
         return np.array(torques) * self.unit
 
     def elastic_torques(self, places: Array) -> Array:
-        """Compute torques of the change of tension, J_Lᵀ (F(L) − F) (P, 1, nv) [N m]."""
+        """Compute the torque J_Lᵀ (F(L) − F) (P, 1, nv) [N m] of the changes of the tensions."""
         poses = [self._pose.arm.at(q, check_limits=False) for q in self._angles(places)]
         longer = np.array([pose.cable_lengths for pose in poses]) - self._pose.cable_lengths
         more = np.zeros_like(longer)
@@ -221,9 +225,9 @@ class Neighbourhood:
 
     @property
     def first_step(self) -> float:
-        """Return the first, largest step of the differences, a joint displacement in :attr:`unit`.
+        """Return the largest step of the differences, a joint displacement in :attr:`unit`.
 
-        It is so small that no cable segment loses half its length.
+        With this step, no cable segment loses half of its length.
         """
         return min(_FIRST, self._closing_motion / 4.0)
 
@@ -238,7 +242,7 @@ class Neighbourhood:
 
     @cached_property
     def _closing_motion(self) -> float:
-        """Return the least joint displacement, in :attr:`unit`, that may close a cable segment."""
+        """Return the least joint displacement, in :attr:`unit`, at which two sites may coincide."""
         pose = self._pose
         routing = pose.arm._model.routing
         segment, joint = routing.segment, routing.joint
@@ -254,7 +258,7 @@ class Neighbourhood:
 
     @property
     def length_noise(self) -> Array:
-        """Estimate the rounding errors (C,) [m] of cable lengths, from sums and from the sites."""
+        """Estimate the rounding error (C,) [m] of each cable length."""
         return np.asarray(_ULPS * (self._pose.cable_lengths + self._pose.arm.length))
 
     def kinematic_noise(self, step: float) -> Array:
@@ -266,7 +270,7 @@ class Neighbourhood:
         return np.array([self._tension @ self.length_noise, _ULPS * weight, _ULPS * load])
 
     def elastic_noise(self, step: float) -> Array:
-        """Return the rounding error of :meth:`elastic` (1,) [N m], displacements up to ``step``."""
+        """Return the rounding error (1,) [N m] of :meth:`elastic`, for steps ≤ ``step``."""
         k, F = self._k, self._tension
         stored = np.divide(F * F, k, out=np.zeros_like(k), where=k > 0.0).sum()
         return np.array([_ROOT * stored + 2.0 * step * (k * self._arms) @ self.length_noise])
@@ -278,7 +282,7 @@ class Neighbourhood:
         return noise
 
     def elastic_torque_noise(self, step: float) -> Array:
-        """Return the error of :meth:`elastic_torques` (1,) [N m], displacements up to ``step``."""
+        """Return the rounding error (1,) [N m] of :meth:`elastic_torques`, for steps ≤ ``step``."""
         k = self._k
         errors = k * self.length_noise + _ROOT * self._tension * (k > 0.0)
         tilted = 2.0 * step * (k * self._arms) @ self.length_noise
@@ -286,5 +290,5 @@ class Neighbourhood:
 
 
 def joint_unit(arm: Manipulator) -> Array:
-    """Return 1 rad for revolute joints, the arm's length [m] for prismatic joints (nv,)."""
+    """Return the unit of each joint (nv,): 1 rad, or the arm's length [m] for a prismatic joint."""
     return JointUnits(arm.slides).levers(arm.length)

@@ -20,7 +20,7 @@ APART = 0.1
 """A note is given if the three tip stiffnesses along an axis differ by more than this fraction."""
 
 CLOSE = 0.05
-"""A note is given if the distance of a tension to a bound of its law is below this fraction."""
+"""A note is given if a tension F is nearer to an end of its law's domain than this times F."""
 
 _SINGULAR = 1e-12  # an eigenvalue of at most this part of the norm of K_θ is rounding
 _DIGITS = 1e10  # condition number of K_θ above which K_θ⁻¹ has less than six digits

@@ -81,10 +81,10 @@ class Report(ReadOnlyState):
     def trustworthy(self) -> bool:
         """Return whether there are no faults.
 
-        The self-check agrees for every term, their sum and the torque. The residual of the balance
-        is at most 1e-6 of the torques. K_θ is positive definite by more than rounding. Distributed
-        tensions are the least within their bounds. Notes are ignored: they say how to read the
-        stiffness.
+        Without faults, the self-check agrees for every term, their sum and the torque; the residual
+        of the balance is at most 1e-6 of the torques; K_θ is positive definite by more than
+        rounding; and distributed tensions are the least within their bounds. Notes are ignored:
+        they say how to read the stiffness.
         """
         return not self.faults
 

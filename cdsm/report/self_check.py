@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 Verdict = Literal["agrees", "DIFFERS", "not possible"]
 
 RESOLVED = 1e-6
-"""A comparison is a check only if its expected error is at most this part of the largest entry."""
+"""A comparison proves something if its expected error is at most this part of the largest entry."""
 
 _NEGLIGIBLE = 1e-8
-"""For a small term, an expected error of this part of the largest entry of K_θ is enough."""
+"""For a small term it is enough if the error is at most this part of the largest entry of K_θ."""
 
 _TERMS = ("active", "passive", "gravity", "load")
 
@@ -137,8 +137,8 @@ def self_check(K: Stiffness) -> SelfCheck:
     """Compare K_θ, its terms and the residual of Eq. 13 with finite differences.
 
     K_θ is compared with second differences of the potential and with first differences of the
-    torque, the residual with first differences of the potential. Motors do not move, and the
-    tensions need not balance the arm. A comparison that is not possible names the reason.
+    torque. The residual is compared with first differences of the potential. Motors do not move,
+    and the tensions need not balance the arm. A comparison that is not possible names the reason.
     """
     near = Neighbourhood(K)
     energies, torques = _recomputed_terms(near)
@@ -170,7 +170,7 @@ def self_check(K: Stiffness) -> SelfCheck:
 
 
 def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Recomputed]]:
-    """Compute the terms twice: as differences, second of the potential and first of the torque."""
+    """Return the terms as second differences of the potential, and as first ones of the torque."""
     step = near.first_step
     moved = _differentiated(hessians, near, near.kinematic, near.kinematic_noise, step)
     turned = _differentiated(
@@ -227,9 +227,9 @@ def _compare(
     torque: _Recomputed = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
-    """Compare ``given`` with its values by differences; ``largest`` is as in :class:`Agreement`.
+    """Compare the term ``given`` with its values by differences of the potential and of the torque.
 
-    ``whole`` is the largest entry of K_θ.
+    ``largest`` is its largest entry, as in :class:`Agreement`; ``whole`` is that of K_θ.
     """
     unit = _UNITS.get(name, "N m/rad")
     enough = max(RESOLVED * largest, _NEGLIGIBLE * whole)

@@ -27,7 +27,7 @@ def rounded(value: float, *, up: bool) -> str:
 
 
 def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
-    """Return the range of ``values`` as text: ``2 to 5``, or ``2`` if both ends look alike."""
+    """Return the range of ``values`` as text: ``2 to 5``, or ``2`` if both ends print alike."""
     low, high = form(float(values.min())), form(float(values.max()))
     return low if low == high else f"{low} to {high}"
 
@@ -45,7 +45,7 @@ _ROUNDING = 1e-9  # a number of a table below this fraction of the largest is pr
 
 
 def without_rounding(values: Array) -> Array:
-    """Return the numbers of a table; rounding errors of the largest number are replaced by 0."""
+    """Return the numbers of a table; those below the rounding error of the largest become 0."""
     size = abs(values)
     return np.where(size > _ROUNDING * size.max(initial=0.0), values, 0.0)
 
@@ -124,7 +124,7 @@ class JointUnits(NamedTuple):
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
-        """Return q (..., nv) by joint name: ``angles_rad``, and ``ways_m`` of prismatic joints."""
+        """Return q (..., nv) by joint name, in ``angles_rad`` or, if prismatic, in ``ways_m``."""
         found: dict[str, object] = {}
         for key_of, chosen in (("angles_rad", ~self.slides), ("ways_m", self.slides)):
             if chosen.any() or key_of == "angles_rad":
@@ -133,7 +133,10 @@ class JointUnits(NamedTuple):
         return found
 
     def joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
-        """Return ``turning`` or ``sliding`` for a joint; None: for all, joined by "or" if mixed."""
+        """Return the text for a joint: ``sliding`` if it is prismatic, else ``turning``.
+
+        If ``joint`` is None, the text is for all joints; "or" joins both texts if they differ.
+        """
         slides = self.slides if joint is None else self.slides[joint : joint + 1]
         if slides.all():
             return sliding

@@ -70,7 +70,7 @@ Point = Annotated[
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
 
 ONE, EACH = "(one)", "(each)"
-"""Tags: one value for all joints, or one value for each joint. Faults do not print them."""
+"""Tags of pydantic: one value for all joints, or one for each joint. Faults do not print tags."""
 
 
 def one_or_each(value: object) -> str:
@@ -159,7 +159,7 @@ def parse(kind: type[_Record], data: object) -> _Record:
 
 
 def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
-    """Return one TOML line for each field of a record that is not None; ``keys``: only these."""
+    """Return one TOML line for each field of a record, or of ``keys``, whose value is not None."""
     names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
     values = ((name, getattr(record, name)) for name in names)
     return [f"{name} = {toml_value(value)}" for name, value in values if value is not None]

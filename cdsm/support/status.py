@@ -22,8 +22,9 @@ from cdsm.errors import (
 class Status(IntEnum):
     """Status of one posture of a batch: which quantities exist; the others are NaN.
 
-    The status names the first failure; a single posture raises the error in brackets. A negative
-    margin (unstable arm) and an infinite stiffness ``along`` (immobile direction) are no failures.
+    The status names the first failure; for a single posture, the error in brackets is raised. A
+    negative margin (unstable arm) and an infinite stiffness ``along`` (immobile direction) are not
+    failures.
     """
 
     OK = 0

@@ -92,7 +92,7 @@ def read_table(
 
 
 def _rows_of_numbers(lines: list[tuple[int, str]], delimiter: str) -> int:
-    """Count the lines that have two numbers or more with this delimiter."""
+    """Count the lines that have two or more numbers if ``delimiter`` splits them."""
     table = Table([], [], delimiter)
     cells = ([cell.strip(' "') for cell in line.split(delimiter)] for _, line in lines)
     return sum(sum(not math.isnan(table.number(cell)) for cell in row) > 1 for row in cells)
@@ -136,8 +136,8 @@ def column_in(
 ) -> tuple[int, float]:
     """Return the index of the column ``name`` of ``found``, and the factor to SI of its unit.
 
-    ``known`` has the factor of each allowed unit. If there is no such column, ``refuse`` is called,
-    which raises an error.
+    ``known`` has the factor of each allowed unit. If the column is missing or has another unit,
+    ``refuse`` is called, which raises an error.
     """
     at, unit = found.get(name, (-1, ""))
     if unit not in known:

@@ -37,7 +37,7 @@ def dataset(
     labels: Mapping[str, Sequence[object] | NDArray[Any]],
     **attributes: str,
 ) -> xarray.Dataset:
-    """Build a Dataset from variables (dimensions, values, SI unit) and labels by dimension."""
+    """Build a Dataset; a variable has dimensions, values, SI unit, a dimension has ``labels``."""
     need("sweep", "xarray")
     import xarray
 
@@ -87,7 +87,7 @@ def check_sweep(dataset: object) -> None:
 
 
 def status_names(dataset: xarray.Dataset) -> dict[int, str]:
-    """Return the word for each value of a sweep's ``status``; InvalidInput if there are none."""
+    """Return the word of each value of a sweep's ``status``; InvalidInput if they do not fit."""
     flags = dataset["status"].attrs
     try:
         values = np.atleast_1d(flags["flag_values"]).tolist()
@@ -99,7 +99,7 @@ def status_names(dataset: xarray.Dataset) -> dict[int, str]:
 
 
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
-    """Build a table of a sweep: a row per entry of ``status``, a column with unit per component."""
+    """Build a table of a sweep: a row for each entry, a column with unit for each component."""
     import pandas
 
     if not dataset["status"].ndim:
@@ -128,7 +128,10 @@ def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
 def _components(
     variable: xarray.DataArray, status: xarray.DataArray
 ) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the name suffix and column of each component of a variable; a row per ``status``."""
+    """Yield the columns of a variable, one for each component, with the suffix of its name.
+
+    A column has an entry for each entry of ``status``.
+    """
     inner = [dim for dim in variable.dims if dim not in status.dims]
     names = [map(str, variable[dim].values.tolist()) for dim in inner]
     for places in itertools.product(*(enumerate(each) for each in names)):

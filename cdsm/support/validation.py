@@ -116,7 +116,7 @@ def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
 
 
 def _first_of(array: Array, chosen: NDArray[np.bool_]) -> str:
-    """Name the first chosen entry of an array: ``entry [0, 2] is 5``."""
+    """Return a text about the first entry where ``chosen`` is True: ``entry [0, 2] is 5``."""
     at = np.argwhere(chosen)[0]
     where = f"entry [{', '.join(map(str, at))}] is " if array.ndim else ""
     return f"{where}{array[tuple(at)]:g}"
@@ -143,7 +143,7 @@ def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_
 def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | None = None) -> Array:
     """Return a new, read-only, finite vector (size,), or raise InvalidInput with its ``meaning``.
 
-    ``kind`` is the key of the entries in :data:`RANGES`.
+    ``kind`` is the key of :data:`RANGES` that gives the range of the entries.
     """
     array = number_array(name, value, kind)
     if array.shape != (size,):
@@ -226,7 +226,7 @@ def text(name: str, value: object) -> str:
 
 
 def one_of(kind: str, name: object, known: Iterable[str], remedy: str = "") -> str:
-    """Return ``name`` if it is ``known``; else raise UnknownName, which calls it a ``kind``."""
+    """Return ``name`` if it is among ``known``, the names of a ``kind``; else raise UnknownName."""
     known = tuple(known)
     if not isinstance(name, str) or name not in known:
         raise UnknownName(kind, name, known, remedy)

@@ -16,8 +16,10 @@ DEEPEST = 100
 _LONGEST = 10_000  # maximum number of characters of an attribute or of the text of an element
 
 _WIDEST = 100_000
-"""Maximum number of characters of a tag with the text behind it, or of a comment; libxml2 compares
-the attributes of an element in pairs."""
+"""Maximum number of characters of a comment, or of a tag with the text behind it.
+
+libxml2 compares the attributes of an element in pairs, which takes long for many attributes.
+"""
 
 _SHOWN = 160  # maximum number of characters of a text that a fault shows
 
@@ -29,8 +31,8 @@ class XmlFault(ValueError):
 def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Element:
     """Parse an XML text and return its root element, which must have the name ``root``.
 
-    ``doctype`` is a pattern of the system identifier of an allowed DOCTYPE without other content;
-    its DTD is not read. Any other DOCTYPE is refused: it can define entities or name files to read.
+    A DOCTYPE is allowed only if it does nothing but name a DTD that matches the pattern
+    ``doctype``; the DTD is not read. Other DOCTYPEs could define entities or name files to read.
     Raises XmlFault if the text is not well-formed, too large or too deep, or has another root.
     """
     if len(text) > MAXIMUM_BYTES:
@@ -84,7 +86,7 @@ def _names_dtd(text: str, system: str) -> bool:
 
 
 def numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:
-    """Return the ``count`` finite numbers in a text, or raise XmlFault, which quotes ``where``."""
+    """Return the ``count`` finite numbers in a text; else raise XmlFault, which names ``where``."""
     words = (text or "").split()
     try:
         values = tuple(float(word) for word in words if "_" not in word)

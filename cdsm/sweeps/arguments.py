@@ -31,7 +31,7 @@ def label(dims: tuple[str, ...], values: object, long_name: str, units: str = ""
 @final
 @dataclass(frozen=True, eq=False)
 class Choice(ReadOnlyState, Generic[_Values]):
-    """Value or values of an argument; several values become a dimension named like the argument."""
+    """One value of an argument, or several, which become a dimension with the argument's name."""
 
     name: str  # of the argument
     values: _Values  # all values in order, also if there is only one
@@ -39,14 +39,18 @@ class Choice(ReadOnlyState, Generic[_Values]):
 
     @property
     def labels(self) -> dict[str, Label]:
-        """Return the coordinate of the dimension under its name; empty for a single value."""
+        """Return the coordinate of the argument's dimension, by name; empty if it has one value."""
         if self.names is None:
             return {}
         kind, units = ("name", "") if self.names.dtype.kind == "U" else ("number", "1")
         return {self.name: label((self.name,), self.names, f"{kind} of the {self.name}", units)}
 
     def label(self, values: Array, dims: tuple[str, ...], long_name: str, units: str) -> Label:
-        """Build a coordinate with an entry for each value; ``dims`` are its further dimensions."""
+        """Build a coordinate along the argument's dimension and then ``dims``.
+
+        ``values`` has a row for each value of the argument. For a single value, the coordinate has
+        the dimensions ``dims`` alone.
+        """
         if self.names is None:
             return label(dims, values[0], long_name, units)
         return label((self.name, *dims), values, long_name, units)
@@ -89,7 +93,7 @@ def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]
 
 
 def distinct(name: str, values: ArrayLike) -> Array:
-    """Check and return the labels (n,) of a dimension: one or more different numbers."""
+    """Check and return the values (n,) of a dimension: one or more numbers, no two equal."""
     array = np.atleast_1d(number_array(name, values))
     array = vector(name, array, array.size, "the values of a dimension")
     if not array.size:
@@ -107,7 +111,7 @@ def vectors_of(
     value: Direction | Sequence[Direction] | Mapping[str, Direction],
     checked: Callable[[str, ArrayLike], Array],
 ) -> Choice[Array]:
-    """Check one or more vectors, such as wrenches (W, 6), each by the function ``checked``."""
+    """Check one vector or several, such as wrenches (W, 6), by the function ``checked``."""
     if isinstance(value, str):
         return Choice(name, frozen(checked(name, value)[None]), None)
     if isinstance(value, (list, tuple)) and all(isinstance(each, str) for each in value):

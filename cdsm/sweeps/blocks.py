@@ -13,8 +13,9 @@ Block = Mapping[str, slice]
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
     """Return the size along each dimension of a block of up to ``most`` postures.
 
-    ``poses`` are the sizes of the pose set. A block takes its last dimensions completely, a part of
-    the one before, and one entry of the others. So the blocks cover all postures in order.
+    ``poses`` has the size of each dimension of the pose set. A block has the full size along the
+    last dimensions, a part of the dimension before them, and the size 1 along all others. So the
+    blocks cover all postures in order.
     """
     room, extent = most, {}
     for dim, size in reversed(list(poses.items())):

@@ -116,7 +116,7 @@ def _on_worker(payload: bytes, client_version: str, q: Array) -> BlockResult:
 
 @lru_cache(maxsize=4)
 def _task(payload: bytes) -> SweepTask:
-    """Unpickle the task ``payload``, once in each worker: building an arm takes milliseconds."""
+    """Unpickle a task, only once in each worker, since building its arm takes milliseconds."""
     from distributed.protocol.pickle import loads
 
     task: SweepTask = loads(payload)

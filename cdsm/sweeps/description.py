@@ -21,10 +21,10 @@ _SAMPLES = np.ldexp(np.arange(4.0, 8.0), np.arange(-12, 18)[:, None]).ravel()
 """Tensions [N] from 1e-3 to 1e6, four per octave, with equal bits on every machine."""
 
 _WITHIN = 65
-"""Number of evenly spaced tensions over a domain; narrow domains contain few of ``_SAMPLES``."""
+"""Number of further tensions, evenly spaced over a domain, since it may have few ``_SAMPLES``."""
 
 _SAMPLED = re.compile(r"\b([\w.<>]+) (\w+), samples ([0-9a-f]{16})")
-"""Pattern of texts of :func:`law_text`: class, state, and a digest of domain, EA and strain."""
+"""Pattern of a :func:`law_text` with samples: class, digest of the state, digest of samples."""
 
 
 def attributes_of(arm: Manipulator) -> dict[str, str]:
@@ -60,9 +60,10 @@ def law_text(law: Elasticity) -> str:
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Return the classes of the laws that changed, if two texts of an arm differ in digests alone.
+    """Return the classes of the laws whose samples differ in two texts of an arm.
 
-    Empty if they differ in more.
+    The samples are those of :func:`law_text`. The result is empty if the texts also differ in
+    something else.
     """
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()
@@ -71,7 +72,7 @@ def changed_laws(one: str, other: str) -> tuple[str, ...]:
 
 
 def _answers(law: Elasticity) -> str:
-    """Return domain, EA and strain of a law at the sampled tensions, with all bits."""
+    """Return a text of the domain of a law, and of EA and strain at sampled tensions, exactly."""
     domain = law.domain
     first, high = domain.first, domain.high
     tensions = _SAMPLES[(first <= _SAMPLES) & (high >= _SAMPLES)]
@@ -82,7 +83,7 @@ def _answers(law: Elasticity) -> str:
 
 
 def _answer(law: Elasticity, name: str, tension: float) -> str:
-    """Return what a method of a law returns at a tension [N], exactly, or the name of its error."""
+    """Return the exact answer of method ``name`` of a law at a tension [N], or its error's name."""
     try:
         value: Array = np.asarray(getattr(law, name)(np.array([tension])), dtype=np.float64)
         return float(value.reshape(())).hex()

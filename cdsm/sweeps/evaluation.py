@@ -101,8 +101,8 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     """Compute all cases of ``task`` at joint angles q (P, nv) [rad]; a failure sets the status.
 
     Returns:
-        ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs. An
-        output has the axes among these on which it depends.
+        ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs. The
+        first axes of an output are P and those of E, W and M on which the output depends.
     """
     wrenches = task.wrenches.values
     shape = len(q), len(wrenches), len(task.minima.values)
@@ -172,9 +172,11 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 def _bounds(
     task: SweepTask, q: Array, threads: int | None
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Return both bounds of tension (R, C) [N], friction (R, C), and which of R rows have bounds.
+    """Return the bounds of the tensions at the motors, and the friction, for each of R rows.
 
-    Friction is the largest ratio of two tensions along a cable; 1 without ``worst_friction``.
+    The results are lower bounds (R, C) [N], upper bounds (R, C) [N], the largest ratio of two
+    tensions along a cable (R, C), and whether the bounds of a row are consistent (R,). The ratio is
+    1 if the task has no ``worst_friction``.
     """
     lows = task.minima.values
     minima = np.tile(lows, len(q) // len(lows))
@@ -190,7 +192,7 @@ def _bounds(
 
 
 def _needed(names: list[str]) -> list[str]:
-    """Return the outputs of a batch from which the quantities ``names`` follow, and the margin."""
+    """Return the outputs of a batch that the quantities ``names`` need, the margin among them."""
     if not names:
         return []
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
@@ -207,10 +209,10 @@ def _finish(
     loss: Array,
     names: list[str],
 ) -> None:
-    """Add to ``rows`` the outputs in ``names`` that a batch does not compute; complete ``status``.
+    """Add the outputs in ``names`` that a batch does not compute to ``rows``; set ``status``.
 
-    These are ``wire_strain`` and those of the stage ``principal``. ``tension`` [N] and ``loss``
-    have the shape (R, C); ``loss`` is the largest ratio of two tensions along a cable.
+    These outputs are ``wire_strain`` and the quantities of the stage ``principal``. ``tension`` [N]
+    and ``loss`` have the shape (R, C); ``loss`` is the largest ratio of two tensions along a cable.
     """
     if "wire_strain" in names:
         # friction may take a tension along a cable out of the domain of its law
@@ -243,10 +245,10 @@ def _rows(
     bounded: NDArray[np.bool_] | None = None,
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """Compute the quantities ``names`` and the status of each row; NaN where one does not exist.
+    """Compute the quantities ``names`` and the status of each row of the arguments.
 
-    Rows that are False in ``bounded`` have no consistent bounds of tension; their status is
-    INFEASIBLE.
+    A quantity that does not exist is NaN. Rows that are False in ``bounded`` have no consistent
+    bounds of tension; their status is INFEASIBLE.
     """
     outputs = [_BATCH_NAMES.get(name, name) for name in names]
     found = batch.evaluate(
@@ -277,7 +279,7 @@ def _rows(
 
 
 def _spread(values: Array, place: NDArray[np.bool_]) -> Array:
-    """Return an array of all rows, with ``values`` at the rows ``place`` and NaN at the others."""
+    """Return ``values`` at the rows where ``place`` is True, and NaN at all other rows."""
     full = np.full((len(place), *values.shape[1:]), np.nan)
     full[place] = values
     return full

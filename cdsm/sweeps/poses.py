@@ -151,7 +151,7 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     @property
     def _distances(self) -> Array:
-        """Return the distance along the path to each waypoint (n,) [rad]."""
+        """Return the distance √Σδθ² along the path from the first waypoint to each (n,) [rad]."""
         steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
 

@@ -33,7 +33,7 @@ _WIRE = {
     "breaking_load": ("breaking load of the wire", "N"),
     "bend_diameter": ("diameter of the bend in the holes", "m"),
 }
-"""Name in words and unit of each size of the wire, by argument of :func:`sweep`."""
+"""Long name and unit of each argument of :func:`sweep` that is a property of the wire."""
 
 _WORST = {
     "worst_friction": "all segments of the cables stay within the bounds, and wires are under their"
@@ -42,10 +42,10 @@ _WORST = {
 """Attribute of a Dataset that was computed with ``worst_friction``."""
 
 _OF_SLIDES = {"N m": "N", "N m rad-1": "N m-1"}
-"""Units of torque and joint stiffness of prismatic joints, by the unit of revolute joints."""
+"""Unit for prismatic joints, by the unit for revolute joints: torque and joint stiffness."""
 
 _NAME = re.compile(r"[A-Za-z0-9_\x80-\U0010ffff]([^/\\\x00-\x1f\x7f]*[^/\\\x00-\x20\x7f])?")
-"""Names of variables that NetCDF and Zarr both take; a slash would divide a name into folders."""
+"""Pattern of names that NetCDF and Zarr both accept; a slash would divide a name into folders."""
 
 EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 """Initial value of ``status``; the initial value of all outputs is NaN."""
@@ -54,7 +54,7 @@ EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 @final
 @dataclass(frozen=True, eq=False)
 class Specification:
-    """Postures and task of a sweep; it gives dimensions, shapes and attributes of the Dataset."""
+    """Postures and task of a sweep; they determine the dimensions and attributes of its Dataset."""
 
     task: SweepTask  # quantities and cases to compute at each posture
     poses: Poses
@@ -80,7 +80,7 @@ class Specification:
         return (*self.task.outputs, "status")
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Return the dimensions of an output or ``status``: of poses, of cases, then its own."""
+        """Return the dimensions of an output or ``status``: those of poses, of cases, its own."""
         quantity = QUANTITIES.get(name, _STATUS)
         wanted = (*self.poses.sizes, *quantity.cases, *quantity.dims)
         return tuple(dim for dim in wanted if dim in self.frame.sizes)
@@ -136,7 +136,7 @@ class Specification:
 
 
 def _labels(task: SweepTask, poses: Poses) -> dict[str, Label]:
-    """Return all coordinates of the Dataset: of poses, of cases, of the quantities."""
+    """Return all coordinates of the Dataset, by name."""
     arm, wrenches, lows, directions = task.arm, task.wrenches, task.minima, task.directions
     force, moment = wrenches.values[:, :3], wrenches.values[:, 3:]
     labels = {
@@ -172,7 +172,7 @@ def _labels(task: SweepTask, poses: Poses) -> dict[str, Label]:
 
 
 def _require_own_names(poses: Poses, taken: set[str]) -> None:
-    """Raise InvalidInput if a joint of a grid cannot give its name to a coordinate."""
+    """Raise InvalidInput if the Dataset cannot have a coordinate with the name of a joint."""
     for name in poses.labels:
         if name in taken:
             why = "is a name that the Dataset has already"

@@ -131,7 +131,7 @@ def _dataset(path: Path) -> tuple[xarray.Dataset, Any]:
 
 
 def _once(path: Path, array: Any) -> Any:
-    """Return an array of a store as a lazy array, which is read from disk at most once."""
+    """Return an array of a store that is read when it is needed, at most once."""
     lazy: Any = LazilyIndexedArray(_OnDisk(path, array))
     return MemoryCachedArray(CopyOnWriteArray(lazy))  # type: ignore[no-untyped-call]
 
@@ -168,7 +168,7 @@ def _damage(path: Path, array: Any, error: Exception) -> FileError:
 
 
 def _gaps(path: Path, group: Any) -> Iterator[tuple[Path, tuple[slice, ...]]]:
-    """Yield each missing file of a computed block, and the part of ``status`` of this block."""
+    """Yield each missing file of a computed block, and the slices of this block in ``status``."""
     status = group["status"]
     outputs = [group[name] for name in QUANTITIES if name in group]
     try:
@@ -187,9 +187,10 @@ def _gaps(path: Path, group: Any) -> Iterator[tuple[Path, tuple[slice, ...]]]:
 
 
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> bool:
-    """Write an empty store, with chunks of the size ``extent``, near ``path``; then rename it.
+    """Make an empty store at ``path`` with chunks of the size ``extent``.
 
-    Returns False if another run has made a store there in the meantime.
+    It is written beside ``path``, then renamed. Returns False if another run has made a store at
+    ``path`` in the meantime.
     """
     import zarr
     from zarr.codecs import ZstdCodec

@@ -30,7 +30,10 @@ def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> in
 
 
 def _angle(start: Array, span: Array, u: Array) -> float:
-    """Return the smallest angle [rad] between the ray u from 0 and the segment start + span."""
+    """Return the least angle [rad] between a ray along u and a segment, ``start`` + t·``span``.
+
+    The ray begins at the origin; t is 0 to 1.
+    """
     across, off = span - (span @ u) * u, start - (start @ u) * u
     part = float(np.clip(-(off @ across) / max(float(across @ across), 1e-300), 0.0, 1.0))
     point = start + part * span

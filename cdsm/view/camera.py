@@ -21,8 +21,10 @@ _FIRST: Final = np.array([0.2, -1.5, 0.75])
 _MARGIN = 1.3  # radius of the visible ball, over the radius of the arm
 
 _OUTSIDE, _SMALL = 1.3, 0.5
-"""The cameras are fitted again if the arm reaches farther than the first, or less far than the
-second, times the radius of the fitted ball."""
+"""Limits of the reach of the arm, divided by the radius of the ball to which cameras are fitted.
+
+If the arm reaches farther than the first, or less far than the second, they are fitted again.
+"""
 
 _USUAL = 4.0 / 3.0  # width over height of the picture for which the first camera is placed
 
@@ -53,10 +55,11 @@ class Ball:
 
 
 def placed(ball: Ball, direction: Array, aspect: float, free: float) -> tuple[Array, Array]:
-    """Compute position and look-at point [m] of a camera that looks at a ball.
+    """Compute position and look-at point [m] of a camera that shows a ball.
 
-    ``direction`` points to the camera. ``aspect`` is width divided by height of the picture, whose
-    upper part ``free`` (0 to 1) nothing covers.
+    ``direction`` points from the ball to the camera. ``aspect`` is the width of the picture divided
+    by its height. Only the fraction ``free`` of its height, at the top, is not covered by the
+    panel; the ball is shown there.
     """
     high = math.tan(_FOV / 2.0)
     distance = _MARGIN * ball.radius / min(high * free, high * aspect)
@@ -79,7 +82,7 @@ class _Browser:
 
 
 class Cameras:
-    """Cameras of all browsers. A camera that its user has not moved follows a resized picture."""
+    """Cameras of all browsers; one that its user has not moved is fitted to a resized picture."""
 
     def __init__(self, server: viser.ViserServer, ball: Ball) -> None:
         self._server, self._ball = server, ball
@@ -91,7 +94,7 @@ class Cameras:
         server.on_client_disconnect(self._on_disconnect)
 
     def follow(self, ball: Ball) -> None:
-        """Fit all cameras to the new ball, if it is outside the picture or small in it."""
+        """Fit all cameras to ``ball`` if it would be partly outside the pictures, or too small."""
         if not self._ball.fits(ball):
             self._ball = ball
             self._set_first()

@@ -17,7 +17,7 @@ _COPY: Final = (
     "getSelection().selectAllChildren(this.parentNode.querySelector('code'));"
     "document.execCommand('copy')"
 )
-"""JavaScript that copies the command. ``navigator.clipboard`` needs https on other machines."""
+"""JavaScript that copies the command; ``navigator.clipboard`` works only here or with https."""
 
 _SAVE: Final = (
     "const size=one=>one.width*one.height;"
@@ -27,8 +27,10 @@ _SAVE: Final = (
     "link.download=document.title.split(':')[0]+'.png';"
     "link.click();window.URL.revokeObjectURL(link.href)})"
 )
-"""JavaScript that saves the largest canvas, the scene. In a handler, ``URL`` is the page's address;
-so ``window.URL`` is written."""
+"""JavaScript that saves the scene, which is the largest canvas, as a picture.
+
+It uses ``window.URL``, since in a handler ``URL`` is the address of the page.
+"""
 
 _BUTTON: Final = "padding:0.3em 0.8em;margin-right:0.6em;cursor:pointer"
 _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin-bottom:0.6em"

@@ -111,7 +111,7 @@ class Controls:
             joint.move(angle)
 
     def add_switch(self, label: str, hint: str, on: bool) -> viser.GuiCheckboxHandle:
-        """Add a checkbox with a label, a hint and a first state; a click calls ``changed``."""
+        """Add a checkbox, at first checked if ``on``; a click calls the function ``changed``."""
         switch = self._gui.add_checkbox(label, on, hint=hint)
         switch.on_update(lambda _: self._changed())
         self._admit(switch)

@@ -66,7 +66,7 @@ Control = (
 
 
 class _Address(str):
-    """Address of one guard; compared by identity, so that views at equal addresses are distinct."""
+    """Address of one guard. Two of them are never equal, so two views may have equal addresses."""
 
     __slots__ = ()
 
@@ -209,7 +209,7 @@ class Guard:
         return within
 
     def _refuse(self, what: str) -> None:
-        """Count the refusal of ``what``, and log the count each time it has doubled."""
+        """Count a refused request or message, and log the count each time it has doubled."""
         self.refused += 1
         if self.refused & (self.refused - 1) == 0:
             _LOG.warning("Refused from clients so far: %d; the last: %s.", self.refused, what)

@@ -100,7 +100,7 @@ def serve(
 
 
 def _tips(arm: Manipulator, path: Array, of_tips: bool) -> Array:
-    """Return the tips (S, 3) [m] of ``path``, which has tips if ``of_tips``, else angles (S, nv).
+    """Return the tips (S, 3) [m] of a path of tips (``of_tips``) or of joint angles (S, nv).
 
     Raises InvalidInput if a sample of joint angles is not a posture of the arm.
     """

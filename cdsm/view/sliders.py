@@ -16,15 +16,14 @@ if TYPE_CHECKING:
     import viser
 
 _STEPS = 500
-"""Smallest number of steps of a slider. A slider is some hundred pixels long."""
+"""Smallest number of steps of a slider, which is a few hundred pixels long."""
 
 _TURN: Final = 2.0 * math.pi
 _LENGTHS = 10.0
-"""Range of a prismatic joint without limits, in arm lengths. A revolute joint turns once each way.
-"""
+"""Largest coordinate of a prismatic joint on its slider, divided by the arm length."""
 
 _DECIMALS: Final = 9
-"""Decimals of a position that is not a step, in degrees, mm or N. Further decimals are noise."""
+"""Decimals to which a position between two steps is rounded, in degrees, mm or N."""
 
 _ROUND = 1e-9  # largest difference of an end from a round number, as a fraction of a step
 
@@ -32,7 +31,7 @@ _ROUND = 1e-9  # largest difference of an end from a round number, as a fraction
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, step, first position and digits of a slider; their unit has the SI size ``unit``."""
+    """Ends, step, first position and digits of a slider, in a unit whose size in SI is ``unit``."""
 
     label: str
     low: float
@@ -47,7 +46,7 @@ def slider_range(label: str, low: float, high: float, initial: float, unit: floa
     """Return the range of a slider with round ends and round steps, in a unit shown to the user.
 
     ``low``, ``high``, ``initial`` and the size of this ``unit`` are in SI. The ends are rounded
-    inwards, but never beyond the first position ``initial``, which is not rounded.
+    inwards, but the range always contains the first position ``initial``, which is not rounded.
     """
     low, high, initial = (value / unit for value in (low, high, initial))
     if not high > low:

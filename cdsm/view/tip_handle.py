@@ -73,11 +73,11 @@ class TipHandle:
         return found.angles
 
     def moved_to(self, q: Array) -> None:
-        """Store the angles (nv,) to which the sliders were moved, as the sliders rounded them."""
+        """Store the angles (nv,) of the sliders after they were moved to the result of a search."""
         self._q = q
 
     def remark(self, q: Array) -> str:
-        """Return why the tip did not reach the handle; empty if ``q`` has changed since then."""
+        """Return why the tip did not reach the handle; empty if ``q`` is not the stored angles."""
         return self._remark if np.array_equal(q, self._q) else ""
 
     def update(self, shown: Shown) -> None:

@@ -26,7 +26,7 @@ class Worker:
                 self._last = self._thread.submit(self._run)
 
     def wait(self) -> None:
-        """Wait until all requests made before are done."""
+        """Wait until the runs for all earlier requests have ended."""
         futures.wait([self._last] if self._last else [])
 
     def no_request_within(self, seconds: float) -> bool:
@@ -37,7 +37,7 @@ class Worker:
         return not self._asked.wait(seconds)
 
     def close(self) -> None:
-        """Wait until all requests made before are done, and refuse further ones."""
+        """Wait until the runs for all earlier requests have ended, and ignore later requests."""
         self._thread.shutdown()
 
     def _run(self) -> None:

@@ -64,7 +64,7 @@ def name_of(law: Elasticity) -> str | None:
 
 
 def label(law: Elasticity) -> str:
-    """Return a short text for a wire: its name, its EA, or its kind with its domain."""
+    """Return a short text for a law: the name of its wire, its EA, or its kind with its domain."""
     known = name_of(law)
     if known is not None:
         return known
@@ -81,7 +81,7 @@ def label(law: Elasticity) -> str:
 
 
 def wires_text(cables: Iterable[Cable]) -> str:
-    """Return a text that names the wires of cables and their springs."""
+    """Return a text with the wires of cables, the springs in series, and how many have each."""
     counts = Counter(
         label(cable.elasticity)
         + (

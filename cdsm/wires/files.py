@@ -18,7 +18,7 @@ from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 from cdsm.wires.slack import SlackBelow
 
 _MEASURED = re.compile(r'^"?[-+]?\d[\d.,eE+-]*"?\s*[;,\t]\s*"?[-+]?\d', re.MULTILINE)
-"""A line that begins with two numbers: a CSV has such lines, TOML only within arrays."""
+"""Pattern of a line that begins with two numbers; such a file is a CSV, not a TOML."""
 
 _Row = Annotated[tuple[Number, ...], Field(strict=False)]
 

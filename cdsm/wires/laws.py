@@ -54,8 +54,9 @@ class StrandElasticity(Elasticity):
         high: High end of the domain [N], included.
 
     Raises:
-        InvalidInput: The numbers or their count do not fit, the tensions are not ascending, or two
-            ranges do not meet at their join.
+        InvalidInput: A number is invalid, the numbers of ranges and joins do not fit, ``low``,
+            ``joins`` and ``high`` are not ascending from 0 or more, or two ranges do not meet at
+            their join.
     """
 
     coefficients: tuple[tuple[float, ...], ...]
@@ -192,10 +193,11 @@ class TabulatedElasticity(Elasticity):
     where θ rises with F from 0 to 1, and θ' = 1 − θ (Gregory and Delbourgo, IMA J. Numer. Anal. 2,
     1982). Strain and its inverse are C1. EA = 1/(dε/dF) is continuous and positive.
 
-    The slopes at the points follow from ln EA of the chords. Each value is assigned to the middle
-    of the chord's strain, and the values are interpolated in the strain. At an end, ln EA changes
-    by at most the change of a straight line, and by at least half of it. A slope is at most 3 times
-    that of either neighbouring chord, and at least the smaller of the two, or half of it at an end.
+    The slopes at the points follow from ln EA of the chords. Each chord's ln EA is assigned to the
+    middle of its strain, and interpolated to the strains of the points. From the last middle to an
+    end of the table, ln EA changes by 0.5 to 1 times the change of a straight line. A slope is at
+    most 3 times that of either neighbouring chord, and at least the smaller of the two, or half of
+    it at an end.
     EA on an interval is then at most 2.1 times the largest rigidity of its chord and the two
     neighbours: D²/N is convex in (a, b), so it is largest in a corner.
 

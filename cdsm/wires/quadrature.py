@@ -1,9 +1,9 @@
 """Integrate Fⁿ dF/p(F) over piecewise polynomials p, to rounding, by a Gauss rule on panels.
 
-1/p is analytic except at the roots of p. Take the ellipse whose foci are the ends of an interval
-and which passes through the nearest root. ρ is the sum of its half-axes, divided by the half-width
-of the interval. The error of a Gauss rule on the interval falls by ρ² per node. So the panels
-follow from the roots. On a part of a panel the rule is even more accurate.
+1/p is analytic except at the roots of p. For an interval, take the ellipse whose foci are the two
+ends and which passes through the nearest root. ρ is the sum of its half-axes, divided by the
+half-width of the interval. The error of a Gauss rule on the interval falls by ρ² per node. So the
+panels are chosen from the roots. On a part of a panel the rule is even more accurate.
 
 scipy's quad takes about 300 times as long (tests/benchmarks/test_equilibrium_speed.py). Bisection,
 until rules of 12 and 24 nodes agree, needs no roots. But near a root, the rounding of p keeps the
@@ -27,7 +27,7 @@ from cdsm.support.values import Array
 NODES, WEIGHTS = (leggauss(12)[0] + 1.0) / 2.0, leggauss(12)[1] / 2.0
 
 _NEAREST = 6.0
-"""Least ρ of a panel. ρ^-24 = 2e-19 leaves a factor of 1000 for the growth of 1/p."""
+"""Least ρ of a panel. The error of 12 nodes is ρ^-24 = 2e-19 times the growth of 1/p."""
 
 _ROUNDING = 1e-14
 """A polynomial below this fraction of the sum of its terms' magnitudes is taken as zero."""
@@ -37,12 +37,12 @@ _NARROWEST = 4  # width of a panel in units in the last place; panels shrink tow
 
 
 def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
-    """Return coefficients as an array (powers, polynomials); ``rows`` has a polynomial per row."""
+    """Return coefficients as an array (powers, polynomials); each of ``rows`` is a polynomial."""
     return np.array(list(zip_longest(*rows, fillvalue=0.0)))
 
 
 def piecewise(joins: Array, table: Array, F: Array) -> Array:
-    """Evaluate piecewise polynomials at F, any shape; column i of ``table`` is valid to join i."""
+    """Evaluate piecewise polynomials at F of any shape; column i of ``table`` ends at join i."""
     return np.asarray(_polynomials(joins, table, F.ravel()).reshape(F.shape))
 
 
@@ -82,7 +82,7 @@ def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) 
 
 
 class Panels(NamedTuple):
-    """Panels from the low end up to :attr:`end`; made by :func:`panels`."""
+    """Panels from the low end of a law up to :attr:`end`; made by :func:`panels`."""
 
     edges: Array  # tensions at which the panels begin and end (P+1,) [N]
     coefficients: Array  # of the polynomial on each panel, lowest power first, (powers, P)
@@ -91,7 +91,7 @@ class Panels(NamedTuple):
 
     @property
     def pieces(self) -> tuple[Array, Array]:
-        """Edges (3, P) and coefficients (powers, P) as in :class:`~cdsm.kernels.wires.Wires`."""
+        """Edges (3, P) and coefficients (powers, P) of the panels, as kernels need them."""
         return np.array([self.edges[:-1], self.edges[1:], self.before[0]]), self.coefficients
 
     def integral(self, F: Array, power: int) -> Array:
@@ -127,9 +127,9 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
 
 
 def _significant(row: Sequence[float], high: float) -> list[float]:
-    """Drop coefficients of high powers that are negligible up to ``high``.
+    """Return a polynomial without the highest powers whose terms are negligible up to ``high``.
 
-    The roots that they cause would overflow.
+    These terms would cause roots that overflow.
     """
     sizes = abs(np.array(row)) * high ** np.arange(len(row))
     last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
@@ -137,7 +137,7 @@ def _significant(row: Sequence[float], high: float) -> list[float]:
 
 
 def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
-    """Return where the panels from ``low`` to ``high`` end; they follow from the ``roots`` of p."""
+    """Return the upper ends of the panels from ``low`` to ``high``, chosen by the roots of p."""
     narrowest = _NARROWEST * np.spacing(high)
     ends: list[float] = []
     intervals = [(low, high)] if low < high else []

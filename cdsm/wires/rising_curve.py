@@ -35,9 +35,10 @@ _NODES, _WEIGHTS = (leggauss(24)[0] + 1.0) / 2.0, leggauss(24)[1] / 2.0
 
 
 class RisingCurve:
-    """Curve through n points with ascending x and y (n,). A point belongs to the piece below it.
+    """Curve through n points with ascending x and y (n,), in n − 1 pieces.
 
-    ``chords`` are the slopes (n − 1,) of the straight lines between neighbouring points.
+    A point belongs to the piece below it. ``chords`` are the slopes (n − 1,) of the straight lines
+    between neighbouring points.
     """
 
     def __init__(self, x: Array, y: Array) -> None:
@@ -69,13 +70,13 @@ class RisingCurve:
 
     @property
     def pieces(self) -> tuple[Array, Array]:
-        """Edges (3, n − 1), coefficients (4, n − 1) as in :class:`~cdsm.kernels.wires.Wires`."""
+        """Edges (3, n − 1) and coefficients (4, n − 1) of the pieces, as kernels need them."""
         edges = np.array([self._x[:-1], self._x[1:], self._y[:-1]])
         return edges, np.array([self.chords, self._rise, *self._ends])
 
     @cached_property
     def _ends(self) -> Array:
-        """Slopes (2, n − 1) at both ends of each piece, divided by its chord's slope: a and b."""
+        """Slopes a and b (2, n − 1) at both ends of each piece, divided by the chord's slope."""
         slopes = slopes_at_points(self.chords, self._rise)
         return np.array([slopes[:-1], slopes[1:]]) / self.chords
 
@@ -104,9 +105,10 @@ class RisingCurve:
 def slopes_at_points(chords: Array, rise: Array) -> Array:
     """Compute the slopes (n,) at n points from the slopes and rises Δy (n − 1,) of the chords.
 
-    The logarithms of the slopes are interpolated as in :class:`~cdsm.TabulatedElasticity`. At an
-    inner point, the value is the mean of two parabolas through three chords each, clipped to the
-    neighbouring chords. At an end it follows one parabola, and the change is clipped.
+    The logarithm of a chord's slope is assigned to the middle of its y, as in
+    :class:`~cdsm.TabulatedElasticity`. At an inner point, the logarithm is the mean of two
+    parabolas through three chords each, limited to the range of the two neighbouring chords. At an
+    end it follows one parabola, and its change from the last chord is limited.
     """
     if len(chords) == 1:
         return np.repeat(chords, 2)

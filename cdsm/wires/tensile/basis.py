@@ -26,7 +26,8 @@ class Basis(NamedTuple):
         """Build splines from F_0, 3 ``noise`` [N] below the first force, to the largest force.
 
         The knots are equally spaced in the mean of log(F − F_0 + corner) and F, each scaled to 0…1.
-        The corner is a small force well above the noise. Below it, they are nearly equal in F.
+        The corner is a small force well above the noise. Up to it, knots are nearly equally spaced
+        in F; far above it, they become wider.
         """
         low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
         corner = max(low, 8.0 * noise, 5e-3 * high)

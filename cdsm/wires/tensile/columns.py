@@ -120,7 +120,7 @@ def _is_data(table: Table, k: int) -> bool:
 
 
 def _rows_of_data(table: Table, first: int) -> int:
-    """Count the unbroken run of rows of numbers that begins at row ``first`` of a table."""
+    """Count the rows of numbers from row ``first`` of a table to the first other row."""
     rows = range(first, len(table.rows))
     return next((k for k in rows if not _is_data(table, k)), len(table.rows)) - first
 
@@ -149,7 +149,7 @@ def _numbered(table: Table) -> Header:
 def _column(at: int, cell: str, below: str) -> Column:
     """Read cell ``at`` of a header: name, unit and kind of its column.
 
-    The unit is in brackets, or is the last word of the cell, or is ``below``, the cell below it.
+    The unit stands in brackets, or as the last word of the cell, or in the next row: ``below``.
     """
     groups = [each.strip() for each in re.findall(r"[\[(]([^\])]*)[\])]", cell)]
     name = re.sub(r"\s*[\[(][^\])]*[\])]", "", cell).strip()
@@ -168,7 +168,7 @@ def _column(at: int, cell: str, below: str) -> Column:
 
 
 def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list[Column]]:
-    """Return the columns that may be the displacement, and those that may be the force."""
+    """Return two lists: columns that may be the displacement, and that may be the force."""
     if wanted is not None:
         return [_wanted(header, name, kind) for name, kind in zip(wanted, _BOTH, strict=True)]
 
@@ -180,7 +180,7 @@ def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list
 
 
 def _wanted(header: Header, name: str | int, kind: str) -> list[Column]:
-    """Return the columns with this name, or this number from 1 on, as columns of a kind."""
+    """Return the columns that have this name, or this number from 1 on, with their kind set."""
     if str(name).isdigit():
         found = [column for column in header.columns if column.at == int(name) - 1]
     else:

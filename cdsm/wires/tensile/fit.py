@@ -56,10 +56,10 @@ class Band(ReadOnlyState):
     """Confidence band: it contains EA at each tension with 95 %, given the scatter of the points.
 
     The band exp(m ± t s) belongs to a rougher curve than the fitted one: the bias of the rougher
-    curve is far below its scatter. m is its ln EA, s the standard deviation of m from the residuals
-    near each tension, and t the quantile of Student's distribution. The fitted law is smoother:
-    where it leaves this interval, the band is widened to contain it. t s is at least 1e-4, the
-    error of a fit without noise.
+    curve is far below its scatter. m is ln EA of the rougher curve, s the standard deviation of m
+    from the residuals near each tension, and t the quantile of Student's distribution. The fitted
+    law is smoother: where it leaves this interval, the band is widened to contain it. t s is at
+    least 1e-4, the error of a fit without noise.
 
     In 100 tests of 400 points each, of three wires with 0.5 N and 2 N of noise, the band contained
     EA in 95.9 % of all cases, and in 90 to 100 % at each of 14 tensions. Within a few newtons of a
@@ -139,8 +139,8 @@ class TensileFit(ReadOnlyState):
         """Return the band as a tolerance for the rigidity of cables made of this wire.
 
         The standard uncertainty of EA(F) is half the width of the band of ln EA, divided by 1.96.
-        All cables are of one spool, so they share one error; ``of`` are their names, as for
-        :class:`~cdsm.Tolerance`. Raises InvalidInput for a fit by polynomials, which has no band.
+        The cables are assumed to be of one spool and share one error; ``of`` are their names, as
+        for :class:`~cdsm.Tolerance`. InvalidInput for a fit by polynomials, which has no band.
         """
         if self.band is None:
             raise InvalidInput("method", "a fit by polynomials has no band; fit by 'monotone'.")
@@ -178,8 +178,8 @@ def fit_tensile_test(
     beyond its uncertainty. The first of the ``stages``, pre-tensioning, ends where EA begins to
     grow slower than √F.
 
-    Wrong units are found only if the strain is above 1 or the rigidity is outside 1 N to 1e9 N. A
-    force in kN passes for a thin thread. Read the report.
+    Wrong units are found only if the strain is above 1 or the rigidity is outside 1 N to 1e9 N.
+    For example, forces in kN that are taken as N fit a thin thread. So read the report.
 
     Args:
         displacement: Δl, shape (n,) [m], in the order recorded.
@@ -266,7 +266,7 @@ def _stages(
 
 
 def _as_law(curve: Curve, points: Points) -> TabulatedElasticity:
-    """Return the law of a fitted curve: a table of its strains within the range of the points."""
+    """Return a fitted curve as a law: a table of its strains over the range of the points."""
     grid = curve.basis.tensions
     # the ends follow from the fit: noise would shift the extreme forces
     first, last = curve.force(points.strain[[0, -1]])
@@ -288,6 +288,6 @@ def _band(tensions: Array, law: Elasticity, curve: Curve, points: Points) -> Ban
 
 
 def _grid(low: float, high: float, grid: Array) -> Array:
-    """Return low, high, and tensions of ``grid`` between them (n,) [N]: about 200 for all of it."""
+    """Return ``low``, some tensions of ``grid``, and ``high`` (n,) [N]; about 200 in all."""
     inside = grid[(grid > low) & (grid < high)][5 :: len(grid) // _KNOTS]
     return np.array([low, *inside[:-1], high])

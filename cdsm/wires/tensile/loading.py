@@ -33,7 +33,10 @@ _MISTAKEN = (  # mistake, then factors that correct force, displacement and gaug
 
 @dataclass(frozen=True)
 class Points:
-    """Points of a test; points of equal strain, or of a dense record, are averaged."""
+    """Points of a test, each the average of one or more recorded points.
+
+    Recorded points are averaged if their strains are equal, or if there are too many of them.
+    """
 
     strain: Array  # rising (n,) [-]
     force: Array  # (n,) [N]
@@ -114,9 +117,9 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
 
 
 def _outliers(values: Array) -> NDArray[np.bool_]:
-    """Return which values (n,) are single values far from their neighbours.
+    """Return for each of n values whether it is an outlier: alone and far from its neighbours.
 
-    A real peak is not an outlier: the steps between the values on either side of it are similar.
+    A real peak is not an outlier: the steps between the values before and after it are large, too.
     """
     # extrapolate the missing neighbour at each end
     first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
@@ -131,7 +134,7 @@ def _outliers(values: Array) -> NDArray[np.bool_]:
 
 
 def local_noise(errors: Array) -> Array:
-    """Estimate the local standard deviation (n,) of errors (n,), at least the overall one."""
+    """Estimate the standard deviation (n,) of errors (n,) around each, at least that of all."""
     width = min(_AROUND, len(errors))
     near = np.pad(abs(errors), (width // 2, width - 1 - width // 2), mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(near, width), axis=1)
@@ -157,8 +160,8 @@ def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
 def _slack(points: Points, noise: float, least: float) -> int:
     """Count the points at the beginning of the test at which the wire is slack.
 
-    There the force does not rise significantly. ``noise`` and ``least`` [N] are those of
-    :func:`_trends`.
+    At these points the force does not rise significantly. ``noise`` is the standard deviation of a
+    force [N]; ``least`` [N] replaces it where it is smaller.
     """
     slope, error = _trends(points, noise, least)
     flat = np.flatnonzero(slope <= _SURE * error)
@@ -173,10 +176,10 @@ def _slack(points: Points, noise: float, least: float) -> int:
 
 
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
-    """Fit a line to the first n points, for each n; return slopes [N per point], standard errors.
+    """Fit a line to the first n points, for each n; return its slopes and their standard errors.
 
-    The standard error follows from the ``noise`` [N], or from the scatter of the points if that is
-    smaller; a value below ``least`` [N] is replaced by ``least``.
+    Both are in N per point. The error follows from the ``noise`` of a force [N], or from the
+    scatter of the n points if that is smaller. Noise and scatter below ``least`` [N] count as it.
     """
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)
@@ -221,7 +224,10 @@ def _check_rigidity(points: Points, gauge_length: float) -> None:
 
 
 def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
-    """Name the mistakes in units or gauge length that explain rigidity [N] and strain ``reach``."""
+    """Return a sentence on mistakes that explain an implausible rigidity [N] or strain ``reach``.
+
+    They are mistakes in the units or in the gauge length.
+    """
     found = []
     low, high = _GAUGES
     for mistake, force, displacement, gauge in _MISTAKEN:
@@ -237,7 +243,7 @@ def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
 
 
 def _is_loading(strain: Array) -> NDArray[np.bool_]:
-    """Return which points have a strain above all earlier strains, up to the noise."""
+    """Return for each strain whether it is at least the largest earlier one, less its noise."""
     jitter = 4.0 * _MAD * float(np.median(abs(np.diff(strain, 2)))) / np.sqrt(6.0)
     jitter = min(jitter, 0.005 * float(np.ptp(strain)))
     kept: NDArray[np.bool_] = strain >= np.maximum.accumulate(strain) - jitter
@@ -245,7 +251,7 @@ def _is_loading(strain: Array) -> NDArray[np.bool_]:
 
 
 def _noise(points: Points) -> float:
-    """Estimate the noise [N] of a point from distances to lines through neighbouring points."""
+    """Estimate the noise of a force [N] from distances of points to lines between neighbours."""
     before, at, after = points.strain[:-2], points.strain[1:-1], points.strain[2:]
     share = (at - before) / (after - before)
     error = points.force[1:-1] - (1.0 - share) * points.force[:-2] - share * points.force[2:]

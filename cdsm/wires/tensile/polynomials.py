@@ -53,7 +53,11 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 
 
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
-    """Find the ranges of tension [N] where the polynomials ``rows`` between ``edges`` are > 0."""
+    """Find the ranges of tension [N] where a piecewise polynomial is positive.
+
+    Each of ``rows`` has the coefficients of one polynomial, valid from one of ``edges`` [N] to the
+    next.
+    """
     tensions = np.linspace(edges[0], edges[-1], 400)
     values = piecewise(np.array(edges[1:-1]), coefficient_table(rows), tensions)
     margin = 1e-6 * float(abs(values).max())  # keeps the strain ∫ dF/EA finite
@@ -75,7 +79,7 @@ def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[f
 
 
 def _joins_of(points: Points, join: float) -> tuple[float, ...]:
-    """Return (``join``,), or () if the range on one side of it is too narrow or has few points."""
+    """Return (``join``,), or () if one side of it has too few points or too narrow a range."""
     below = int(np.count_nonzero(points.force <= join))
     enough = 2 * (_DEGREE + 1)
     low, high = float(points.force.min()), float(points.force.max())

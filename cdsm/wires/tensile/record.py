@@ -82,15 +82,15 @@ def read_tensile_csv(
     """Read a tensile test from the text file of a testing machine, or from any CSV.
 
     The header is one of the first 50 lines and names both columns; of several such lines, it is the
-    one before the most rows of numbers. Titles and tables of results may stand before it. It names
-    a displacement, extension, elongation or stroke, and a force or load, in English or another
+    one before the most rows of numbers. Titles and tables of results may stand before it. The names
+    are a displacement, extension, elongation or stroke, and a force or load, in English or another
     language (Standardweg, Standardkraft, Déplacement, Fuerza, 位移, …). Each name has a unit:
     ``displacement [mm]``, ``Load (kN)``, ``force_N``, ``Kraft/N``. The units may also form the next
     line. A strain in % or mm/mm is read where there is no displacement. Other columns are ignored.
 
     Commas, semicolons or tabs separate the columns. Decimal commas are allowed with semicolons and
-    tabs. The text is UTF-8, UTF-16 or Windows-1252. A comment may give the gauge length:
-    ``# gauge_length = 500 mm``; so may a title line: ``Gauge length``, ``Einspannlänge``,
+    tabs. The text is UTF-8, UTF-16 or Windows-1252. The gauge length may be given by a comment,
+    ``# gauge_length = 500 mm``, or by a title line with ``Gauge length``, ``Einspannlänge`` or
     ``Messlänge``.
 
     Args:

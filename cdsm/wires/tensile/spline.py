@@ -25,7 +25,7 @@ from cdsm.wires.tensile.basis import Basis
 from cdsm.wires.tensile.loading import Points
 
 NEAR = 41
-"""Neighbouring points over which the noise is assumed constant."""
+"""Number of neighbouring points over which the noise is assumed constant."""
 _ROUGHER = 1000.0  # less smoothing of the band's curve: its bias is then far below its scatter
 
 
@@ -37,14 +37,14 @@ def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
 
 
 def _neighbours(values: Array) -> Array:
-    """Sum the values (n,) of the points around each point, reflected at the ends."""
+    """Sum the values (n,) over the points around each point; the ends are reflected."""
     near = min(NEAR, len(values))
     padded = np.pad(values, (near // 2, near - 1 - near // 2), mode="reflect")
     return np.convolve(padded, np.ones(near), mode="valid")
 
 
 def _least_variance(points: Points) -> float:
-    """Compute the variance [N²] below which a test with these points is taken as exact."""
+    """Compute the variance [N²] below which the forces of a test are taken as exact."""
     return (1e-6 * float(np.ptp(points.force))) ** 2
 
 
@@ -68,8 +68,8 @@ class Spread(NamedTuple):
 class Curve:
     """Fitted curve, given by log EA on a grid of tensions and by the strain at one of them.
 
-    This tension is the anchor, where the wire is stiff. At a soft end, any change of EA would shift
-    the rest of the curve, and the fit would converge slowly.
+    The tension with the given strain is the anchor. It is chosen where the wire is stiff: at a soft
+    end, any change of EA would shift the rest of the curve, and the fit would converge slowly.
     """
 
     basis: Basis  # splines of log EA
@@ -97,9 +97,9 @@ class Curve:
         return np.asarray(inside + before + np.maximum(strain - grid[-1], 0.0) * rigidity[-1])
 
     def jacobian(self, strain: Array) -> Array:
-        """Compute the derivatives (n, k + 1) of :meth:`force` at strains (n,) by the unknowns.
+        """Compute the derivatives (n, k + 1) of :meth:`force` at strains (n,).
 
-        These are the coefficients and the anchor strain.
+        The derivatives are with respect to the k coefficients and the anchor strain.
         """
         tensions, grid = self.basis.tensions, self.strain
         inside = np.clip(strain, grid[0], grid[-1])
@@ -181,16 +181,19 @@ class Curve:
         return np.asarray(splines @ rough.coefficients), np.asarray(half)
 
     def _inverse(self, rows: Array) -> tuple[Array, Array]:
-        """Return the inverse of the penalised normal matrix, and the leverage of each row."""
+        """Return N⁻¹ of the penalised normal matrix N (k + 1, k + 1), and the leverage of each row.
+
+        N is rowsᵀ rows + penalty.
+        """
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
         return inverse, np.clip(((rows @ inverse) * rows).sum(axis=1), 0.0, 1.0)
 
     def loosest(self, points: Points) -> Curve:
-        """Find the curve with the least smoothing that its restricted likelihood allows.
+        """Find the curve with the least smoothing that the restricted likelihood allows.
 
-        Its −2 log likelihood is 1 above the minimum (one standard deviation). Without bends the
-        most likely curve is straight, and a band around it would be too narrow.
+        Its −2 log likelihood is up to 1 above the minimum (one standard deviation). If log EA has
+        no bend, the most likely curve is straight, and a band around it would be too narrow.
         """
         least, chosen = np.inf, self
         for smoothing in self.smoothing * 10.0 ** np.arange(0.0, -6.0, -0.25):
@@ -222,17 +225,20 @@ class Curve:
 
     @property
     def _penalty(self) -> Array:
-        """Matrix (k + 1, k + 1) of the penalty on the unknowns: coefficients and anchor strain."""
+        """Matrix (k + 1, k + 1) of the roughness penalty; it is zero for the anchor strain."""
         return np.pad(self.smoothing * self.basis.roughness, (0, 1))
 
     def _linearised(self, points: Points) -> tuple[Array, Array]:
-        """Return :meth:`jacobian` and errors (n,) of the force, times √(points per average)."""
+        """Return :meth:`jacobian` and the residuals of the force (n,) [N], both weighted.
+
+        The weight of a point is √(number of recorded points that it averages).
+        """
         weight = np.sqrt(points.count)
         error = weight * (points.force - self.force(points.strain))
         return weight[:, None] * self.jacobian(points.strain), error
 
     def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
-        """Return the Cholesky factor of N/(s sᵀ) and s = √diag N, N the penalised normal matrix."""
+        """Return the Cholesky factor of N_ij/(s_i s_j), s = √diag N; N is rowsᵀ rows + penalty."""
         normal = rows.T @ rows + self._penalty
         # strain and log EA are orders apart
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
