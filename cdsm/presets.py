@@ -55,8 +55,8 @@ def virtual_prototype_geometry(
     """Build the geometry of Section IV: five universal joints, R = 30 mm, disks every 20 mm.
 
     R is the distance of the holes from the axis. The paper gives the joints, R and the spacing of
-    the disks. Assumptions: three cables per joint that end as in :class:`~cdsm.CableRoute`, no
-    lead, 0.5 kg per link.
+    the disks. The rest is assumed: three cables per joint, which end on the first disk after the
+    joint, no lead, and 0.5 kg per link.
 
     Args:
         link_mass: Mass of every link [kg].

@@ -86,8 +86,8 @@ class RigidBody:
     def locate(self, link: str) -> tuple[int, Array, Array]:
         """Return the row of a link's joint, and the link's frame in the frame of that joint.
 
-        The frame is a rotation (3, 3) and a translation (3,) [m]. UnknownName if there is no such
-        link.
+        The frame is a rotation (3, 3) and a translation (3,) [m]. Raises UnknownName if the arm has
+        no such link.
         """
         frame = self._model.frames[self._frame(link)]
         return (

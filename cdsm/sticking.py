@@ -49,7 +49,7 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
 
     ``sliding`` marks the holes (P,) in which the cable slides: there the larger tension is exp(μ φ)
     times the smaller. A cable always slides in holes in which it cannot stick; see :func:`holding`.
-    ElasticityRangeError if a tension is outside the domain of its law.
+    Raises ElasticityRangeError if a tension is outside the domain of its law.
     """
     model, segments = pose.arm._model, pose.segments
     chains, laws, length = segments.chains, model.segment_laws, segments.lengths

@@ -163,7 +163,7 @@ def read_routed(cables: object) -> list[Routed]:
 
 
 def _sites(entry: _Entry) -> tuple[Site, ...]:
-    """Build the sites of the cable ``entry``; its friction is that of all holes that give none."""
+    """Build the sites of the cable ``entry``; all holes that give no friction have the cable's."""
     passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
     sites = []
     for i, site in enumerate(entry.sites):

@@ -116,7 +116,7 @@ def _sticking(
 ) -> tuple[list[str], Json]:
     """Return stuck stiffness and breakaway load in each direction, as lines of text and for JSON.
 
-    ``breakaways`` are those of :func:`_breakaways`. If there are none, text and JSON are empty.
+    ``breakaways`` is the result of :func:`_breakaways`. If it is empty, so are text and JSON.
     """
     from cdsm.stiffness_matrix.prints import model_of
 

@@ -33,9 +33,9 @@ debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
 """Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
 
-3 is the exit code of every answer with a warning (the arm is unstable, has left its reference, some
-samples cannot be planned, no entry of a sweep is ok, the report is not trustworthy), and of errors
-that say what the arm cannot do.
+UNMET is the exit code of every answer with a warning: the arm is unstable or has left its
+reference, some samples cannot be planned, no entry of a sweep is ok, or the report is not
+trustworthy. It is also the exit code of errors that say what the arm cannot do.
 """
 
 _LIST = re.compile(r"(?<=\[)\n[^][{}\"]*\n\s*(?=\])")

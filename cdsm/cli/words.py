@@ -60,6 +60,6 @@ def in_options(message: str) -> str:
 
 
 def newer(command: str, word: str) -> str:
-    """Return ``word``, an argument of a command, with the current name of its option."""
+    """Return ``word``, typed after a command; an older name of an option is replaced in it."""
     name, equals, value = word.partition("=")
     return OLDER.get(command, {}).get(name, name) + equals + value

@@ -82,7 +82,8 @@ class Elasticity(ABC):
     def scaled(self, factor: float) -> Elasticity:
         """Return this law with ``factor`` times its rigidity, e.g. for a wire of another spool.
 
-        Strains and energies are divided by the factor [-]. InvalidInput if it is not positive.
+        Strains and energies are divided by the factor [-]. Raises InvalidInput if the factor is not
+        positive.
         """
         from cdsm.elasticity.scaled import ScaledElasticity
 

@@ -85,8 +85,8 @@ def _short_links(geometry: Description) -> list[str]:
 def doubts_about_units(length: float, sizes: Iterable[tuple[str, float, float]] = ()) -> list[str]:
     """Return a doubt about the unit of lengths as a text in a list; the list may be empty.
 
-    ``length`` is that of the arm [m]. Each of ``sizes`` is a description, a size and its largest
-    plausible value [m].
+    ``length`` is the length of the arm [m]. Each of ``sizes`` is a description, a size and its
+    largest plausible value [m].
     """
     if 0.0 < length < _SHORTEST:
         return [

@@ -243,7 +243,7 @@ def _cables(
 ) -> list[float]:
     """Add a tendon for each cable to ``root``, and actuators; return ``ctrl`` at the posture.
 
-    ``damping`` is that of the tendons (C,) [N s/m].
+    ``damping`` (C,) [N s/m] is the damping of each tendon.
     """
     tendon, motors = etree.SubElement(root, "tendon"), etree.Element("actuator")
     at_start = []

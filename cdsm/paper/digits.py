@@ -45,8 +45,8 @@ _PRINTED, _HALF = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
 def least_bend() -> tuple[float, float]:
     """Return dEA/dF [-] just below and above 31 N, for the smallest kink that Eq. 19 can have.
 
-    EA is continuous at 31 N. Each coefficient rounds to its printed digits, except that of F⁶ below
-    31 N, which may be any number. Even then the two slopes differ.
+    EA is continuous at 31 N. The coefficient of F⁶ below 31 N may be any number; all others round
+    to their printed digits. Even then the two slopes differ.
     """
     below, above = _branches(powers(JOIN, slope=True)[0])
     free: list[tuple[float | None, float | None]] = [(-1.0, 1.0)] * 14

@@ -100,7 +100,7 @@ class RoughPrototype:
     def weigh(self) -> list[LoadingPath]:
         """Load the arm slowly with the weight of each entry of Table II, row by row (15 paths).
 
-        CdsmError if an equilibrium is not found.
+        Raises CdsmError if an equilibrium is not found.
         """
         pose = self.arm().at(POSTURE)
         return [
@@ -156,7 +156,7 @@ class RoughFit:
     Attributes:
         prototype: Identified parameters.
         table: Table II of this prototype (5, 3) [N/m].
-        misfit: Root mean square of ln(model/paper) over the columns of Table II (3,) [-].
+        misfit: Root mean square of ln(model/paper) in each column of Table II (3,) [-].
     """
 
     prototype: RoughPrototype

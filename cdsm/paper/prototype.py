@@ -40,7 +40,7 @@ class Prototype:
         drive_stiffness: Stiffness of the drive in series with every strand [N/m].
         tension_offset: Actual minus reported tension of the force-controlled cables [N].
         angle_1: Joint angle 1 of the second configuration of Figs. 12 and 13 [rad]. The first
-            configuration is assumed to be that of Table II.
+            configuration is assumed to be the posture of Table II.
         angle_2: Joint angle 2 of the second configuration [rad].
         angle_3: Joint angle 3 of the second configuration [rad].
         spring_ratio: Stiffest divided by softest hybrid cable stiffness [-]; Fig. 11 is only a
@@ -97,7 +97,7 @@ class Prototype:
     def arm(self, cable_stiffness: float | None = None) -> Manipulator:
         """Build the arm with the strand, or with hybrid cables of ``cable_stiffness`` [N/m].
 
-        GeometryError if the dimensions are invalid.
+        Raises GeometryError if the dimensions are invalid.
         """
         if cable_stiffness is None:
             return arm_of(self, presets.STRAND_1X19, self.drive_stiffness)
@@ -145,7 +145,10 @@ class Prototype:
         return np.array(rows)
 
     def predict(self, table_alone: bool = False) -> Predicted:
-        """Predict the numbers of Section V, or of Table II alone; errors as for :meth:`measure`."""
+        """Predict the numbers of Section V, or those of Table II alone.
+
+        Raises the errors of :meth:`measure`.
+        """
         table = self.weigh(self.arm().at(POSTURE), self.levels)
         if table_alone:
             return Predicted(table=frozen(table))

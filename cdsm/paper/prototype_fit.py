@@ -148,7 +148,7 @@ class PrototypeFit:
 
     @property
     def misfit(self) -> Array:
-        """Root mean square of ln(model/paper) over the columns of Table II (3,) [-]."""
+        """Root mean square of ln(model/paper) in each column of Table II (3,) [-]."""
         table = self.residuals[: TABLE_II.size].reshape(TABLE_II.shape)
         return np.asarray(np.sqrt(np.mean(table**2, axis=0)))
 

@@ -39,8 +39,8 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
     """Plot the values of a Monte Carlo run as a histogram, and a normal distribution.
 
-    The normal distribution is that of first-order error propagation. Dashed lines mark the 95 %
-    intervals of both.
+    The normal distribution has the uncertainty of first-order error propagation. Dashed lines mark
+    the 95 % intervals of both.
 
     Raises InvalidInput if ``run`` is not a result of :func:`~cdsm.monte_carlo`.
     """

@@ -85,8 +85,8 @@ def plot_path(
 def plot_modes(modes: Modes) -> Figure:
     """Plot an arm deflected by its lowest modes, or by the fastest growing ones if it is unstable.
 
-    Deflections are enlarged: the tip moves by at most 25 % of the length of the arm. InvalidInput
-    if ``modes`` is not a result of :func:`~cdsm.modes`.
+    Deflections are enlarged: the tip moves by at most 25 % of the length of the arm. Raises
+    InvalidInput if ``modes`` is not a result of :func:`~cdsm.modes`.
     """
     expect("modes", modes, "Modes")
     pose = modes.stiffness.posture

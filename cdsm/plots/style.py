@@ -1,7 +1,7 @@
 """Draw all figures alike: sizes, colours, units, axes and legends that the plots share.
 
-A figure is as wide as one or two columns of a journal, with text of 7 and 8 points. Colours are
-those of Okabe and Ito (2008), distinct to all kinds of colour vision; lines also differ in style.
+A figure is as wide as one or two columns of a journal, with text of 7 and 8 points. The palette of
+Okabe and Ito (2008) is distinct to all kinds of colour vision; lines also differ in style.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def panels(
 ) -> tuple[Figure, Any]:
     """Build a figure of a size [inch], and its panels (rows, columns), each with grid lines.
 
-    ``options`` are those of ``Figure.subplots`` of matplotlib.
+    ``options`` are passed to ``Figure.subplots`` of matplotlib.
     """
     figure = Figure(figsize=(width, height), dpi=SCREEN, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)

@@ -77,8 +77,8 @@ def read_table(
     """Read a table. Its delimiter is the one with which most lines have two or more numbers.
 
     If several ``delimiters`` give equally many such lines, the first of them that occurs in the
-    header is taken. The first ``skip`` lines are not read; ``any_encoding`` is that of
-    :func:`read_text`. FileError names the line that cannot be split into cells.
+    header is taken. The first ``skip`` lines are not read. ``any_encoding`` is an argument of
+    :func:`read_text`. Raises FileError, which names the line that cannot be split into cells.
     """
     text = read_text(path, any_encoding=any_encoding)
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and k > skip]

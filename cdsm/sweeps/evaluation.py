@@ -102,7 +102,7 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 
     Returns:
         ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs. The
-        first axes of an output are P and those of E, W and M on which the output depends.
+        first axes of an output are P, and each of E, W and M on which the output depends.
     """
     wrenches = task.wrenches.values
     shape = len(q), len(wrenches), len(task.minima.values)

@@ -80,7 +80,7 @@ class Specification:
         return (*self.task.outputs, "status")
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Return the dimensions of an output or ``status``: those of poses, of cases, its own."""
+        """Return the dimensions of an output or ``status``: of the poses, the cases, its own."""
         quantity = QUANTITIES.get(name, _STATUS)
         wanted = (*self.poses.sizes, *quantity.cases, *quantity.dims)
         return tuple(dim for dim in wanted if dim in self.frame.sizes)

@@ -107,8 +107,8 @@ class Shown(ReadOnlyState):
     Attributes:
         setting: Values of the controls.
         condition: Whether the arm is stable, or why not, or what went wrong: a :class:`Condition`.
-        problem: Error message, or why the arm is not stable. For a stable arm, a sentence if it
-            passes through itself; else empty.
+        problem: Error message, or the reason why the arm is not stable. For a stable arm that
+            passes through itself, a sentence that says so. Otherwise empty.
         reference: Posture of the setting. None if its angles are invalid or beyond a limit, or
             sites of a cable coincide.
         tension: Tensions at the reference; None if none balance the arm.

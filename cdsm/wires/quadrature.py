@@ -66,7 +66,7 @@ def _horner(table: Array, column: int, F: float) -> float:
 def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) -> Array:
     """Integrate Fⁿ dF/p(F), n = ``power``, from the low end of the panels to each F (N,).
 
-    ``edges``, ``table`` (``coefficients``) and ``before`` are those of :class:`Panels`.
+    ``edges``, ``table`` (its ``coefficients``) and ``before`` are fields of :class:`Panels`.
     """
     result = np.empty(F.shape[0])
     for i in range(F.shape[0]):

@@ -13,8 +13,8 @@ For a wire, x is the tension, y the strain, and EA = 1/y'.
 
 scipy's monotone interpolators bound y' from above, but EA needs a bound from below. With points of
 Eq. 19 at 2.3, 5, 10, 20, 50, … N the median error of EA is 0.51 % for this curve, 0.77 % for PCHIP
-and 0.58 % for Akima; next to the low end, where the wire is soft, 134, 209 and 185 %. For uneven
-steps EA is up to 1.02 times that of the chords nearby, with PCHIP 2.0 times.
+and 0.58 % for Akima. Next to the low end, where the wire is soft, it is 134, 209 and 185 %. For
+uneven steps EA is up to 1.02 times the EA of the chords nearby, with PCHIP 2.0 times.
 """
 
 from __future__ import annotations

@@ -134,7 +134,10 @@ def _outliers(values: Array) -> NDArray[np.bool_]:
 
 
 def local_noise(errors: Array) -> Array:
-    """Estimate the standard deviation (n,) of errors (n,) around each, at least that of all."""
+    """Estimate the standard deviation (n,) of errors (n,) around each of them.
+
+    It is at least the standard deviation of all errors.
+    """
     width = min(_AROUND, len(errors))
     near = np.pad(abs(errors), (width // 2, width - 1 - width // 2), mode="reflect")
     local = np.median(np.lib.stride_tricks.sliding_window_view(near, width), axis=1)
@@ -179,7 +182,7 @@ def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
     """Fit a line to the first n points, for each n; return its slopes and their standard errors.
 
     Both are in N per point. The error follows from the ``noise`` of a force [N], or from the
-    scatter of the n points if that is smaller. Noise and scatter below ``least`` [N] count as it.
+    scatter of the n points if that is smaller; it is assumed to be at least ``least`` [N].
     """
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)

@@ -104,7 +104,7 @@ def read_tensile_csv(
         force_unit: ``mN``, ``N``, ``kN``, ``MN``, ``lbf`` or ``kgf``. The same
             as the second of ``units``.
         gauge_length: l_0 [m], if the file does not give it. A strain needs none, since EA does not
-            depend on it: the test is then that of 1 m of wire, and ``source`` says so.
+            depend on it: the result is then a test of 1 m of wire, and ``source`` says so.
 
     Raises:
         FileError: The file cannot be read.
