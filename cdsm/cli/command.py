@@ -28,7 +28,8 @@ class Command(typer.core.TyperCommand):
             return rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help page of ``ctx``; a unit such as [deg] is not taken for markup."""
+        """Write the help page of ``ctx``: join lines of a paragraph; take no unit for markup."""
+        self.help = re.sub(r"(?<!\n)\n(?!\n)", " ", self.help or "")
         for option in self.params:
             text = getattr(option, "help", None)
             if text:

@@ -93,7 +93,8 @@ def buckle(
         multiplied = [0.0] * 6 if load is None else numbers("--load", load, 6, "FX,...,MZ")
         multiplied[:3] += weight.vector(pose.arm)
         if not any(multiplied):
-            raise cdsm.InvalidInput("force", "is zero, and so is any multiple of it; give a load.")
+            option = "--force" if weight.mass is None else "--mass"
+            raise misuse(option, "is zero, and so is any multiple of it; give a load.")
         least = 10.0 if min_tension is None else min_tension
         most = math.inf if max_tension is None else max_tension
         low = (least,)

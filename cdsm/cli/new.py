@@ -119,7 +119,8 @@ def new(
             "lead": lead / 1000.0,
         }
         if hinged is not None:
-            sizes["spread"] = math.radians(10.0)
+            # 10 degrees, or less, so that the holes of one plane do not reach those of the next
+            sizes["spread"] = min(math.radians(10.0), math.tau / (count * each))
         if i:  # between the holes of all sections, wherever those are
             sizes["phase"] = math.tau / max(math.lcm(*counts), 1) / each * i / len(counts)
         parts.append((kind, sizes))

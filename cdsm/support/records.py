@@ -40,6 +40,13 @@ def _plain(value: object) -> object:
     return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
+def _name(value: str) -> str:
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,63}", value):
+        allowed = "up to 64 of a-z, A-Z, 0-9, _ are needed, a letter first"
+        raise ValueError(f"{value!r} given; {allowed}")
+    return value
+
+
 def _in_range(kind: str, zero: bool = False) -> Callable[[float], float]:
     """Return a validator that refuses values outside ``RANGES[kind]``; ``zero`` also allows 0."""
 
@@ -67,7 +74,7 @@ Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), Before
 Point = Annotated[
     tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), BeforeValidator(_plain)
 ]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=64)]
+Name = Annotated[str, AfterValidator(_name)]
 
 ONE, EACH = "(one)", "(each)"
 """Tags of pydantic: one value for all joints, or one for each joint. Faults do not print tags."""

@@ -16,7 +16,7 @@ from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
 from cdsm.support.extras import need
-from cdsm.support.validation import bound, flag, instance, quantity, vector, whole_number
+from cdsm.support.validation import flag, instance, quantity, vector, whole_number
 from cdsm.support.values import Array
 from cdsm.tension import DEFAULT_SOLVER, installed_solver
 from cdsm.view.live_view import View, quiet
@@ -86,7 +86,7 @@ def serve(
     start = Setting(
         q=arm._angles(straight if q is None else q, check_limits=True),
         minimum=quantity("minimum", minimum, "tension", zero=True),
-        maximum=float(bound("maximum", maximum, 1)[0]),
+        maximum=quantity("maximum", maximum, "tension", infinite=True),
         force=vector("force", force, 3, "force at the tip [N], base axes"),
         sag=flag("sag", sag),
         solver=installed_solver(solver),

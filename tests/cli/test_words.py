@@ -1,5 +1,6 @@
 """The command line speaks its own words: options, units, warnings first, errors as JSON."""
 
+import itertools
 import json
 from pathlib import Path
 
@@ -262,7 +263,13 @@ def test_help_shows_units_and_whole_lists() -> None:
     assert "tip_position, along" in text
     assert "…" not in text
     for command in app.registered_commands:
-        assert "\\[" not in call(command.name, "--help").output
+        page = call(command.name, "--help").output
+        assert "\\[" not in page
+        prose = [line.rstrip() for line in page.partition("╭")[0].splitlines()]
+        for line, following in itertools.pairwise(prose):
+            # a paragraph breaks only where the next word would not fit, not as in our code
+            if line and following:
+                assert len(f"{line} {following.split()[0]}") > 79, line
 
 
 # --- values ---------------------------------------------------------------------------------

@@ -227,7 +227,7 @@ FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "no number": ({"base_length": None}, ["base_length", "valid number", "None"]),
     "limit zero": ({"joint_limit": 0.0}, ["joint_limit", "greater than 0", "0.0"]),
     "limit above pi": ({"joint_limit": 4.0}, ["joint_limit", "less than or equal to 3.14", "4.0"]),
-    "bad name": ({"name": "my arm"}, ["name", "pattern", "'my arm'"]),
+    "bad name": ({"name": "my arm"}, ["name", "letter first", "'my arm'"]),
     "number for a name": ({"name": 3}, ["name", "valid string", "3"]),
     "overlapping disks": (
         {"link_length": 0.019},
