@@ -9,7 +9,7 @@ import numpy as np
 
 from cdsm.batch.layout import AXES, DIMENSIONS, DIRECTIONAL, JOINTS, MOTIONS
 from cdsm.manipulator import Manipulator
-from cdsm.support.format import coordinates
+from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.status import Status
 from cdsm.support.tidy import dataset
 from cdsm.support.values import Array
@@ -36,6 +36,7 @@ def to_dataset(
     is not installed.
     """
     units = {"torque": arm.torque_unit(), "stiffness": arm.stiffness_unit()}
+    units["lever"] = JointUnits(arm.slides).joined("m/rad", "1")
     variables: dict[str, tuple[Sequence[str], Array, str]] = {
         "q": (("pose", "joint"), q, " or ".join(sorted(set(arm.joint_units))[::-1]))
     }

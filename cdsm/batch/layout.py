@@ -34,7 +34,7 @@ DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     "tip": (("row", "column"), "1"),
     "jacobian": (("motion", "joint"), "1"),
     "cable_lengths": (("cable",), "m"),
-    "length_jacobian": (("cable", "joint"), "m/rad"),
+    "length_jacobian": (("cable", "joint"), "lever"),
     "gravity_torque": (("joint",), "torque"),
     "gravity": (JOINTS, "stiffness"),
     # these also need tensions
@@ -60,8 +60,9 @@ DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
 }
 """Dimensions and unit of each quantity, in the order in which a record contains them.
 
-The unit is 1 for matrices whose entries have different SI units. Units of "torque" and "stiffness"
-depend on the joints of the arm: N m and N m/rad, or N and N/m for prismatic joints.
+The unit is 1 for matrices whose entries have different SI units. Units of "torque",
+"stiffness" and "lever" depend on the joints of the arm: N m, N m/rad and m/rad, or N, N/m and 1 for
+prismatic joints.
 """
 
 QUANTITIES: Final = tuple(DIMENSIONS)

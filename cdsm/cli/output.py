@@ -132,10 +132,11 @@ def reported(as_json: bool) -> Iterator[None]:
         with misuse_reported(as_json), warnings.catch_warnings():
             warnings.showwarning = partial(_show, warnings.showwarning)
             yield
-    except KeyboardInterrupt:
-        if debug_wanted.get():
+    except (KeyboardInterrupt, SystemError) as error:
+        # Ctrl-C within a compiled kernel raises SystemError from KeyboardInterrupt
+        if debug_wanted.get() or not isinstance(error.__cause__ or error, KeyboardInterrupt):
             raise
-        console().print("interrupted: no file is half-written; what --resume or --out keeps stays")
+        console().print("interrupted: no file is half-written; what was saved stays")
         raise typer.Exit(INTERRUPTED) from None
     # OSError: of the terminal or pipe
     except (cdsm.CdsmError, OSError) as error:

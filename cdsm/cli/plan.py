@@ -87,7 +87,8 @@ def plan(
         )
         write(out, plan.write)
         write_picture(figure, plan.plot)
-        write(animation, lambda file: cdsm.plots.plot_path(plan, animate=file))
+        if plan.planned:  # otherwise there is no posture to draw
+            write(animation, lambda file: cdsm.plots.plot_path(plan, animate=file))
         missed = len(plan.target) - len(plan.planned)
         warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"] if missed else []
         conditions = Conditions(robot, (min_tension,), planned=True)

@@ -118,6 +118,8 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
     """Return the lines of the run's printed table: name and value."""
     n = numbers(run)
     low, high = n["least_tension_N"], n["largest_tension_N"]
+    lacking = int(np.isnan(run.margin).sum())
+    unknown = f" (none known at {plural(lacking, 'step')})" if lacking else ""
     lines = [
         ("tip error, mean and largest", f"{1e3 * n['tip_error_mean_m']:.3g}, "
          f"{1e3 * n['tip_error_largest_m']:.3g} mm"),
@@ -126,7 +128,7 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
          f"{100.0 * n['stiffness_error_largest']:.3g} %"),
         ("true tensions at the motors", f"{low:.4g} to {high:.4g} N"),
         ("least margin to buckling", f"{n['least_margin_Nm_per_rad']:.4g} "
-         f"{run.plan.arm.stiffness_unit()}"),
+         f"{run.plan.arm.stiffness_unit()}{unknown}"),
         ("motors clamped at a tension bound",
          _names_or_count(run.saturated_motors, run.tension.shape[1])),
         ("rigidity of the wires, as estimated", f"{100.0 * n['estimated_rigidity']:.4g} %"),

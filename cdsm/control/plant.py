@@ -13,6 +13,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.load_cycle import slow_loading
 from cdsm.statics.slow_loading import Load, SlowLoading, State
+from cdsm.support.validation import instance
 from cdsm.support.values import Array, frozen
 
 
@@ -116,8 +117,8 @@ class SlowPlant:
 
 
 def require_unstrained(name: str, arm: Manipulator) -> None:
-    """Raise InvalidInput about ``name`` if ``original_length`` of the arm is "stretched"."""
-    if arm.original_length != "unstrained":
+    """Raise InvalidInput about ``name`` unless it is an arm of "unstrained" lengths."""
+    if instance(name, arm, Manipulator).original_length != "unstrained":
         raise InvalidInput(
             name, 'has original_length = "stretched"; motors pay out unstrained lengths.'
         )

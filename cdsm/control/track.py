@@ -131,7 +131,7 @@ def track(
     before, mean, wire = None, reference.tension, last.wire
     records: list[_Step] = []
     refused: dict[int, str] = {}
-    short = False
+    refusal, short = "", False
     outcome: Outcome = "completed"
     reason = ""
     for k in progress.track(range(size), "following the path"):
@@ -141,9 +141,7 @@ def track(
         if outer is not None:
             planned = outer.next(wanted, schedule.targets[k], estimate, mean)
             wanted, mean = planned.reference, planned.mean
-            short = planned.short
-            if planned.refused:
-                refused[k] = planned.refused
+            refusal, short = planned.refused, planned.short
         moment = Moment(wanted, reading, before or wanted, last, wire, low, high, forced)
         command = checked_command(command_of(moment), moment, arm.cables.names)
         try:
@@ -161,6 +159,8 @@ def track(
         records.append(
             _Step(wanted, short, reading, estimate, command, state, judged, banded, found)
         )
+        if refusal:
+            refused[k] = refusal
         before, last, wire = wanted, reading, command.wire
         off = float(np.linalg.norm(state.pose.tip[:3, 3] - schedule.tips[k]))
         if off > _LOST * arm.length:

@@ -66,7 +66,11 @@ class ArmParameters:
         instance("arm", self.arm, Manipulator)
         object.__setattr__(self, "names", tuple(text("names", name) for name in self.names))
         if self.arm.cables.names != self.geometry.cable_names:
-            raise InvalidInput("arm", "has other cables than those of its geometry.")
+            raise InvalidInput(
+                "arm",
+                "has other cables than those of its geometry, which the parameters describe. "
+                "Describe springs and wires in [cables.NAME] of the ARM.toml.",
+            )
         taken = set[tuple[str, int]]()
         for name in self.names:
             kind, where = self._place(name)

@@ -83,7 +83,7 @@ def plot_path(
 
 
 def plot_modes(modes: Modes) -> Figure:
-    """Plot an arm deflected by its lowest modes, or by the fastest growing ones if it is unstable.
+    """Plot an arm deflected by its growing modes, if it is unstable, then by its lowest modes.
 
     Deflections are enlarged: the tip moves by at most 25 % of the length of the arm. Raises
     InvalidInput if ``modes`` is not a result of :func:`~cdsm.modes`.
@@ -122,7 +122,9 @@ def _postures(path: PathPlan | Sequence[Posture]) -> tuple[list[Posture], Array 
         if pose.arm != poses[0].arm:
             raise InvalidInput("path", "has postures of two arms; give those of one.")
     if not poses:
-        raise InvalidInput("path", "has no posture to draw; give at least one.")
+        raise InvalidInput(
+            "path", "has no posture to draw; give one, or a plan that reaches its target."
+        )
     return poses, tensions
 
 

@@ -29,6 +29,12 @@ if TYPE_CHECKING:
 _SHOWN = 24
 """Largest number of loads that ``print`` shows; of more loads it shows the first and last ones."""
 
+_SNAP = 0.05
+"""Unaccounted energy of a snap-through, relative to work + stored + dissipated of a step.
+
+The coarsest ``accuracy``, 10 % of the work, leaves less: the work is stored or dissipated, too.
+"""
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -88,6 +94,19 @@ class LoadHistory(ReadOnlyState):
         """
         work = self.load_work + self.motor_work
         return frozen(work - self.stored - self.dissipated)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Loads at which the arm snaps through, with the energy [mJ] that sets it in motion.
+
+        At these loads ``unaccounted`` exceeds 5 % of the largest energy turned over in a step. What
+        follows can depend on the steps. Empty if there are none.
+        """
+        turned = abs(self.load_work) + abs(self.motor_work) + abs(self.stored) + self.dissipated
+        return tuple(
+            f"SNAPS THROUGH at load {k + 1}: {1000.0 * self.unaccounted[k]:.4g} mJ set it in motion"
+            for k in np.flatnonzero(self.unaccounted > _SNAP * turned.max()).tolist()
+        )
 
     @cached_property
     def tensions(self) -> tuple[Array, ...]:
@@ -188,6 +207,7 @@ class LoadHistory(ReadOnlyState):
             "motor_work_J": self.motor_work,
             "stored_J": self.stored,
             "dissipated_J": self.dissipated,
+            "unaccounted_J": self.unaccounted,
         }
         return plain(numbers)
 

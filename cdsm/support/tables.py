@@ -111,10 +111,18 @@ def named_columns(
     """Return index and unit of each column of a table, by name.
 
     A table may have other columns than the ``known`` ones. ``refuse`` raises an error if a name is
-    given twice or looks like a misspelt known name, or if semicolons separate the columns.
+    given twice or looks like a misspelt known name, if semicolons separate the columns, or if a row
+    has more cells than the header.
     """
     if len(table.header) == 1 and ";" in table.header[0]:
         refuse("has its columns separated by semicolons; separate them by commas")
+    width = len(table.header)
+    for line, cells in table.rows[1:]:
+        if any(cells[width:]):
+            refuse(
+                f"line {line}: has {len(cells)} cells, but the header {width}; write decimals with "
+                "a point"
+            )
     found: dict[str, tuple[int, str]] = {}
     for at, cell in enumerate(table.header):
         name, unit = name_and_unit(cell)

@@ -278,6 +278,7 @@ def test_plan_follows_a_path_as_the_api_does(kind: str, geometry: Path, tmp_path
         ("x [mm],x [mm],z [mm]\n1,2,3\n", "two columns called x"),
         ("x [mm],y [mm],z [mm]\n1,2,3\n\n1,two,3\n", "line 4: 'two' is not a finite number"),
         ("x [mm],y [mm],z [mm]\n1,2\n", "line 2: '' is not a finite number"),
+        ("x [mm],y [mm],z [mm]\n1,5,2,3\n", "line 2: has 4 cells, but the header 3"),
         ("x [mm],y [mm],z [mm],target [N/mm]\n1,2,3,-4\n", "target: -4000 N/m given"),
     ],
 )

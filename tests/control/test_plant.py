@@ -59,3 +59,8 @@ def test_stretched_lengths_are_refused() -> None:
     )
     with pytest.raises(cdsm.InvalidInput, match="stretched"):
         cdsm.SlowPlant(stretched)
+
+
+def test_plant_of_something_else_than_an_arm_is_refused() -> None:
+    with pytest.raises(cdsm.InvalidInput, match="arm: None given; a Manipulator is needed"):
+        cdsm.SlowPlant(None)  # type: ignore[arg-type]

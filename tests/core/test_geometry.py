@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,22 @@ def test_hinge_k_is_turned_by_k_minus_1_twists_and_its_pair_sits_beside_it() -> 
         assert [cable.joint for cable in pair] == [k + 1, k + 1]
         turns = [(cable.angle - psi) % (2.0 * math.pi) for cable in pair]
         assert turns == pytest.approx([math.pi / 2.0, 3.0 * math.pi / 2.0])
+
+
+def test_long_hinged_arm_has_angles_below_two_turns_and_no_doubt_about_them() -> None:
+    sizes: dict[str, Any] = {
+        "link_length": 0.06,
+        "base_length": 0.03,
+        "disk_offset": 0.005,
+        "hole_radius": 0.02,
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        arm = cdsm.Geometry.hinged(
+            joints=30, twist=math.pi / 2, link_mass=0.05, spread=math.radians(6.0), **sizes
+        )
+    np.testing.assert_allclose(arm.joints[29].axes[0], (0.0, 0.0, 1.0), atol=1e-14)
+    assert max(cable.angle for cable in arm.cables) < 5.0 * math.pi
 
 
 def test_hinged_cables_are_evenly_spread_from_90_degrees_beside_the_axis() -> None:

@@ -408,3 +408,27 @@ def test_random_histories_stay_in_the_band_of_rest_and_come_near_its_ends() -> N
     outside, far = histories.farthest(*histories.two_hinges(0.1), 12.0, 60)
     assert not outside
     assert 0.7 < far <= 1.0
+
+
+def test_snap_through_is_a_warning_and_its_energy_is_no_loss() -> None:
+    geometry = cdsm.Geometry.universal(
+        joints=3,
+        cables_per_joint=3,
+        link_length=[0.04, 0.048, 0.078],
+        base_length=0.03,
+        disk_offset=[0.012, 0.0134, 0.0108],
+        hole_radius=[0.023, 0.0217, 0.0127],
+        link_mass=0.05,
+        lead=0.3,
+        friction=0.054,
+    )
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(88e3))
+    pose = arm.at(np.deg2rad([5.0, -5.0, 10.0, 3.0, 8.0, -6.0]))
+    load = np.array([40.0, 15.0, 12.0, 0.0, 0.0, 0.0])
+    history = cdsm.load_cycle(pose, cdsm.distribute_tension(pose, 30.0), [load, 0 * load, -load])
+    assert history.warnings == history.warnings[-1:]
+    assert history.warnings[0].startswith("SNAPS THROUGH at load 3: ")
+    assert history.unaccounted[2] > 5.0 * history.dissipated[2]
+    # without friction the arm buckles on the same way
+    with pytest.raises(cdsm.EquilibriumError, match="buckles at 7"):
+        cdsm.weight_test(pose, cdsm.distribute_tension(pose, 30.0), -load[:3], steps=1)
