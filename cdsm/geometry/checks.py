@@ -120,7 +120,9 @@ def doubts_about(geometry: Description) -> list[str]:
     doubts = doubts_about_units(geometry.length, sizes)
     names = geometry.cable_names
     widest = max(geometry.cables, key=lambda cable: abs(cable.angle))
-    doubts += doubts_about_angle("a hole angle is", widest.angle, _WIDEST_ANGLE)
+    # the angles of hinges grow by the twist, up to half a turn, from one to the next
+    most = max(_WIDEST_ANGLE, math.pi * (len(geometry.joints) + 4))
+    doubts += doubts_about_angle("a hole angle is", widest.angle, most)
     groups = [
         " and ".join(names[c] for c in each) for each in sharing(geometry.cables, geometry.disks)
     ]

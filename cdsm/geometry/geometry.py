@@ -159,7 +159,7 @@ class Geometry(Description):
         keywords = locals()  # of the call, before there are other variables
         if cables_per_joint is None and hole_angles is None:
             keywords["cables_per_joint"] = 2
-        rolls = [math.fmod(k * twist, math.tau) for k in range(joints)]
+        rolls = [k * twist for k in range(joints)]
         axes = [((0.0, math.cos(roll), math.sin(roll)),) for roll in rolls]
         return cls(**uniform(axes, lambda m: hinge_hole_angles(rolls, m), keywords))
 

@@ -78,7 +78,7 @@ def test_hinge_k_is_turned_by_k_minus_1_twists_and_its_pair_sits_beside_it() -> 
         assert turns == pytest.approx([math.pi / 2.0, 3.0 * math.pi / 2.0])
 
 
-def test_long_hinged_arm_has_angles_below_two_turns_and_no_doubt_about_them() -> None:
+def test_long_hinged_arm_has_angles_of_many_turns_and_no_doubt_about_them() -> None:
     sizes: dict[str, Any] = {
         "link_length": 0.06,
         "base_length": 0.03,
@@ -91,7 +91,7 @@ def test_long_hinged_arm_has_angles_below_two_turns_and_no_doubt_about_them() ->
             joints=30, twist=math.pi / 2, link_mass=0.05, spread=math.radians(6.0), **sizes
         )
     np.testing.assert_allclose(arm.joints[29].axes[0], (0.0, 0.0, 1.0), atol=1e-14)
-    assert max(cable.angle for cable in arm.cables) < 5.0 * math.pi
+    assert max(cable.angle for cable in arm.cables) > 8.0 * math.pi
 
 
 def test_hinged_cables_are_evenly_spread_from_90_degrees_beside_the_axis() -> None:
