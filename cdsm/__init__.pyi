@@ -77,7 +77,6 @@ from cdsm.identification import WeightLoop as WeightLoop
 from cdsm.identification import identify as identify
 from cdsm.identification import plan_experiment as plan_experiment
 from cdsm.identification import read_loops as read_loops
-from cdsm.instability import Remedy as Remedy
 from cdsm.interchange.caspr import read_caspr as read_caspr
 from cdsm.interchange.mjcf import to_mjcf as to_mjcf
 from cdsm.interchange.mjcf import write_mjcf as write_mjcf
@@ -131,6 +130,7 @@ from cdsm.statics.weight_test import weight_test as weight_test
 from cdsm.stiffness_matrix import Shares as Shares
 from cdsm.stiffness_matrix import Stiffness as Stiffness
 from cdsm.stiffness_matrix import stiffness as stiffness
+from cdsm.stiffness_matrix.instability import Remedy as Remedy
 from cdsm.support.status import Status as Status
 from cdsm.sweeps.export import read_sweep as read_sweep
 from cdsm.sweeps.export import sweep_to_pandas as sweep_to_pandas

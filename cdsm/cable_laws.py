@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
-from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.elasticity import Elasticity, LinearElasticity, SlackBelow
 from cdsm.elasticity.answers import rigidity_of, slope_of, strain_of
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.kernels.stiffness import single_cable_stiffness
@@ -19,7 +19,6 @@ from cdsm.support.values import Array, frozen
 from cdsm.wires.continuity import find_jump
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 from cdsm.wires.quadrature import NODES, WEIGHTS
-from cdsm.wires.slack import SlackBelow
 
 OriginalLength = Literal["unstrained", "stretched"]
 

@@ -31,7 +31,6 @@ CHAPTERS = {
     "tension": "Posture, tension, stiffness",
     "stiffness_matrix": "Posture, tension, stiffness",
     "report": "Posture, tension, stiffness",
-    "instability": "Posture, tension, stiffness",
     "friction": "Friction in the holes",
     "measures": "Measures of an arm",
     "statics": "Weights, buckling, vibration",

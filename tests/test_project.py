@@ -1,8 +1,11 @@
 """What stands around the code: citation, recipe, workflows, article, catalogue of wires."""
 
+import ast
 import math
 import re
 import tomllib
+from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +15,8 @@ import yaml
 import cdsm
 
 ROOT = Path(__file__).parents[1]
-PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+SETTINGS: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+PROJECT, TOOLS = SETTINGS["project"], SETTINGS["tool"]
 
 CONDA = {"pin": "pinocchio", "matplotlib": "matplotlib-base"}
 """Names on conda-forge that differ from those on PyPI."""
@@ -72,6 +76,38 @@ def test_the_article_is_short_and_cites_what_exists() -> None:
     cited = set(re.findall(r"@(\w+)", text))
     entries = set(re.findall(r"@\w+\{(\w+),", (ROOT / "paper/paper.bib").read_text("utf-8")))
     assert cited == entries
+
+
+def imported(node: ast.AST) -> Iterator[str]:
+    """Dotted names that code imports, also in functions, but not for type checkers alone."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.ImportFrom):
+            yield from (f"{child.module}.{name.name}" for name in child.names)
+        elif not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
+            yield from imported(child)
+
+
+def test_no_file_imports_itself_through_others() -> None:
+    package = ROOT / "cdsm"
+    files = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in package.rglob("*.py")
+    }
+    uses = {
+        name: {
+            used if used in files else used.rpartition(".")[0]
+            for used in imported(ast.parse(path.read_text(encoding="utf-8")))
+            if used.startswith("cdsm.")
+        }
+        for name, path in files.items()
+    }
+    assert list(TopologicalSorter(uses).static_order())  # CycleError names a circle
+
+
+def test_the_house_is_small() -> None:
+    layers = TOOLS["importlinter"]["contracts"][0]["layers"]
+    assert len(layers) <= 14
+    assert sum(path.is_file() for path in (ROOT / "cdsm").iterdir()) <= 16
 
 
 def strand(diameter: float, stretch_factor: float) -> float:

@@ -18,7 +18,6 @@ from cdsm.arm_file.cables import (
     setting_lines,
     with_current_keys,
 )
-from cdsm.arm_file.tolerances import from_table, tolerance_lines
 from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entries
 from cdsm.arm_model import GRAVITY, ArmParts
 from cdsm.cable import Cable
@@ -32,6 +31,7 @@ from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
 from cdsm.support.validation import RANGES, one_of
 from cdsm.tolerance import Tolerances
+from cdsm.tolerance.sources import from_table, tolerance_lines
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 from cdsm.wires.catalogue import Wire, as_wire

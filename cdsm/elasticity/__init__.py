@@ -7,4 +7,6 @@ A cable of unstretched length l_0 under tension F has the stiffness dF/dL = EA(F
 from cdsm.elasticity.domain import Domain as Domain
 from cdsm.elasticity.inverse import tension_at as tension_at
 from cdsm.elasticity.law import Elasticity as Elasticity
+from cdsm.elasticity.law import ScaledElasticity as ScaledElasticity
+from cdsm.elasticity.law import SlackBelow as SlackBelow
 from cdsm.elasticity.linear import LinearElasticity as LinearElasticity

@@ -1,12 +1,17 @@
-"""The abstract law: rigidity, strain and energy of a cable as functions of its tension."""
+"""The abstract law: rigidity, strain and energy of a cable as functions of its tension.
+
+Its methods ``scaled`` and ``slack_below`` build the two laws that follow it here.
+"""
 
 from __future__ import annotations
 
 import math
 import os
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +28,9 @@ if TYPE_CHECKING:
 
 
 _STEP = 6e-6  # relative step of central differences: the cube root of the rounding of float64
+
+_SHORTEST: Final = 0.5
+"""Least length of a slack wire, divided by its length at the low end of its law."""
 
 
 class Elasticity(ABC):
@@ -42,15 +50,11 @@ class Elasticity(ABC):
     @staticmethod
     def read(path: str | os.PathLike[str]) -> Elasticity:
         """Read an elasticity from a TOML file; see :func:`~cdsm.read_elasticity`."""
-        from cdsm.wires.files import read_elasticity  # which imports this module
-
-        return read_elasticity(path)
+        return cdsm.read_elasticity(path)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the elasticity to a TOML file; see :func:`~cdsm.write_elasticity`."""
-        from cdsm.wires.files import write_elasticity  # which imports this module
-
-        return write_elasticity(self, path)
+        return cdsm.write_elasticity(self, path)
 
     def plot(self) -> Figure:
         """Plot tangent and secant rigidity [kN] against the tension [N]."""
@@ -75,8 +79,6 @@ class Elasticity(ABC):
         Raises:
             InvalidInput: The wire would be shorter than half its length when it is slack.
         """
-        from cdsm.wires.slack import SlackBelow
-
         return self if 0.0 in self.domain else SlackBelow(self)
 
     def scaled(self, factor: float) -> Elasticity:
@@ -85,8 +87,6 @@ class Elasticity(ABC):
         Strains and energies are divided by the factor [-]. Raises InvalidInput if the factor is not
         positive.
         """
-        from cdsm.elasticity.scaled import ScaledElasticity
-
         return ScaledElasticity(self, positive_factor(factor))
 
     @abstractmethod
@@ -155,6 +155,109 @@ class Elasticity(ABC):
         secant = np.array(self.rigidity(values))
         np.divide(values - self.rest, strain, out=secant, where=strain != 0.0)
         return secant
+
+
+@final
+@dataclass(frozen=True)
+class ScaledElasticity(Elasticity):
+    """Law with the rigidity of another law, times a factor: EA(F) = factor · EA_law(F)."""
+
+    law: Elasticity
+    factor: float
+
+    @property
+    def domain(self) -> Domain:
+        """Domain of ``law``, which scaling does not change."""
+        return self.law.domain
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        """Compute EA [N] at tensions [N]."""
+        return self.factor * self.law.rigidity(tension)
+
+    def rigidity_slope(self, tension: ArrayLike) -> Array:
+        """Compute dEA/dF [-] at tensions [N]."""
+        return self.factor * self.law.rigidity_slope(tension)
+
+    def strain(self, tension: ArrayLike) -> Array:
+        """Compute ε [-] at tensions [N]."""
+        return self.law.strain(tension) / self.factor
+
+    def energy(self, tension: ArrayLike) -> Array:
+        """Compute ∫ F dε at tensions F [N], the energy per unstretched length [J/m] = [N]."""
+        return self.law.energy(tension) / self.factor
+
+
+@final
+@dataclass(frozen=True)
+class SlackBelow(Elasticity):
+    """A law continued to 0 N with its rigidity at its low end; see :meth:`Elasticity.slack_below`.
+
+    Attributes:
+        law: The law. Within its domain, rigidity, strain and energy are those of the law, bit for
+            bit.
+
+    Raises:
+        InvalidInput: The wire would be shorter than half its length when it is slack.
+    """
+
+    law: Elasticity
+
+    def __post_init__(self) -> None:
+        low, EA = self.rest, self._least
+        if low > _SHORTEST * EA:
+            raise InvalidInput(
+                "slack_below",
+                f"the rigidity at the low end, {low:g} N, is only {EA:.4g} N: a wire that keeps it "
+                f"would be slack after shortening by {100.0 * low / EA:.3g} %. Begin the law at "
+                "another tension.",
+            )
+
+    def __repr__(self) -> str:
+        return f"{self.law!r}.slack_below()"
+
+    @cached_property
+    def domain(self) -> Domain:
+        """Tensions from zero to the high end of the law [N]."""
+        return Domain(0.0, self.law.domain.high)
+
+    @property
+    def rest(self) -> float:
+        """Low end of the law [N], where the strain is zero."""
+        return self.law.rest
+
+    @cached_property
+    def _least(self) -> float:
+        return float(self.law.rigidity(self.law.domain.first))
+
+    def scaled(self, factor: float) -> SlackBelow:
+        """Return the law of factor × EA, with its slack branch; see :meth:`Elasticity.scaled`."""
+        return SlackBelow(self.law.scaled(factor))
+
+    def rigidity(self, tension: ArrayLike) -> Array:
+        """Compute EA(F) [N], constant on the slack branch; see :meth:`Elasticity.rigidity`."""
+        return np.asarray(self.law.rigidity(self._split(tension)[0]))
+
+    def rigidity_slope(self, tension: ArrayLike) -> Array:
+        """Compute dEA/dF [-], zero on the slack branch; see :meth:`Elasticity.rigidity_slope`."""
+        inside, below = self._split(tension)
+        return np.where(below < 0.0, 0.0, self.law.rigidity_slope(inside))
+
+    def strain(self, tension: ArrayLike) -> Array:
+        """Compute ∫ dF/EA(F) [-] from the low end of the law; negative below it."""
+        inside, below = self._split(tension)
+        return np.where(below < 0.0, below / self._least, self.law.strain(inside))
+
+    def energy(self, tension: ArrayLike) -> Array:
+        """Compute ∫ F dF/EA(F) [N] from the low end of the law; negative below it."""
+        inside, below = self._split(tension)
+        slack = below * (2.0 * self.rest + below) / (2.0 * self._least)
+        return np.where(below < 0.0, slack, self.law.energy(inside))
+
+    def _split(self, tension: ArrayLike) -> tuple[Array, Array]:
+        """Return max(F, low), inside the law, and min(F − low, 0), the part on the slack branch."""
+        values = self.domain.check(tension)
+        inside = np.maximum(values, self.law.domain.first)
+        return inside, np.where(values < inside, values - self.rest, 0.0)
 
 
 def checked_law(law: object) -> Elasticity:

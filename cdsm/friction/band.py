@@ -14,10 +14,10 @@ from cdsm.errors import ElasticityRangeError, SolverError
 from cdsm.friction.neighbourhood import Neighbourhood
 from cdsm.friction.remainders import Bends
 from cdsm.friction.rest_states import RestStates
-from cdsm.instability import verdict
 from cdsm.posture import Posture
-from cdsm.sticking import holding
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.stiffness_matrix.instability import verdict
+from cdsm.stiffness_matrix.sticking import holding
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState, frozen

@@ -1,8 +1,8 @@
 """Breakaway: the load at which the first cable of a stuck arm begins to slide in a hole.
 
 W_i is the load at which, to first order, the cable begins to slide in hole i
-(:mod:`cdsm.sticking`). Newton's method starts at the smallest W_i. It finds the load at which the
-arm, with all its cables stuck, reaches the friction bound of a hole.
+(:mod:`cdsm.stiffness_matrix.sticking`). Newton's method starts at the smallest W_i. It finds the
+load at which the arm, with all its cables stuck, reaches the friction bound of a hole.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.friction.stuck import assemble_segments, stuck_stiffness
 from cdsm.posture import Posture
-from cdsm.sticking import SLACK, first_order_loads, holding
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.stiffness_matrix.sticking import SLACK, first_order_loads, holding
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState, frozen

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput
 from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.posture import Posture
-from cdsm.sticking import Flags, tension_gradient
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
+from cdsm.stiffness_matrix.sticking import Flags, tension_gradient
 from cdsm.support.validation import NO_WRENCH, instance, number_array, vector, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension

@@ -21,7 +21,6 @@ from lxml import etree
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.instability import verdict
 from cdsm.interchange.mjcf_bodies import add_bodies, row
 from cdsm.interchange.mjcf_motion import Motion, choose_motion
 from cdsm.manipulator import Manipulator
@@ -29,6 +28,7 @@ from cdsm.posture import Posture
 from cdsm.report.facts import balance_error
 from cdsm.report.remarks import BALANCED
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.stiffness_matrix.instability import verdict
 from cdsm.support.files import write_text
 from cdsm.support.format import coordinates
 from cdsm.support.validation import RANGES, instance, one_of, scalar

@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike
 
 from cdsm import presets
 from cdsm.cable import Cable
-from cdsm.elasticity import LinearElasticity
-from cdsm.elasticity.scaled import ScaledElasticity
+from cdsm.elasticity import LinearElasticity, ScaledElasticity
 from cdsm.errors import EquilibriumError
 from cdsm.identification.least_squares import LeastSquares, no_model
 from cdsm.manipulator import Manipulator

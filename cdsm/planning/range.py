@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.elasticity import LinearElasticity
+from cdsm.elasticity import LinearElasticity, SlackBelow
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.planning.admissible import Admissible
 from cdsm.planning.objectives import along_constraints, checked_starts
@@ -32,7 +32,6 @@ from cdsm.support.validation import NO_WRENCH
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
-from cdsm.wires.slack import SlackBelow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

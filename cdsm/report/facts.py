@@ -13,7 +13,7 @@ import numpy as np
 from cdsm.cable import Cable, Control
 from cdsm.errors import CdsmError, ElasticityRangeError, SingularStiffness
 from cdsm.report.potential import evaluate_law, joint_unit
-from cdsm.sticking import first_order_loads, holding, tension_gradient
+from cdsm.stiffness_matrix.sticking import first_order_loads, holding, tension_gradient
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:

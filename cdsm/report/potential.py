@@ -19,12 +19,12 @@ import numpy as np
 
 from cdsm.cable import Cable
 from cdsm.cable_laws import kinks
+from cdsm.elasticity import SlackBelow
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import JointUnits
 from cdsm.support.values import Array
 from cdsm.wires.laws import TabulatedElasticity
-from cdsm.wires.slack import SlackBelow
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness

@@ -4,7 +4,8 @@
           active   passive       gravity   load
 
 The module ``assembly`` computes K_θ, and ``value`` is the result. ``cartesian`` computes the
-stiffness at the tip, ``shares`` the contribution of each cable, ``prints`` tables and JSON.
+stiffness at the tip, ``shares`` the contribution of each cable, ``instability`` what would hold an
+unstable arm, ``sticking`` tensions of cables that stick in holes, ``prints`` tables and JSON.
 """
 
 from cdsm.stiffness_matrix.assembly import assemble as assemble

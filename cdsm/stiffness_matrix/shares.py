@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
 import cdsm
-from cdsm.instability import verdict
+from cdsm.stiffness_matrix.instability import verdict
 from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import aligned, coordinates, plain
 from cdsm.support.tidy import data_frame

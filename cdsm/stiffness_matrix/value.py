@@ -12,6 +12,7 @@ from cdsm.errors import InvalidInput
 from cdsm.kernels.read import read_margin
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.cartesian import CartesianReadings, Term
+from cdsm.stiffness_matrix.instability import Remedy, advice, find_remedies, verdict
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.markup import element, row
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-    from cdsm.instability import Remedy
     from cdsm.report import Report
 
 Friction = Literal["frictionless", "stuck", "sliding"]
@@ -152,15 +152,11 @@ class Stiffness(CartesianReadings):
         distributed again: for them only wires and springs are tried. This takes a few tenths of a
         second.
         """
-        from cdsm.instability import find_remedies  # here, since a stable arm does not need it
-
         return find_remedies(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Lines that say that the arm is UNSTABLE, with its remedies; empty for a stable arm."""
-        from cdsm.instability import advice, verdict
-
         return () if self.is_stable else (verdict(self), *advice(self))
 
     def report(self) -> Report:

@@ -1,4 +1,4 @@
-"""Tolerances of an arm, one or more for each source of uncertainty."""
+"""Tolerances of an arm, one or more for each source of uncertainty, and their TOML."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Self, final
+from typing import Any, Self, final
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import CdsmError, FileError, GeometryError, InvalidInput, counted
+from cdsm.support.files import read_text, write_text
+from cdsm.support.records import read_toml, toml_value
 from cdsm.support.validation import one_of, sequence_of
-from cdsm.tolerance.tolerance import Tolerance
+from cdsm.tolerance.tolerance import EVERY, Tolerance
 
 LARGEST = dict.fromkeys(("rigidity", "spring", "friction"), 0.5) | dict.fromkeys(
     ("joint_angle", "hole_angle"), 0.3
@@ -22,6 +24,8 @@ LARGEST = dict.fromkeys(("rigidity", "spring", "friction"), 0.5) | dict.fromkeys
 
 COMMON = ("rigidity", "friction")
 """Sources whose inputs share one error by default: wires of one spool, holes of one material."""
+
+_KEYS = ("standard", "within", "distribution", "correlation", "of", "tensions")
 
 OneOrMore = float | Tolerance | Sequence[Tolerance]
 """Types of a source of :class:`Tolerances`: a standard uncertainty, or one or more tolerances."""
@@ -119,9 +123,12 @@ class Tolerances:
             FileError: The file cannot be read, is not TOML, or has no tolerances. Every
                 fault is listed.
         """
-        from cdsm.arm_file.tolerances import read_tolerances  # pydantic: slow to import
-
-        return read_tolerances(path)
+        try:
+            table = read_toml(read_text(path))
+            own = table.get("tolerances", table)
+            return from_table(own if isinstance(own, dict) else table)
+        except GeometryError as error:
+            raise FileError(path, f"does not hold tolerances, {counted(error.faults)}") from None
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write a TOML file from which :meth:`read` builds equal tolerances; return its path.
@@ -129,9 +136,8 @@ class Tolerances:
         Raises:
             FileError: The file cannot be written; an existing file stays unchanged.
         """
-        from cdsm.arm_file.tolerances import write_tolerances
-
-        return write_tolerances(self, path)
+        head = "# Tolerances of an arm, one sigma: rad, m, N, kg; rigidity and spring relative.\n"
+        return write_text(path, "\n".join([head, *tolerance_lines(self)]) + "\n")
 
 
 # help and completion show the fields, not the keywords of __new__
@@ -157,3 +163,64 @@ def _require_size(source: str, tolerance: Tolerance) -> None:
             f"a standard uncertainty of {tolerance.standard:g} given; up to {largest:g} is a "
             f"tolerance. It is {unit}.",
         )
+
+
+def from_table(table: Mapping[str, Any]) -> Tolerances:
+    """Build tolerances from a parsed TOML table; raise GeometryError with every fault."""
+    found: dict[str, Any] = {}
+    faults = []
+    for name, value in table.items():
+        try:
+            one_of("source of uncertainty", name, SOURCES)
+            several = isinstance(value, list)
+            parts = [_tolerance(name, each) for each in (value if several else [value])]
+            found[name] = parts if several else parts[0]
+            Tolerances(**{name: found[name]})
+        except CdsmError as error:
+            faults.append(f"{name}: {str(error).removeprefix(f'{name}: ')}")
+    if faults:
+        raise GeometryError(faults)
+    return Tolerances(**found)
+
+
+def _tolerance(name: str, value: object) -> Tolerance:
+    """Build one tolerance from a number or a table; CdsmError if it is invalid."""
+    if not isinstance(value, dict):
+        return Tolerance(value, correlation=float(name in COMMON))  # type: ignore[arg-type]
+    for key in value:
+        one_of(f"key of {name}", key, _KEYS)
+    values: dict[str, Any] = {"correlation": float(name in COMMON)} | value
+    if ("standard" in values) == ("within" in values):
+        raise InvalidInput(name, "give one of standard and within.")
+    if "within" not in values:
+        return Tolerance(**values)
+    if "tensions" in values:
+        raise InvalidInput(name, "tensions go with standard, not with within.")
+    return Tolerance.within(values.pop("within"), **values)
+
+
+def tolerance_lines(tolerances: Tolerances) -> list[str]:
+    """Return one TOML line for each source of ``tolerances`` that is not zero."""
+    every, none = ((name, getattr(tolerances, name)) for name in SOURCES), Tolerances()
+    return [f"{name} = {_value(value)}" for name, value in every if value != getattr(none, name)]
+
+
+def _value(value: Tolerance | tuple[Tolerance, ...]) -> str:
+    """Return a tolerance as a TOML table, or several as a list of TOML tables."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    values: dict[str, Any] = {"standard": value.standard, "correlation": value.correlation}
+    if value.distribution != "normal":
+        values["distribution"] = value.distribution
+    if value.of != EVERY:
+        values["of"] = value.of
+    if value.tensions is not None:
+        values["tensions"] = value.tensions
+    return f"{{{', '.join(f'{key} = {toml_value(_plain(x))}' for key, x in values.items())}}}"
+
+
+def _plain(value: Any) -> object:
+    """Return an array as nested tuples, from which TOML is written; other values unchanged."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    return tuple(map(_plain, value)) if isinstance(value, list) else value

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
-from cdsm.instability import verdict
 from cdsm.posture import Posture
+from cdsm.stiffness_matrix.instability import verdict
 from cdsm.support.validation import scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.arm_file.tolerances import tolerance_lines
 from cdsm.errors import FileError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.support.extras import need
@@ -26,6 +25,7 @@ from cdsm.support.validation import flag, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
+from cdsm.tolerance.sources import tolerance_lines
 from cdsm.uncertainties.budget import (
     Uncertainty,
     checked_probability,

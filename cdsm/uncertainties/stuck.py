@@ -21,7 +21,7 @@ from cdsm.cable import Cable
 from cdsm.kernels.tree import Indices
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.sticking import holding
+from cdsm.stiffness_matrix.sticking import holding
 from cdsm.support.values import Array
 from cdsm.uncertainties.inputs import inputs_of
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError, EquilibriumError, InvalidInput
 from cdsm.friction.stuck import stuck_stiffness
-from cdsm.instability import advice, verdict
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
@@ -22,8 +21,9 @@ from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.load_cycle import load_cycle
 from cdsm.statics.load_history import LoadHistory
 from cdsm.statics.rest_search import equilibrium
-from cdsm.sticking import holding
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.stiffness_matrix.instability import advice, verdict
+from cdsm.stiffness_matrix.sticking import holding
 from cdsm.support.status import Status
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension

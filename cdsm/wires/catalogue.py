@@ -8,11 +8,10 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
-from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.elasticity import Elasticity, LinearElasticity, SlackBelow
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.wires.files import read_elasticity
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
-from cdsm.wires.slack import SlackBelow
 
 if TYPE_CHECKING:
     from cdsm.cable import Cable

@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.elasticity import Elasticity, LinearElasticity, SlackBelow
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
-from cdsm.wires.slack import SlackBelow
 
 _SAMPLES = np.linspace(0.0, 1.0, 257) ** 3  # shares of the domain, more at low tension
 _LARGEST_TENSION = 1e5  # [N], end of an infinite domain: more than any cable carries

@@ -10,12 +10,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from cdsm.elasticity import Elasticity, LinearElasticity
+from cdsm.elasticity import Elasticity, LinearElasticity, SlackBelow
 from cdsm.errors import FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import Number, Rigidity, parse, read_toml, record, toml_lines
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
-from cdsm.wires.slack import SlackBelow
 
 _MEASURED = re.compile(r'^"?[-+]?\d[\d.,eE+-]*"?\s*[;,\t]\s*"?[-+]?\d', re.MULTILINE)
 """Pattern of a line that begins with two numbers; such a file is a CSV, not a TOML."""

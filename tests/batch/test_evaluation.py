@@ -17,7 +17,7 @@ from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.inputs import run_slices
 from cdsm.batch.layout import DIRECTIONAL, QUANTITIES
 from cdsm.friction.breakaway import hole_loads
-from cdsm.sticking import holding
+from cdsm.stiffness_matrix.sticking import holding
 from cdsm.support.values import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.support.processes import uncompiled

@@ -5,7 +5,7 @@ import pytest
 
 import cdsm
 from cdsm import paper
-from cdsm.elasticity.scaled import ScaledElasticity
+from cdsm.elasticity import ScaledElasticity
 from cdsm.paper.friction_fit import ADDED, RoughPrototype
 from cdsm.paper.prototype_fit import TABLE_START
 from cdsm.paper.section_v import POSTURE

@@ -16,7 +16,7 @@ from cdsm.friction.breakaway import hole_loads
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.measures.payload import largest_force
 from cdsm.measures.program import Loads
-from cdsm.sticking import holding
+from cdsm.stiffness_matrix.sticking import holding
 from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
 from cdsm.sweeps.description import law_text

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable
-from cdsm.elasticity.scaled import ScaledElasticity
+from cdsm.elasticity import ScaledElasticity
 from cdsm.errors import CdsmError, GeometryError
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.kernels.read import read_margin
