@@ -8,6 +8,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
+from itertools import zip_longest
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
@@ -26,6 +27,18 @@ _ALIKE = 0.8  # similarity of names that differ in one letter of five or more
 _TRIED = 500  # lines that tell the delimiter; titles are fewer
 
 
+def _numbers(decimal: str, thousands: str) -> tuple[re.Pattern[str], re.Pattern[str]]:
+    """Return the patterns of numbers without and with separators of thousands."""
+    whole = rf"(?:0|[1-9]\d{{0,2}}(?:{re.escape(thousands)}\d{{3}})*)"
+    point, power = re.escape(decimal), r"(?:[eE][-+]?\d+)?"
+    plain = rf"[-+]?(?:\d+(?:{point}\d*)?|{point}\d+){power}"
+    return re.compile(plain), re.compile(rf"[-+]?{whole}(?:{point}\d*)?{power}")
+
+
+_MARKS: Final = ",."  # of decimals; the other one separates thousands
+_NUMBERS: Final = {",": _numbers(",", "."), ".": _numbers(".", ",")}
+
+
 def csv_text(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
     """Write a header and rows as CSV."""
     out = io.StringIO()
@@ -38,7 +51,8 @@ class Table(NamedTuple):
 
     rows: list[tuple[int, list[str]]]  # line number and cells; the first row is the header
     comments: list[str]  # lines that begin with #
-    delimiter: str  # between cells; unless it is a comma, decimal commas are read
+    delimiter: str  # between cells
+    marks: str = _MARKS  # those that may mark decimals, unless the delimiter is a comma
 
     @property
     def header(self) -> list[str]:
@@ -61,10 +75,60 @@ class Table(NamedTuple):
 
     def number(self, cell: str) -> float:
         """Return the number in a cell; NaN if the cell has no number."""
+        if self.delimiter != ",":
+            return next(iter(readings(cell, self.marks)), math.nan)
         try:
-            return float(cell if self.delimiter == "," else cell.replace(",", "."))
+            return float(cell)
         except ValueError:
             return math.nan
+
+    def with_decimal_mark(self, refuse: Callable[[str], NoReturn], first: int = 1) -> Table:
+        """Return this table with the decimal mark of its numbers from row ``first`` on.
+
+        All columns of numbers decide. Where both marks occur, one must separate thousands. A mark
+        that occurs alone marks decimals, but for columns such as 998, 1.004. If the marks remain
+        unclear, ``refuse`` is called.
+        """
+        if self.delimiter == ",":
+            return self._replace(marks=".")
+        rows = self.rows[first:]
+        cells = zip_longest(*(cells for _, cells in rows), fillvalue="")
+        columns = [[cell for cell in column if cell] for column in cells]
+        columns = [column for column in columns if all(readings(each, _MARKS) for each in column)]
+        possible = [mark for mark in _MARKS if all(_is_read(each, mark) for each in columns)]
+        used = [mark for mark in _MARKS if any(mark in "".join(each) for each in columns)]
+        even = all(len({mark in cell for cell in each}) < 2 for each in columns for mark in used)
+        alone = len(possible) == 2 and len(used) < 2 and even
+        if not alone and len(possible) != 1:
+            shown = [
+                next(
+                    f"line {line}, column {at}: {cell!r}"
+                    for line, cells in rows
+                    for at, cell in enumerate(cells, 1)
+                    if mark in cell and readings(cell, _MARKS)
+                )
+                for mark in used
+            ]
+            refuse(
+                f"{' and '.join(shown)}: it is not clear whether a comma or a point marks "
+                "decimals; write all numbers with the same decimal mark and without separators of "
+                "thousands"
+            )
+        return self._replace(marks="".join(used if alone else possible) or _MARKS)
+
+
+def readings(cell: str, marks: str) -> list[float]:
+    """Return the numbers that a cell may be if one of ``marks`` marks decimals."""
+    return [
+        float(cell.replace(thousands, "").replace(mark, "."))
+        for mark, thousands in (",.", ".,")
+        if mark in marks and any(pattern.fullmatch(cell) for pattern in _NUMBERS[mark])
+    ]
+
+
+def _is_read(cells: list[str], mark: str) -> bool:
+    """Return whether all cells are numbers, and either all or none separate their thousands."""
+    return any(all(map(pattern.fullmatch, cells)) for pattern in _NUMBERS[mark])
 
 
 def read_table(

@@ -236,3 +236,49 @@ def test_measured_points_are_no_law_of_a_wire(path: Path) -> None:
         cdsm.read_elasticity(path)
     with pytest.raises(cdsm.FileError, match="Fit it first: `cdsm fit`"):
         as_wire(str(path))  # as --wire does
+
+
+@pytest.mark.parametrize(
+    ("rows", "force"),
+    [
+        ("0,0833;1.100 0,1;1.200", [1100, 1200]),
+        ("0,08;998,5 0,09;1.004,25", [998.5, 1004.25]),
+        ("0.08;998.5 0.09;1,004.25", [998.5, 1004.25]),
+        ("0.08;998 0.09;1,004", [998, 1004]),
+        ("1;1.234.567 2;1.234.568", [1234567, 1234568]),
+        ("1;1,100 2;1,200", [1.1, 1.2]),
+        ("1;1.1E+03;9,5 2;1.2E+03;n/a", [1100, 1200]),
+    ],
+)
+def test_columns_tell_decimals_from_thousands(
+    rows: str, force: list[float], tmp_path: Path
+) -> None:
+    path = written(tmp_path, "Weg [mm];Kraft [N]\n" + rows.replace(" ", "\n"))
+    assert cdsm.read_tensile_csv(path, gauge_length=0.5).force.tolist() == force
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("0,0833;1.1052 0,1;1.2", "line 2, column 1: '0,0833' and line 2, column 2: '1.1052'"),
+        ("1,100;1.100 2,200;2.200", "same decimal mark"),
+        ("1,5;1 2.5;2", "line 2, column 1: '1,5' and line 3, column 1: '2.5'"),
+        ("1;998 2;1.004", "line 3, column 2: '1.004': it is not clear"),
+        ("0,1;998 0,2;0.999", "line 3, column 2: '0.999'"),
+        ("0,1;1200 0,2;1.300", "line 3, column 2: '1.300'"),
+    ],
+)
+def test_marks_that_stay_unclear_are_refused(rows: str, said: str, tmp_path: Path) -> None:
+    path = written(tmp_path, "Weg [mm];Kraft [N]\n" + rows.replace(" ", "\n"))
+    with pytest.raises(cdsm.TensileTestError) as caught:
+        cdsm.read_tensile_csv(path, gauge_length=0.5)
+    assert said in str(caught.value)
+
+
+def test_gauge_length_is_read_with_the_mark_of_the_points(tmp_path: Path) -> None:
+    title = "# gauge_length = 1.500 mm\nWeg [mm];Kraft [N]\n"
+    path = written(tmp_path, title + "0,1;1,5\n0,2;2,5\n")
+    assert cdsm.read_tensile_csv(path).gauge_length == 1.5
+    path = written(tmp_path, title + "1;1\n2;2\n")
+    with pytest.raises(cdsm.TensileTestError, match=r"'1\.500' 'mm' is not understood"):
+        cdsm.read_tensile_csv(path)

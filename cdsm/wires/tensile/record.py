@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NoReturn, final
 
 from cdsm.errors import InvalidInput, TensileTestError
-from cdsm.support.tables import Table, read_table
+from cdsm.support.tables import Table, read_table, readings
 from cdsm.support.validation import number_array, scalar, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.wires.tensile.columns import UNITS, USUAL, Column, Header, find_header
@@ -89,7 +89,8 @@ def read_tensile_csv(
     line. A strain in % or mm/mm is read where there is no displacement. Other columns are ignored.
 
     Commas, semicolons or tabs separate the columns. Decimal commas are allowed with semicolons and
-    tabs. The text is UTF-8, UTF-16 or Windows-1252. The gauge length may be given by a comment,
+    tabs. If both points and commas occur, one must separate thousands, and the numbers must show
+    which. The text is UTF-8, UTF-16 or Windows-1252. The gauge length may be given by a comment,
     ``# gauge_length = 500 mm``, or by a title line with ``Gauge length``, ``Einspannlänge`` or
     ``Messlänge``.
 
@@ -121,6 +122,7 @@ def read_tensile_csv(
     try:
         header, *read = find_header(table, columns)
         scales = [_scale(each, unit) for each, unit in zip(read, given, strict=True)]
+        table = table.with_decimal_mark(_refuse, header.first)
         displacement, force = (table.column(each.at, _bad_cell, header.first) for each in read)
         length = _gauge_length(table, header, gauge_length)
         if length is None and read[0].kind != "strain":
@@ -164,6 +166,10 @@ def _scale(column: Column, given: str | None) -> float:
     return known[unit]
 
 
+def _refuse(problem: str) -> NoReturn:
+    raise TensileTestError(f"{problem}.")
+
+
 def _bad_cell(problem: str) -> NoReturn:
     raise TensileTestError(
         f"{problem}; write one point per line, with a decimal point (a comma only where "
@@ -175,9 +181,8 @@ def _gauge_length(table: Table, header: Header, given: float | None) -> float | 
     """Return the gauge length [m], given or read from the file; None if there is none."""
     known = UNITS["displacement"]
     lengths = [] if given is None else [scalar("gauge_length", given)]
-    decimal_comma = table._replace(delimiter=";")
     for number, unit in _GAUGE.findall("\n".join(table.comments)):
-        value = decimal_comma.number(number)
+        value = _length(table, number)
         if math.isnan(value) or unit not in known:
             raise TensileTestError(
                 f"the gauge length {number!r} {unit!r} is not understood; write it with its unit: "
@@ -189,7 +194,7 @@ def _gauge_length(table: Table, header: Header, given: float | None) -> float | 
         for between, number, unit in _TITLE.findall("\n".join(titles)):
             before = re.findall(r"[\[(]\s*([^\W\d]+)\s*[\])]", between)
             unit = unit if unit in known else next(iter(before), "")
-            if unit in known and math.isfinite(value := decimal_comma.number(number)):
+            if unit in known and math.isfinite(value := _length(table, number)):
                 lengths.append(value * known[unit])
     if not lengths:
         return None
@@ -197,3 +202,9 @@ def _gauge_length(table: Table, header: Header, given: float | None) -> float | 
         listed = " and ".join(f"{1e3 * length:g} mm" for length in dict.fromkeys(lengths))
         raise TensileTestError(f"the gauge length is {listed}; give one, as gauge_length= [m].")
     return lengths[0]
+
+
+def _length(table: Table, text: str) -> float:
+    """Return the number of a gauge length; NaN if the marks of the table leave it unclear."""
+    found = set(readings(text, table.marks) or readings(text, ",."))
+    return found.pop() if len(found) == 1 else math.nan
