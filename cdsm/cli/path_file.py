@@ -30,7 +30,8 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
 
     The header names the columns and their units. Joint columns have the names of the joints of
     the arm; joints without a column stay at 0. Other columns are ignored, unless their names look
-    like typing errors: then FileError is raised. Lines that begin with # are comments.
+    like typing errors or like a joint that the arm does not have: then FileError is raised. Lines
+    that begin with # are comments.
     """
 
     def refuse(problem: str) -> NoReturn:

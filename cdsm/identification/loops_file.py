@@ -53,7 +53,8 @@ def read_loops(
 
     A cell of a joint, a cable, ``direction`` or ``minimum`` may be empty after the first line of a
     test. Lines that begin with # are ignored. Columns with other names are ignored too, unless a
-    name looks like a misspelling of one of these names: that is an error.
+    name looks like a misspelling of one of these names, or like a joint or cable that the arm does
+    not have: that is an error.
 
     Args:
         path: The file.

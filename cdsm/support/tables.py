@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
-from cdsm.errors import FileError
+from cdsm.errors import FileError, named
 from cdsm.support.files import read_text
 from cdsm.support.records import did_you_mean
 from cdsm.support.values import Array
@@ -24,6 +24,7 @@ ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
 
 _ALIKE = 0.8  # similarity of names that differ in one letter of five or more
+_NUMBERED = re.compile(r"[^\d]+(?=\d)")  # what is before the number of a name
 _TRIED = 500  # lines that tell the delimiter; titles are fewer
 
 
@@ -175,8 +176,9 @@ def named_columns(
     """Return index and unit of each column of a table, by name.
 
     A table may have other columns than the ``known`` ones. ``refuse`` raises an error if a name is
-    given twice or looks like a misspelt known name, if semicolons separate the columns, or if a row
-    has more cells than the header.
+    given twice, looks like a misspelt known name or begins like one up to its number (a joint that
+    the arm does not have), if semicolons separate the columns, or if a row has more cells than the
+    header.
     """
     if len(table.header) == 1 and ";" in table.header[0]:
         refuse("has its columns separated by semicolons; separate them by commas")
@@ -188,6 +190,7 @@ def named_columns(
                 "a point"
             )
     found: dict[str, tuple[int, str]] = {}
+    kinds = {begin[0] for each in known if (begin := _NUMBERED.match(each))}
     for at, cell in enumerate(table.header):
         name, unit = name_and_unit(cell)
         if name in found:
@@ -196,6 +199,9 @@ def named_columns(
         meant = "" if name in known else did_you_mean(name, as_long, _ALIKE)
         if meant:
             refuse(f"has a column {name}, which is not known{meant} Rename it")
+        begin = _NUMBERED.match(name)
+        if name not in known and begin and begin[0] in kinds:
+            refuse(f"has a column {name}, which is not known; there are {named(known)}")
         found[name] = at, unit
     return found
 

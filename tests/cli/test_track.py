@@ -138,13 +138,18 @@ def test_path_without_columns_is_named(files: tuple[Path, Path]) -> None:
     assert "path.csv: has columns for neither of joint angles" in shown.stderr
 
 
-def test_misspelt_columns_are_refused(files: tuple[Path, Path]) -> None:
+def test_misspelt_columns_and_unknown_joints_are_refused(
+    files: tuple[Path, Path],
+) -> None:
     path = files[1].read_text(encoding="utf-8")
     for old, new in (("joint2", "joint9"), ("\n", ",targt [N/mm]\n")):
         files[1].write_text(path.replace(old, new, 1), encoding="utf-8")
         shown = call("track", *files, "--stiffness", "z=15")
         assert shown.exit_code == 1
         assert "did you mean" in shown.stderr
+    files[1].write_text(path.replace("\n", ",joint3_1 [deg]\n", 1), encoding="utf-8")
+    shown = call("track", *files, "--stiffness", "z=15")
+    assert "has a column joint3_1, which is not known" in shown.stderr
     files[1].write_text(path.replace("\n", ",time [s]\n", 1), encoding="utf-8")
     assert read_path(files[1], cdsm.Manipulator.read(files[0])).angles is not None
 
