@@ -16,6 +16,7 @@ from lxml import etree
 from cdsm.errors import InvalidInput, UrdfError, listed
 from cdsm.geometry import MAXIMUM_JOINTS
 from cdsm.support.files import read_text
+from cdsm.support.records import misspelt
 from cdsm.support.validation import RANGES, flag
 from cdsm.support.xml import XmlFault, numbers, parse_xml
 
@@ -29,13 +30,37 @@ _INSTEAD = {
     "spherical": "write it as three revolute joints",
 }
 
-_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_ONCE = {
+    "link": ("inertial",),
+    "inertial": ("origin", "mass", "inertia"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
+}
+"""Elements that another element holds once at most."""
+
+_OTHERS = {
+    "robot": ("link", "joint", "material", "gazebo", "transmission"),
+    "link": ("visual", "collision"),
+    "joint": ("calibration", "dynamics", "safety_controller"),
+}
+"""Elements that may be repeated, or that cdsm does not read."""
+
+_ATTRIBUTES = {
+    "origin": ("xyz", "rpy"),
+    "mass": ("value",),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "parent": ("link",),
+    "child": ("link",),
+    "axis": ("xyz",),
+    "limit": ("lower", "upper", "effort", "velocity"),
+}
 
 _MOST_LINKS = 2000
 """Largest number of links, since Pinocchio compares the name of each link with all others."""
 
 _LONGEST_CHAIN = 400
 """Largest number of joints in series, fixed ones included; 4000 crash Pinocchio."""
+
+_ALIKE = 0.75  # similarity of a misspelt element; elements of other programs are less alike
 
 _LOOSE = 1e-2
 """Tolerance of the inertia check for rounded values, relative to the largest principal moment."""
@@ -70,6 +95,7 @@ def _faults(robot: etree._Element, check_inertia: bool) -> list[str]:
     faults = [*_names("link", links), *_names("joint", joints)]
     if not robot.get("name"):
         faults.append("<robot> has no name")
+    _check_elements(faults, "", robot)
     for link in links:
         _check_link(faults, link, check_inertia)
     for joint in joints:
@@ -82,6 +108,31 @@ def _faults(robot: etree._Element, check_inertia: bool) -> list[str]:
     if moving > 2 * MAXIMUM_JOINTS:
         faults.append(f"has {moving} joints that move; {2 * MAXIMUM_JOINTS} are taken at most")
     return faults or _tree_faults([str(link.get("name")) for link in links], joints)
+
+
+def _check_elements(faults: list[str], where: str, element: etree._Element) -> None:
+    """Find elements that are repeated, misspelt or for xacro, in ``element`` and what it holds.
+
+    Elements and attributes of other programs are no faults.
+    """
+    once = _ONCE.get(element.tag, ())
+    known = (*once, *_OTHERS.get(element.tag, ()))
+    for name, count in Counter(each.tag for each in element.iterchildren("*")).items():
+        own = etree.QName(name)
+        if "xacro" in (own.namespace or ""):
+            faults.append(f"{where}<xacro:{own.localname}> is left; run xacro on the file first")
+        elif name in once and count > 1:
+            faults.append(f"{where}has {count} <{name}>; one is needed")
+        elif meant := misspelt(name, known, _ALIKE):
+            faults.append(f"{where}<{name}> is not known{meant}")
+    for name, attributes in _ATTRIBUTES.items():
+        for part in element.findall(name):
+            for key in map(str, part.keys()):
+                if meant := misspelt(key, attributes):
+                    faults.append(f"{where}<{name}> has {key}, which is not known{meant}")
+    for part in element.iterchildren(*_ONCE):
+        within = f"{part.tag} {part.get('name')}: " if part.get("name") else where
+        _check_elements(faults, within, part)
 
 
 def _names(kind: str, elements: list[etree._Element]) -> list[str]:
@@ -107,7 +158,7 @@ def _check_link(faults: list[str], link: etree._Element, check_inertia: bool) ->
     if inertia is None:
         faults.append(f"{where}: <inertial> has no <inertia>")
         return
-    read = [_read(faults, f"{where}: {key}", inertia.get(key), 1) for key in _MOMENTS]
+    read = [_read(faults, f"{where}: {key}", inertia.get(key), 1) for key in _ATTRIBUTES["inertia"]]
     if check_inertia and None not in read:
         xx, xy, xz, yy, yz, zz = (each[0] for each in read if each is not None)
         moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -146,6 +197,9 @@ def _check_joint(faults: list[str], joint: etree._Element) -> None:
     if limit is None:
         faults.append(f"{where}: has no <limit>, which a {kind} joint needs")
         return
+    for key in ("effort", "velocity"):
+        if limit.get(key) is None:
+            faults.append(f'{where}: <limit> has no {key}; write {key}="0" if it is unknown')
     ends = [
         _read(faults, f"{where}: {key} limit", limit.get(key, "0"), 1) for key in ("lower", "upper")
     ]

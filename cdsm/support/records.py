@@ -207,6 +207,16 @@ def did_you_mean(key: str, known: Iterable[str], least: float = 0.6) -> str:
     return f"; did you mean {near[0]}?" if near and near[0] != key else ""
 
 
+def misspelt(name: str, known: Iterable[str], least: float = 0.6) -> str:
+    """Return :func:`did_you_mean` of a name that is not known; known ones are as long, but for one.
+
+    Unlike keys of cdsm's own files, longer or shorter names may be those of other programs.
+    """
+    known = tuple(known)
+    as_long = [each for each in known if abs(len(each) - len(name)) < 2]
+    return "" if name in known else did_you_mean(name, as_long, least)
+
+
 def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
     known = _keys(kind)
     listed: list[str] = []

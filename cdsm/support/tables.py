@@ -15,7 +15,7 @@ import numpy as np
 
 from cdsm.errors import FileError, named
 from cdsm.support.files import read_text
-from cdsm.support.records import did_you_mean
+from cdsm.support.records import misspelt
 from cdsm.support.values import Array
 
 _LONGEST_CELL = 1000  # maximum number of characters of a cell; numbers and names are shorter
@@ -195,9 +195,7 @@ def named_columns(
         name, unit = name_and_unit(cell)
         if name in found:
             refuse(f"has two columns called {name}; give each once")
-        as_long = [each for each in known if abs(len(each) - len(name)) < 2]
-        meant = "" if name in known else did_you_mean(name, as_long, _ALIKE)
-        if meant:
+        if meant := misspelt(name, known, _ALIKE):
             refuse(f"has a column {name}, which is not known{meant} Rename it")
         begin = _NUMBERED.match(name)
         if name not in known and begin and begin[0] in kinds:

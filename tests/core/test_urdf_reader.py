@@ -74,6 +74,20 @@ def test_generated_arms_pass() -> None:
         (changed('xyz="0 1 0"', 'xyz="0 nan 0"'), "it must be finite"),
         (changed('lower="-1"', 'lower="2"'), "joint j1: lower limit 2 above the upper one 1"),
         (changed('lower="-1"', 'lower="-inf"'), "j1: lower limit: '-inf' given"),
+        (changed("<axis", "<orgin/><axis"), "joint j1: <orgin> is not known; did you mean origin?"),
+        (
+            changed("<axis", '<origin rpy_="0 0 1"/><axis'),
+            "joint j1: <origin> has rpy_, which is not known; did you mean rpy?",
+        ),
+        (changed('xyz="0 1 0"', 'xzy="0 1 0"'), "joint j1: <axis> has xzy"),
+        (changed("<axis", "<origin/><origin/><axis"), "joint j1: has 2 <origin>; one is needed"),
+        (changed('<link name="a">', '<link name="a"><inertail/>'), "link a: <inertail> is not"),
+        (changed("<joint", '<jiont name="j0"/><joint'), "<jiont> is not known"),
+        (
+            changed("<link", '<xacro:arm xmlns:xacro="http://ros.org/wiki/xacro"/><link'),
+            "<xacro:arm> is left; run xacro",
+        ),
+        (changed(' effort="1"', ""), 'joint j1: <limit> has no effort; write effort="0"'),
         (
             changed('<limit lower="-1" upper="1" effort="1" velocity="1"/>', ""),
             "j1: has no <limit>",
@@ -122,6 +136,13 @@ def test_faults_are_named(text: str, said: str) -> None:
         read_urdf(text)
     assert said in str(caught.value)
     assert len(str(caught.value)) < 4000
+
+
+def test_elements_of_other_programs_are_no_faults() -> None:
+    others = changed("<axis", '<dynamics damping="1"/><drive kind="belt"/><axis')
+    others = others.replace("<link", '<gazebo/><ros2_control name="r"/><link', 1)
+    others = others.replace("effort=", 'command_effort="2" gear_velocity="3" effort=')
+    assert read_urdf(others) == others
 
 
 def test_billion_laughs_are_not_expanded() -> None:
