@@ -84,7 +84,7 @@ def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
     search = find_rest(loaded, loaded.at(pose, F))
     K = search.state.K
     if not search.converged:
-        raise no_rest(pose, K.posture, K.residual.copy(), 0.0)
+        raise no_rest(pose, search, 0.0)
     loaded.require_domains(K.tension)
     return K
 

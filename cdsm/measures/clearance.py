@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,9 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 
 KINDS = ("cable_clearance", "link_clearance", "disk_clearance")
 """Names of the clearances, in the order of the columns of the kernel's result."""
+
+_BESIDE = np.array([1.0, 0.5, 0.5])
+"""Diameters of cables between the axes of two cables, and between an axis and a link or disk."""
 
 _BACKBONE = 0.2
 """Radius of a link's backbone, divided by the hole radius of its first disk, as in the URDF."""
@@ -95,15 +98,14 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
     """
     arm = instance("pose", pose, Posture).arm
     d = quantity("diameter", diameter, "diameter", zero=True)
-    found, nearest = _rows(arm, pose.q[None], 1)
+    distance, nearest = _rows(arm, pose.q[None], d, 1)
+    cables, links, disks = distance[0].tolist()
     shape = _shape(arm)
-    cables, links, disks = (found[0] - d * np.array([1.0, 0.5, 0.5])).tolist()
+    segments = [arm.cables[c].name for c in shape.segment[:, 0]]
     names = [
-        ("", "") if second < 0 else (arm.cables[shape.segment[first, 0]].name, other[second])
+        ("", "") if second < 0 else (segments[first], other[second])
         for (first, second), other in zip(
-            nearest[0].tolist(),
-            ([arm.cables[c].name for c in shape.segment[:, 0]], shape.bone_names, shape.disk_names),
-            strict=True,
+            nearest[0].tolist(), (segments, shape.bone_names, shape.disk_names), strict=True
         )
     ]
     return Clearance(
@@ -128,8 +130,8 @@ def clearances(
     """
     angles = postures(instance("arm", arm, Manipulator), q)
     d = quantity("diameter", diameter, "diameter", zero=True)
-    found, _ = _rows(arm, angles, checked_threads(threads))
-    return {kind: found[:, i] - d * (1.0 if i == 0 else 0.5) for i, kind in enumerate(KINDS)}
+    distance, _ = _rows(arm, angles, d, checked_threads(threads))
+    return dict(zip(KINDS, distance.T.copy(), strict=True))
 
 
 class _Shape(NamedTuple):
@@ -146,17 +148,16 @@ class _Shape(NamedTuple):
     disk_names: list[str]
 
 
-def _rows(arm: Manipulator, q: Array, threads: int) -> tuple[Array, Indices]:
+def _rows(arm: Manipulator, q: Array, diameter: float, threads: int) -> tuple[Array, Indices]:
+    """Compute the distances of :data:`KINDS` (B, 3) [m], and the nearest bodies (B, 3, 2)."""
     distance, nearest = np.empty((len(q), 3)), np.empty((len(q), 3, 2), dtype=np.intp)
     shape = _shape(arm)
 
     def fill(part: slice) -> None:
-        bodies: tuple[Any, ...] = arm._model.tree, *shape[:7]
-        arguments = *bodies, q[part], distance[part], nearest[part]
-        clearance_rows(*arguments)
+        clearance_rows(arm._model.tree, *shape[:7], q[part], distance[part], nearest[part])
 
     run_slices(fill, len(q), 1, threads)
-    return distance, nearest
+    return distance - diameter * _BESIDE, nearest
 
 
 @lru_cache(maxsize=8)

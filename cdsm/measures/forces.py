@@ -18,7 +18,7 @@ from cdsm.errors import InvalidInput, SolverError
 from cdsm.measures.hull import hull_of
 from cdsm.measures.program import Loads
 from cdsm.posture import Posture
-from cdsm.support.format import key, plain
+from cdsm.support.format import coordinates, key, plain
 from cdsm.support.validation import NO_WRENCH, instance, number_array, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import bounds_at, distribute_tension
@@ -115,10 +115,9 @@ class ForcePolytope(ReadOnlyState):
         )
 
     def __str__(self) -> str:
-        x, y, z = self.worst_direction
         return (
             f"{len(self.vertices)} vertices; holds {self.margin():.4g} N in any direction, least "
-            f"along ({x:.3g}, {y:.3g}, {z:.3g})"
+            f"along {coordinates(self.worst_direction, '.3g')}"
         )
 
 

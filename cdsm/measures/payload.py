@@ -25,7 +25,6 @@ from cdsm.tension import bounds_at, distribute_tension
 
 PayloadLimit = Literal["tension", "deflection", "stability", "elasticity", "none"]
 
-
 _AROUND: Final = np.array([u for u in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(u)])
 """Directions in which the worst payload is searched for loads that buckle the arm (26, 3)."""
 
@@ -132,8 +131,8 @@ def payload(
         }
     known = min(limits.values())
     u, failing, kind = _until_unstable(K, u, known, low, high, worst=direction is None)
-    limits |= {"stability": failing if kind == "buckling" else math.inf}
-    limits |= {"elasticity": failing if kind == "elasticity" else math.inf}
+    limits["stability"] = failing if kind == "buckling" else math.inf
+    limits["elasticity"] = failing if kind == "elasticity" else math.inf
     reason = min(limits, key=lambda name: limits[name])
     force = max(limits[reason], 0.0)
     return Payload(
@@ -165,10 +164,8 @@ def _worst(
     softest = _ratio(allowed, math.sqrt(max(float(values[-1]), 0.0)))
     if softest >= tension:
         u = polytope.worst_direction
-        return u, {
-            "tension": tension,
-            "deflection": _ratio(allowed, float(np.linalg.norm(compliance @ u))),
-        }
+        deflection = _ratio(allowed, float(np.linalg.norm(compliance @ u)))
+        return u, {"tension": tension, "deflection": deflection}
     u = vectors[:, -1]
     slopes = polytope.normals @ u
     facing = slopes > 0.0

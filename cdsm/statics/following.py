@@ -76,14 +76,14 @@ def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Ite
     K_θ of the joints off their stops is checked at points along the path: an arm that snaps through
     has an unstable posture there, over which the search may have stepped.
     """
-    path = search.state.q - start.q
+    path = search.state.pose.q - start.pose.q
     length = float(abs(path).max())
     if length > _FAR:
         return False
     free = np.flatnonzero(~search.at_stop)
     for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
         try:
-            K = loaded.moved(start.q + part * path, start).stiffness
+            K = loaded.moved(start.pose.q + part * path, start).stiffness
         except CableError:
             return False
         if eigenvalues(K, free).min(initial=math.inf) <= 0.0:

@@ -37,11 +37,6 @@ class Settled(NamedTuple):
     stiffness: Array  # ∂r/∂q (nv, nv) [N m/rad]
     slope: Array  # ∂T/∂q (S, nv) [N/rad]
 
-    @property
-    def q(self) -> Array:
-        """Joint angles (nv,) [rad]."""
-        return self.pose.q
-
     def holding_back(self, torque: Array | float) -> Settled:
         """Return this state with ``self.torque`` = r − ``torque`` (nv,) [N m].
 
@@ -54,14 +49,10 @@ class FrictionalArm(NamedTuple):
     """Arm with friction under a wrench; its methods compute its state at other joint angles."""
 
     problem: ChainProblem
-    limits: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]
+    stops: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]
     natural: Array  # natural length of each segment before the move (S,) [m]
     wrench: Array  # W (6,): force [N], then moment [N m]
     forced: Array  # tension of force-controlled cables (C,) [N]; NaN: position-controlled
-
-    def stops(self) -> tuple[Array, Array]:
-        """Return the lowest and highest angles (nv,) [rad], at which joints rest on stops."""
-        return self.limits
 
     def moved(self, q: Array, near: Settled) -> Settled:
         """Compute the state at joint angles ``q`` (nv,) [rad]; ``near`` is a state close to it.
@@ -69,7 +60,7 @@ class FrictionalArm(NamedTuple):
         Raises CableError if two sites coincide.
         """
         pose = near.pose.arm.at(q, check_limits=False)
-        return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.q), 0.0))
+        return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.pose.q), 0.0))
 
     def settled(self, pose: Posture, near: Array) -> Chain:
         """Compute the tensions and slips of all segments at a posture.

@@ -97,10 +97,7 @@ class LoadingPath:
                 elif part > _SHORTEST * longest:
                     part /= 2.0
                 else:
-                    left = np.where(search.at_stop, 0.0, search.state.torque)
-                    raise no_rest(
-                        pose, search.state.pose, left, reached, f"the step to load {k + 1}"
-                    )
+                    raise no_rest(pose, search, reached, f"the step to load {k + 1}")
             last.append(len(rests) - 1)
         return cls(loading, tension, start, tuple(rests), tuple(last))
 
@@ -149,7 +146,7 @@ class LoadingPath:
             near = state.settled
             share = (holding @ state.load.holding) / (holding @ holding) if holding.any() else 0.0
             arm = loading.arm(natural, state.load.wrench, motors)
-            beside = pose.arm.at(near.q, check_limits=False)
+            beside = pose.arm.at(near.pose.q, check_limits=False)
             chain = arm.settled(beside, near.chain.tension)
             moved = give @ (arm.residual(beside, chain.tension) - share * start.load.holding)
             natural = chain.natural + left @ moved

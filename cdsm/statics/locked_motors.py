@@ -35,9 +35,9 @@ class Iterate(NamedTuple):
     rounding: Array  # rounding of r (nv,) [N m]
 
     @property
-    def q(self) -> Array:
-        """Joint angles (nv,) [rad]."""
-        return self.K.posture.q
+    def pose(self) -> Posture:
+        """The posture."""
+        return self.K.posture
 
     @property
     def stiffness(self) -> Array:
@@ -74,6 +74,7 @@ class LoadedArm:
         self.reference = reference
         self.tension = tension
         self.wrench = wrench
+        self.stops = stops(reference)
         laws, L = reference.arm._model.laws, reference.cable_lengths if lengths is None else lengths
         self._free_length = laws.original_lengths(L, tension)
         self._laws = []
@@ -102,10 +103,6 @@ class LoadedArm:
         pose = self.reference.arm.at(q, check_limits=False)
         longer = pose.cable_lengths - before.posture.cable_lengths
         return self.at(pose, before.tension + before.cable_stiffness * longer)
-
-    def stops(self) -> tuple[Array, Array]:
-        """Return the lowest and highest angles (nv,) [rad], at which joints rest on stops."""
-        return stops(self.reference)
 
     def require_domains(self, tension: Array) -> None:
         """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws."""

@@ -7,6 +7,8 @@ included.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,11 +20,10 @@ from cdsm.statics.trust_region import RestSearch, find_rest
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import place
 from cdsm.support.validation import wrench_vector
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import frozen
 from cdsm.tension import Tension
 
 _SMALLEST_STEP = 2.0**-6  # smallest load step that is tried
-
 
 _CLOSE = 1e-3
 """Two sites of a cable meet if their distance is below this part of the reference distance."""
@@ -73,8 +74,7 @@ def equilibrium(
         elif step > _SMALLEST_STEP:
             step /= 2.0
         else:
-            residual = np.where(search.at_stop, 0.0, search.state.torque)
-            raise no_rest(pose, search.state.K.posture, residual, reached)
+            raise no_rest(pose, search, reached)
 
 
 def require_between_stops(pose: Posture) -> None:
@@ -114,15 +114,16 @@ def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> 
 
 
 def no_rest(
-    reference: Posture, pose: Posture, residual: Array, reached: float, load: str = "the load"
+    reference: Posture, search: RestSearch[Any], reached: float, load: str = "the load"
 ) -> EquilibriumError:
     """Return the error of a search that found no equilibrium beyond a part ``reached`` of ``load``.
 
-    ``residual`` (nv,) is the torque out of balance at ``pose``, the last iterate. The error names
-    the joint where it is largest, and a cable if two neighbouring sites meet: at ``pose`` they are
-    1000 times nearer to each other than at ``reference``.
+    The error has the torque out of balance at the last iterate. It names the joint where it is
+    largest, and a cable if two neighbouring sites meet: they are 1000 times nearer to each other
+    than at ``reference``.
     """
-    frozen(residual)
+    pose = search.state.pose
+    residual = frozen(np.where(search.at_stop, 0.0, search.state.torque))
     worst = int(abs(residual).argmax())
     joint = pose.arm.joint_names[worst]
     problem = (

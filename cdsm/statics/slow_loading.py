@@ -15,6 +15,7 @@ sub-step by Simpson's rule. A sub-step is halved until both sides agree.
 
 from __future__ import annotations
 
+import operator
 from typing import NamedTuple
 
 import numpy as np
@@ -84,13 +85,7 @@ class Passage(NamedTuple):
 
     def joined(self, other: Passage) -> Passage:
         """Return the sum of this passage and ``other``, which follows it."""
-        return Passage(
-            self.load_work + other.load_work,
-            self.motor_work + other.motor_work,
-            self.stored + other.stored,
-            self.dissipated + other.dissipated,
-            self.slip + other.slip,
-        )
+        return Passage(*map(operator.add, self, other))
 
 
 class SlowLoading(NamedTuple):
@@ -98,7 +93,7 @@ class SlowLoading(NamedTuple):
 
     problem: ChainProblem
     start: Indices  # first segment of each cable, and the number of segments (C+1,)
-    limits: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]
+    stops: tuple[Array, Array]  # lowest and highest angles (nv,) [rad]
     forced: NDArray[np.bool_]  # whether the motor of each cable holds the tension (C,)
     reference: Posture
     accuracy: float  # largest part of the work of a step that may stay unaccounted for
@@ -139,8 +134,7 @@ class SlowLoading(NamedTuple):
                     reached, part = goal, 2.0 * part
                     continue
             elif part <= _SHORTEST:
-                residual = np.where(search.at_stop, 0.0, search.state.torque)
-                raise no_rest(self.reference, search.state.pose, residual, reached, what)
+                raise no_rest(self.reference, search, reached, what)
             part = (goal - reached) / 2.0
         self._require_domains(state, what)
         return state, total
@@ -162,7 +156,7 @@ class SlowLoading(NamedTuple):
         ``natural`` (S,) [m] are the natural lengths of its segments before wire slips.
         """
         forced = np.where(self.forced, motors, np.nan)
-        return FrictionalArm(self.problem, self.limits, natural, wrench, forced)
+        return FrictionalArm(self.problem, self.stops, natural, wrench, forced)
 
     def rest(
         self, before: State, load: Load, motion: Array | None = None
@@ -185,7 +179,7 @@ class SlowLoading(NamedTuple):
         if not search.converged:
             return None, search
         reaction = np.where(search.at_stop, search.state.torque, 0.0)
-        return State(load, search.state, reaction, search.state.q - old.q), search
+        return State(load, search.state, reaction, search.state.pose.q - old.pose.q), search
 
     def _energies(self, start: State, middle: State, end: State) -> tuple[Passage, float]:
         """Return energies and slips of a sub-step, and the rounding error of its balance [J].
@@ -200,7 +194,7 @@ class SlowLoading(NamedTuple):
         half, other = middle.settled.chain.slip, end.settled.chain.slip
         before, after = self._stored(start), self._stored(end)
         passage = Passage(
-            load_work=_work(torque, [s.settled.q for s in states]),
+            load_work=_work(torque, [s.pose.q for s in states]),
             motor_work=_work([p[first] for p in P], wire),
             stored=after - before,
             dissipated=_dissipated([np.append(np.diff(p), 0.0) for p in P], half, other),
@@ -224,7 +218,7 @@ def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> S
     Its torque is r − ``holding``.
     """
     try:
-        return arm.moved(np.clip(old.q + motion, *arm.limits), old).holding_back(holding)
+        return arm.moved(np.clip(old.pose.q + motion, *arm.stops), old).holding_back(holding)
     except CdsmError:
         return None
 
@@ -237,7 +231,7 @@ def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Arra
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
         near = start._replace(slope=old.slope)
-        guess = arm.moved(np.clip(old.q + step, *arm.limits), near).holding_back(holding)
+        guess = arm.moved(np.clip(old.pose.q + step, *arm.stops), near).holding_back(holding)
     except (CdsmError, np.linalg.LinAlgError):  # sites meet, or about to buckle
         return start
     return guess if np.linalg.norm(guess.torque) < np.linalg.norm(start.torque) else start

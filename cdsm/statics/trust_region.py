@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError
+from cdsm.posture import Posture
 from cdsm.support.values import Array
 
 _ATTEMPTS = 200
@@ -44,8 +45,8 @@ class Iterate(Protocol):
     """State of an arm at one posture, balanced or not, as :func:`find_rest` needs it."""
 
     @property
-    def q(self) -> Array:
-        """Joint angles (nv,) [rad]."""
+    def pose(self) -> Posture:
+        """The posture."""
 
     @property
     def torque(self) -> Array:
@@ -78,8 +79,9 @@ class Loaded(Protocol[State]):
         Raises CableError if two sites coincide.
         """
 
+    @property
     def stops(self) -> tuple[Array, Array]:
-        """Return the lowest and highest angles (nv,) [rad], at which joints rest on stops."""
+        """Lowest and highest angles (nv,) [rad], at which joints rest on stops."""
 
 
 class RestSearch(NamedTuple, Generic[State]):
@@ -106,7 +108,7 @@ class _Free(NamedTuple):
 
     @classmethod
     def of(cls, state: Iterate, lower: Array, upper: Array) -> _Free:
-        q, torque, rounding = state.q, state.torque, state.rounding
+        q, torque, rounding = state.pose.q, state.torque, state.rounding
         # a stop can push, but not pull
         at_stop = ((q <= lower) & (torque > rounding)) | ((q >= upper) & (torque < -rounding))
         indices = np.flatnonzero(~at_stop)
@@ -131,13 +133,13 @@ def find_rest(
     ``holding`` is (nv,) [N m]. A joint at a stop need not be balanced: the stop gives the missing
     torque.
     """
-    stops = loaded.stops()
+    stops = loaded.stops
     state, radius = start.holding_back(holding), _FIRST
     free = _Free.of(state, *stops)
     history, convex = [free.imbalance], free.lowest > free.flat
     for iteration in range(_ATTEMPTS):
         done = free.balanced and free.lowest >= -free.flat
-        q, expected = (state.q, 0.0) if done else _trial(state, free, stops, radius)
+        q, expected = (state.pose.q, 0.0) if done else _trial(state, free, stops, radius)
         # balanced at a saddle, and the stops bar every way down
         if done or (free.balanced and expected == 0.0):
             return RestSearch(state, free.at_stop, tuple(history), iteration, True, convex)
@@ -149,7 +151,7 @@ def find_rest(
             quality = work(state, trial) / expected
         except CdsmError:  # for example, two sites of a cable coincide
             quality = -math.inf
-        length = float(np.linalg.norm(q - state.q))
+        length = float(np.linalg.norm(q - state.pose.q))
         if quality < _POOR:
             radius = length / 4.0
         elif quality > _GOOD and length > 0.8 * radius:
@@ -163,7 +165,7 @@ def find_rest(
 
 def work(before: Iterate, after: Iterate) -> float:
     """Compute the work ∫ r·dq [J] of the residual torque from ``before`` straight to ``after``."""
-    step = after.q - before.q
+    step = after.pose.q - before.pose.q
     change = step @ before.stiffness @ step - step @ after.stiffness @ step
     return float((before.torque + after.torque) @ step / 2.0 + change / 12.0)
 
@@ -177,10 +179,10 @@ def _trial(
     """
     # at a saddle r is rounding and must not decide the way to leave it
     torque, signs = (0.0 * state.torque, (1.0, -1.0)) if free.balanced else (state.torque, (1.0,))
-    q, expected = state.q, 0.0
+    q, expected = state.pose.q, 0.0
     for sign in signs:
         end = _descend(state, torque, free, stops, radius, sign)
-        change = end - state.q
+        change = end - state.pose.q
         predicted = float(change @ torque + change @ state.stiffness @ change / 2.0)
         if predicted < expected * (1.0 + 1e-9):  # if equal, keep the first
             q, expected = end, predicted
@@ -207,9 +209,9 @@ def _descend(
     The path from ``state`` is at most ``radius`` [rad] long. ``torque`` is r at ``state``; if it is
     zero, ``sign`` (±1) chooses between the two opposite ways down.
     """
-    (lower, upper), q, indices, spectrum = stops, state.q.copy(), free.indices, free.spectrum
+    (lower, upper), q, indices, spectrum = stops, state.pose.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:
-        r = torque + state.stiffness @ (q - state.q)
+        r = torque + state.stiffness @ (q - state.pose.q)
         K = state.stiffness[np.ix_(indices, indices)]
         step = _step(r[indices], K, *spectrum, radius, sign)
         stop = np.where(step > 0.0, upper[indices], lower[indices])

@@ -183,7 +183,7 @@ def test_last_steps_converge_quadratically(name: str, moment: bool) -> None:
         start = loaded.at(pose.arm.at(rest.pose.q + distance * way), rest.tension)
         search = trust_region.find_rest(loaded, start)
         assert search.converged
-        np.testing.assert_allclose(search.state.q, rest.pose.q, atol=1e-10)
+        np.testing.assert_allclose(search.state.pose.q, rest.pose.q, atol=1e-10)
         first.append(search.history[:2])
     before, after = np.log2(first).T
     np.testing.assert_allclose(np.diff(after) / np.diff(before), 2.0, atol=0.1)
