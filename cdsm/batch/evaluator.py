@@ -173,7 +173,11 @@ class Evaluator:
         out: Array,
         balance: Balance | None = None,
     ) -> None:
-        """Fill status and outputs of the postures ``rows``; if bounds are given, guess tensions."""
+        """Compute the quantities ``wanted`` of the postures ``rows``, which may have bounds.
+
+        Fills the status ``found`` (b,) and the values ``out`` (b, …). With bounds the tensions are
+        guessed and proved; ``balance`` keeps the balance of the postures without proof.
+        """
         balance = balance or self._empty_balance(0)
         read, (nv, width) = wanted > layout.STUCK_JOINT, (self._arm.nv, self._block)
         stuck = np.isin(wanted, STUCK)

@@ -40,8 +40,8 @@ class Command(typer.core.TyperCommand):
 def as_command(function: Callable[..., None]) -> Callable[..., None]:
     """Return a function as typer needs it: one parameter per option, and errors as messages.
 
-    typer reads options only from the signature. Options that several commands share are the fields
-    of a dataclass. In the signature, these fields replace the parameter of this dataclass.
+    typer reads options only from the signature. A parameter whose type is a dataclass holds options
+    that several commands share. In the signature, the fields of the dataclass replace it.
     """
     groups: dict[str, Any] = {}
     options: list[inspect.Parameter] = []

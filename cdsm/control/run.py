@@ -42,7 +42,7 @@ class TrackingRun(ReadOnlyState):
     There are n steps, C cables and D wanted directions. With friction, the true stiffness of a
     state is the frictionless stiffness at the equilibrium that the arm would have without friction,
     with the same wire and load. It is NaN if there is no such equilibrium. :meth:`hung_weight`
-    measures this stiffness, since it shakes the load.
+    measures this stiffness: it shakes the load, which ends the effect of friction.
 
     Attributes:
         plan: The plan that was followed.
@@ -54,8 +54,8 @@ class TrackingRun(ReadOnlyState):
         angles: True joint angles (n, nv) [rad]; [m] for prismatic joints.
         estimated_angles: Angles that the controller estimated before each step (n, nv) [rad].
         tips: True tip positions (n, 3) [m].
-        wanted_tension: Reference values of the tensions at the motors (n, C) [N].
-        commanded_tension: Tensions that correspond to the commands (n, C) [N], within the bounds.
+        wanted_tension: Tensions at the motors that the outer loop wants (n, C) [N].
+        commanded_tension: Tensions that the motor commands give (n, C) [N], within the bounds.
         commanded_wire: Commanded wire to pay out (n, C) [m].
         measured_tension: Readings of the load cells before each step (n, C) [N].
         tension: True tensions at the motors (n, C) [N].
@@ -66,8 +66,7 @@ class TrackingRun(ReadOnlyState):
         felt: Stiffness measured with the motors along each direction (n, D) [N/m]; NaN at steps
             without such a measurement, or if it failed.
         banded: Whether a band was computed (n,).
-        band: Least and largest proved displacement along the first direction (n, 2) [m], from the
-            equilibrium without friction; NaN where no band was computed or proved.
+        band: Proved bounds of ``displacement`` (n, 2) [m]; NaN where none were computed or proved.
         displacement: Displacement of the tip from the equilibrium without friction along the first
             direction (n,) [m].
         wrench: Load (n, 6): force [N], then moment [N m].

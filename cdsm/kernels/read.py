@@ -1,4 +1,4 @@
-"""Readings of K_θ by name, of one posture or of blocks of postures."""
+"""Compute readings of K_θ (numbers such as ``along``), at one posture or in blocks of postures."""
 
 from __future__ import annotations
 

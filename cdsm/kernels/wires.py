@@ -1,7 +1,7 @@
 """Kernels of the rigidity EA(F) of wires: linear laws, polynomials on intervals, and tables.
 
-:mod:`cdsm.wires.quadrature` and :mod:`cdsm.wires.rising_curve` give the same bits, but take one law
-at a time and twice as long.
+:mod:`cdsm.wires.quadrature` and :mod:`cdsm.wires.rising_curve` give the same bits, but one law at a
+time and half as fast.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Solutions of inverse kinematics.
 
 All solutions are within the joint limits. If disks touch at a limit and their holes coincide, a
-cable has no direction. Solutions then end at 1 − 1e-5 times the limit.
+cable has no direction. The limit is then reduced by the factor
+1 − 1e-5.
 """
 
 from __future__ import annotations

@@ -43,13 +43,13 @@ class Prototype:
             configuration is assumed to be the posture of Table II.
         angle_2: Joint angle 2 of the second configuration [rad].
         angle_3: Joint angle 3 of the second configuration [rad].
-        spring_ratio: Stiffest divided by softest hybrid cable stiffness [-]; Fig. 11 is only a
-            picture.
-        hybrid_tension: Tension in Fig. 13 and in the accuracy check [N]. The cables of the check
-            are assumed to be the hybrid ones of 1.89 N/mm.
+        spring_ratio: Stiffest divided by softest stiffness of the hybrid cables (strand and spring)
+            [-]; Fig. 11 gives no numbers.
+        hybrid_tension: Tension in Fig. 13 and in the accuracy check [N]. We assume that the
+            check uses the hybrid cables of 1.89 N/mm.
         highest_hybrid_tension: Highest tension in Fig. 12 [N]; the lowest is 3 N, as in Table II.
-        disk_ratio: Disk offset divided by hole radius [-]. At tan 15° disks touch at ±30°, the
-            stated joint limit.
+        disk_ratio: Disk offset divided by hole radius [-]. If it is tan 15°, disks touch at ±30°,
+            the stated joint limit.
         level_2: Tension of row 2 of Table II [N]. Row 1 is at 3 N, row 5 at 86 N.
         level_3: Tension of row 3 of Table II [N].
         level_4: Tension of row 4 of Table II [N].

@@ -210,7 +210,7 @@ class PrototypeFigure(Figure):
     """Residuals of all numbers of Section V for the identified prototypes.
 
     Attributes:
-        fits: Prototype identified at each step.
+        fits: Identified prototypes, one for each step of the identification.
     """
 
     fits: tuple[PrototypeFit, ...]

@@ -68,7 +68,7 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Restrict ``region``, of ``sample``, to tensions within the rate from those of ``other``.
+        """Keep the tensions of ``region`` at ``sample`` that the rate allows from ``other``.
 
         If ``other`` is None, ``region`` is returned. The result is None if no tensions remain.
         """

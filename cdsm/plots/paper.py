@@ -234,7 +234,7 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
 
 
 def _draw_curve(axes: Any, curve: paper.Curve, values: Array, **line: Any) -> None:
-    """Draw a stiffness (N,) [N/m] against the mean tension of ``curve``; bars show the range."""
+    """Draw a stiffness (N,) [N/m] against the mean tension; bars show the range of tensions."""
     low, mean, high = curve.tension.T
     axes.plot(mean, N_PER_MM * values, **line)
     some = np.linspace(0, len(mean) - 1, _BARS).round().astype(int)

@@ -122,14 +122,14 @@ _ROOT = 2e-13  # relative error of a tension that is computed from the elongatio
 
 
 class Neighbourhood:
-    """The arm near the posture of a stiffness K, with its motors locked there.
+    """The arm near the posture at which K was computed, with its motors locked there.
 
     ``places`` (P, nv) are joint displacements from the posture in units of :attr:`unit`, so all
-    derivatives with respect to them are in N m.
+    derivatives of the potential U with respect to them are in N m.
 
     Attributes:
-        locked: The position-controlled cables, except slack cables without stiffness (at some
-            equilibria): a small motion does not tension them.
+        locked: The position-controlled cables, except cables so slack that a small motion does not
+            tension them.
         unit: 1 rad for each revolute joint, the arm's length for each prismatic joint (nv,).
     """
 

@@ -37,7 +37,7 @@ def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
 
 
 def _neighbours(values: Array) -> Array:
-    """Sum the values (n,) over the points around each point; the ends are reflected."""
+    """Sum values (n,) over the NEAR points around each point, itself included; reflect the ends."""
     near = min(NEAR, len(values))
     padded = np.pad(values, (near // 2, near - 1 - near // 2), mode="reflect")
     return np.convolve(padded, np.ones(near), mode="valid")
