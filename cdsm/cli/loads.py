@@ -44,7 +44,11 @@ def weigh(
         raise misuse("--force", "give it or --mass: the weight.")
     pose = arm.at(angles)
     tension = tensions.distribute(pose, wrench_of(wrench))
-    test = cdsm.weight_test(pose, tension, weight.vector(pose.arm), steps=steps)
+    force = weight.vector(pose.arm)
+    if not force.any():
+        said = "is zero; nothing moves, and there is nothing to measure."
+        raise cdsm.InvalidInput(weight.option, said)
+    test = cdsm.weight_test(pose, tension, force, steps=steps)
     write_picture(figure, test.plot)
     without = " without friction" if pose.arm.has_friction else ""
     loaded = f"at the full load{without}:\n{test.loaded[-1]}"
@@ -93,8 +97,8 @@ def buckle(
         multiplied = [0.0] * 6 if load is None else numbers("--load", load, 6, "FX,...,MZ")
         multiplied[:3] += weight.vector(pose.arm)
         if not any(multiplied):
-            option = "--force" if weight.mass is None else "--mass"
-            raise cdsm.InvalidInput(option, "is zero, and so is any multiple of it; give a load.")
+            said = "is zero, and so is any multiple of it; give a load."
+            raise cdsm.InvalidInput(weight.option, said)
         least = 10.0 if min_tension is None else min_tension
         most = math.inf if max_tension is None else max_tension
         low = (least,)

@@ -16,6 +16,8 @@ from cdsm.cli.output import Json, answer
 from cdsm.cli.values import gravity_of, misuse, numbers
 
 _kind = {"rich_help_panel": "The kind of arm: one of them"}
+_OTHER_WIRES = "Or give EA in N; later commands take --wire WIRE.toml, which replaces it."
+
 _size = {"rich_help_panel": "Its sizes"}
 
 
@@ -98,7 +100,7 @@ def new(
     try:
         law: str | float = float(wire)
     except ValueError:
-        law = one_of("wire", wire, WIRES)
+        law = one_of("wire", wire, WIRES, _OTHER_WIRES)
     counts = [universal or hinged or 0]
     if sections is not None:
         counts = [round(count) for count in numbers("--sections", sections)]

@@ -245,13 +245,21 @@ class WeightOptions:
         """Whether a force or a mass is given."""
         return self.force is not None or self.mass is not None
 
+    @property
+    def option(self) -> str:
+        """Name of the option to which a message about the load belongs."""
+        return "--force" if self.mass is None else "--mass"
+
     def vector(self, arm: cdsm.Manipulator) -> Array:
         """Return --force plus the weight of --mass (3,) [N]."""
         import numpy as np
 
+        from cdsm.support.validation import number_array
+
         force = np.zeros(3)
         if self.force is not None:
-            force += numbers("--force", self.force, 3, "FX,FY,FZ")
+            given = numbers("--force", self.force, 3, "FX,FY,FZ")
+            force += number_array("--force", given, "force")
         if self.mass is not None:
             if not arm.gravity.any():
                 raise misuse("--mass", "has no weight without gravity.")

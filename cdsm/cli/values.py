@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import typer
@@ -102,7 +103,8 @@ def numbers(option: str, text: str, count: int | None = None, form: str = "N,N,.
     from cdsm.support.format import plural
 
     values = []
-    for word in text.replace(",", " ").split():
+    between = [""] if "," in text else []  # an empty entry between two commas is told
+    for word in chain.from_iterable(part.split() or between for part in text.split(",")):
         try:
             values.append(float(word))
         except ValueError:

@@ -251,7 +251,8 @@ def _native(name: str, value: ArrayLike) -> Array:
             name, f"a {type(value).__name__} given; give its numbers alone, in order, as an array."
         )
     if array.dtype.kind not in "iuf":
-        raise InvalidInput(name, f"holds {array.dtype} entries; real numbers are needed.")
+        such = "".join(f", such as {each!r:.60}" for each in array.ravel()[:1].tolist())
+        raise InvalidInput(name, f"holds {array.dtype} entries{such}; real numbers are needed.")
     if array.dtype == np.float64:
         return np.array(array, order="C")
     with np.errstate(over="ignore"):  # numbers beyond float64 become inf, which is refused later

@@ -693,7 +693,7 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
     "q ragged": (lambda: cdsm.evaluate(ARM, [[0.0], [0.0, 1.0]], F), ("q: is not an array",)),
     "q masked": (lambda: cdsm.evaluate(ARM, np.ma.masked_array(Q, Q > 0), F), ("q: is a masked",)),
     "q complex": (lambda: cdsm.evaluate(ARM, Q + 0j, F), ("q: holds complex128",)),
-    "q None": (lambda: cdsm.evaluate(ARM, ANY, F), ("q: holds object",)),
+    "q None": (lambda: cdsm.evaluate(ARM, ANY, F), ("q: holds object entries, such as None;",)),
     "tension short": (
         lambda: cdsm.evaluate(ARM, Q, F[:2]),
         (f"tension: shape (2, {C})", f"(3, {C})"),

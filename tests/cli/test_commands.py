@@ -390,6 +390,8 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
         (("stiffness", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
         (("stiffness", "{geometry}", "--solver", "dapq"), "did you mean 'daqp'"),
         (("weigh", "{geometry}", "--force", "0,0,0"), "--force: is zero"),
+        (("weigh", "{geometry}", "--mass", "0"), "--mass: is zero"),
+        (("stiffness", "{geometry}", "--force", "nan,0,0"), "--force: entry [0] is nan"),
         (("weigh", "{geometry}", "--force", "0,0,-1", "--steps", "0"), "--steps: 0 given"),
         (("weigh", "{geometry}", "--force", "0,0,-900"), "810 N"),
         (("buckle", "{geometry}", "--force", "0,0,0"), "--force: is zero"),

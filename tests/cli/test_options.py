@@ -118,6 +118,7 @@ def test_a_file_that_is_read_or_written_twice_is_refused(
             ("stiffness", "{geometry}", "--wire", 48e3, "--direction", "w"),
             "'w' is no number; give an axis such as -y, or X,Y,Z.",
         ),
+        (("stiffness", "{geometry}", "--angles", "1,,2"), "--angles: '' is no number"),
         (("fit", "absent.csv", "--gauge-length", "-300"), "--gauge-length"),
         (("plan", "{geometry}", "--direction", "z", "--target", "-1"), "--target"),
     ],

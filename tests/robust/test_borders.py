@@ -265,5 +265,5 @@ def test_tables_of_pandas_are_the_numbers_they_hold() -> None:
         np.testing.assert_array_equal(found[name], expected[name])
     np.testing.assert_array_equal(ARM.at(angles.iloc[0]).tip, POSE.tip)
     for other in (angles.astype(object), angles.astype(str)):
-        with pytest.raises(cdsm.InvalidInput, match="q: holds object entries"):
+        with pytest.raises(cdsm.InvalidInput, match="q: holds object entries, such as"):
             cdsm.evaluate(ARM, other, tension)
