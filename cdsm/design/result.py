@@ -152,11 +152,7 @@ class DesignSearch(ReadOnlyState):
             InvalidInput: ``jobs`` is below 1.
         """
         return evaluate_designs(
-            self.problem.in_full(),
-            self._front.designs,
-            jobs=jobs,
-            client=client,
-            progress=progress,
+            self.problem.in_full(), self._front.designs, jobs=jobs, client=client, progress=progress
         )
 
     @property

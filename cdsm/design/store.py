@@ -43,10 +43,7 @@ class Store:
     """
 
     def __init__(
-        self,
-        path: str | os.PathLike[str] | None,
-        problem: DesignProblem,
-        **search: int,
+        self, path: str | os.PathLike[str] | None, problem: DesignProblem, **search: int
     ) -> None:
         self._path: Path | None = None if path is None else as_path(path)
         self._found: dict[bytes, Found] = {}
