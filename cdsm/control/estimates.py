@@ -85,28 +85,25 @@ class Observer:
         """Return the estimate after one more reading; ``before`` is the previous estimate."""
         locked, laws = self.arm.cables.position_controlled, self.arm._model.laws
         F, wire = np.clip(reading.tension, *self._domains), reading.wire
-        pose, x, variance = before.pose, before.softness, before.variance
+        pose, x = before.pose, before.softness
         strain = self._mean_strain(pose, before.shares, F)
         spring = laws.series * (F - laws.rest)
         # an error of the tension stretches the cable; the encoder rounds by half a count at most
         slack = self._tension_spread * (self._compliance(wire, F) * x)
         spread = np.hypot(slack, self._encoder_spread)[locked]
-        q = pose.q
+        q, sure = pose.q, np.sqrt(before.variance)
+        prior = np.append(np.zeros(q.size), 1.0) / sure
         for _ in range(_STEPS):
             pose = self.arm.at(q, check_limits=False)
             missing = (wire * (1.0 + x * strain) + spring - pose.cable_lengths)[locked] / spread
             rows = np.c_[pose.length_jacobian[locked], -(wire * strain)[locked]] / spread[:, None]
-            prior = np.append(np.zeros(q.size), 1.0) / np.sqrt(before.variance)
-            step = np.linalg.lstsq(
-                np.vstack([rows, prior]),
-                np.append(missing, (before.softness - x) / np.sqrt(before.variance)),
-                rcond=None,
-            )[0]
+            scaled = np.vstack([rows, prior])
+            right = np.append(missing, (before.softness - x) / sure)
+            step = np.linalg.lstsq(scaled, right, rcond=None)[0]
             q, x = q + step[:-1], x + float(step[-1])
             if abs(step).max() < _CONVERGED:
                 break
-        information = np.vstack([rows, prior])
-        variance = float(np.linalg.inv(information.T @ information)[-1, -1])
+        variance = float(np.linalg.inv(scaled.T @ scaled)[-1, -1])
         inside = np.clip(q, self.arm.lower, self.arm.upper)
         pose = pose if (inside == q).all() else self.arm.at(inside)
         return self._after_sliding(before, pose, F, x, variance)

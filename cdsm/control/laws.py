@@ -22,7 +22,6 @@ from cdsm.support.values import Array
 PROPORTIONAL, INTEGRAL = 0.2, 0.3
 """Gains of the tension control [-]: fractions of the tension error that one step corrects."""
 
-
 _ROUNDING = 1e-9  # distance of a tension beyond its bound [N] that counts as rounding
 
 

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 Outcome = Literal["completed", "lost", "no rest", "wire"]
 
+_ROUNDING = 1e-9  # distance beyond a band [m] that counts as rounding
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -255,6 +257,3 @@ class TrackingRun(ReadOnlyState):
     def __str__(self) -> str:
         head = f"law {self.law}: {plural(len(self.time), 'step')}, {self.outcome}"
         return "\n".join([*self.warnings, head, *aligned(rows(self))])
-
-
-_ROUNDING = 1e-9  # distance beyond a band [m] that counts as rounding

@@ -74,13 +74,11 @@ def tension_controlled(plan: PathPlan, names: Sequence[str] | None) -> NDArray[n
     by a pivoted QR decomposition of J_Lᵀ at the first sample.
     """
     cables = plan.arm.cables.names
+    if names is not None:
+        chosen = [one_of("cable", name, cables) for name in names]
+        return np.array([cable in chosen for cable in cables])
+    J = plan.stiffness[0].posture.length_jacobian
+    *_, order = qr(J.T, mode="economic", pivoting=True)
     forced = np.ones(len(cables), dtype=np.bool_)
-    if names is None:
-        J = plan.stiffness[0].posture.length_jacobian
-        *_, order = qr(J.T, mode="economic", pivoting=True)
-        forced[order[: J.shape[1]]] = False
-    else:
-        forced[:] = False
-        for name in names:
-            forced[cables.index(one_of("cable", name, cables))] = True
+    forced[order[: J.shape[1]]] = False
     return forced

@@ -26,8 +26,12 @@ from cdsm.support.format import coordinates, without_rounding
 from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, proved_largest
 from cdsm.support.validation import instance, quantity, vector
 from cdsm.support.values import Array, ReadOnlyState
+from cdsm.tension import grip
 
 _WIDEST = 1e6  # limit of T and f in the linear programs, over the largest tension
+
+_ROUNDING = 1e-12
+"""Reduced costs below this are rounding and taken as zero, since ``_WIDEST`` multiplies them."""
 
 
 @final
@@ -101,10 +105,7 @@ def tip_force(
         cone[rows + side * len(ratio), chains.hole + there] = 1.0
         cone[rows + side * len(ratio), chains.hole + here] = -ratio
     low, high = np.zeros(size + 3), np.full(size + 3, _WIDEST)
-    grip = np.zeros(size)
-    grip[chains.hole] = segments.grip
-    most = np.exp(np.add.reduceat(grip, chains.start[:-1]))
-    high[:size] = (most * (F + off) / scale)[chains.cable]
+    high[:size] = (np.exp(grip(pose)) * (F + off) / scale)[chains.cable]
     first = chains.start[:-1]
     low[first], high[first] = np.maximum(F - off, 0.0) / scale, np.maximum(F + off, 0.0) / scale
     low[size:] = -_WIDEST
@@ -126,7 +127,3 @@ def tip_force(
     if not math.isfinite(ends[0] + ends[1]):
         raise SolverError("highs", "bounds no force at the tip")
     return TipForce(posture=pose, tension=F, error=off, direction=u, low=ends[0], high=ends[1])
-
-
-_ROUNDING = 1e-12
-"""Reduced costs below this are rounding and taken as zero, since ``_WIDEST`` multiplies them."""

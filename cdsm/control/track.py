@@ -19,12 +19,7 @@ from cdsm.control.schedule import Schedule, checked_plan
 from cdsm.control.schedule import tension_controlled as choose_cables
 from cdsm.control.sensors import Sensors
 from cdsm.control.stiffness_loop import StiffnessLoop
-from cdsm.errors import (
-    CdsmError,
-    ElasticityRangeError,
-    EquilibriumError,
-    InvalidInput,
-)
+from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput
 from cdsm.planning.path import checked_rate
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support import progress

@@ -73,6 +73,11 @@ class Designs(ReadOnlyState, Named):
         return violations(self.problem, self.values)
 
     @property
+    def _goals(self) -> Array:
+        """Objectives (D, objectives), negated if they are maximised: searches minimise them."""
+        return np.column_stack([each.sign * self[each.key] for each in self.problem.objectives])
+
+    @property
     def feasible(self) -> Array:
         """Whether each design meets all constraints (D,): 1 or 0."""
         return np.asarray((self.violations == 0.0).all(axis=1), dtype=np.float64)

@@ -26,7 +26,7 @@ def explain(designs: Designs) -> NoReturn:
     total[~arms] = np.inf
     order = np.lexsort((np.nan_to_num(missed, posinf=1e9).sum(axis=1), total))
     best = int(next(i for i in order if arms[i]))
-    row, values = designs.designs[best], designs.values[best]
+    row = designs.designs[best]
     chosen = [
         f"{each.name} {each.shown(value)}"
         for each, value in zip(problem.variables, problem.values(row), strict=True)
@@ -38,17 +38,16 @@ def explain(designs: Designs) -> NoReturn:
             f"{100.0 * missed[best, 0]:.3g} % of its postures and loads are not held: "
             + _first_reason(designs, best)
         )
-    keys = [each.key for each in problem.measures]
     for constraint, miss in zip(problem.constraints, missed[best, 1:], strict=True):
         if miss > 0.0:
-            value = float(values[keys.index(constraint.key)])
+            value = float(designs[constraint.key][best])
             names.append(constraint.key)
             is_now = "does not exist" if np.isnan(value) else constraint.shown(value)
             far = f", {100.0 * miss:.3g} % off" if np.isfinite(miss) else ""
             words = with_margin(problem, constraint, constraint.words)
             said.append(f"{words} {is_now}, {constraint.asked} is asked{far}")
     for objective in problem.objectives:
-        value = float(values[keys.index(objective.key)])
+        value = float(designs[objective.key][best])
         if not np.isfinite(value) and objective.key not in names:
             names.append(objective.key)
             said.append(f"{objective.words} is {objective.shown(value)}")

@@ -209,14 +209,14 @@ class DesignProblem(ReadOnlyState):
             InvalidInput: A number of the design is outside its range.
             GeometryError: No valid arm has these values; the error lists every fault.
         """
-        new = changed(self.arm.geometry, self.variables, self.values(design))
+        geometry, wire = changed(self.arm.geometry, self.variables, self.values(design))
         old = self.arm.cables
-        law = None if new.wire is None else as_wire(new.wire)
-        routed = serpentine_cables(new.geometry, law or old[0].elasticity)
+        law = None if wire is None else as_wire(wire)
+        routed = serpentine_cables(geometry, law or old[0].elasticity)
         like: Sequence[Cable] = old
         if len(routed) != len(old):
             joints = [route.joint for route in self.arm.geometry.cables]
-            at = [route.joint for route in new.geometry.cables]
+            at = [route.joint for route in geometry.cables]
             like = tuple(old[joints.index(joint) if joint in joints else 0] for joint in at)
         minimum = self.minimum_of(design)
         cables = [
@@ -232,7 +232,7 @@ class DesignProblem(ReadOnlyState):
             for cable, kept in zip(routed, like, strict=True)
         ]
         return Manipulator(
-            new.geometry,
+            geometry,
             cables=cables,
             gravity=self.arm.gravity,
             original_length=self.arm.original_length,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -123,21 +124,15 @@ def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
     """
     text = read_text(path)
     folder = Path(path).parent
-    faults: tuple[str, ...] | list[str]
     try:
         file = parse(_File, read_toml(text))
-        return ProblemFile(
-            _problem(file, folder),
-            file.search.generations,
-            file.search.population,
-            file.search.seed,
-        )
+        return ProblemFile(_problem(file, folder), **asdict(file.search))
     except GeometryError as error:
         faults = error.faults
     except FileError:
         raise
     except CdsmError as error:
-        faults = [str(error)]
+        faults = (str(error),)
     raise FileError(path, f"is no design problem, {counted(faults)}")
 
 

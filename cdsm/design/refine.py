@@ -10,13 +10,12 @@ from numpy.typing import ArrayLike
 from cdsm.design.evaluation import evaluate_designs
 from cdsm.design.goals import KINDS, Measure
 from cdsm.design.gradients import SMOOTH, rows_and_gradients
-from cdsm.design.infeasible import explain
 from cdsm.design.problem import DesignProblem
 from cdsm.design.result import DesignSearch
-from cdsm.design.search import pareto, progress_of
+from cdsm.design.search import best_of, progress_of
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.support.validation import instance, whole_number
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array
 
 _SAFE = 1e-7
 """Relative distance of a refined design from each limit, so that rounding violates none."""
@@ -102,7 +101,9 @@ def refine_design(
                     method="SLSQP",
                     options={"maxiter": iterations, "ftol": 1e-12},
                 ).x
-    return _finished(problem, smooth.visited)
+    whole = evaluate_designs(problem, np.array(smooth.visited), progress=False)
+    counts = range(1, len(whole) + 1)
+    return best_of(whole, 0, (progress_of(problem, n, whole.values[:n]) for n in counts))
 
 
 class _PostureNotHeld(Exception):
@@ -171,18 +172,6 @@ class _SmoothProblem:
         c[count:] -= _SAFE
         self._raised = np.append(np.ones(count), np.zeros(len(c) - count))
         return c, np.vstack(slopes)
-
-
-def _finished(problem: DesignProblem, visited: list[Array]) -> DesignSearch:
-    whole = evaluate_designs(problem, np.array(visited), progress=False)
-    front = pareto(whole)
-    if not len(front):
-        explain(whole)
-    count = range(1, len(whole) + 1)
-    history = tuple(progress_of(problem, n, whole.values[:n]) for n in count)
-    return DesignSearch(
-        problem=problem, seed=0, evaluated=whole, front=frozen(front), history=history
-    )
 
 
 def require_smooth(problem: DesignProblem) -> None:

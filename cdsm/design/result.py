@@ -81,16 +81,10 @@ class DesignSearch(ReadOnlyState):
 
         Differences are divided by the range of each objective on the front.
         """
-        goals = self._goals
+        goals = self.evaluated._goals[self.front]
         size = np.ptp(goals, axis=0)
         scaled = (goals - goals.min(axis=0)) / np.where(size > 0.0, size, 1.0)
         return int(np.linalg.norm(scaled, axis=1).argmin())
-
-    @property
-    def _goals(self) -> Array:
-        objectives = self.problem.objectives
-        every = [each.sign * self.evaluated[each.key][self.front] for each in objectives]
-        return np.column_stack(every)
 
     def design(self, number: int | None = None) -> Array:
         """Return design ``number`` of the front (n,) [m, rad, N, -], from 0; None: the compromise.
@@ -106,8 +100,7 @@ class DesignSearch(ReadOnlyState):
     def values(self, number: int | None = None) -> dict[str, float]:
         """Return all quantities, by name in SI, of a design of the front; None: the compromise."""
         row = self.evaluated.values[self.front[self._number(number)]]
-        keys = [each.key for each in self.problem.measures]
-        return dict(zip(keys, row.tolist(), strict=True))
+        return dict(zip(self.evaluated.keys(), row.tolist(), strict=True))
 
     def _number(self, number: int | None) -> int:
         if number is None:
@@ -159,11 +152,7 @@ class DesignSearch(ReadOnlyState):
             InvalidInput: ``jobs`` is below 1.
         """
         return evaluate_designs(
-            self.problem.in_full(),
-            self._front.designs,
-            jobs=jobs,
-            client=client,
-            progress=progress,
+            self.problem.in_full(), self._front.designs, jobs=jobs, client=client, progress=progress
         )
 
     @property

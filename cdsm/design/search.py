@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -88,7 +88,8 @@ def search_designs(
                 asked = algorithm.ask()
             if asked is None or not len(asked):
                 break
-            designs = np.array([_numbers(problem, each) for each in asked.get("X")])
+            names = [each.name for each in problem.variables]
+            designs = np.array([[float(each[x]) for x in names] for each in asked.get("X")])
             evaluated = kept.evaluated(designs, compute)
             advance(len(designs))
             _tell(problem, algorithm, asked, designs, evaluated)
@@ -98,14 +99,18 @@ def search_designs(
             history.append(progress_of(problem, step + 1, values))
             if report is not None:
                 report(history[-1])
-    whole = gathered(problem, np.array(rows), found)
-    front = pareto(whole)
+    return best_of(gathered(problem, np.array(rows), found), seed, history)
+
+
+def best_of(evaluated: Designs, seed: int, history: Iterable[DesignProgress]) -> DesignSearch:
+    """Return the result of a search; raise InfeasibleDesign if no evaluated design is feasible."""
+    front = pareto(evaluated)
     if not len(front):
-        explain(whole)
+        explain(evaluated)
     return DesignSearch(
-        problem=problem,
+        problem=evaluated.problem,
         seed=seed,
-        evaluated=whole,
+        evaluated=evaluated,
         front=frozen(front),
         history=tuple(history),
     )
@@ -117,8 +122,7 @@ def pareto(designs: Designs) -> Indices:
     They are sorted by the first objective, the best first. Of designs with equal objectives, only
     the first is returned.
     """
-    problem = designs.problem
-    goals = np.column_stack([each.sign * designs[each.key] for each in problem.objectives])
+    goals = designs._goals
     usable = np.flatnonzero((designs.feasible == 1.0) & np.isfinite(goals).all(axis=1))
     kept: list[int] = []
     for i in usable.tolist():
@@ -183,16 +187,12 @@ def _algorithm(problem: DesignProblem, population: int, generations: int, seed: 
     return algorithm
 
 
-def _numbers(problem: DesignProblem, chosen: dict[str, Any]) -> Array:
-    return np.array([float(chosen[each.name]) for each in problem.variables])
-
-
 def _tell(
     problem: DesignProblem, algorithm: Any, asked: Any, designs: Array, evaluated: list[Found]
 ) -> None:
     """Give pymoo's algorithm the objectives and violations of the designs that it ``asked`` for."""
     whole = gathered(problem, designs, evaluated)
-    goals = np.column_stack([each.sign * whole[each.key] for each in problem.objectives])
+    goals = whole._goals
     missed = np.nan_to_num(whole.violations, nan=_FAR, posinf=_FAR)
     lost = ~np.isfinite(goals).all(axis=1)
     missed[lost, 0] += 1.0

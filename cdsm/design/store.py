@@ -43,10 +43,7 @@ class Store:
     """
 
     def __init__(
-        self,
-        path: str | os.PathLike[str] | None,
-        problem: DesignProblem,
-        **search: int,
+        self, path: str | os.PathLike[str] | None, problem: DesignProblem, **search: int
     ) -> None:
         self._path: Path | None = None if path is None else as_path(path)
         self._found: dict[bytes, Found] = {}
@@ -57,7 +54,7 @@ class Store:
             if not self._path.exists():
                 self._path.write_text(head + "\n", encoding="utf-8")
             self._read(self._path.read_text(encoding="utf-8"), head)
-        except (StoreError, FileError):
+        except FileError:
             raise
         except (OSError, ValueError) as error:
             raise FileError(self._path, f"cannot be used as a record: {error}.") from None

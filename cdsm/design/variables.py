@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal, NamedTuple, final, get_args
+from typing import Final, Literal, final, get_args
 
 from cdsm.errors import InvalidInput
 from cdsm.geometry import CableRoute, Geometry
 from cdsm.geometry.checks import WIDEST, doubts_about_angle, doubts_about_units
 from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles
+from cdsm.support.format import place
 from cdsm.support.validation import one_of, quantity, scalar, whole_number
 from cdsm.support.warning import warn
 from cdsm.wires.catalogue import Wire, as_wire
@@ -137,9 +138,7 @@ class Variable:
         unit = UNITS.get(self.of)
         if unit is None or isinstance(value, str):
             return f"{value}" if isinstance(value, (str, int)) else f"{value:g}"
-        if unit == "m":
-            return f"{1e3 * value:.4g} mm"
-        return f"{math.degrees(value):.4g}°" if unit == "rad" else f"{value:.4g} N"
+        return f"{value:.4g} N" if unit == "N" else place(value, unit)
 
 
 def _whole(name: str, value: float) -> int:
@@ -147,21 +146,15 @@ def _whole(name: str, value: float) -> int:
     return whole_number(name, round(value) if float(value).is_integer() else value, 1)
 
 
-class Changed(NamedTuple):
-    """Parts of an arm after a change of variables; None for a part that no variable changes."""
-
-    geometry: Geometry
-    wire: Wire | None
-    minimum: float | None
-
-
-def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[Value]) -> Changed:
-    """Return the parts of the arm in which ``variables`` have ``values`` [SI].
+def changed(
+    geometry: Geometry, variables: Sequence[Variable], values: Iterable[Value]
+) -> tuple[Geometry, Wire | None]:
+    """Return the geometry in which ``variables`` have ``values`` [SI], and the wire, if it changes.
 
     Raises GeometryError if no valid geometry has these values.
     """
     wire: Wire | None = None
-    minimum, common = None, geometry.hole_radius
+    common = geometry.hole_radius
     joints, links, cables = [*geometry.joints], [*geometry.links], [*geometry.cables]
     # where cables end first: lead and phase belong to the cables of a joint
     pairs = sorted(zip(variables, values, strict=True), key=lambda pair: pair[0].of not in WHOLE)
@@ -172,8 +165,6 @@ def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[
             continue
         where = range(1, len(joints) + 1) if at is None or of in _OF_CABLE else [int(at)]
         match of:
-            case "minimum":
-                minimum = float(value)
             case "cables_per_joint":
                 cables = _even(geometry, int(value))
             case "end":
@@ -199,13 +190,10 @@ def changed(geometry: Geometry, variables: Sequence[Variable], values: Iterable[
             case "disk_offset":
                 for k in where:
                     joints[k - 1] = replace(joints[k - 1], disk_offset=value)
-    return Changed(
-        geometry.replace(
-            joints=tuple(joints), links=tuple(links), cables=tuple(cables), hole_radius=common
-        ),
-        wire,
-        minimum,
+    new = geometry.replace(
+        joints=tuple(joints), links=tuple(links), cables=tuple(cables), hole_radius=common
     )
+    return new, wire
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:

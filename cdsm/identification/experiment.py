@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import CdsmError, InvalidInput, UnknownName
+from cdsm.errors import CdsmError, InvalidInput
 from cdsm.identification.design import Criterion, Design
 from cdsm.identification.determination import Determination
 from cdsm.identification.experiment_plan import ExperimentPlan
@@ -79,12 +79,19 @@ def plan_experiment(
         UnknownName: ``model_of`` does not take a parameter, or a name in ``wanted`` or ``known`` is
             not among ``parameters``.
     """
-    noise = (displacement_std, force_std, tension_std)
-    candidates = _candidates(postures, directions, weights, minimum, noise, steps)
     return plan_tests(
         model_of,
         parameters,
-        candidates,
+        _candidates(
+            postures,
+            directions,
+            weights,
+            steps,
+            minimum=minimum,
+            displacement_std=displacement_std,
+            force_std=force_std,
+            tension_std=tension_std,
+        ),
         tests=tests,
         wanted=wanted,
         known=known,
@@ -177,12 +184,9 @@ def _wanted(
 ) -> tuple[str, ...]:
     """Return the names of the parameters to determine; check them and the names in ``known``."""
     chosen = tuple(values) if wanted is None else tuple(wanted)
-    for kind, given in (("wanted", chosen), ("known", tuple(known))):
+    for kind, given in (("wanted", chosen), ("known", known)):
         for name in given:
-            if name not in values:
-                raise UnknownName(
-                    f"parameter in {kind}", name, tuple(values), "Name one of the arm."
-                )
+            one_of(f"parameter in {kind}", name, values, "Name one of the arm.")
     if not chosen:
         raise InvalidInput("wanted", "names no parameter; leave it out for all of them.")
     return chosen
@@ -229,10 +233,10 @@ def _candidates(
     postures: ArrayLike,
     directions: Direction | Sequence[Direction],
     weights: ArrayLike,
-    minimum: float | ArrayLike,
-    noise: tuple[float, float, float],
     steps: int,
+    **shared: Any,
 ) -> list[WeightLoop]:
+    """Return a loop for each posture, direction and weight; ``shared`` are other fields of it."""
     angles, forces = number_array("postures", postures), number_array("weights", weights, "force")
     if angles.ndim != 2 or not angles.size:
         raise InvalidInput(
@@ -242,13 +246,7 @@ def _candidates(
         raise InvalidInput("weights", f"{weights!r} given; positive forces (n,) [N] are needed.")
     if len(forces) * len(angles) > _MOST:
         raise InvalidInput("postures", f"more than {_MOST} candidates; give fewer.")
-    bound = number_array("minimum", minimum)
-    shared: dict[str, Any] = {
-        "displacement_std": noise[0],
-        "force_std": noise[1],
-        "tension_std": noise[2],
-        "minimum": float(bound) if bound.ndim == 0 else tuple(bound.tolist()),
-    }
+    shared["minimum"] = number_array("minimum", shared["minimum"])
     count = whole_number("steps", steps, 1, 100)
     axes = np.atleast_2d(unit_directions("directions", directions))
     return [

@@ -72,10 +72,7 @@ def read_loops(
     instance("arm", arm, Manipulator)
     table = read_table(path)
     return _Reader(path, arm, table).loops(
-        minimum,
-        displacement_std=displacement_std,
-        force_std=force_std,
-        tension_std=tension_std,
+        minimum, displacement_std=displacement_std, force_std=force_std, tension_std=tension_std
     )
 
 

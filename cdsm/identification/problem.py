@@ -14,7 +14,6 @@ from cdsm.identification.least_squares import LeastSquares, NoModelError, no_mod
 from cdsm.identification.loop import WeightLoop, Weights, measured
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
-from cdsm.posture import Posture
 from cdsm.statics.following import follow
 from cdsm.statics.loading_path import LoadingPath, same_segments
 from cdsm.statics.rest_search import equilibrium
@@ -131,10 +130,11 @@ class Model:
                 assert path is not None
                 tips, pose = path.tips, path.loading.reference
                 if near:
-                    pose, tension, wrench = self._started(arm, each, parameters)
+                    K = self._stiffness(arm, each, parameters)
+                    pose = K.posture
                     if not same_segments(pose, path.start.pose):
                         raise NoModelError("the cables have other segments than beside there.")
-                    tips = path.beside(pose, tension, wrench)
+                    tips = path.beside(pose, K.tension, K.wrench)
                 predicted.append(((tips - pose.tip[:3, 3]) @ each.axes.T).ravel())
         return arm, predicted
 
@@ -191,21 +191,14 @@ class Model:
         if not isinstance(loop, WeightLoop):
             return None
         with no_model(f"measurement {label(i, loop)}: "):
-            pose, tension, wrench = self._started(arm, loop, parameters)
-            return LoadingPath.of(pose, tension, wrench, loop.applied, near=near)
+            K = self._stiffness(arm, loop, parameters)
+            return LoadingPath.of(K.posture, K.tension, K.wrench, loop.applied, near=near)
 
-    def _started(
-        self, arm: Manipulator, loop: WeightLoop, parameters: Parameters
-    ) -> tuple[Posture, Array, Array]:
-        """Return posture, tensions (C,) [N] and wrench (6,) before the first force of ``loop``."""
-        pose = arm.at(loop.angles)
-        K = stiffness(pose, *self._tension(pose, loop, parameters))
-        return pose, K.tension, K.wrench
-
-    def _tension(
-        self, pose: Posture, measurement: Measurement | WeightLoop, parameters: Parameters
-    ) -> tuple[Tension | ArrayLike, ArrayLike | None]:
-        """Return the tensions of a measurement, and its wrench (None if a Tension contains it)."""
+    def _stiffness(
+        self, arm: Manipulator, measurement: Measurement | WeightLoop, parameters: Parameters
+    ) -> Stiffness:
+        """Compute the stiffness of the arm before the first force of a measurement."""
+        pose = arm.at(measurement.angles)
         tension: Tension | ArrayLike
         if self.tension_of is not None:
             tension = _call_model("tension_of", self.tension_of, parameters, pose, measurement)
@@ -214,7 +207,8 @@ class Model:
         else:
             assert measurement.minimum is not None
             tension = distribute_tension(pose, measurement.minimum, wrench=measurement.wrench)
-        return tension, None if isinstance(tension, Tension) else measurement.wrench
+        wrench = None if isinstance(tension, Tension) else measurement.wrench
+        return stiffness(pose, tension, wrench)
 
     def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
         """Compute the derivatives of the readings of ``loop`` from its equilibria ``path``.
@@ -238,8 +232,7 @@ class Model:
         return by_forces, by_tensions
 
     def _along(self, arm: Manipulator, measurement: Measurement, parameters: Parameters) -> float:
-        pose = arm.at(measurement.angles)
-        K = stiffness(pose, *self._tension(pose, measurement, parameters))
+        K = self._stiffness(arm, measurement, parameters)
         if not K.is_stable:
             raise SingularStiffness(
                 f"the arm buckles: the smallest stiffness is {K.margin:.3g} "

@@ -80,7 +80,8 @@ class Identification(ReadOnlyState):
     @property
     def freedom(self) -> int:
         """Degrees of freedom: n − :attr:`rank`, minus one offset for each axis of each loop."""
-        zeros = sum(len(loop.axes) for loop in self._loops)
+        loops = (each for each in self.measurements if isinstance(each, WeightLoop))
+        zeros = sum(len(loop.axes) for loop in loops)
         return len(self.predicted) - zeros - self.rank
 
     @property
@@ -239,10 +240,6 @@ class Identification(ReadOnlyState):
         """For each of the n measured numbers, the measurement to which it belongs."""
         return [each for each in self.measurements for _ in measured(each)]
 
-    @property
-    def _loops(self) -> list[WeightLoop]:
-        return [each for each in self.measurements if isinstance(each, WeightLoop)]
-
     @cached_property
     def _determination(self) -> Determination:
         return Determination(self.names, self.jacobian, np.ptp(self.bounds, axis=1))
@@ -252,13 +249,12 @@ class Identification(ReadOnlyState):
         """Name of each of the n measured numbers, a stiffness or a reading of a loop."""
         names = []
         for i, each in enumerate(self.measurements):
-            axes = len(each.axes) if isinstance(each, WeightLoop) else 0
             own = label(i, each)
-            names += (
-                [f"{own} force {k // axes + 1}" for k in range(len(measured(each)))]
-                if axes
-                else [own]
-            )
+            if isinstance(each, WeightLoop):
+                numbers = np.repeat(np.arange(len(each.forces)) + 1, len(each.axes))
+                names += [f"{own} force {number}" for number in numbers]
+            else:
+                names.append(own)
         return names
 
     @property

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import InvalidInput, UnknownName
+from cdsm.errors import InvalidInput
 from cdsm.identification.diagnosis import ambiguous, unfinished, warnings_of
 from cdsm.identification.intervals import LowerOptimumError, Profile, Profiler
 from cdsm.identification.least_squares import LeastSquares
@@ -22,7 +22,7 @@ from cdsm.identification.result import Identification
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import plural
 from cdsm.support.progress import progress_allowed, track
-from cdsm.support.validation import scalar, vector
+from cdsm.support.validation import one_of, scalar, vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
@@ -195,10 +195,8 @@ def check_call(name: str, function: object, positional: int, names: Sequence[str
         by_keyword = (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
         known = [each.name for each in kinds if each.kind in by_keyword][positional:]
         for each in names:
-            if each not in known:
-                raise UnknownName(
-                    f"parameter of {name}", each, known, f"Give {name} one of that name, or **rest."
-                )
+            remedy = f"Give {name} one of that name, or **rest."
+            one_of(f"parameter of {name}", each, known, remedy)
     try:
         signature.bind(*(None,) * positional, **dict.fromkeys(names))
     except TypeError as error:

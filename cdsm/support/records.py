@@ -173,8 +173,9 @@ def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
 
 
 def toml_value(value: object) -> str:
-    """Return a text, a number, or a tuple of these, as a TOML value."""
-    if isinstance(value, tuple):
+    """Return a text, a number, or a tuple or array of these, as a TOML value."""
+    value = _plain(value)
+    if isinstance(value, tuple | list):
         return f"[{', '.join(map(toml_value, value))}]"
     if isinstance(value, str):
         # JSON and TOML escape alike, except for DEL and the pairs of \\u that JSON writes for emoji

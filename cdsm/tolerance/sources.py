@@ -216,11 +216,4 @@ def _value(value: Tolerance | tuple[Tolerance, ...]) -> str:
         values["of"] = value.of
     if value.tensions is not None:
         values["tensions"] = value.tensions
-    return f"{{{', '.join(f'{key} = {toml_value(_plain(x))}' for key, x in values.items())}}}"
-
-
-def _plain(value: Any) -> object:
-    """Return an array as nested tuples, from which TOML is written; other values unchanged."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    return tuple(map(_plain, value)) if isinstance(value, list) else value
+    return f"{{{', '.join(f'{key} = {toml_value(x)}' for key, x in values.items())}}}"

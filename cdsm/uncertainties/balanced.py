@@ -19,17 +19,16 @@ bounds.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
-from cdsm.kernels.sensitivity import single_gradient
 from cdsm.kernels.tension import OPTIMALITY
 from cdsm.support.values import Array
 from cdsm.tension import Tension
-from cdsm.uncertainties.inputs import Inputs, Places
+from cdsm.uncertainties.inputs import Inputs
 
 _NO_VELOCITY = np.zeros(3)
 
@@ -103,16 +102,9 @@ class Balance(NamedTuple):
         ``motion`` (nv,) is the joint velocity. ``loaded`` is 1 to add the power of gravity and
         load, otherwise 0.
         """
-        pose, none = self.tension.posture, np.zeros_like(weights)
-        model = pose.arm._model
-        arguments: tuple[Any, ...] = (
-            *(model.tree, model.routing, model.masses),
-            *(pose.q, inputs.first, motion, _NO_VELOCITY),
-            *(none, none, none, weights, self.tension.wrench, 0.0, loaded),
-        )
-        _, by_q, *by_places, by_mass, _, _ = single_gradient(*arguments)
-        by_link = {"joint_angle": by_q, "link_mass": by_mass[inputs.link_rows]}
-        return inputs.zeros() | by_link | inputs.by_source(Places(*by_places))
+        none = np.zeros_like(weights)
+        given = none, none, none, weights, self.tension.wrench, 0.0, loaded
+        return inputs.gradient(self.tension.posture, motion, _NO_VELOCITY, *given)[0]
 
 
 def buckling_gradient(

@@ -107,7 +107,10 @@ class Uncertainty(ReadOnlyState):
 
         Raises InvalidInput if the probability is not between 0 and 1.
         """
-        half = coverage_factor(probability) * self.standard_uncertainty
+        from scipy.special import ndtri
+
+        k = float(ndtri((1.0 + checked_probability(probability)) / 2.0))
+        half = k * self.standard_uncertainty
         return self.value - half, self.value + half
 
     def largest_inputs(self, count: int = 5) -> tuple[tuple[str, str, float], ...]:
@@ -269,13 +272,6 @@ def uncertainty(
         contributions={source: math.sqrt(variances[source]) for source in ranked},
         sensitivities={source: frozen(g) for source, g in gradient.items()},
     )
-
-
-def coverage_factor(probability: float) -> float:
-    """Return k for which value ± k u contains this ``probability`` of a normal distribution."""
-    from scipy.special import ndtri
-
-    return float(ndtri((1.0 + checked_probability(probability)) / 2.0))
 
 
 def checked_probability(probability: float) -> float:

@@ -102,14 +102,12 @@ class DrawnArms:
         """
         arms, given = drawn or self.evaluate(), self._K.distribution
         assert given is not None
-        low = np.broadcast_to(given.minimum, self._tension.shape).copy()
-        if minimum is not None:
-            low[:] = minimum[:, None]
-        high = np.broadcast_to(given.maximum, low.shape).copy()
+        bounds = given.minimum if minimum is None else minimum[:, None], given.maximum
+        low, high = (frozen(np.broadcast_to(x, self._tension.shape).copy()) for x in bounds)
         none = abs(arms.length_jacobian) < NO_ARM * self._K.posture.arm.length
         J, tension = np.where(none, 0.0, arms.length_jacobian), np.empty_like(low)
         outcome = np.empty(len(low), dtype=np.intp)
-        search_tensions(J, arms.torque, frozen(low), frozen(high), tension, outcome)
+        search_tensions(J, arms.torque, low, high, tension, outcome)
         if (outcome != OPTIMAL).any():
             raise InvalidInput(
                 "tolerances",

@@ -9,13 +9,14 @@ the points into derivatives with respect to the inputs.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.sparse import csr_matrix, hstack
 
 from cdsm.errors import InvalidInput
+from cdsm.kernels.sensitivity import single_gradient
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
@@ -141,6 +142,20 @@ class Inputs:
         """
         by_input = self._transposed @ by_place.stacked()
         return {source: by_input[columns] for source, columns in self.columns.items()}
+
+    def gradient(
+        self, pose: Posture, motion: Array, velocity: Array, *given: Any
+    ) -> tuple[dict[str, Array], Array, Array]:
+        """Compute the derivatives of Ψ, see :func:`~cdsm.kernels.sensitivity.single_gradient`.
+
+        ``given`` are the arguments of this kernel from ``tension`` on. The result has an array for
+        each source (0 for inputs of wires), and the derivatives by F (C,) and k (C,).
+        """
+        model = pose.arm._model
+        arguments = model.tree, model.routing, model.masses, pose.q, self.first, motion, velocity
+        _, by_q, *by_places, by_mass, by_F, by_k = single_gradient(*arguments, *given)
+        by_link = {"joint_angle": by_q, "link_mass": by_mass[self.link_rows]}
+        return self.zeros() | by_link | self.by_source(Places(*by_places)), by_F, by_k
 
     def displaced(self, errors: Mapping[str, Array]) -> Array:
         """Convert errors of the inputs of N arms to displacements (N, n) [m] of their points.

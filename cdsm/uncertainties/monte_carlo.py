@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import os
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -26,11 +24,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 from cdsm.tolerance import Tolerances
 from cdsm.tolerance.sources import tolerance_lines
-from cdsm.uncertainties.budget import (
-    Uncertainty,
-    checked_probability,
-    uncertainty,
-)
+from cdsm.uncertainties.budget import Uncertainty, checked_probability, uncertainty
 from cdsm.uncertainties.question import chosen_tolerances
 from cdsm.uncertainties.readings import Reading
 from cdsm.uncertainties.texts import with_uncertainty
@@ -40,7 +34,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BLOCK = 1000  # number of draws in a block; each block has its own random numbers
-
 
 AGREES = 0.1
 """Two 95 % intervals agree if their limits differ by at most this part of the uncertainty."""
@@ -103,17 +96,15 @@ class MonteCarlo(ReadOnlyState):
         import xarray
 
         question, labels = self.budget.question, self.budget.question.labels
-        drawn = [_errors(self.budget, self.seed, *block) for block in _blocks(self.values.size)]
+        drawn = [_errors(self.budget, self.seed, block) for block in _blocks(self.values.size)]
         reading = xarray.Variable(
             "draw", self.values, {"long_name": question.name, "units": question.si_unit}
         )
         variables: dict[str, object] = {question.of: reading}
         for source in self.budget.parts:
             size = f"{source}_input"
-            variables[f"{source}_error"] = (
-                (("draw", size)),
-                np.concatenate([e[source] for e in drawn]),
-            )
+            errors = np.concatenate([each[source] for each in drawn])
+            variables[f"{source}_error"] = (("draw", size), errors)
             variables[size] = ((size,), list(labels[source]))
         return xarray.Dataset(variables, attrs={"seed": self.seed})
 
@@ -199,39 +190,38 @@ def monte_carlo(
     folder = None if store is None else _open_store(store, budget, start)
     values = np.empty(count)
     compute = partial(_block, budget, start, folder)
-    blocks = list(_blocks(count))
+    blocks = _blocks(count)
     with (
         progress_bar("Monte Carlo", count, wanted=wanted, rate=True) as advance,
         ThreadPoolExecutor(os.cpu_count()) as pool,
     ):
-        for (i, size), part in zip(
-            blocks, pool.map(compute, *zip(*blocks, strict=True)), strict=True
-        ):
+        for (i, size), part in zip(blocks, pool.map(compute, blocks), strict=True):
             values[i * _BLOCK : i * _BLOCK + size] = part
             advance(size)
     return MonteCarlo(budget=budget, values=frozen(values), seed=start)
 
 
-def _blocks(count: int) -> Iterator[tuple[int, int]]:
-    """Yield the number and the size of each block of ``count`` draws in total."""
-    for i in range(math.ceil(count / _BLOCK)):
-        yield i, min(_BLOCK, count - i * _BLOCK)
+def _blocks(count: int) -> list[tuple[int, int]]:
+    """Return the number and the size of each block of ``count`` draws in total."""
+    return [(start // _BLOCK, min(_BLOCK, count - start)) for start in range(0, count, _BLOCK)]
 
 
-def _errors(budget: Uncertainty, seed: int, block: int, count: int) -> dict[str, Array]:
-    """Draw errors of the first ``count`` arms of a block: an array (count, inputs) per source."""
-    errors = budget._drawn(np.random.default_rng([seed, block]), _BLOCK)
+def _errors(budget: Uncertainty, seed: int, block: tuple[int, int]) -> dict[str, Array]:
+    """Draw errors of the arms of a block: an array (arms, inputs) per source."""
+    number, count = block
+    errors = budget._drawn(np.random.default_rng([seed, number]), _BLOCK)
     return {source: drawn[:count] for source, drawn in errors.items()}
 
 
-def _block(budget: Uncertainty, seed: int, folder: Path | None, block: int, count: int) -> Array:
-    """Compute the readings (count,) of the first ``count`` arms of a block, or read its file."""
-    path = None if folder is None else folder / f"{block:06d}.npy"
+def _block(budget: Uncertainty, seed: int, folder: Path | None, block: tuple[int, int]) -> Array:
+    """Compute the readings (arms,) of the arms of a block, or read its file."""
+    number, count = block
+    path = None if folder is None else folder / f"{number:06d}.npy"
     if path is not None and path.exists():
         stored = np.load(path)
         if stored.size >= count:
             return np.asarray(stored[:count])
-    values = budget.question.at(_errors(budget, seed, block, count))
+    values = budget.question.at(_errors(budget, seed, block))
     if path is not None:
         write_file(path, lambda aside: np.save(aside, values))
     return values

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from cdsm.elasticity.answers import slope_of
-from cdsm.kernels.sensitivity import single_gradient
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState
@@ -173,8 +172,7 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
     derivatives are those of −uᵀ C_vv u.
     """
     pose, F, k = K.posture, K.tension, K.cable_stiffness
-    model = pose.arm._model
-    laws = model.laws
+    laws = pose.arm._model.laws
     rigidity, strain = laws_at(K, F)
     stretched = rigidity * (1.0 + strain)
     wire = pose.cable_lengths - laws.series * (F - laws.rest)
@@ -182,20 +180,13 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
     slope = -(k**2) / stretched
     by_spring = k**2 * laws.series * (1.0 - (F - laws.rest) / stretched)
     by_force = k**2 * laws.series / stretched + by_stretched * _stretched_slope(K, strain)
-    arguments: tuple[Any, ...] = (
-        *(model.tree, model.routing, model.masses),
-        *(pose.q, inputs.first, motion, -2.0 * direction),
-        *(F, k, slope, np.zeros_like(F), K.wrench, 1.0, 0.0),
-    )
-    _, by_q, *by_places, by_mass, by_tension, by_stiffness = single_gradient(*arguments)
-    return inputs.zeros() | {
+    given = F, k, slope, np.zeros_like(F), K.wrench, 1.0, 0.0
+    found, by_tension, by_stiffness = inputs.gradient(pose, motion, -2.0 * direction, *given)
+    return found | {
         "rigidity": by_stiffness * by_stretched * rigidity,
         "spring": (by_stiffness * by_spring)[laws.series > 0.0],
-        "joint_angle": by_q,
         "tension": by_tension + by_stiffness * by_force,
         "lead": by_stiffness * slope,
-        "link_mass": by_mass[inputs.link_rows],
-        **inputs.by_source(Places(*by_places)),
     }
 
 

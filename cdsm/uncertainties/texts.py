@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from cdsm.support.format import span
 from cdsm.support.values import Array
 
 
@@ -33,5 +34,4 @@ _SHOWN = {
 def shown(source: str, standards: Array) -> str:
     """Write the range of standard uncertainties ``standards`` (n,) in the unit of ``source``."""
     size, unit = _SHOWN.get(source, (1e-3, " mm"))
-    low, high = (f"{each / size:.3g}" for each in (standards.min(), standards.max()))
-    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
+    return span(standards / size, "{:.3g}".format) + unit
