@@ -353,7 +353,7 @@ def test_steps_and_ramps_of_a_path_are_drawn_as_what_they_are() -> None:
     np.testing.assert_allclose(_shown(line), [x, y])
 
 
-def test_many_cables_are_not_told_apart_by_colour() -> None:
+def test_many_cables_have_colours_by_their_number_and_a_colour_bar() -> None:
     arm = cdsm.Manipulator(
         cdsm.Geometry.universal(
             joints=9,
@@ -370,9 +370,11 @@ def test_many_cables_are_not_told_apart_by_colour() -> None:
     K = cdsm.stiffness(arm.at(q[0]), cdsm.distribute_tension(arm.at(q[0]), 20.0))
     u = (0.0, 0.0, 1.0)
     plan = cdsm.plan_path(arm, u, K.along(u), 10.0, angles=q)
-    below = plots.plot_path_plan(plan).axes[1]
+    _, below, bar = plots.plot_path_plan(plan).axes
     assert below.get_legend() is None
-    assert len({line.get_color() for line in below.get_lines()}) == 1
+    assert len({tuple(line.get_color()) for line in below.get_lines()}) == 27
+    assert bar.get_ylabel() == "number of the cable"
+    assert bar.get_ylim() == (1.0, 27.0)
 
 
 def _shown(line: Line2D) -> Array:
