@@ -65,6 +65,9 @@ ROOM: Final = 1.15
 NAMED: Final = 24
 """Largest number of cables or loops with names. More have colours by their number."""
 
+_CORNER: Final = 0.07
+"""Distance of a tick from the corners of a 3D picture, divided by the longest axis."""
+
 _GAP: Final = 0.06  # free space around a picture [inch]
 
 BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
@@ -205,13 +208,18 @@ def number_colors(axes: Any, count: int, name: str) -> Array:
     return np.asarray(colors.to_rgba(np.arange(1, count + 1)))
 
 
-def equal_axes(axes: Any, zoom: float = 0.75) -> None:
-    """Give 3D axes equal scales; ``zoom`` < 1 leaves space for their labels."""
+def equal_axes(axes: Any, zoom: float = 1.0) -> None:
+    """Give 3D axes equal scales, and ticks away from the corners, where axes meet.
+
+    ``zoom`` < 1 makes the drawing smaller.
+    """
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
-    axes.set_box_aspect(ranges, zoom=zoom)
+    axes.set_box_aspect(ranges.tolist(), zoom=zoom)  # an array would be scaled in place
     for letter, part in zip(XYZ, ranges / ranges.max(), strict=True):
-        ticks = MaxNLocator(max(1, round(TICKS * part)))  # fewer ticks on a short axis
-        getattr(axes, f"{letter}axis").set_major_locator(ticks)
+        low, high = getattr(axes, f"get_{letter}lim")()
+        low, high = low + _CORNER * ranges.max(), high - _CORNER * ranges.max()
+        ticks = MaxNLocator(max(1, round(TICKS * part))).tick_values(low, high)
+        getattr(axes, f"set_{letter}ticks")(ticks[(ticks >= low) & (ticks <= high)])
 
 
 class _Picture(Axes3D):  # type: ignore[misc]

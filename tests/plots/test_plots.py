@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
@@ -431,6 +431,22 @@ def test_pictures_fill_their_canvas_below_their_title_also_when_cropped() -> Non
         cropped = figure.get_tightbbox(renderer)
         assert min(cropped.min) >= 0.0
         assert (cropped.max <= figure.get_size_inches()).all()
+
+
+def test_tick_labels_do_not_touch_where_axes_meet() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    pose = arm.at(np.full(arm.nv, 0.1))
+    forces = cdsm.force_polytope(pose, 5.0, 200.0)
+    for figure in (arm.plot(), cdsm.distribute_tension(pose, 20.0).plot(), forces.plot()):
+        figure.draw_without_rendering()
+        axes: Any = figure.axes[0]
+        boxes = [
+            tick.label1.get_window_extent()
+            for axis in axes._axis_map.values()
+            for tick in axis.get_major_ticks()
+        ]
+        assert len(boxes) >= 7
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
 def test_every_result_that_people_look_at_has_a_picture(tmp_path: Path) -> None:
