@@ -161,9 +161,9 @@ def frame_arms(axes: Any, limits: Array | None, label: str = "{} [mm]") -> None:
     ranges = np.ptp(limits, axis=1)
     ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
     for name, middle, size in zip(XYZ, limits.mean(axis=1), ranges, strict=True):
-        getattr(axes, f"set_{name}label")(label.format(name), fontsize=TEXT, labelpad=2)
+        getattr(axes, f"set_{name}label")(label.format(name), fontsize=TEXT, labelpad=-2)
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
-    equal_axes(axes, 1.0)
+    equal_axes(axes)
 
 
 def _draw_joints(axes: Any, pose: Posture) -> None:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 _SAME = 1e-9  # largest difference between the entries of two equal unit directions
 _WIDE = 12  # above this number of cables, a figure with their names is two columns wide
+_MOST_NAMES = 72  # largest number of names below an axis; of more, every second, third, … is shown
 
 
 def plot_shares(shares: Shares) -> Figure:
@@ -129,6 +130,9 @@ def _width(names: Sequence[str]) -> float:
 
 def _name_cables(axes: Any) -> None:
     axes.tick_params(axis="x", rotation=60)
+    place, names = axes.get_xticks(), [label.get_text() for label in axes.get_xticklabels()]
+    step = -(-len(names) // _MOST_NAMES)
+    axes.set_xticks(place[::step], names[::step])
     for label in axes.get_xticklabels():
         label.set(ha="right", rotation_mode="anchor")
 

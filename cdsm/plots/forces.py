@@ -43,6 +43,5 @@ def plot_force_polytope(polytope: ForcePolytope) -> Figure:
     )
     box = np.array([polytope.vertices.min(axis=0), polytope.vertices.max(axis=0)])
     frame_arms(axes, box.T, "force {} [N]")
-    axes.tick_params(pad=1)
     finish_picture(figure, axes, "loads at the tip that the cables hold")
     return figure

@@ -15,6 +15,7 @@ from cdsm.plots.style import (
     MM,
     ONE_COLUMN,
     SMALL,
+    TICKS,
     TWO_COLUMNS,
     VERMILLION,
     cable_lines,
@@ -41,8 +42,8 @@ _SEEN = 2e-3  # a narrower range, relative to the axis, cannot be seen
 def plot_weight_test(test: WeightTest) -> Figure:
     """Plot load against tip displacement, nonlinear and linear, and tensions against load.
 
-    Up to 24 cables have names. Raises InvalidInput if ``test`` is not a result of
-    :func:`~cdsm.weight_test`.
+    Up to 24 cables have names, more have colours by their number. Raises InvalidInput if ``test``
+    is not a result of :func:`~cdsm.weight_test`.
     """
     expect("test", test, "WeightTest")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
@@ -54,6 +55,7 @@ def plot_weight_test(test: WeightTest) -> Figure:
         left.plot(MM * nonlinear, loads, f"{marker}-", color=color, markersize=3, label=axis)
         left.plot([0.0, MM * linear], [0.0, loads[-1]], "--", color=color, linewidth=0.9)
     left.set(xlabel="displacement of the tip [mm]", ylabel="load [N]")
+    left.locator_params("x", nbins=TICKS)
     legend(left, title="direction; dashed: linear")
     names = test.without.pose.arm.cables.names
     cable_lines(right, loads, np.vstack([test.without.tension, test.tensions]), names)

@@ -50,6 +50,7 @@ class Map(NamedTuple):
     values: Array  # plotted quantity at each tip (N,), NaN if missing
     status: NDArray[np.int8]  # status code of each tip (N,)
     plane: tuple[int, int]  # indices of the two base axes that the panel shows
+    base: bool  # whether the slab of the panel contains the base
 
     @property
     def limits(self) -> Array:
@@ -61,6 +62,11 @@ class Map(NamedTuple):
         wide = np.maximum(high - low, _THIN * (high - low).max())  # a line of tips needs some room
         middle = (low + high) / 2.0
         return np.array([middle - wide / 2.0 - room, middle + wide / 2.0 + room]).T
+
+    @property
+    def shows_base(self) -> bool:
+        """Whether the base is in the panel."""
+        return self.base and bool((self.limits.prod(axis=1) <= 0.0).all())
 
 
 class Case(NamedTuple):

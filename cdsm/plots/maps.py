@@ -18,6 +18,7 @@ from cdsm.errors import InvalidInput
 from cdsm.plots.map_panels import Case, Map, cases_of, slices_of
 from cdsm.plots.style import (
     BLACK,
+    BLUE,
     COLOR_MAP,
     MM,
     N_PER_MM,
@@ -61,6 +62,7 @@ _MIDDLE = (0.05, 0.95)
 """Probabilities of two quantiles. If these are d apart, values more than d outside are outliers."""
 
 _TALLEST = 4.0  # largest height of a panel [inch]
+_BAR = 0.17  # width of the colour bar [inch]
 _NARROWEST = 1.2  # least width of a title, and of a panel without its ticks [inch]
 
 Statistic = Literal["median", "min", "max"]
@@ -144,6 +146,7 @@ def plot_map(
             factor * case.values[inside],
             case.status[inside],
             part.plane,
+            bool(part.contains(np.zeros((1, 3)))[0]),
         )
         for case in cases
         for part in slices
@@ -176,10 +179,11 @@ def plot_map(
         axes.locator_params("x", nbins=min(TICKS, round(2.4 * height / ratio)))
     title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
     name = dataset[quantity].long_name.split(",")[0]
-    if np.isnan(every).all():
-        title += f": {name} exists at none of these tips"
+    if not np.isfinite(every).any():
+        found = "exists at none" if np.isnan(every).all() else "is infinite at all"
+        title += f": {name} {found} of these tips"
     else:
-        bar = figure.colorbar(colors, ax=grid, extend=extend)
+        bar = figure.colorbar(colors, ax=grid, extend=extend, aspect=size[1] / _BAR)
         sign = "; below 0: unstable" if quantity == "margin" else ""
         of = f"{shown} of a cell: " if shown else ""
         bar.set_label(textwrap.fill(f"{of}{name} [{unit}]{sign}", 45), fontsize=TEXT)
@@ -204,11 +208,13 @@ def _colors(values: Array) -> tuple[ScalarMappable, str]:
     near, far = np.quantile(measure, _MIDDLE)
     inner = finite[(measure >= 2.0 * near - far) & (measure <= 2.0 * far - near)]
     low, high = float(inner.min()), float(inner.max())
-    below, above = bool((finite < low).any()), bool((values > high).any())
     scale, name = LogNorm if wide and high > _WIDE * low else Normalize, COLOR_MAP
-    if low < 0.0 < high:  # a margin: zero is in the middle of the scale, so colours show its sign
-        low, high, name = -max(-low, high), max(-low, high), "PuOr"
-    cmap = colormaps[name].with_extremes(under=BLACK, over=VERMILLION)
+    over = VERMILLION
+    if finite.min() < 0.0 < finite.max():  # a margin: colours show its sign, zero is in the middle
+        high, name = max(-low, high), "PuOr"
+        low, over = -high, BLUE
+    below, above = bool((finite < low).any()), bool((values > high).any())
+    cmap = colormaps[name].with_extremes(under=BLACK, over=over)
     extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[below, above]
     if high - low <= _EQUAL * abs(high):
         low, high = low - 0.05 * abs(low), high + 0.05 * abs(high)
@@ -253,7 +259,10 @@ def _draw(
             linewidths=0.0,
         )
     axes.set(xlim=limits[0], ylim=limits[1])
-    axes.plot(0.0, 0.0, "s", color="0.1", markersize=4)
+    if colors.norm.vmin == -highest:  # the middle of the scale is white
+        axes.set_facecolor("0.88")
+    if shown.shows_base:
+        axes.plot(0.0, 0.0, "s", color="0.1", markersize=4)
     for letter, axis in zip("xy", shown.plane, strict=True):
         getattr(axes, f"set_{letter}label")(f"{XYZ[axis]} [mm]")
     axes.locator_params(nbins=TICKS)
@@ -270,7 +279,7 @@ def _legend(
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)
     handles = []
-    if any((each.limits[:, 0] <= 0.0).all() and (each.limits[:, 1] >= 0.0).all() for each in maps):
+    if any(each.shows_base for each in maps):
         handles.append(Line2D([], [], marker="s", color="0.1", linestyle="", label="base"))
     for value, count in zip(*np.unique(status, return_counts=True), strict=True):
         word = words[int(value)]

@@ -17,11 +17,14 @@ from cdsm.plots.style import (
     KN,
     MM,
     N_PER_MM,
+    NAMED,
     SMALL,
     TWO_COLUMNS,
     VERMILLION,
     heading,
     legend,
+    legend_below,
+    number_colors,
     panels,
 )
 
@@ -36,16 +39,18 @@ _MOST_LABELS = 30  # above this number of measurements the axis shows numbers, n
 
 
 def plot_tensile_fit(fit: TensileFit) -> Figure:
-    """Plot force against displacement with the fit, and the rigidity EA against tension.
+    """Plot force against strain with the fit, and the rigidity EA against tension.
 
     The second panel also shows the stages of the wire, and the 95 % band of EA if the fit has one.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
     tension, band = fit.tensions, fit.band
-    stretch = fit.start + fit.elasticity.strain(tension) * fit.test.gauge_length
-    left.plot(MM * fit.test.displacement, fit.test.force, ".", color="0.6", ms=3, label="test")
-    left.plot(MM * stretch, tension, color=VERMILLION, label=fit.method)
-    left.set(xlabel="displacement [mm]", ylabel="force [N]")
+    length = fit.test.gauge_length
+    measured = 100.0 * fit.test.displacement / length
+    fitted = 100.0 * (fit.start / length + fit.elasticity.strain(tension))
+    left.plot(measured, fit.test.force, ".", color="0.6", ms=3, label="test")
+    left.plot(fitted, tension, color=VERMILLION, label=fit.method)
+    left.set(xlabel="strain [%]", ylabel="force [N]")
     if band is not None:
         right.fill_between(
             tension,
@@ -84,21 +89,28 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
     """Plot predicted and measured values, and residuals divided by σ with a label for each."""
     rows = fit._rows
-    loops: list[Any] = [each for each in fit.measurements if hasattr(each, "forces")]
+    loops: list[tuple[int, Any]] = [
+        (i, each) for i, each in enumerate(fit.measurements) if hasattr(each, "forces")
+    ]
     stiff = [k for k, each in enumerate(rows) if not hasattr(each, "forces")]
     figure, (axes,) = panels(TWO_COLUMNS, 3.2, 1 + bool(stiff) + bool(loops))
     *left, right = axes
     if stiff:
         _plot_stiffnesses(left[0], fit, stiff)
-    for shade, loop in zip(np.linspace(0.0, 0.8, len(loops)), loops, strict=True):
-        own = [k for k, each in enumerate(rows) if each is loop]
-        _plot_loop(left[-1], fit, loop, own, colormaps[COLOR_MAP](shade))
     if loops:
+        named = len(loops) <= NAMED
+        shades = colormaps[COLOR_MAP](np.linspace(0.0, 0.8, len(loops)))
+        colors = shades if named else number_colors(left[-1], len(loops), "loop")
+        for color, (i, loop) in zip(colors, loops, strict=True):
+            own = [k for k, each in enumerate(rows) if each is loop]
+            _plot_loop(left[-1], fit, loop, own, color)
+            if named and len(loops) > 1:
+                left[-1].plot([], [], color=color, label=loop.label or f"[{i}]")
         left[-1].set(xlabel="force [N]", ylabel="displacement along force [mm]")
         line, dot = ({"color": "0.2", **style} for style in ({}, {"marker": ".", "ls": ""}))
         left[-1].plot([], [], label="predicted", **line)
         left[-1].plot([], [], label="measured", **dot)
-        legend(left[-1])
+        legend_below(figure, left[-1], 5)
     place = np.arange(len(rows))
     for width, shade in ((2.0, 0.12), (1.0, 0.2)):
         right.axhspan(-width, width, color="0.5", alpha=shade, linewidth=0.0)

@@ -137,8 +137,9 @@ def plot_saturation(found: Saturation) -> Figure:
 def plot_path_plan(plan: PathPlan) -> Figure:
     """Plot wanted and planned stiffness, and tensions, against the samples of a path.
 
-    Infeasible samples are shaded. Up to 24 cables have colours and names. Raises InvalidInput if
-    ``plan`` is not a result of :func:`~cdsm.plan_path`, or its target is the Cartesian matrix.
+    Infeasible samples are shaded. Up to 24 cables have names, more have colours by their number.
+    Raises InvalidInput if ``plan`` is not a result of :func:`~cdsm.plan_path`, or its target is the
+    Cartesian matrix.
     """
     expect("plan", plan, "PathPlan")
     if plan.direction is None:

@@ -16,6 +16,8 @@ from typing import Any, Final
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from matplotlib.transforms import Bbox
@@ -61,7 +63,10 @@ ROOM: Final = 1.15
 """Upper limit of an axis that begins at zero, divided by the largest value drawn."""
 
 NAMED: Final = 24
-"""Largest number of cables with names and different lines. More cables all have equal lines."""
+"""Largest number of cables or loops with names. More have colours by their number."""
+
+_CORNER: Final = 0.07
+"""Distance of a tick from the corners of a 3D picture, divided by the longest axis."""
 
 _GAP: Final = 0.06  # free space around a picture [inch]
 
@@ -180,26 +185,41 @@ def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> Non
 def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line: Any) -> None:
     """Draw values (N, C) against x (N,) as a line per cable.
 
-    Up to 24 cables have lines of their own and a legend with ``names``. ``line`` has further
-    options of the lines.
+    Up to 24 cables have lines of their own and a legend with ``names``; more are coloured by their
+    number. ``line`` has further options of the lines.
     """
-    named = len(names) <= NAMED
+    if len(names) > NAMED:
+        for color, own in zip(number_colors(axes, len(names), "cable"), values.T, strict=True):
+            axes.plot(x, own, color=color, **line)
+        return
     for c, name in enumerate(names):
-        color = _CABLES[c % len(_CABLES)] if named else BLUE
-        style = STYLES[c // len(_CABLES)] if named else "-"
+        color, style = _CABLES[c % len(_CABLES)], STYLES[c // len(_CABLES)]
         axes.plot(x, values[:, c], color=color, linestyle=style, label=name, **line)
-    if named:
-        columns = 1 + (len(names) > NAMED // 2)
-        legend(axes, **BESIDE, ncols=columns)
+    legend(axes, **BESIDE, ncols=1 + (len(names) > NAMED // 2))
 
 
-def equal_axes(axes: Any, zoom: float = 0.75) -> None:
-    """Give 3D axes equal scales; ``zoom`` < 1 leaves space for their labels."""
+def number_colors(axes: Any, count: int, name: str) -> Array:
+    """Return a colour for each number from 1 to ``count`` (count, 4), and draw their colour bar."""
+    colors = ScalarMappable(Normalize(1, count), COLOR_MAP)
+    bar = axes.figure.colorbar(colors, ax=axes, aspect=30.0)
+    bar.set_label(f"number of the {name}", fontsize=TEXT)
+    bar.ax.tick_params(labelsize=SMALL)
+    bar.locator = MaxNLocator(TICKS, integer=True)
+    return np.asarray(colors.to_rgba(np.arange(1, count + 1)))
+
+
+def equal_axes(axes: Any, zoom: float = 1.0) -> None:
+    """Give 3D axes equal scales, and ticks away from the corners, where axes meet.
+
+    ``zoom`` < 1 makes the drawing smaller.
+    """
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
-    axes.set_box_aspect(ranges, zoom=zoom)
+    axes.set_box_aspect(ranges.tolist(), zoom=zoom)  # an array would be scaled in place
     for letter, part in zip(XYZ, ranges / ranges.max(), strict=True):
-        ticks = MaxNLocator(max(1, round(TICKS * part)))  # fewer ticks on a short axis
-        getattr(axes, f"{letter}axis").set_major_locator(ticks)
+        low, high = getattr(axes, f"get_{letter}lim")()
+        low, high = low + _CORNER * ranges.max(), high - _CORNER * ranges.max()
+        ticks = MaxNLocator(max(1, round(TICKS * part))).tick_values(low, high)
+        getattr(axes, f"set_{letter}ticks")(ticks[(ticks >= low) & (ticks <= high)])
 
 
 class _Picture(Axes3D):  # type: ignore[misc]

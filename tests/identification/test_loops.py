@@ -205,7 +205,10 @@ def test_result_prints_loops_and_draws_them() -> None:
     assert "[µm]" in text
     assert "at 0.45" in text
     assert html.unescape(FOUND._repr_html_()) == f"<pre>{text}</pre>"
-    left, right = FOUND.plot().axes
+    figure = FOUND.plot()
+    left, right = figure.axes
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert told == [*(loop.label for loop in FOUND._loops), "predicted", "measured"]
     assert left.get_xlabel() == "force [N]"
     assert "measured)/σ" in right.get_ylabel()
     assert FOUND.residuals.shape == FOUND.predicted.shape == (2 * len(FORCES),)

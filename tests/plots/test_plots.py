@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
@@ -353,7 +353,7 @@ def test_steps_and_ramps_of_a_path_are_drawn_as_what_they_are() -> None:
     np.testing.assert_allclose(_shown(line), [x, y])
 
 
-def test_many_cables_are_not_told_apart_by_colour() -> None:
+def test_many_cables_have_colours_by_their_number_and_a_colour_bar() -> None:
     arm = cdsm.Manipulator(
         cdsm.Geometry.universal(
             joints=9,
@@ -370,9 +370,11 @@ def test_many_cables_are_not_told_apart_by_colour() -> None:
     K = cdsm.stiffness(arm.at(q[0]), cdsm.distribute_tension(arm.at(q[0]), 20.0))
     u = (0.0, 0.0, 1.0)
     plan = cdsm.plan_path(arm, u, K.along(u), 10.0, angles=q)
-    below = plots.plot_path_plan(plan).axes[1]
+    _, below, bar = plots.plot_path_plan(plan).axes
     assert below.get_legend() is None
-    assert len({line.get_color() for line in below.get_lines()}) == 1
+    assert len({tuple(line.get_color()) for line in below.get_lines()}) == 27
+    assert bar.get_ylabel() == "number of the cable"
+    assert bar.get_ylim() == (1.0, 27.0)
 
 
 def _shown(line: Line2D) -> Array:
@@ -429,6 +431,22 @@ def test_pictures_fill_their_canvas_below_their_title_also_when_cropped() -> Non
         cropped = figure.get_tightbbox(renderer)
         assert min(cropped.min) >= 0.0
         assert (cropped.max <= figure.get_size_inches()).all()
+
+
+def test_tick_labels_do_not_touch_where_axes_meet() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    pose = arm.at(np.full(arm.nv, 0.1))
+    forces = cdsm.force_polytope(pose, 5.0, 200.0)
+    for figure in (arm.plot(), cdsm.distribute_tension(pose, 20.0).plot(), forces.plot()):
+        figure.draw_without_rendering()
+        axes: Any = figure.axes[0]
+        boxes = [
+            tick.label1.get_window_extent()
+            for axis in axes._axis_map.values()
+            for tick in axis.get_major_ticks()
+        ]
+        assert len(boxes) >= 7
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
 def test_every_result_that_people_look_at_has_a_picture(tmp_path: Path) -> None:

@@ -107,16 +107,54 @@ def test_the_margin_is_shown_with_its_sign_also_where_it_is_negative(planar: xr.
 
 def test_infinite_values_are_at_the_end_of_the_bar() -> None:
     q = np.vstack([np.zeros(6), np.linspace(0.1, 0.4, 20)[:, None] * np.ones(6)])
-    for postures in (q, q[:1]):  # flat, the tip cannot move along the arm
-        found = cdsm.sweep(short_arm(), postures, minimum=20.0)
-        assert (
-            np.isposinf(found.anisotropy).values.tolist()
-            == ([True] + [False] * 20)[: len(postures)]
-        )
-        *_, colors = drawn(plots.plot_map(found, "anisotropy", section=("y", 0.0, 1.0)))
-        values = np.asarray(colors.get_array())
-        assert np.isfinite(values).all()
-        assert values[0] > float(colors.norm.vmax)  # type: ignore[arg-type]
+    found = cdsm.sweep(short_arm(), q, minimum=20.0)  # flat, the tip cannot move along the arm
+    assert np.isposinf(found.anisotropy).values.tolist() == [True] + [False] * 20
+    *_, colors = drawn(plots.plot_map(found, "anisotropy", section=("y", 0.0, 1.0)))
+    values = np.asarray(colors.get_array())
+    assert np.isfinite(values).all()
+    assert values[0] > float(colors.norm.vmax)  # type: ignore[arg-type]
+
+
+def test_a_map_of_infinite_values_has_no_colour_bar_and_says_so() -> None:
+    found = cdsm.sweep(short_arm(), np.zeros((1, 6)), minimum=20.0)
+    figure = plots.plot_map(found, "anisotropy")
+    assert len(figure.axes) == 1  # no bar
+    said = figure._suptitle.get_text()  # type: ignore[attr-defined]
+    assert "is infinite at all of these tips" in " ".join(said.split())
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_margins_beyond_the_scale_keep_the_colour_of_their_sign(
+    planar: xr.Dataset, sign: float
+) -> None:
+    data = planar.isel(minimum=0).copy(deep=True)
+    sound = np.linspace(-1.0, 2.0, data.margin.size).reshape(data.margin.shape)
+    data["margin"] = data.margin.copy(data=sound)
+    data.margin[dict.fromkeys(data.margin.dims, 0)] = sign * 100.0
+    figure = plots.plot_map(data, "margin")
+    (colors,) = drawn(figure)
+    red, _, blue, _ = np.transpose(colors.to_rgba(sign * np.array([100.0, 1.0])))
+    assert float(colors.norm.vmax) == pytest.approx(2.0)  # type: ignore[arg-type]
+    assert (
+        (red < blue) == (sign > 0.0)
+    ).all()  # purple and blue are stable, orange and black are not
+
+
+def test_a_few_unstable_margins_have_a_scale_with_zero_in_its_middle(planar: xr.Dataset) -> None:
+    data = planar.isel(minimum=0).copy(deep=True)
+    sound = np.linspace(1.0, 2.0, data.margin.size).reshape(data.margin.shape)
+    data["margin"] = data.margin.copy(data=sound)
+    data.margin[dict.fromkeys(data.margin.dims, 0)] = -1.9
+    (colors,) = drawn(plots.plot_map(data, "margin"))
+    assert colors.get_clim() == (-2.0, 2.0)
+
+
+def test_slices_without_the_base_do_not_draw_it() -> None:
+    found = cdsm.sweep(short_arm(), cdsm.RandomPoses(64), minimum=20.0)
+    for place, shown in ((0.05, False), (0.0, True)):
+        figure = plots.plot_map(found, "softest", section=("x", place, 0.045))
+        squares = [line for line in figure.axes[0].get_lines() if line.get_marker() == "s"]
+        assert bool(squares) == shown
 
 
 def test_three_dimensions_sections_and_statuses() -> None:

@@ -289,17 +289,17 @@ def test_fit_is_reproducible_and_reports_itself() -> None:
     assert not np.shares_memory(fit.test.force, force)
 
 
-def test_figure_shows_data_fit_band_and_stages_in_mm_and_kn() -> None:
+def test_figure_shows_data_fit_band_and_stages_over_strain_and_in_kn() -> None:
     displacement, force = strand_test(0.5, 0)
     fit = cdsm.fit_tensile_test(displacement, force, GAUGE)
     left, right = fit.plot().axes
-    assert (left.get_xlabel(), left.get_ylabel()) == ("displacement [mm]", "force [N]")
+    assert (left.get_xlabel(), left.get_ylabel()) == ("strain [%]", "force [N]")
     assert (right.get_xlabel(), right.get_ylabel()) == ("tension [N]", "tangent rigidity EA [kN]")
     shown, fitted = (np.asarray(line.get_xydata()).T for line in left.get_lines())
-    np.testing.assert_array_equal(shown, (1e3 * displacement, force))
+    np.testing.assert_array_equal(shown, (100.0 * displacement / GAUGE, force))
     # the fitted line runs through the points
     off = np.interp(shown[0], *fitted) - force
-    assert abs(off[shown[0] > 12.0]).max() < 3.0
+    assert abs(off[shown[0] > 2.4]).max() < 3.0
     assert {text.get_text() for text in right.texts} == {"pre-tensioning", "elastic"}
 
 
