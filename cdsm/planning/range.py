@@ -17,12 +17,7 @@ from cdsm.planning.admissible import Admissible
 from cdsm.planning.objectives import along_constraints, checked_starts
 from cdsm.planning.sqp import HIGHEST, LOWEST, Objective, Program, search
 from cdsm.planning.starts import StartPoints
-from cdsm.planning.stiffness_model import (
-    Constraints,
-    ConstraintValues,
-    Evaluation,
-    StiffnessModel,
-)
+from cdsm.planning.stiffness_model import Constraints, ConstraintValues, Evaluation, StiffnessModel
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.directions import Direction, unit_direction

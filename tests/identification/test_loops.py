@@ -208,7 +208,7 @@ def test_result_prints_loops_and_draws_them() -> None:
     figure = FOUND.plot()
     left, right = figure.axes
     told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert told == [*(loop.label for loop in FOUND._loops), "predicted", "measured"]
+    assert told == [*(loop.label for loop in FOUND.measurements), "predicted", "measured"]
     assert left.get_xlabel() == "force [N]"
     assert "measured)/σ" in right.get_ylabel()
     assert FOUND.residuals.shape == FOUND.predicted.shape == (2 * len(FORCES),)
