@@ -18,7 +18,7 @@ from cdsm.geometry.contacts import overlapping
 from cdsm.kernels import chains as chain_kernels
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.kernels.tree import Frames, Routing
-from cdsm.support.format import JointUnits, aligned, coordinates, plain
+from cdsm.support.format import JointUnits, aligned, coordinates, plain, plural
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -272,7 +272,8 @@ class MomentArms(ReadOnlyState):
         return data_frame(dict(zip(names, self.values.T, strict=True)), "cable", self.cables)
 
     def __repr__(self) -> str:
-        return f"<MomentArms of {len(self.cables)} cables about {len(self.joints)} joints>"
+        cables, joints = plural(len(self.cables), "cable"), plural(len(self.joints), "joint")
+        return f"<MomentArms of {cables} about {joints}>"
 
     def __str__(self) -> str:
         scale = np.where(self.slides, 1.0, 1e3)

@@ -15,6 +15,7 @@ from cdsm.cli.files import Picture, file_option, out_option
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension
 from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import direction_of, misuse
+from cdsm.support.format import plural
 
 
 def plan(
@@ -90,7 +91,9 @@ def plan(
         if plan.planned:  # otherwise there is no posture to draw
             write(animation, lambda file: cdsm.plots.plot_path(plan, animate=file))
         missed = len(plan.target) - len(plan.planned)
-        warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"] if missed else []
+        warnings = (
+            [f"NOT REACHED at {missed} of {plural(len(plan.target), 'sample')}"] if missed else []
+        )
         conditions = Conditions(robot, (min_tension,), planned=True)
         answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
     elif wanted is None:

@@ -17,6 +17,7 @@ from cdsm.cli.files import Picture, file_option, out_option
 from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension
 from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import axis, misuse, numbers
+from cdsm.support.format import plural
 
 
 def _laws() -> list[str]:
@@ -169,7 +170,7 @@ def track(
     conditions = Conditions(robot, (min_tension,), friction=True)
     missed = len(plan.infeasible)
     if missed:
-        warnings = [f"NOT REACHED at {missed} of {len(plan.target)} samples"]
+        warnings = [f"NOT REACHED at {missed} of {plural(len(plan.target), 'sample')}"]
         answer(as_json, plan.to_dict, conditions, plan, warnings=warnings)
     run = cdsm.track(
         plan,

@@ -266,17 +266,17 @@ class DesignProblem(ReadOnlyState):
             found.append(float(value))
         return frozen(np.array(found))
 
+    def __repr__(self) -> str:
+        return f"<DesignProblem {str(self).splitlines()[0]}>"
+
     def __str__(self) -> str:
-        lines = [
-            f"{self.arm.name}: {plural(len(self.variables), 'variable')}, "
-            f"{plural(len(self.loads), 'load')}"
-        ]
+        counts = plural(len(self.variables), "variable"), plural(len(self.loads), "load")
+        lines = [f"{self.arm.name}: {', '.join(counts)}"]
         lines += [
             f"  {each.name}: "
             + (
                 ", ".join(map(each.shown, each.choices))
-                if each.choices
-                else f"{each.shown(each.low or 0.0)} to {each.shown(each.high or 0.0)}"
+                or f"{each.shown(each.low or 0.0)} to {each.shown(each.high or 0.0)}"
             )
             for each in self.variables
         ]

@@ -59,6 +59,9 @@ class Geometry(Description):
         CdsmWarning: Cables share a hole, or lengths look like millimetres.
     """
 
+    def __repr__(self) -> str:
+        return f"<Geometry {self}>"
+
     @classmethod
     @checked_keywords
     def universal(

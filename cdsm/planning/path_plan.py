@@ -19,7 +19,7 @@ from cdsm.planning.half_way import HalfWay, half_way
 from cdsm.planning.path_table import path_table
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
-from cdsm.support.format import JointUnits, plain
+from cdsm.support.format import JointUnits, plain, plural
 from cdsm.support.progress import track
 from cdsm.support.tables import csv_text
 from cdsm.support.tidy import data_frame
@@ -219,10 +219,10 @@ class PathPlan(ReadOnlyState):
         return self.write(path)
 
     def __repr__(self) -> str:
-        return f"<PathPlan of {len(self.planned)} of {len(self.target)} samples>"
+        return f"<PathPlan of {len(self.planned)} of {plural(len(self.target), 'sample')}>"
 
     def __str__(self) -> str:
-        lines = [f"{len(self.planned)} of {len(self.target)} samples planned"]
+        lines = [f"{len(self.planned)} of {plural(len(self.target), 'sample')} planned"]
         if self.planned:
             F = self.tensions
             lines[0] += f", with {F.min():.4g} to {F.max():.4g} N"

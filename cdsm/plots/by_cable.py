@@ -25,6 +25,7 @@ from cdsm.plots.style import (
     legend,
     panels,
 )
+from cdsm.support.format import plural
 
 if TYPE_CHECKING:
     from cdsm.batch import Tensions
@@ -118,7 +119,7 @@ def plot_tensions(tensions: Tensions) -> Figure:
     axes.errorbar(names, middle, reach, fmt="o", color=BLUE, markersize=3, capsize=2, linewidth=0.8)
     axes.set_ylabel("tension [N]")
     from_zero(axes, high)
-    count = f"{len(found)} of {len(tensions)} postures"
+    count = f"{len(found)} of {plural(len(tensions), 'posture')}"
     caption(axes, f"{tensions.arm.name}: median and range, {count}")
     _name_cables(axes)
     return figure

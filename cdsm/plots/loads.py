@@ -26,6 +26,7 @@ from cdsm.plots.style import (
     panels,
 )
 from cdsm.support.directions import XYZ
+from cdsm.support.format import plural
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -194,6 +195,6 @@ def plot_load_history(history: LoadHistory) -> Figure:
     right.xaxis.set_major_locator(MaxNLocator(integer=True))
     right.set(xlabel="number of the load", ylabel="tension of each segment [N]")
     legend(right, title=history.reference.arm.cables[cable].name, **BESIDE)
-    lost = f"{1000.0 * history.dissipated.sum():.4g} mJ lost in all in {len(history.holes)} holes"
-    heading(figure, f"{history.reference.arm.name}: {lost}")
+    lost = f"{1000.0 * history.dissipated.sum():.4g} mJ lost in all in"
+    heading(figure, f"{history.reference.arm.name}: {lost} {plural(len(history.holes), 'hole')}")
     return figure

@@ -27,6 +27,7 @@ from cdsm.plots.style import (
     number_colors,
     panels,
 )
+from cdsm.support.format import plural
 
 if TYPE_CHECKING:
     from cdsm.identification.experiment_plan import ExperimentPlan
@@ -166,7 +167,7 @@ def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
         )
         for y, x in zip(place + shift, half, strict=True):
             if not np.isfinite(x):
-                left.text(0.0, y, " not determined", va="center")
+                left.text(0.0, y, " not determined", va="center", fontsize=SMALL)
     left.set_yticks(place, plan.names)
     left.invert_yaxis()
     left.set_xlabel("95 % interval, ± % of the expected value")
@@ -182,8 +183,10 @@ def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
             textcoords="offset points",
             xytext=(0, -12),
             ha="center",
+            fontsize=SMALL,
         )
     right.set(xlabel="candidate", ylabel="gain by one more test, over the largest", ylim=(0, 1.15))
+    right.xaxis.set_major_locator(MaxNLocator(integer=True))
     legend(right)
-    heading(figure, f"{len(plan.tests)} tests, {plan.criterion}-optimal")
+    heading(figure, f"{plural(len(plan.tests), 'test')}, {plan.criterion}-optimal")
     return figure

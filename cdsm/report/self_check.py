@@ -126,6 +126,10 @@ class SelfCheck(ReadOnlyState):
         """Return all comparisons: of the terms, the torque residual and the lengths."""
         return (*self.terms, self.statics, self.lengths)
 
+    def __repr__(self) -> str:
+        agree = sum(each.verdict == "agrees" for each in self.compared)
+        return f"<SelfCheck: {agree} of {len(self.compared)} comparisons agree>"
+
     def __str__(self) -> str:
         return "\n".join(
             f"{each.name:<8} {each.verdict}{f': {each.reason}' if each.reason else ''}"

@@ -209,7 +209,7 @@ class WeightFriction(ReadOnlyState):
             )
         rows.append(
             f"this weight, {self.weight:.4g} N, measures {self.secant / 1000.0:.4g} N/mm; "
-            f"{self.sliding_holes} of {self.history.sliding.shape[1]} holes slide"
+            f"{self.sliding_holes} of {plural(self.history.sliding.shape[1], 'hole')} slide"
         )
         if math.isfinite(self.dithered):
             rows.append(

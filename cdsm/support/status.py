@@ -16,6 +16,7 @@ from cdsm.errors import (
     SingularStiffness,
     SolverError,
 )
+from cdsm.support.format import plural
 
 
 @unique
@@ -69,4 +70,4 @@ def summary(status: NDArray[np.uint8]) -> str:
     """Return a text that counts the postures with each status."""
     counts = np.bincount(status, minlength=len(Status))
     listed = [f"{counts[each]} {each.name}" for each in Status if counts[each] or each == Status.OK]
-    return f"{len(status)} postures: {', '.join(listed)}"
+    return f"{plural(len(status), 'posture')}: {', '.join(listed)}"

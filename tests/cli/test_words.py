@@ -124,7 +124,7 @@ def test_json_has_numbers_of_a_list_in_one_line(geometry: Path) -> None:
         ),
         (
             ("plan", *STEEL, "--direction", "z", "--path", "{folder}/path.csv", "--target", 1e6),
-            "NOT REACHED at 1 of 1 samples",
+            "NOT REACHED at 1 of 1 sample",
         ),
     ],
 )

@@ -43,3 +43,19 @@ def test_tolerances_print_what_is_not_the_default() -> None:
     assert eval(repr(made), vars(cdsm)) == made
     varying = cdsm.Tolerance(np.array([0.1, 0.05]), tensions=np.array([10.0, 90.0]))
     assert "standard=array([0.1 , 0.05]), tensions=array([10., 90.])" in repr(varying)
+
+
+def test_values_of_many_fields_are_one_line_at_the_prompt() -> None:
+    arm = random_arm(4, 3)
+    geometry = arm.geometry
+    assert repr(geometry) == f"<Geometry {geometry}>"
+    assert "\n" not in repr(geometry)
+    K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), np.full(len(arm.cables), 20.0))
+    assert repr(K.report().self_check) == "<SelfCheck: 7 of 7 comparisons agree>"
+    problem = cdsm.DesignProblem(
+        arm=cdsm.presets.virtual_prototype(),
+        variables=[cdsm.Variable("hole_radius", 0.02, 0.03)],
+        objectives=[cdsm.Objective("motor_force")],
+        postures=np.zeros((1, 10)),
+    )
+    assert repr(problem) == "<DesignProblem virtual_prototype: 1 variable, 1 load>"

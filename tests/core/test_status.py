@@ -27,4 +27,4 @@ def test_other_errors_have_none() -> None:
 
 def test_summary_counts_rows() -> None:
     assert summary(np.array([0, 3, 3], dtype=np.uint8)) == "3 postures: 1 OK, 2 INFEASIBLE"
-    assert summary(np.array([3], dtype=np.uint8)) == "1 postures: 0 OK, 1 INFEASIBLE"
+    assert summary(np.array([3], dtype=np.uint8)) == "1 posture: 0 OK, 1 INFEASIBLE"

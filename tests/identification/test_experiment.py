@@ -110,6 +110,8 @@ def test_a_plan_prints_and_draws_itself() -> None:
     left, right = PLAN.plot().axes
     assert left.get_xlabel() == "95 % interval, ± % of the expected value"
     assert right.get_xlabel() == "candidate"
+    ticks = right.get_xticks()
+    np.testing.assert_array_equal(ticks, np.round(ticks))
 
 
 def test_candidates_that_fail_are_left_out_with_their_reason() -> None:
