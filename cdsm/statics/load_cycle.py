@@ -59,12 +59,14 @@ def load_cycle(
         motors: Commands of the motors at each load (n, C): for a position-controlled cable the
             natural length of wire taken in since the reference [m], positive if it pulls; for a
             force-controlled cable its tension [N]. Default: 0 m, and the tension F at the
-            reference.
+            reference. A motor cannot take in all wire of its cable.
         accuracy: Largest error of the energy balance (work − stored energy − dissipation) of each
             step, relative to the work, from 1e-12 to 0.1. Steps are divided until the error is
-            smaller. Tips and tensions depend on sub-steps only where a hole stops sliding within
-            one: with 1e-3, the tips of 39 random arms were then off by up to 0.5 % of the largest
-            displacement, half of them by less than 0.06 %. A snap-through cannot keep the balance:
+            smaller. The net work of a thin loop is much less than the work of its steps: there
+            ``print`` says how well the loss is known. Tips and tensions depend on sub-steps only
+            where a hole stops sliding within one: with 1e-3, the tips of 39 random arms were then
+            off by up to 0.5 % of the largest displacement, half of them by less than 0.06 %. A
+            snap-through cannot keep the balance:
             see ``warnings`` of the result.
 
     Raises:
@@ -91,6 +93,7 @@ def load_cycle(
     if motors is not None:
         commands = _commands(motors, loading.forced, commands.shape)
     state, none = loading.begin(F, W), frozen(np.zeros(pose.q.size))
+    _require_wire(commands, loading, state, pose.arm.cables.names)
     history = []
     for k, (wrench, command) in enumerate(track(tuple(zip(loads, commands, strict=True)), "loads")):
         state, passage = loading.carry(
@@ -132,6 +135,21 @@ def _commands(motors: ArrayLike, forced: NDArray[np.bool_], shape: tuple[int, ..
     number_array("motors", commands[:, ~forced], "length")
     number_array("motors", tensions, "tension")
     return commands
+
+
+def _require_wire(
+    commands: Array, loading: SlowLoading, state: State, names: Sequence[str]
+) -> None:
+    """Raise InvalidInput if a motor takes in all wire that its cable has at ``state`` or more."""
+    wire = np.add.reduceat(state.settled.chain.natural, loading.start[:-1])
+    beyond = ~loading.forced & (commands >= wire)
+    if beyond.any():
+        k, c = np.argwhere(beyond)[0].tolist()
+        raise InvalidInput(
+            "motors",
+            f"{commands[k, c]:g} m of wire taken in for {names[c]} at load {k + 1}; it has only "
+            f"{wire[c]:.4g} m. Take in less.",
+        )
 
 
 def _labelled(

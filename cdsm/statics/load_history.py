@@ -35,6 +35,9 @@ _SNAP = 0.05
 The coarsest ``accuracy``, 10 % of the work, leaves less: the work is stored or dissipated, too.
 """
 
+_KNOWN = 0.01
+"""Error of the energy balance, relative to the loss, above which ``print`` says it."""
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -250,10 +253,15 @@ class LoadHistory(ReadOnlyState):
                 f"{k + 1:>5}  {force}{moved}{np.count_nonzero(self.sliding[k]):>9}"
                 f"{1000.0 * works[k]:>12.4g}{1000.0 * self.dissipated[k]:>12.4g}"
             )
+        lost, missed = self.dissipated.sum(), abs(self.unaccounted).sum()
         rows.append(
             f"{self.sliding.shape[1]} holes; in all {1000.0 * work.sum():.4g} mJ of work, "
-            f"{1000.0 * self.dissipated.sum():.4g} mJ of it lost in the holes"
+            f"{1000.0 * lost:.4g} mJ of it lost in the holes"
         )
+        if missed > _KNOWN * lost and not self.warnings:
+            rows.append(
+                f"(both known to about {1000.0 * missed:.2g} mJ only: lower accuracy= for more)"
+            )
         return "\n".join(rows)
 
     def _index(self, load: int) -> int:
