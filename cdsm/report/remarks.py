@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.geometry import doubts_about_units
+from cdsm.stiffness_matrix.instability import advice, verdict
+from cdsm.stiffness_matrix.prints import missing_leads
 
 if TYPE_CHECKING:
     from cdsm.report.report import Report
@@ -51,7 +53,7 @@ def faults(report: Report) -> Iterator[str]:
         )
     arm = K.posture.arm
     if not K.is_stable:
-        what, how, *remedies = K.warnings
+        what, how, *remedies = verdict(K), *advice(K)
         yield f"{what}; {how} {'; '.join(map(str.strip, remedies))}".rstrip()
     elif K.margin <= _SINGULAR * np.linalg.norm(K.joint, 2):
         yield (
@@ -122,12 +124,7 @@ def _of_tensions(report: Report) -> Iterator[str]:
                 f"within {100.0 * CLOSE:g} % of the {end} end of their law: {_listed(names)}. "
                 "The law is not defined beyond it."
             )
-    pairs = zip(K.posture.arm.cables, K.free_lengths, strict=True)
-    if lost := [cable.name for cable, l0 in pairs if l0 <= 0.0]:
-        yield (
-            f"the series spring stretches by more than the whole cable is long: {_listed(lost)}. "
-            "Give a longer lead; without it K is off by up to F/EA."
-        )
+    yield from missing_leads(K)
     if K.wrench[3:].any():
         yield (
             "a moment at the tip has no potential: K_θ is not symmetric, stability is judged on "

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.errors import SingularStiffness
+from cdsm.errors.base import named
 from cdsm.stiffness_matrix.cartesian import axis_of
 from cdsm.support.format import MODEL, key, plain
 
@@ -76,6 +77,18 @@ def notes(K: Stiffness) -> tuple[str, ...]:
     unit = K.posture.arm.stiffness_unit()
     least = f"smallest joint stiffness {K.margin:.4g} {unit} ({model_of(K)})"
     return (*missing, *K.posture.remarks, f"{state}, {least}")
+
+
+def missing_leads(K: Stiffness) -> tuple[str, ...]:
+    """Return a line that names the cables whose series springs leave no wire, if there are any."""
+    pairs = zip(K.posture.arm.cables, K.free_lengths, strict=True)
+    lost = [cable.name for cable, l_0 in pairs if l_0 <= 0.0]
+    if not lost:
+        return ()
+    return (
+        f"the series spring stretches by more than the whole cable is long: {named(lost)}. "
+        "Give a longer lead; without it K is off by up to F/EA.",
+    )
 
 
 def model_of(K: Stiffness) -> str:
