@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.geometry import doubts_about_units
-from cdsm.stiffness_matrix.instability import advice, verdict
 from cdsm.stiffness_matrix.prints import missing_leads
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ def faults(report: Report) -> Iterator[str]:
         )
     arm = K.posture.arm
     if not K.is_stable:
-        what, how, *remedies = verdict(K), *advice(K)
+        what, how, *remedies = K.warnings
         yield f"{what}; {how} {'; '.join(map(str.strip, remedies))}".rstrip()
     elif K.margin <= _SINGULAR * np.linalg.norm(K.joint, 2):
         yield (

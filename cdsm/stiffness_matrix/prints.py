@@ -76,7 +76,7 @@ def notes(K: Stiffness) -> tuple[str, ...]:
     state = "stable" if K.is_stable else "UNSTABLE"
     unit = K.posture.arm.stiffness_unit()
     least = f"smallest joint stiffness {K.margin:.4g} {unit} ({model_of(K)})"
-    return (*missing, *K.posture.remarks, f"{state}, {least}")
+    return (*missing, *K.posture.remarks, *missing_leads(K), f"{state}, {least}")
 
 
 def missing_leads(K: Stiffness) -> tuple[str, ...]:

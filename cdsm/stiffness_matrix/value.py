@@ -75,7 +75,7 @@ class Stiffness(CartesianReadings):
 
         The locked motors keep l_0 = (L − ΔF/k_series)/(1 + ε(F)) constant; symbols as in
         :class:`Cable`. l_0 is negative if the series spring stretches by more than the length of
-        the cable; :attr:`warnings` says so. For a force-controlled cable it is L.
+        the cable; ``print`` says so. For a force-controlled cable it is L.
         """
         if self.free_length is not None:
             return self.free_length
@@ -156,12 +156,8 @@ class Stiffness(CartesianReadings):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Lines that say that the arm is UNSTABLE, with its remedies, or which leads are too short.
-
-        There are none for a stable arm whose series springs are shorter than its cables.
-        """
-        unstable = () if self.is_stable else (verdict(self), *advice(self))
-        return (*unstable, *prints.missing_leads(self))
+        """Lines that say that the arm is UNSTABLE, with its remedies; empty for a stable arm."""
+        return () if self.is_stable else (verdict(self), *advice(self))
 
     def report(self) -> Report:
         """Check this stiffness; return facts, warnings and a second derivation of K_θ.
