@@ -13,7 +13,7 @@ from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity, SlackBelow
 from cdsm.elasticity.answers import rigidity_of, slope_of, strain_of
 from cdsm.errors import ElasticityRangeError, InvalidInput
-from cdsm.kernels.stiffness import STIFFEST, single_cable_stiffness
+from cdsm.kernels.stiffness import single_cable_stiffness
 from cdsm.kernels.wires import AT_ONCE, CURVE, POLYNOMIAL, Wires, single_rigidity
 from cdsm.support.values import Array, frozen
 from cdsm.wires.continuity import find_jump
@@ -66,7 +66,6 @@ class CableLaws:
         self._bounded = bool(self._least.any() or np.isfinite(self._most).any())
         series = np.array([cable.series_stiffness for cable in self._cables])
         self.series = frozen(1.0 / series)
-        self._sprung = bool(self.series.any())
         self.rest = frozen(np.array([cable.elasticity.rest for cable in self._cables]))
         # constant EA of linear laws; all other laws are evaluated at each tension
         self.nonlinear, constant, linear = [], np.zeros(count), np.zeros(count)
@@ -133,31 +132,7 @@ class CableLaws:
         """Compute the diagonal of K_L (C,) [N/m]: 1/(l_0/EA(F) + 1/k_series).
 
         Force-controlled cables have the stiffness 0. ``lengths`` is L (C,) [m] and ``tension`` is
-        F (C,) [N], both checked and not negative. Raises ElasticityRangeError if a tension is
-        outside the domain of its law, or stretches a spring so far that no wire is left.
-        """
-        k = self.segment_stiffness(lengths, tension)
-        if self._sprung:
-            lost = np.flatnonzero((k < 0.0) | (k * self.series > STIFFEST))
-            if lost.size:
-                c = lost[0]
-                stretch = self.series[c] * (tension[c] - self.rest[c])
-                raise self.naming(
-                    ElasticityRangeError(
-                        f"stretches its series spring by {1e3 * stretch:.4g} mm, but the whole "
-                        f"cable is {1e3 * lengths[c]:.4g} mm long, so that no wire is left. Give "
-                        "the cable a longer lead, a stiffer spring or less tension.",
-                        tension[lost].tolist(),
-                        lost.tolist(),
-                    ),
-                    slice(None),
-                )
-        return k
-
-    def segment_stiffness(self, lengths: Array, tension: Array) -> Array:
-        """Compute :meth:`stiffness` where the springs may be longer than the given ``lengths``.
-
-        The series spring of a cable counts as a part of its first segment.
+        F (C,) [N], both checked and not negative.
         """
         rigidity = self._rigidity(tension) if self.nonlinear else self.constant
         k = single_cable_stiffness(lengths, tension, rigidity, self.linear, self.series, self.rest)

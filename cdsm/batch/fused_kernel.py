@@ -46,7 +46,6 @@ from cdsm.kernels.serpentine_guess import empty_guess
 from cdsm.kernels.serpentine_multipliers import set_proof
 from cdsm.kernels.stiffness import (
     add_passive_stiffness,
-    has_no_wire,
     set_cable_stiffness,
     set_load_stiffness,
     sum_terms,
@@ -207,9 +206,6 @@ def evaluate_rows(
                 set_rigidity(arm.laws, F, stretched, wiring, width)
             _note_outside(code, stretched, width)
             set_cable_stiffness(L, F, stretched, holes.series, holes.rest, k, width)
-            for w in lanes(width):
-                if code[w] == OK and has_no_wire(k, holes.series, w):
-                    code[w] = OUTSIDE_ELASTICITY
             if asked.slides:
                 clear(passive, width)
                 add_passive_stiffness(J, k, passive, six, width)

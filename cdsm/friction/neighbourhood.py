@@ -36,7 +36,7 @@ class Neighbourhood:
         chains, laws = segments.chains, K.posture.arm._model.segment_laws
         cable, start, F = chains.cable, chains.start, K.tension
         with np.errstate(divide="ignore"):
-            soft = 1.0 / laws.segment_stiffness(segments.lengths, F[cable])
+            soft = 1.0 / laws.stiffness(segments.lengths, F[cable])
         steps = np.zeros((cable.size, chains.hole.size))
         for i, hole in enumerate(chains.hole):
             of = slice(start[cable[hole]], start[cable[hole] + 1])

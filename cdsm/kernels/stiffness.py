@@ -4,20 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.kernels.compiling import Index, Width, compiled, inlined, inner, lanes, upwards
+from cdsm.kernels.compiling import Index, Width, compiled, inner, lanes, upwards
 from cdsm.kernels.records import mirror
 from cdsm.kernels.segments import add_length_hessian, segment_scratch
 from cdsm.kernels.tree import Indices, one_frames
 from cdsm.support.values import Array
 
 _Rows = tuple[Array, Array, Array]
-
-STIFFEST = 1.05
-"""Largest valid k/k_series.
-
-Only a wire of negative length makes k larger than k_series: the spring then stretches by more than
-the cable is long, as if a lead were missing. Where the strains are small, k is still nearly right.
-"""
 
 
 @inner
@@ -43,19 +36,6 @@ def set_cable_stiffness(
             wire = length[c, w] - series[c] * (tension[c, w] - rest[c])
             k = 1.0 / (wire / rigidity[c, w] + series[c])
             stiffness[c, w] = k if rigidity[c, w] > 0.0 else 0.0
-
-
-@inlined
-def has_no_wire(stiffness: Array, series: Array, w: Index) -> bool:
-    """Check whether a cable of posture w has no valid k, since its spring leaves it no wire.
-
-    ``stiffness`` is k (C, W) [N/m], ``series`` 1/k_series (C,) [m/N].
-    """
-    lost = False
-    for c in range(stiffness.shape[0]):
-        k = stiffness[c, w]
-        lost = lost or k < 0.0 or k * series[c] > STIFFEST
-    return lost
 
 
 @inner

@@ -77,6 +77,7 @@ def load_cycle(
         EquilibriumError: No equilibrium was found in the step to a load. The error names the load.
     """
     F, W = checked_tension(pose, tension, None)
+    pose.arm._model.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
     loads = number_array("wrenches", wrenches, "wrench")
     if loads.ndim != 2 or loads.shape[1] != 6 or not 0 < len(loads) <= MOST_LOADS:
         raise InvalidInput(
@@ -109,7 +110,7 @@ def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) 
     :func:`load_cycle`. Raises InvalidInput if ``pose`` is beyond a joint limit.
     """
     require_between_stops(pose)
-    LoadedArm(pose, tension, wrench)  # refuses tensions for which there is no stiffness
+    LoadedArm(pose, tension, wrench)  # refuses a spring that leaves no wire
     arm = pose.arm
     start = np.searchsorted(pose.segments.chains.cable, np.arange(len(arm.cables) + 1))
     forced = ~arm.cables.position_controlled

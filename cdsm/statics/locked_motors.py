@@ -76,7 +76,6 @@ class LoadedArm:
         self.wrench = wrench
         self.stops = stops(reference)
         laws, L = reference.arm._model.laws, reference.cable_lengths if lengths is None else lengths
-        laws.stiffness(L, tension)  # refuses a spring that leaves no wire
         self._free_length = laws.original_lengths(L, tension)
         self._laws = []
         for law, cables in laws.held:

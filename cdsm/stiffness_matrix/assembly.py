@@ -30,8 +30,7 @@ def stiffness(
     Raises:
         InvalidInput: An argument has the wrong shape or is not numbers, a tension is negative, the
             tensions are of another posture or arm, or a wrench is given with a ``Tension``.
-        ElasticityRangeError: A tension is outside the domain of its cable's elasticity, or
-            stretches a series spring so far that no wire is left.
+        ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     F, W = checked_tension(pose, tension, wrench)
     k = pose.arm._model.laws.stiffness(pose.cable_lengths, F)

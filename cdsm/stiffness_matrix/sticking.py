@@ -53,7 +53,7 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
     """
     model, segments = pose.arm._model, pose.segments
     chains, laws, length = segments.chains, model.segment_laws, segments.lengths
-    k = laws.segment_stiffness(length, tension)
+    k = laws.stiffness(length, tension)
     # (1 + ε) of the wire: the spring in series is part of the length
     wire = length - laws.series * (tension - laws.rest)
     stretch = wire / laws.original_lengths(length, tension)

@@ -41,9 +41,8 @@ class Status(IntEnum):
     """The solver finds no tensions, though some exist (SolverError): only quantities of the joint
     angles alone exist."""
     OUTSIDE_ELASTICITY = 5
-    """A tension is outside the domain of its law, or a series spring leaves no wire
-    (ElasticityRangeError): tensions, residual, active and load terms exist; quantities that need
-    the cable stiffness do not."""
+    """A tension is outside the domain of its law (ElasticityRangeError): tensions, residual, active
+    and load terms exist; quantities that need the cable stiffness do not."""
     SINGULAR = 6
     """K_θ is singular (SingularStiffness): along, compliance and cartesian do not exist. If the tip
     is also IMMOBILE, pseudoinverse does not exist."""

@@ -150,44 +150,16 @@ def test_failure_of_an_own_elasticity_beyond_the_stiffness_is_told(
             ask()
 
 
-def sprung(spring: float, friction: float = 0.0) -> cdsm.Manipulator:
-    """An arm of stretchy wires on springs, without leads."""
+def test_spring_longer_than_its_cable_is_told() -> None:
+    """Under 60 N a spring of 1 N/mm stretches by 60 mm, three times the 20 mm of cable1_1."""
     geometry = cdsm.Geometry.universal(
         joints=2, cables_per_joint=3, link_length=0.04, base_length=0.02, disk_offset=0.01,
         hole_radius=0.03, link_mass=0.05,
     )  # fmt: skip
-    wire = cdsm.LinearElasticity(2e3)
-    cables = cdsm.serpentine_cables(geometry, wire, series_stiffness=spring)
-    return cdsm.Manipulator(geometry, cables=cables).with_friction(friction)
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.2])
-def test_spring_that_leaves_no_wire_is_refused_alone_and_in_a_batch(friction: float) -> None:
-    """(200 N)/(1 N/mm) is ten times the 20 mm of cable: l_0 = −164 mm gave 1.09 times k_series."""
-    arm, F = sprung(1e3, friction), np.full(6, 200.0)
-    pose = arm.at(np.zeros(arm.nv))
-    said = r"200, … N \(cable cable1_1, .*\): .* spring by 200 mm, .* 20 mm long.* longer lead"
-    for asks in (
-        lambda: cdsm.stiffness(pose, F),
-        lambda: cdsm.equilibrium(pose, F),
-        lambda: cdsm.stuck_stiffness(pose, F),
-    ):
-        with pytest.raises(cdsm.ElasticityRangeError, match=said):
-            asks()
-    names = ["active", "cable_stiffness", "margin", "stuck_joint"]
-    batch = cdsm.evaluate(arm, np.zeros((2, arm.nv)), F, outputs=names)
-    assert (batch.status == cdsm.Status.OUTSIDE_ELASTICITY).all()
-    assert np.isfinite(batch["active"]).all()
-    assert all(np.isnan(batch[name]).all() for name in names[1:])
-
-
-def test_spring_a_little_longer_than_its_cable_is_told() -> None:
-    """Under 60 N l_0 is −39 mm, and k 2 % above k_series."""
-    for spring, tension, lost in ((1e3, 60.0, True), (3e3, 59.0, False), (math.inf, 60.0, False)):
-        arm = sprung(spring)
-        K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), np.full(6, tension))
-        assert (K.cable_stiffness.max() > spring) == lost
+    wire, F = cdsm.LinearElasticity(2e3), np.full(6, 60.0)
+    for spring, lost in ((1e3, True), (3.1e3, False), (math.inf, False)):
+        cables = cdsm.serpentine_cables(geometry, wire, series_stiffness=spring)
+        arm = cdsm.Manipulator(geometry, cables=cables)
+        K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), F)
         assert ("longer lead" in str(K)) == lost
         assert any("longer lead" in line for line in K.report().notes) == lost
-        batch = cdsm.evaluate(arm, np.zeros((1, arm.nv)), K.tension, outputs=["cable_stiffness"])
-        assert batch["cable_stiffness"][0].tolist() == K.cable_stiffness.tolist()
