@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -62,7 +63,16 @@ def write_labelled(
     if suffix == ".csv":
         return write_file(path, table().to_csv)
     data = labelled()
-    return write_file(path, lambda aside: data.to_netcdf(aside, engine="netcdf4"))
+    return write_file(path, lambda aside: write_netcdf(data, aside))
+
+
+def write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
+    """Write a Dataset to a NetCDF file; OSError says how much room is left."""
+    try:
+        dataset.to_netcdf(path, engine="netcdf4")
+    except (RuntimeError, PermissionError) as error:  # HDF5 does not report a full disk
+        free = shutil.disk_usage(path.parent).free
+        raise OSError(f"{error} ({free} bytes are free there)") from None
 
 
 def checked_suffix(path: str | os.PathLike[str]) -> str:

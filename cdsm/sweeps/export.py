@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdsm.errors import FileError, InvalidInput
 from cdsm.support.extras import need
 from cdsm.support.files import as_path, write_file
-from cdsm.support.tidy import check_sweep, checked_suffix, tidy
+from cdsm.support.tidy import check_sweep, checked_suffix, tidy, write_netcdf
 
 if TYPE_CHECKING:
     import pandas
@@ -36,7 +35,7 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
         FileError: The file cannot be written.
     """
     check_sweep(dataset)
-    write = _write_table if checked_suffix(path) == ".csv" else _write_netcdf
+    write = _write_table if checked_suffix(path) == ".csv" else write_netcdf
     return write_file(path, lambda aside: write(dataset, aside))
 
 
@@ -99,14 +98,6 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
     except Exception as error:  # netCDF4 and xarray may raise anything
         given = "give the .nc of a sweep, or the folder of its store"
         raise FileError(path, f"cannot be read as NetCDF: {error}; {given}.") from None
-
-
-def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
-    try:
-        dataset.to_netcdf(path, engine="netcdf4")
-    except (RuntimeError, PermissionError) as error:  # HDF5 does not report a full disk
-        free = shutil.disk_usage(path.parent).free
-        raise OSError(f"{error} ({free} bytes are free there)") from None
 
 
 def _write_table(dataset: xarray.Dataset, path: Path) -> None:

@@ -75,6 +75,7 @@ def _in_words(left: dict[str, str]) -> str:
 
 WRITERS = (
     *("urdf", "geometry", "cables", "elasticity", "mjcf", "netcdf", "csv", "path plan"),
+    "load history",
     *("cdsm urdf", "cdsm export", "cdsm fit", "cdsm fit --figure", "cdsm sweep", "cdsm map"),
     *("cdsm weigh", "cdsm reproduce"),
 )

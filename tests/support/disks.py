@@ -40,6 +40,7 @@ def write(path: Path) -> dict[str, Callable[[], object]]:
     """What writes a file at a path, by the name of the writer."""
     wire, pose = cdsm.LinearElasticity(48e3), ARM.at(np.full(ARM.nv, 0.1))
     pull = cdsm.distribute_tension(pose, 10.0)
+    loaded = cdsm.load_cycle(pose, pull, np.eye(6)[2:3])
     swept = cdsm.sweep(ARM, POSES, minimum=20.0, outputs=OUTPUTS)
     plan = cdsm.plan_path(ARM, (0, 0, 1), 1e3, 10.0, 500.0, angles=np.full((20, ARM.nv), 0.1))
     table = path.with_suffix(".csv")
@@ -52,6 +53,7 @@ def write(path: Path) -> dict[str, Callable[[], object]]:
         "netcdf": lambda: cdsm.write_sweep(swept, path.with_suffix(".nc")),
         "csv": lambda: cdsm.write_sweep(swept, table),
         "path plan": lambda: plan.write_csv(table),
+        "load history": lambda: loaded.write(path.with_suffix(".nc")),
     }
 
 
