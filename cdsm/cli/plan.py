@@ -15,7 +15,6 @@ from cdsm.cli.files import Picture, file_option, out_option
 from cdsm.cli.options import ArmOptions, AsJson, LoadOptions, MaxTension, MinTension
 from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import direction_of, misuse
-from cdsm.support.format import plural
 
 
 def plan(
@@ -78,6 +77,7 @@ def plan(
     wanted = None if target is None else 1000.0 * target
     if path is not None:
         from cdsm.cli.path_file import one_target, read_path
+        from cdsm.support.format import plural
 
         robot = arm.read()
         file = read_path(path, robot)

@@ -17,7 +17,6 @@ from cdsm.cli.files import Picture, file_option, out_option
 from cdsm.cli.options import ArmOptions, AsJson, MaxTension, MinTension
 from cdsm.cli.output import answer, write, write_picture
 from cdsm.cli.values import axis, misuse, numbers
-from cdsm.support.format import plural
 
 
 def _laws() -> list[str]:
@@ -158,6 +157,7 @@ def track(
     or a sample cannot be planned.
     """
     from cdsm.cli.path_file import one_target, read_path
+    from cdsm.support.format import plural
 
     true.check()
     robot = arm.read()
