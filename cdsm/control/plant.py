@@ -11,7 +11,7 @@ from cdsm.control.laws import Command, Reading
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.load_cycle import slow_loading
+from cdsm.statics.load_cycle import checked_accuracy, slow_loading
 from cdsm.statics.slow_loading import Load, SlowLoading, State
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, frozen
@@ -82,10 +82,12 @@ class SlowPlant:
 
     Attributes:
         arm: The true arm.
-        accuracy: Largest error of the energy balance of a step, relative to the work [-].
+        accuracy: Largest error of the energy balance of a step, relative to the work [-], as in
+            :func:`~cdsm.load_cycle`.
 
     Raises:
-        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``.
+        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``, or ``accuracy`` is not
+            from 1e-12 to 0.1.
     """
 
     arm: Manipulator
@@ -93,6 +95,7 @@ class SlowPlant:
 
     def __post_init__(self) -> None:
         require_unstrained("arm", self.arm)
+        checked_accuracy(self.accuracy)
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> SlowState:
         """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""

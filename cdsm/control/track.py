@@ -19,7 +19,7 @@ from cdsm.control.schedule import Schedule, checked_plan
 from cdsm.control.schedule import tension_controlled as choose_cables
 from cdsm.control.sensors import Sensors
 from cdsm.control.stiffness_loop import StiffnessLoop
-from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput
+from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, named
 from cdsm.planning.path import checked_rate
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support import progress
@@ -103,6 +103,12 @@ def track(
     plant = SlowPlant(arm) if plant is None else plant
     if not hasattr(plant, "begin"):  # an arm by itself, for example
         raise InvalidInput("plant", f"{plant!r} given; a plant is needed, such as SlowPlant(arm).")
+    own, its = ((*each.joint_names, *each.cables.names) for each in (arm, plant.arm))
+    if own != its:
+        other = sorted({*own} ^ {*its}) or its
+        raise InvalidInput(
+            "plant", f"its arm and that of the plan differ in joints or cables: {named(other)}."
+        )
     schedule = Schedule.of(plan, whole_number("steps", steps, 1, _MOST_STEPS))
     size = len(schedule.references)
     from_step = math.ceil(_share("payload_from", payload_from) * (size - 1))

@@ -85,10 +85,7 @@ def load_cycle(
             f"shape {loads.shape} given, (n, 6) with n from 1 to {MOST_LOADS} needed: one wrench "
             f"per load ({WRENCH}).",
         )
-    share = scalar("accuracy", accuracy)
-    if not _LEAST <= share <= _MOST:
-        raise InvalidInput("accuracy", f"{share:g} given; {_LEAST:g} to {_MOST:g} is needed.")
-    loading = slow_loading(pose, F, W, share)
+    loading = slow_loading(pose, F, W, checked_accuracy(accuracy))
     commands = np.tile(np.where(loading.forced, F, 0.0), (len(loads), 1))
     if motors is not None:
         commands = _commands(motors, loading.forced, commands.shape)
@@ -101,6 +98,14 @@ def load_cycle(
         )
         history.append((state, passage))
     return _labelled(pose, F, W, loads, commands, history)
+
+
+def checked_accuracy(accuracy: float) -> float:
+    """Return the ``accuracy`` of :func:`load_cycle`; InvalidInput if it is out of range."""
+    share = scalar("accuracy", accuracy)
+    if not _LEAST <= share <= _MOST:
+        raise InvalidInput("accuracy", f"{share:g} given; {_LEAST:g} to {_MOST:g} is needed.")
+    return share
 
 
 def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:

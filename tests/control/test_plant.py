@@ -64,3 +64,12 @@ def test_stretched_lengths_are_refused() -> None:
 def test_plant_of_something_else_than_an_arm_is_refused() -> None:
     with pytest.raises(cdsm.InvalidInput, match="arm: None given; a Manipulator is needed"):
         cdsm.SlowPlant(None)  # type: ignore[arg-type]
+    with pytest.raises(cdsm.InvalidInput, match="accuracy: 0 given"):
+        cdsm.SlowPlant(small_path().arm, accuracy=0.0)
+
+
+def test_plant_with_other_cables_is_refused() -> None:
+    plan = small_path()
+    fewer = cdsm.SlowPlant(plan.arm.with_cables(plan.arm.cables[:-1]))
+    with pytest.raises(cdsm.InvalidInput, match=f"cables: {plan.arm.cables[-1].name}"):
+        cdsm.track(plan, plant=fewer)
