@@ -77,6 +77,16 @@ class Case(NamedTuple):
     status: NDArray[np.int8]  # status code of each posture (N,)
 
 
+def drawable(dataset: xarray.Dataset, poses: list[str]) -> list[str]:
+    """Return the names of the quantities with one number per posture and case."""
+    allowed = {*map(str, dataset["status"].dims), "direction"}
+    return [
+        str(name)
+        for name, values in dataset.data_vars.items()
+        if name != "status" and set(poses) <= {*map(str, values.dims)} <= allowed
+    ]
+
+
 def cases_of(
     dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
 ) -> Iterator[Case]:
@@ -87,9 +97,8 @@ def cases_of(
     unstable entries become NaN, except those of the margin.
     """
     status = dataset["status"]
-    allowed = {*map(str, status.dims), "direction"}
     dims = [str(dim) for dim in dataset[quantity].dims]
-    if not set(dims) <= allowed or set(poses) - set(dims):
+    if quantity not in drawable(dataset, poses):
         raise InvalidInput(
             "quantity",
             f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "

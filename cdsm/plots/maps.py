@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.map_panels import Case, Map, cases_of, slices_of
+from cdsm.plots.map_panels import Case, Map, cases_of, drawable, slices_of
 from cdsm.plots.style import (
     BLACK,
     BLUE,
@@ -125,13 +125,14 @@ def plot_map(
             "quantity", "status given; a map of any other quantity marks each status at its tips."
         )
     remedy = "tip_position and the quantity must be among outputs= of the sweep."
-    for name in (quantity, "tip_position"):
-        one_of("quantity", name, [str(each) for each in dataset.data_vars], remedy)
+    one_of("quantity", "tip_position", [str(each) for each in dataset.data_vars], remedy)
+    tips = MM * dataset["tip_position"].transpose(..., "axis")
+    poses = [str(dim) for dim in tips.dims[:-1]]
+    if quantity not in [*dataset.data_vars]:
+        one_of("quantity", quantity, drawable(dataset, poses), remedy)
     if statistic is not None:
         one_of("statistic", statistic, get_args(Statistic))
     whole_number("bins", bins, 2, 500)
-    tips = MM * dataset["tip_position"].transpose(..., "axis")
-    poses = [str(dim) for dim in tips.dims[:-1]]
     words = status_names(dataset)
     cases = list(cases_of(dataset, quantity, poses, words))
     points = tips.values.reshape(-1, 3)

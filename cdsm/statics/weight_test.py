@@ -117,10 +117,18 @@ class WeightTest(ReadOnlyState):
         said = []
         if self.settled_first:
             moved = coordinates(1000.0 * self.without.displacement)
-            said.append(
-                "LEFT ITS REFERENCE: before the weight the arm did not stay there; the tip moved "
+            left = (
+                "before the weight the arm did not stay there; the tip moved "
                 f"by {moved} mm, from where all this is measured"
             )
+            if self.friction is not None:
+                start = self.friction.history.tip[0] - self.without.reference.tip[:3, 3]
+                left = (
+                    f"without friction the arm does not stay there before the weight; its tip "
+                    f"moves by {moved} mm, from where all that is linear or frictionless is "
+                    f"measured. With friction it moves by {coordinates(1000.0 * start)} mm"
+                )
+            said.append(f"LEFT ITS REFERENCE: {left}")
         if not self.without.stable:
             said.append("NEUTRAL: before the weight, not every joint is brought back")
         return tuple(said)
