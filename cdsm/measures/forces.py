@@ -46,10 +46,10 @@ class ForcePolytope(ReadOnlyState):
         vertices: Corners (n, 3) [N].
         faces: Triangles of the surface (m, 3), as indices of ``vertices``; (0, 3) for a flat
             polytope.
-        normals: Outward unit normals of the facets (k, 3) [-].
-        offsets: Distance of each facet from the force zero (k,) [N]; negative if zero is outside.
-        unbounded: Unit directions (u, 3) in which the tip cannot move; the links balance any force
-            along them, and ``vertices`` have no component along them.
+        normals: Outward unit normals of the n facets (n, 3) [-].
+        offsets: Distance of each facet from the force zero (n,) [N]; negative if zero is outside.
+        unbounded: Unit directions (n, 3) in which the tip cannot move, as many as there are; the
+            links balance any force along them, and ``vertices`` have no component along them.
     """
 
     posture: Posture

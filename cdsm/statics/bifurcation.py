@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _UNMOVED: Final = 1e-9
-"""Least tip motion per joint motion in a buckling mode that counts, over the arm length [1/rad]."""
+"""A buckling mode moves the tip if tip motion/joint motion/arm length is above this [1/rad]."""
 
 _AROUND: Final = frozen(np.linspace(0.8, 1.3, 26))
 """Default lower bounds of tension as multiples of the critical bound."""

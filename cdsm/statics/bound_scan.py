@@ -84,7 +84,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 
     All are in [N]. The scan ends where no tensions within the domains of their laws balance the
     arm. If tensions balance it at every bound, the scan ends where the terms of K_θ that grow with
-    the tension outweigh all others: beyond, the sign of the smallest eigenvalue stays the same.
+    the tension outweigh all others: these terms alone decide whether the arm is stable beyond.
     """
     if math.isinf(highest):
         # At large bounds the tensions grow in proportion to the bound. The active part of K_θ

@@ -29,9 +29,9 @@ class CriticalTension(ReadOnlyState):
         minimum: Lower bound of tension [N] at which the arm buckles as the bound rises: the end of
             the first range in :attr:`stable`. It is inf if that range reaches the end of
             :attr:`examined`, and the low end of :attr:`examined` if no range is stable.
-        mode: Unit eigenvector (nv,) of the smallest eigenvalue of K_θ at ``minimum``: the joint
-            motion of buckling. If the arm does not buckle, K_θ is taken at the one of
-            :attr:`bounds` with the smallest margin.
+        mode: Unit joint motion (nv,) of buckling: the eigenvector of the smallest eigenvalue of K_θ
+            at ``minimum``. If the arm does not buckle, K_θ is taken at the bound with the smallest
+            of :attr:`margins`.
         tension: F (C,) [N] at the same bound as ``mode``.
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
         examined: Range [N] of the lower bound that was scanned. It ends where no tensions balance
@@ -109,8 +109,8 @@ class CriticalLoad(ReadOnlyState):
             a factor of half a million.
         limit: Reason of the failure: ``"buckling"``, ``"infeasible"`` (no tensions balance the
             load), ``"elasticity"`` (a tension leaves the domain of its law) or ``"none"``.
-        mode: Unit eigenvector (nv,) of the smallest eigenvalue of K_θ at ``factor``, or at half a
-            million if ``factor`` is inf.
+        mode: Unit joint motion (nv,) of buckling: the eigenvector of the smallest eigenvalue of K_θ
+            at ``factor``, or at half a million if ``factor`` is inf.
         tension: F (C,) [N] at the same factor as ``mode``.
         factors: Factors (n,) [-] under which the arm is stable, from zero to ``factor``; only those
             below ten if ``factor`` is inf.

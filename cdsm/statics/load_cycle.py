@@ -101,7 +101,10 @@ def load_cycle(
 
 
 def checked_accuracy(accuracy: float) -> float:
-    """Return the argument ``accuracy`` of :func:`load_cycle`; InvalidInput if out of range."""
+    """Check the argument ``accuracy`` of :func:`load_cycle` and return it.
+
+    Raises InvalidInput if it is not a number from 1e-12 to 0.1.
+    """
     share = scalar("accuracy", accuracy)
     if not _LEAST <= share <= _MOST:
         raise InvalidInput("accuracy", f"{share:g} given; {_LEAST:g} to {_MOST:g} is needed.")
@@ -149,7 +152,8 @@ def _require_wire(
 ) -> None:
     """Raise InvalidInput if one of the ``commands`` (n, C) would take in all wire of its cable.
 
-    ``state`` is the reference state, which has the wire of each cable; ``names`` are the cables.
+    ``state``, the state at the reference, has the length of this wire. ``names`` (C,) are the names
+    of the cables.
     """
     wire = np.add.reduceat(state.settled.chain.natural, loading.start[:-1])
     beyond = ~loading.forced & (commands >= wire)

@@ -115,9 +115,9 @@ class LoadingPath:
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
 
     def motion(self, i: int, load: int, part: float) -> Array | None:
-        """Return the joint motion (nv,) [rad] from the equilibrium before number ``i`` to this one.
+        """Return the joint motion (nv,) [rad] that led to the equilibrium ``self.rests[i]``.
 
-        Returns None if equilibrium ``i`` does not exist, or is not at the part ``part`` [-] of the
+        Returns None if this equilibrium does not exist, or is not at the part ``part`` [-] of the
         way to load number ``load``.
         """
         if i < len(self.rests) and self.rests[i][1:] == (load, part):

@@ -107,7 +107,7 @@ class SlowLoading(NamedTuple):
     def begin(self, tension: Array, wrench: Array) -> State:
         """Return the first state: the reference posture under ``wrench`` (6,).
 
-        All segments of a cable have its tension of ``tension`` (C,) [N].
+        In each segment the tension is that of its cable in ``tension`` (C,) [N].
         """
         pose = self.reference
         T = tension[pose.segments.chains.cable]
