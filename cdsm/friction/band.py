@@ -24,7 +24,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
 
 _ROOM = 1.1
-"""``room`` of the first neighbourhood; a neighbourhood that is too small grows by this factor."""
+"""First :attr:`RestBand.room`; a neighbourhood that is too small grows by this factor."""
 
 _WIDENINGS = 8  # largest number of neighbourhoods that are tried; then the band is not proved
 _INSIDE = 0.999  # a band that reaches this part of its neighbourhood needs a larger neighbourhood
@@ -39,8 +39,8 @@ class RestBand(ReadOnlyState):
     state of rest is an equilibrium that friction allows. If ``proved`` is True, ``low`` and
     ``high`` bound all states of rest in a neighbourhood of the reference. This neighbourhood is the
     set of all states that are at rest to first order, scaled by ``room``. The bounds ``tensions``,
-    ``end_tensions`` and ``loads`` also hold for all these states; they raise SolverError or
-    ElasticityRangeError if they cannot be proved. A simulation may come near to the bounds, but
+    ``end_tensions`` and ``loads`` also hold in this neighbourhood; reading them raises SolverError
+    or ElasticityRangeError if they cannot be proved. A simulation may come near to the bounds, but
     never exceeds them.
 
     Attributes:
@@ -90,7 +90,7 @@ class RestBand(ReadOnlyState):
     def end_tensions(self) -> Array:
         """Least and largest tension (C, 2) [N] of each cable's last segment, in any state of rest.
 
-        It is the segment farthest from the motor.
+        The last segment is the one farthest from the motor.
         """
         start = self.stiffness.posture.segments.chains.start
         return self._tensions((start[1:] - 1).tolist())
@@ -124,10 +124,11 @@ def rest_band(
 ) -> RestBand:
     """Compute between which points along a direction the tip may rest, whatever loads came before.
 
-    The reference is the posture with the given tension in all segments of each cable. The motors
-    are locked there, or control force. Any other loads may have acted before ``wrench``. The band
-    is proved by linear programs, which include bounds for the errors of linearising geometry and
-    laws, unless :attr:`RestBand.proved` is False.
+    The reference is the posture with the given tension in all segments of each cable. There the
+    position-controlled motors are locked; force-controlled motors hold the tension. Any other loads
+    may have acted before ``wrench``. Linear programs prove the band, unless
+    :attr:`RestBand.proved` is False: they include bounds for the errors of linearising geometry and
+    laws.
 
     Args:
         pose: The posture of the reference.

@@ -1,8 +1,9 @@
 """Breakaway: the load at which the first cable of a stuck arm begins to slide in a hole.
 
-W_i is the load at which, to first order, the cable begins to slide in hole i
+To first order, the cable begins to slide in hole i under the load W_i
 (:mod:`cdsm.stiffness_matrix.sticking`). Newton's method starts at the smallest W_i. It finds the
-load at which the arm, with all its cables stuck, reaches the friction bound of a hole.
+load at which the arm, with all its cables stuck, reaches the friction bound of a hole: there the
+larger one of the tensions on both sides is exp(μ φ) times the smaller one.
 """
 
 from __future__ import annotations
@@ -46,7 +47,8 @@ class Breakaway(ReadOnlyState):
     """Load at which the first cable of a stuck arm begins to slide, and the hole where it does.
 
     Attributes:
-        stiffness: Stiffness that loads below ``load`` measure; see :func:`stuck_stiffness`.
+        stiffness: Stiffness of the stuck arm, which a weight below ``load`` measures; see
+            :func:`stuck_stiffness`.
         direction: Unit direction u (3,) of the force, base axes.
         load: The breakaway load [N], in addition to the wrench of ``stiffness``; 0 without
             friction; inf if no cable ever slides because the force moves no joint.
@@ -54,8 +56,9 @@ class Breakaway(ReadOnlyState):
         hole_loads: First-order load at which the cable begins to slide in each hole (P,) [N]; inf
             for holes in which it never begins to slide, or cannot stick.
         cable: Name of the cable that slides first; None if the load is 0 or inf.
-        site: Number of the hole among the sites of ``cable``, from 1; None if ``cable`` is None.
-        link: Name of the link of the hole; None if ``cable`` is None.
+        site: Number of the hole where it slides first, among the sites of ``cable``, from 1; None
+            if ``cable`` is None.
+        link: Name of the link that has this hole; None if ``cable`` is None.
     """
 
     stiffness: Stiffness
@@ -129,10 +132,10 @@ def breakaway(
 
 
 def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
-    """Compute the load W_i (P,) [N] at which each hole begins to slide, and dθ/dW (nv,) [rad/N].
+    """Compute the first-order load W_i (P,) [N] at which the cable begins to slide in each hole.
 
-    Both are of first order in the load. ``K`` is the stuck stiffness, ``u`` (3,) the unit direction
-    of the force.
+    Also returns the joint motion per force dθ/dW (nv,) [rad/N]. ``K`` is the stuck stiffness, ``u``
+    (3,) the unit direction of the force.
     """
     T, gradient = segment_state(K)
     motion = K._along(u)[1]
@@ -140,11 +143,12 @@ def hole_loads(K: Stiffness, u: Array) -> tuple[Array, Array]:
 
 
 def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
-    """Return the load [N] at which the stuck arm first reaches a friction bound, and the hole.
+    """Return the least load [N] at which the stuck arm reaches the friction bound of a hole.
 
-    ``motion`` (nv,) is dθ/dW [rad/N] for a force along ``u`` (3,). Newton's method for joint angles
-    and load starts at the first-order result. If another hole is beyond its friction bound at the
-    solution, the search is repeated for that hole. Raises EquilibriumError if it does not converge.
+    Also returns the index of this hole. ``motion`` (nv,) is dθ/dW [rad/N] for a force along ``u``
+    (3,). Newton's method for joint angles and load starts at the first-order result. If another
+    hole is beyond its friction bound at the solution, the search is repeated for that hole. Raises
+    EquilibriumError if it does not converge.
     """
     pose, arm = K.posture, K.posture.arm
     chains, sticks = pose.segments.chains, holding(pose)
@@ -197,8 +201,8 @@ def _reached(K: Stiffness, u: Array, motion: Array) -> tuple[float, int]:
 def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float, int]:
     """Find the least load [N] at which the tensions T + load · growth reach a friction bound.
 
-    ``growth`` (S,) is dT/dW [-] and ``motion`` (nv,) dθ/dW [rad/N]. Returns the load and its hole,
-    where the ratio of the two tensions is exp(μ φ).
+    T (S,) are in [N], ``growth`` (S,) is dT/dW [-] and ``motion`` (nv,) dθ/dW [rad/N]. Returns the
+    load and the index of the hole that reaches its bound.
     """
     chains, ratio = pose.segments.chains, np.exp(pose.segments.grip)
     turning = T[chains.hole] * chains.friction * (pose.segments.wrap_jacobian @ motion)
@@ -211,9 +215,9 @@ def _first(pose: Posture, T: Array, growth: Array, motion: Array) -> tuple[float
 
 
 def segment_state(K: Stiffness) -> tuple[Array, Array]:
-    """Return segment tensions T (S,) [N] and ∂T/∂θ (S, nv) [N/rad] of a stuck or sliding ``K``.
+    """Return the segment tensions T (S,) [N] and ∂T/∂θ (S, nv) [N/rad] that ``K`` stores.
 
-    Raises InvalidInput if ``K`` is frictionless.
+    ``K`` is the stiffness of a stuck or sliding arm; a frictionless one raises InvalidInput.
     """
     if K.segment_tension is None or K.tension_gradient is None:
         raise InvalidInput("stiffness", "is frictionless; give one of stuck_stiffness.")

@@ -36,7 +36,10 @@ The remaining error is about ten times its square. The relative rounding of a te
 
 
 class Chain(NamedTuple):
-    """State of all cables at a posture, after wire has slipped; a value for each segment (S,)."""
+    """State of all cables at a posture, after wire has slipped through holes.
+
+    Each field has one value per segment (S,).
+    """
 
     tension: Array  # T [N]
     natural: Array  # a: natural length of the wire in the segment, its length at zero strain [m]
@@ -47,12 +50,13 @@ class Chain(NamedTuple):
 
 
 class ChainProblem:
-    """Laws, series springs and motors of all cables, divided into segments.
+    """Model of all cables as chains of segments: their laws, series springs and motors.
 
-    A force-controlled motor keeps the tension of the first segment constant; a position-controlled
-    motor keeps the length of wire constant. The series spring belongs to the first segment. Outside
-    the domain of its law a segment has the rigidity at the nearest end of the domain. A cable whose
-    tension is zero is slack.
+    It computes the tensions of the segments from their lengths, with friction in the holes between
+    them. A force-controlled motor keeps the tension of the first segment constant; a
+    position-controlled motor keeps the length of wire constant. The series spring belongs to the
+    first segment. Outside the domain of its law a segment has the rigidity at the nearest end of
+    the domain. A cable whose tension is zero is slack.
 
     Args:
         cables: Cables of the arm.
@@ -94,12 +98,12 @@ class ChainProblem:
     def settle(
         self, length: Array, natural: Array, ratio: Array, forced: Array, near: Array
     ) -> Chain:
-        """Solve for the tensions of the segments of lengths ``length`` (S,) [m], with friction.
+        """Compute the tensions and slips of all segments when their lengths become ``length``.
 
-        ``natural`` (S,) [m] are the natural lengths before wire slips. ``ratio`` (S,) is exp(μ φ)
-        of the hole between a segment and the next one, 1 for the last segment of a cable.
-        ``forced`` (C,) [N] is the tension of force-controlled motors, NaN for others. The search
-        starts at ``near`` (S,) [N].
+        ``length`` (S,) [m] are the new lengths, ``natural`` (S,) [m] the natural lengths before
+        wire slips. ``ratio`` (S,) is exp(μ φ) of the hole between a segment and the next one, 1 for
+        the last segment of a cable. ``forced`` (C,) [N] is the tension of force-controlled motors,
+        NaN for others. The search for the tensions starts at ``near`` (S,) [N].
         """
         T = near
         for attempt in range(_ITERATIONS):
@@ -160,10 +164,12 @@ class ChainProblem:
         )
 
     def _shortened(self, T: Array, new: Array, length: Array, natural: Array) -> Array:
-        """Return tensions (S,) [N] between ``T`` and ``new`` with about the least Σ D_j(ln T_j).
+        """Return tensions (S,) [N] on the way from ``T`` to ``new``: a shortened Newton step.
 
-        :mod:`cdsm.kernels.chain_problem` defines D_j. The sum is a convex function along the
-        straight line from ln ``T`` to ln ``new``. ``length`` and ``natural`` (S,) are in [m].
+        They approximately minimise Σ D_j(ln T_j) on the straight line from ln ``T`` to ln ``new``.
+        The solution of the chain minimises the same convex sum, of which
+        :mod:`cdsm.kernels.chain_problem` defines the terms D_j. ``length`` and ``natural`` (S,) are
+        in [m].
         """
         T = np.maximum(T, _SLACK)
         step = np.log(np.maximum(new, _SLACK) / T)
@@ -187,16 +193,16 @@ class ChainProblem:
         """Compute P = T (1 + ε) − ∫ T dε (S,) [N] at ``tension`` T.
 
         P is the work of a motor that takes in wire, per natural length. Wire that slips from one
-        segment to another dissipates the difference of P of the two segments, per natural length.
-        To first order in the strain this is the difference of their tensions.
+        segment to the next dissipates the difference of their P, per natural length. To first order
+        in the strain ε, P is T.
         """
         base, softness = self._strain(tension)
         return np.asarray(tension * (base + softness * tension) - self._energy(tension))
 
     def _strain(self, tension: Array) -> tuple[Array, Array]:
-        """Return base and softness (S,) of the tangent 1 + ε ≈ base + softness · T at ``tension``.
+        """Linearise the strain at ``tension`` (S,) [N]: 1 + ε ≈ base + softness · T.
 
-        ``tension`` is T (S,) [N]; base is [-], softness [1/N].
+        Returns base (S,) [-] and softness (S,) [1/N].
         """
         if not self._curved:
             return self._base, self._softness

@@ -15,15 +15,17 @@ _NEAR = 1e-9
 
 
 class Neighbourhood:
-    """States near a reference: ``room`` times the set of all states at rest to first order.
+    """Neighbourhood of a reference: all states of rest to first order, enlarged by ``room``.
 
-    δ is the change of the joint angles, ΔT_j the change of tension of segment j, and g_j the
-    gradient of its length. In a cable of tension F, ΔT_j = F (y_j + ȳ): ȳ is the mean of ΔT_j/F,
-    weighted with the compliances of the segments, and y_j is the deviation from ȳ. If the motor is
-    locked, F ȳ = k Σ_j g_j·δ, with k the stiffness of the whole cable. Equilibrium becomes K_θ δ =
-    −Σ_j F y_j g_j with the frictionless K_θ. From segment to segment, y changes by any amount
-    within ±μ φ of the hole. A linear function of y is therefore largest with +μ φ or −μ φ at each
-    hole: a closed form.
+    A state of rest is an equilibrium that friction allows. ``K`` is the frictionless stiffness at
+    the reference, where each cable has one tension F. δ is the change of the joint angles, ΔT_j the
+    change of tension of segment j, and g_j the gradient of its length. In each cable, ΔT_j =
+    F (y_j + ȳ): ȳ is the mean of ΔT_j/F, weighted with the compliances of the segments, and y_j is
+    the deviation from ȳ. If the motor is locked, F ȳ = k Σ_j g_j·δ, with k the stiffness of the
+    whole cable. Equilibrium becomes K_θ δ = −Σ_j F y_j g_j. From segment to segment, y changes by
+    at most μ φ of the hole, up or down. So a linear function of y is largest if y changes by +μ φ
+    or by −μ φ at every hole. This gives its maximum in closed form. All μ φ are multiplied by
+    ``room``.
 
     Attributes:
         joints: Largest |δ| (nv,) [rad].
@@ -53,7 +55,7 @@ class Neighbourhood:
         self._set_tensions(apart, F[cable])
 
     def _set_tensions(self, apart: Array, F: Array) -> None:
-        """Set :attr:`tensions` and :attr:`falls` from bounds ``apart`` (S,) of |ln T/F|.
+        """Set :attr:`tensions` and :attr:`falls` from the bounds ``apart`` (S,) of |ln T/F|.
 
         F (S,) [N] are the tensions at the reference.
         """
@@ -61,7 +63,7 @@ class Neighbourhood:
         self.falls = np.minimum(np.maximum(apart * F, _NEAR), F)
 
     def still(self, K: Stiffness) -> Self:
-        """Return the neighbourhood in which only tensions vary, at the joint angles of ``K``.
+        """Return the neighbourhood of all states with the joint angles of ``K``: only T varies.
 
         In each cable, |ln T/F| is at most Σ μ φ over its holes.
         """
@@ -81,7 +83,7 @@ class Neighbourhood:
     def curved(self, forms: Array) -> Array:
         """Compute a bound (…,) of |δᵀ A δ|/2 for ``forms`` A (…, nv, nv), over the neighbourhood.
 
-        The bound is a sum over pairs of holes. It neglects that their joint motions may cancel.
+        The bound is the sum of the largest terms of all pairs of holes, as if none cancelled.
         """
         both = self._steps.T @ forms @ self._steps
         return np.asarray(abs(both).sum(axis=(-2, -1)) / 2.0)

@@ -1,10 +1,12 @@
-"""Bounds of the remainders of a linear model of an arm in a neighbourhood of a posture.
+"""Bounds of the errors of Taylor expansions of an arm, valid in a neighbourhood of a posture.
 
-Some joints change the length l of a segment. Let σ [rad] be the sum of their turns, and r the
-largest distance of the segment's sites from them. Let p be the largest motion of the sites across
-the segment per radian, and m the smallest length. Then |l′′′| ≤ c σ³ with c = 3 r p²/m² + 3 r p/m +
-r. So l differs from its second-order expansion by at most c σ³/6, and ∂l/∂θ_i from its tangent by
-at most c σ²/2. The segment turns by at most p σ/m. The second derivative of this angle is at most
+The proof of a band needs them (:mod:`cdsm.friction.rest_states`). The joints move by δ along a
+straight path θ_0 + s δ, 0 ≤ s ≤ 1. For one segment of length l, let σ [rad] be the sum of the turns
+of those joints that change l. Over the neighbourhood, let r be the largest distance of the two
+sites of the segment from these joints, p the largest motion of a site across the segment per radian
+and m the smallest l. Then |d³l/ds³| ≤ c σ³ with c = 3 r p²/m² + 3 r p/m + r. So l differs from its
+second-order expansion by at most c σ³/6, and ∂l/∂θ_i from its tangent by at most c σ²/2. The
+segment turns by an angle of at most p σ/m, whose second derivative by s is at most
 (2 p r/m² + p²/m² + r/m) σ².
 """
 
@@ -23,17 +25,18 @@ from cdsm.support.values import Array
 _STEP = 1e-4  # step of finite differences [rad] or [m]; their truncation is added to the bounds
 
 TOO_FAR = "finds no band: friction may keep the arm too far from the reference"
-"""Error message if a neighbourhood is so wide that the bounds do not exist."""
+"""Error message if a neighbourhood is so wide that its bounds do not exist."""
 
 _ITERATIONS = 30  # steps of a fixed point that converges by a factor of ten or more
 
 
 class Remainders:
-    """Bounds of the remainders of Taylor expansions in the neighbourhood |δ| ≤ ρ.
+    """Bounds of the errors of Taylor expansions at the posture of ``K``, for |δ_i| ≤ ρ_i.
 
-    δ is the change of the joint angles. A motion ρ of a prismatic joint is treated as a rotation by
-    ρ/r about an axis at the distance r, which moves points by the same distance. Each attribute is
-    a bound of the difference between a quantity and its expansion.
+    δ is the change of the joint angles, and ρ is the argument ``within`` (nv,) [rad]. A motion ρ of
+    a prismatic joint [m] is treated as a rotation by ρ/r about an axis at the distance r, which
+    moves points by the same distance. Each attribute is a bound of the difference between a
+    quantity and its expansion.
 
     Attributes:
         length: Bound for the length of each segment, expanded to second order (S,) [m].
@@ -88,7 +91,9 @@ class Remainders:
 
 
 class Bends:
-    """Second derivatives of the torques at a posture, by finite differences with a bounded error.
+    """Second derivatives of the torques of weight and wrench at the posture of ``K``.
+
+    Central differences compute them; :class:`Remainders` includes the truncation error.
 
     Attributes:
         body: ∂²τ_i/∂θ_j∂θ_k (nv, nv, nv) [N m/rad²] of the torques τ of weight and wrench.
@@ -106,7 +111,7 @@ class Bends:
         self.body = np.stack(weight, axis=-1) / (2.0 * _STEP) + self.of_wrench(K.wrench)
 
     def of_wrench(self, wrench: Array) -> Array:
-        """Compute −∂²(J_Xᵀ W)/∂θ² (nv, nv, nv) [N m/rad²] of ``wrench`` W (6,)."""
+        """Compute −∂²(J_Xᵀ W)/∂θ² (nv, nv, nv) [N m/rad²] for ``wrench`` W (6,)."""
         loads = [
             [single_load_stiffness(end.jacobian, wrench, self._joints) for end in pair]
             for pair in self._ends
@@ -115,10 +120,10 @@ class Bends:
 
 
 def _body_remainders(K: Stiffness, within: Array, slides: NDArray[np.bool_]) -> tuple[float, Array]:
-    """Bound the remainders of the tip displacement [m] and of the torques of weight and wrench.
+    """Compute the bounds ``tip`` [m] and ``body`` (nv,) [N m] of :class:`Remainders`.
 
-    ``within`` is ρ (nv,), the bound of the joint motions |δ|. ``slides`` marks prismatic joints.
-    The bounds of the torques are (nv,) [N m].
+    ``within`` is ρ (nv,), the bound of the joint motions |δ|. ``slides`` (nv,) marks prismatic
+    joints.
     """
     model, pose = K.posture.arm._model, K.posture
     masses, tree = model.masses, model.tree

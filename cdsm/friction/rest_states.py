@@ -6,11 +6,12 @@ A state of rest near a reference has joint angles θ_0 + δ and segment tensions
     Σ_j l_j(θ)/(1 + ε(T_j)) = the same at the reference               (wire of a locked motor)
     exp(−μ φ_i(θ)) ≤ T_{j+1}/T_j ≤ exp(μ φ_i(θ))                      (friction at each hole)
 
-To first order in δ and ΔT these conditions describe a polyhedron. The largest and the smallest
-displacement of the tip in it follow from two linear programs. All neglected terms, including terms
-of nonlinear laws, are bounded in a neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T, and the bounds are
-added to the right-hand sides. With this outer correction, the polyhedron contains all states of
-rest in the neighbourhood:
+l_j and T_j are the length and the tension of segment j, g_j is the gradient of l_j, and ΔT the
+change of T. To first order in δ and ΔT these conditions describe a polyhedron. Two linear programs
+give the largest and the smallest displacement of the tip in it. All neglected terms, including
+terms of nonlinear laws, are bounded in a neighbourhood |δ_i| ≤ ρ_i, |ΔT_j| ≤ ρ_T, and the bounds
+are added to the right-hand sides. The polyhedron so enlarged contains all states of rest in the
+neighbourhood:
 
 - δ is a sum of one motion per hole. So quadratic and cubic forms of δ are sums over two and three
   holes, bounded term by term. This bounds the terms of second and third order of lengths, tip
@@ -55,9 +56,10 @@ class End(NamedTuple):
 class RestStates:
     """Polyhedron that contains all states of rest with |δ| ≤ ρ and |ΔT| ≤ ρ_T.
 
-    δ are the changes of the joint angles, ΔT the changes of the segment tensions from a reference.
-    ``near`` gives ρ and ρ_T. The variables are δ/ρ, ΔT/ρ_T, and one slack per equation. A slack
-    stands for the neglected terms of its equation, within proved bounds.
+    δ are the changes of the joint angles, ΔT those of the segment tensions, from the reference. The
+    reference is the state of the frictionless stiffness ``K``; ``near`` gives ρ and ρ_T. The
+    variables are δ/ρ, ΔT/ρ_T, and one slack variable per equation, which stands for the neglected
+    terms of the equation, within proved bounds.
     """
 
     def __init__(self, K: Stiffness, near: Neighbourhood, bends: Bends) -> None:
@@ -105,7 +107,11 @@ class RestStates:
         self._bends = bends
 
     def displacement(self, u: Array) -> End:
-        """Compute the largest displacement of the tip along a unit direction (3,) [m]."""
+        """Compute the largest displacement [m] of the tip along a unit direction u (3,).
+
+        ``value`` and ``reach`` of the result are those of the linear program. ``bound`` includes
+        the terms of higher order.
+        """
         near, cost = self._near, np.zeros(self._program[-1].size)
         cost[: near.joints.size] = (u @ self._pose.jacobian[:3]) * near.joints
         found = self._largest(cost)
@@ -128,7 +134,8 @@ class RestStates:
     def load(self, u: Array) -> float:
         """Compute the largest force [N] along u (3,) that some tensions of the polyhedron balance.
 
-        The neighbourhood must have ρ = 0, so that no joint moves; see :meth:`Neighbourhood.still`.
+        It is a proved upper bound. The neighbourhood must have ρ = 0, so that no joint moves; see
+        :meth:`Neighbourhood.still`.
         """
         from scipy.sparse import csc_array, hstack
 
@@ -152,7 +159,7 @@ class RestStates:
         return self._largest(np.append(np.zeros(low.size), 1.0), widened).bound
 
     def _largest(self, cost: Array, program: tuple[Any, ...] | None = None) -> End:
-        """Maximise cost · x over the polyhedron, or over the constraints of another ``program``."""
+        """Maximise cost · x over the polyhedron, or under the constraints of ``program``."""
         scale = float(abs(cost).max())
         if scale == 0.0:
             return End(0.0, 0.0, 0.0)
@@ -172,10 +179,10 @@ def _locked(
         b (Σ g·δ − ΔT_1/k_series) + b′ Σ l ΔT + slack = 0
 
     The sums are over the segments of the cable. At the reference, a segment has the length l with
-    the gradient g. ΔT is the change of its tension. ΔT_1, of the first segment, also stretches the
-    series spring. b = 1/(1 + ε) is taken at the reference tension F; b′ is its mean slope over the
-    range of tensions. The slack stands for the terms that are neglected. The docstring of the
-    module defines δ, ρ and ρ_T.
+    the gradient g. ΔT is the change of its tension. ΔT_1, that of the first segment, also stretches
+    the series spring. b = 1/(1 + ε) is taken at the reference tension F; b′ is the mean slope of b
+    over the range of tensions. The slack variable stands for the neglected terms. The docstring of
+    the module defines δ, ρ and ρ_T.
 
     Args:
         K: Stiffness at the reference.
@@ -247,9 +254,10 @@ def _cone(K: Stiffness, near: Neighbourhood, far: Remainders, size: int) -> tupl
 
 
 class _Wire(NamedTuple):
-    """Two parallel lines that bound b = 1/(1 + ε) of a cable over its range of tensions.
+    """Two parallel lines that bound b = 1/(1 + ε) of a cable over a range of tensions.
 
-    b_F + slope ΔT + below ≤ b ≤ b_F + slope ΔT + above, and |b − b_F| ≤ change.
+    b_F + slope ΔT + below ≤ b ≤ b_F + slope ΔT + above, and |b − b_F| ≤ change. b_F is b at the
+    reference tension F, and ΔT = T − F.
     """
 
     least: float  # lowest tension [N]

@@ -20,18 +20,17 @@ _RATIO = 1e-9  # largest relative deviation of a ratio of tensions that counts a
 def stuck_stiffness(
     pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
 ) -> Stiffness:
-    """Compute the stiffness while all cables stick: loads below :func:`breakaway` measure it.
+    """Compute the stiffness while all cables stick: weights below :func:`breakaway` measure it.
 
-    Each segment between two holes is a separate spring k_j = EA(F)/a_j with the natural length a_j:
-    K_θ = Σ_j (F H_j + k_j g_j g_jᵀ) + gravity + load, with g_j = ∂l_j/∂θ and H_j = ∂²l_j/∂θ². l_j
-    is the length of segment j. Lead, series spring and force-controlled motor have no effect if the
-    first hole sticks. A hole without friction, or through which the cable goes straight, cannot
-    stick: the segments on both sides are one spring. An arm without friction has the stiffness of
-    :func:`~cdsm.stiffness`. With the same tensions, the result minus this stiffness is positive
-    semidefinite.
+    All segments of a cable have its tension F, as after shaking the arm. Each segment j between two
+    holes is a separate spring k_j = EA(F)/a_j with the length l_j and the natural length a_j (at
+    zero strain): K_θ = Σ_j (F H_j + k_j g_j g_jᵀ) + gravity + load, with g_j = ∂l_j/∂θ and H_j =
+    ∂²l_j/∂θ². If the cable sticks in its first hole, lead, series spring and force-controlled motor
+    have no effect. A cable cannot stick in a hole without friction, or through which it goes
+    straight: the segments on both sides are one spring. Without friction, K_θ is that of
+    :func:`~cdsm.stiffness`. With friction, it is larger: the difference is positive semidefinite.
 
-    :func:`~cdsm.stiffness` explains the arguments and the errors. All segments of a cable have its
-    tension, as after shaking the arm.
+    :func:`~cdsm.stiffness` explains the arguments and the errors.
     """
     F, W = checked_tension(pose, tension, wrench)
     T = F[pose.segments.chains.cable]
@@ -45,15 +44,16 @@ def sliding_stiffness(
 ) -> Stiffness:
     """Compute the stiffness while cables slide in some holes, in the given directions.
 
-    Segments that sliding holes join share their wire, and their tensions keep the ratio
-    exp(±μ φ). K_θ = Σ_j (T_j H_j + g_j ∂T_j/∂θ) + gravity + load is not symmetric, and may be
-    softer than the frictionless stiffness in some joint motions. It is valid as long as the same
-    holes slide in the same directions.
+    The segments on both sides of such a hole share their wire, and the ratio of their tensions
+    stays exp(±μ φ). K_θ = Σ_j (T_j H_j + g_j ∂T_j/∂θ) + gravity + load, with the tension T_j, the
+    gradient g_j and the Hessian H_j of the length of segment j. It is not symmetric, and may be
+    softer than the frictionless stiffness in some joint motions. It is valid as long as the cables
+    slide in the same holes and directions.
 
     Args:
         pose: The posture.
         tension: T (S,) [N] of the segments of :attr:`Posture.segments`, not negative; or F (C,) [N]
-            at the actuators: the tensions beyond each sliding hole then follow from it.
+            at the actuators, from which the tensions beyond each sliding hole follow.
         sliding: One sign per hole of :attr:`Posture.segments`, (P,): 0 where the cable sticks; 1
             where the tension of the next segment, farther from the motor, is larger by the factor
             exp(μ φ); −1 where it is smaller by this factor.
@@ -88,10 +88,10 @@ def sliding_stiffness(
 
 
 def _require_friction(pose: Posture, tension: Array, signs: Array) -> None:
-    """Raise InvalidInput unless friction allows the ratio of tensions at both sides of each hole.
+    """Raise InvalidInput if friction does not allow the ratio of tensions at one of the holes.
 
     ``tension`` is (S,) [N]. ``signs`` (P,) is the argument ``sliding`` of
-    :func:`sliding_stiffness`.
+    :func:`sliding_stiffness`: where the cable slides, the ratio must be exp(±μ φ).
     """
     chains = pose.segments.chains
     before, after = tension[chains.hole], tension[chains.hole + 1]

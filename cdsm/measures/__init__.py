@@ -1,1 +1,1 @@
-"""Measures of a posture: loads an arm can carry, cable clearance, wrench closure, wire use."""
+"""Measures of a posture: loads an arm can carry, cable clearance, wrench closure, wire life."""

@@ -22,7 +22,7 @@ KINDS = ("cable_clearance", "link_clearance", "disk_clearance")
 """Names of the clearances, in the order of the columns of the kernel's result."""
 
 _BESIDE = np.array([1.0, 0.5, 0.5])
-"""Diameters of cables between the axes of two cables, and between an axis and a link or disk."""
+"""Cable diameters from a cable axis to another axis, to a link, to a disk when they touch [-]."""
 
 _BACKBONE = 0.2
 """Radius of a link's backbone, divided by the hole radius of its first disk, as in the URDF."""
@@ -40,12 +40,12 @@ class Clearance(ReadOnlyState):
     Attributes:
         posture: The posture.
         diameter: Diameter of all cables [m].
-        cables: Distance between the surfaces of two cables [m].
-        links: Distance between a cable and the backbone of a link [m].
-        disks: Distance between a cable and a disk [m], or the outer rim of a disk through which the
-            cable runs.
-        nearest: Names of the two nearest bodies for each of the three distances; empty names for a
-            distance of inf.
+        cables: Smallest distance between the surfaces of two cables [m].
+        links: Smallest distance between a cable and the backbone of a link [m].
+        disks: Smallest distance between a cable and a disk [m]; for a disk through which the cable
+            runs, between the cable and the outer rim.
+        nearest: Names of the two bodies that have the distance ``cables``, then ``links``, then
+            ``disks``; empty names for a distance of inf.
     """
 
     posture: Posture
@@ -83,11 +83,11 @@ def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
     """Compute the smallest signed distances of the cables at a posture.
 
     Cables are straight between their sites, with round sections; leads are ignored. Links are bars
-    from joint to joint, as the URDF draws them: their radius is a fifth of the hole radius. In an
-    arm from a URDF they are lines. Disks are plates without thickness. If a cable is in a hole of a
-    disk, its distance from this disk is the distance between its surface and the outer rim. If a
-    cable pierces a disk elsewhere, the distance is negative. A distance is inf if the arm has no
-    such pair.
+    from joint to joint, as the generated URDF draws them: their radius is a fifth of the hole
+    radius. In an arm from your own URDF, links are lines, and there are no disks. Disks are plates
+    without thickness. If a cable runs through a hole of a disk, its distance from this disk is the
+    distance between its surface and the outer rim. If a cable pierces a disk elsewhere, the
+    distance is negative. A distance is inf if the arm has no such pair.
 
     Args:
         pose: The posture.
@@ -135,7 +135,7 @@ def clearances(
 
 
 class _Shape(NamedTuple):
-    """Points, cable segments, backbones and disks of an arm, as ``clearance_rows`` takes them."""
+    """Cable segments, backbones and disks of an arm: arguments of the kernel ``clearance_rows``."""
 
     routing: Routing  # cable sites, ends of backbones, centres of disks and points on their axes
     segment: Indices  # cable, and both ends among the points, of each segment (S, 3)
@@ -149,7 +149,10 @@ class _Shape(NamedTuple):
 
 
 def _rows(arm: Manipulator, q: Array, diameter: float, threads: int) -> tuple[Array, Indices]:
-    """Compute the distances of :data:`KINDS` (B, 3) [m], and the nearest bodies (B, 3, 2)."""
+    """Compute the distances of :data:`KINDS` (B, 3) [m] at postures q (B, nv) [rad].
+
+    Also returns the indices of the two nearest bodies for each distance (B, 3, 2).
+    """
     distance, nearest = np.empty((len(q), 3)), np.empty((len(q), 3, 2), dtype=np.intp)
     shape = _shape(arm)
 
@@ -162,7 +165,10 @@ def _rows(arm: Manipulator, q: Array, diameter: float, threads: int) -> tuple[Ar
 
 @lru_cache(maxsize=8)
 def _shape(arm: Manipulator) -> _Shape:
-    """Collect the bodies that can touch; cached for the last arms, since it takes milliseconds."""
+    """Collect the cable segments, backbones and disks of an arm.
+
+    This takes milliseconds, so the results for the last arms are cached.
+    """
     model = arm._model
     rows = model.routing.row.tolist()
     points = model.routing.point.tolist()
@@ -211,6 +217,9 @@ def _shape(arm: Manipulator) -> _Shape:
 
 
 def _arrays(bodies: list[tuple[int, int, float, str]]) -> tuple[Indices, Array]:
-    """Return the points (n, 2) of n bodies, as indices, and their radii (n,) [m]."""
+    """Convert n bodies (point, point, radius, name) to arrays.
+
+    Returns the indices of their points (n, 2) and their radii (n,) [m].
+    """
     ends = np.array([body[:2] for body in bodies], dtype=np.intp).reshape(-1, 2)
     return ends, np.array([body[2] for body in bodies])

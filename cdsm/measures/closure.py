@@ -1,4 +1,4 @@
-"""Wrench closure, tension factor (evenness of tensions) and isotropy (of the stiffness)."""
+"""Wrench closure, tension factor (evenness of the tensions) and isotropy of the tip stiffness."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def tension_factor(pose: Posture) -> float:
 def has_wrench_closure(pose: Posture) -> bool:
     """Return whether unlimited tensions F ≥ 0 can balance every joint torque.
 
-    This needs J_Lᵀ of full rank, and F > 0 with J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE T-RO 22,
-    2006). With limits of the tensions, see :func:`force_polytope`. Raises SolverError if the linear
-    program fails.
+    They can if J_Lᵀ has full rank and some F > 0 has J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE
+    T-RO 22, 2006). For limited tensions, see :func:`force_polytope`. Raises SolverError if the
+    linear program fails.
     """
     return tension_factor(pose) > 0.0
 
@@ -34,7 +34,8 @@ def isotropy(stiffness: Stiffness) -> float:
     """Compute the ratio of the least to the largest tip stiffness of all directions, 0 to 1 [-].
 
     The stiffness along u is 1/(uᵀ C_vv u), Eq. 20; the arm must be stable. The ratio is 0 if the
-    stiffness is infinite in a direction. Raises SingularStiffness if K_θ is singular.
+    stiffness is infinite in some directions, and 1 if it is infinite in all. Raises
+    SingularStiffness if K_θ is singular.
     """
     K = instance("stiffness", stiffness, Stiffness)
     return float(principal_stiffness(K.compliance[:3, :3])["isotropy"])

@@ -1,7 +1,7 @@
 """Force polytope: all forces at the tip that tensions within their bounds can balance.
 
-The forces f that some tensions balance, J_Lᵀ F = J_Xᵀ W + J_vᵀ f − g with minimum ≤ F ≤ maximum,
-are a projection of a polytope.
+The pairs of tensions F and forces f with J_Lᵀ F = J_Xᵀ W + J_vᵀ f − g and minimum ≤ F ≤ maximum
+form a polytope. Its projection onto f is the force polytope.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NO_MOTION = 1e-9
-"""Smaller singular values of J_v/(arm's length) count as zero: the tip cannot move along them."""
+"""Smaller singular values of J_v, divided by the arm length, count as zero: no tip motion there."""
 
 
 @final
@@ -35,8 +35,8 @@ _NO_MOTION = 1e-9
 class ForcePolytope(ReadOnlyState):
     """All forces at the tip that an arm can balance; made by :func:`force_polytope`.
 
-    They are the forces f (3,) [N] in base axes, added to ``wrench``, with ``normals`` @ f ≤
-    ``offsets``.
+    The forces f (3,) [N] in base axes act at the tip besides ``wrench``. The polytope is the set of
+    all f with ``normals`` @ f ≤ ``offsets``.
 
     Attributes:
         posture: The posture.
@@ -44,11 +44,12 @@ class ForcePolytope(ReadOnlyState):
         minimum: Lower bounds of the tensions (C,) [N].
         maximum: Upper bounds of the tensions (C,) [N].
         vertices: Corners (n, 3) [N].
-        faces: Corners of the triangles of its surface (m, 3), as indices; (0, 3) if it has none.
-        normals: Outward unit normals of its facets (n, 3) [-].
-        offsets: Distance of each facet from the force zero (n,) [N]; negative: zero is outside.
-        unbounded: Unit directions (n, 3) in which the tip cannot move; the links balance any force
-            along them, and ``vertices`` have no component along them.
+        faces: Triangles of the surface (m, 3), as indices of ``vertices``; (0, 3) for a flat
+            polytope.
+        normals: Outward unit normals of the n facets (n, 3) [-].
+        offsets: Distance of each facet from the force zero (n,) [N]; negative if zero is outside.
+        unbounded: Unit directions (n, 3) in which the tip cannot move, as many as there are; the
+            links balance any force along them, and ``vertices`` have no component along them.
     """
 
     posture: Posture
@@ -63,12 +64,12 @@ class ForcePolytope(ReadOnlyState):
 
     @property
     def worst_direction(self) -> Array:
-        """Unit direction (3,) of the smallest force that the arm cannot balance."""
+        """Unit direction (3,) in which the largest force that the arm can balance is smallest."""
         return np.asarray(self.normals[int(self.offsets.argmin())])
 
     @property
     def volume(self) -> float:
-        """Volume [N³]; inf if it is unbounded, 0 if it is flat."""
+        """Volume of the polytope [N³]; inf if it is unbounded, 0 if it is flat."""
         if len(self.unbounded):
             return math.inf
         corners = self.vertices[self.faces] - self.vertices.mean(axis=0)
@@ -172,10 +173,11 @@ def force_polytope(
 
 
 def directions_of(jacobian: Array, length: float) -> tuple[Array, Array]:
-    """Return k unit directions in which the joints move the tip (3, k), and the others (3−k, 3).
+    """Return orthonormal directions in which the joints can move the tip, and the other directions.
 
-    The first are columns, the others rows. ``jacobian`` is J_X (6, nv). If the tip moves by far
-    less than the ``length`` [m] of the arm per radian, it is taken as immobile.
+    The k directions of motion are columns (3, k), the others rows (3−k, 3). ``jacobian`` is J_X
+    (6, nv). A direction counts as immobile if the tip moves along it by less than 1e-9 times the
+    ``length`` [m] of the arm per radian.
     """
     axes, size, _ = np.linalg.svd(jacobian[:3])
     moving = np.zeros(3, dtype=np.bool_)

@@ -1,8 +1,8 @@
 """Convex hull of all loads that tensions balance, by one linear program for each facet.
 
-Hull method (Lassez and Lassez, 1992; for robots Skuric, Padois and Daney, RA-L 2022): take the hull
-of the known vertices, solve a linear program along the normal of each facet, and repeat until no
-program finds a vertex outside the hull.
+Convex hull method (Lassez and Lassez, 1992; for robots Skuric, Padois and Daney, RA-L 2022): take
+the hull of the known vertices, maximise along the normal of each facet by a linear program, and
+repeat until no program finds a vertex outside the hull.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _FLAT = 1e-8  # smaller widths of a polytope, relative to its size, count as zer
 
 
 class Hull(NamedTuple):
-    """Polytope of k dimensions, 0 to 3; its points x have ``normals`` @ x ≤ ``offsets``."""
+    """Polytope in k = 0 to 3 dimensions: all points x (k,) with ``normals`` @ x ≤ ``offsets``."""
 
     points: Array  # corners (n, k)
     faces: NDArray[np.intp]  # corners of its triangles (m, 3), as indices; none if it is flat
@@ -65,10 +65,11 @@ def hull_of(loads: Loads) -> Hull | None:
 
 
 def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[float]]:
-    """Return points (k,) that span a polytope, then normals and offsets of its flat directions.
+    """Find in which directions a polytope in k dimensions is flat, which means of width zero.
 
-    In a flat direction the polytope has the width zero. ``farthest(u)`` returns the largest u·x of
-    all points x of the polytope, and such an x.
+    ``farthest(u)`` returns the largest u·x of all points x of the polytope, and such an x. Returns
+    points (k,) of the polytope that span its other directions, then normals and offsets of facets:
+    two for each flat direction.
     """
     found: list[Array] = []
     normals: list[Array] = []
@@ -94,9 +95,10 @@ def _span(farthest: _Farthest, k: int) -> tuple[list[Array], list[Array], list[f
 
 
 def _polytope(farthest: _Farthest, points: Array, spanned: Array) -> Hull:
-    """Build a polytope of 2 or 3 dimensions from some of its points (n, k).
+    """Find all vertices and facets of a polytope of 2 or 3 dimensions, from some ``points`` (n, k).
 
-    The rows of ``spanned`` are an orthonormal basis of the directions between the points.
+    ``farthest`` is as for :func:`_span`. The rows of ``spanned`` are an orthonormal basis of the
+    directions in which the polytope is not flat.
     """
     from scipy.spatial import ConvexHull
 

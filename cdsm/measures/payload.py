@@ -26,10 +26,10 @@ from cdsm.tension import bounds_at, distribute_tension
 PayloadLimit = Literal["tension", "deflection", "stability", "elasticity", "none"]
 
 _AROUND: Final = np.array([u for u in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(u)])
-"""Directions in which the worst payload is searched for loads that buckle the arm (26, 3)."""
+"""Directions (26, 3) that are tested for buckling in the search for the worst direction."""
 
 _STEPS: Final = np.arange(1, 17) / 16.0
-"""Parts of a load at which a direction is searched for loads that buckle the arm."""
+"""Forces that are tested for buckling in each direction, over the one that other limits allow."""
 
 
 @final
@@ -43,9 +43,9 @@ class Payload(ReadOnlyState):
         worst: Whether ``direction`` is the worst of all directions.
         force: The largest force [N]: the smallest of ``limits``.
         limit: Which limit gives ``force``, a key of ``limits``; ``"none"`` if the force is inf.
-        limits: Largest force [N] that each limit alone allows: ``"tension"``, ``"deflection"``,
-            ``"stability"`` (the arm buckles), ``"elasticity"`` (a tension leaves the domain of its
-            law); inf if it does not limit the force.
+        limits: Largest force [N] that each limit alone allows: ``"tension"`` (the bounds of the
+            tensions), ``"deflection"``, ``"stability"`` (the arm buckles), ``"elasticity"`` (a
+            tension leaves the domain of its law); inf for a limit that does not restrict it.
     """
 
     posture: Posture
@@ -88,13 +88,15 @@ def payload(
 ) -> Payload:
     """Compute the largest admissible force f along u at the tip, added to the wrench W.
 
-        f = max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum,
+        max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum.
 
-    f |C_vv u| ≤ ``deflection``, and K_θ is positive definite under all loads up to f u. K_θ is
-    computed with the least tensions under each load. C_vv is the compliance without the force,
-    since the motors are locked before the force acts. The worst direction has the smallest f. It is
-    the normal of the nearest facet of the :func:`force_polytope`, or the softest direction of C_vv.
-    Loads that buckle the arm are then searched for in 26 directions, 16 loads in each.
+    Further conditions: f |C_vv u| ≤ ``deflection``, and K_θ is positive definite under all loads up
+    to f u. C_vv is the compliance without the force, since the motors are locked before the force
+    acts. K_θ is computed with the least tensions under each load.
+
+    The worst direction has the smallest f. It is the normal of the nearest facet of the
+    :func:`force_polytope`, or the softest direction of C_vv. 26 more directions are then searched
+    for smaller loads that buckle the arm, with 16 loads in each.
 
     Args:
         pose: The posture, which stays fixed.
@@ -107,7 +109,8 @@ def payload(
         worst_friction: Narrow the bounds for friction, as :func:`~cdsm.distribute_tension` does.
 
     Raises:
-        InvalidInput: An argument has the wrong shape or range; or a cable has no upper bound.
+        InvalidInput: An argument has the wrong shape or range; or a cable has no upper bound, but
+            the worst direction is wanted.
         InfeasibleTension: No tensions balance the arm without the force.
         ElasticityRangeError: A tension without the force is outside the domain of its law.
         SingularStiffness: K_θ without the force is singular.
@@ -154,10 +157,10 @@ def largest_force(loads: Loads) -> float:
 def _worst(
     polytope: ForcePolytope, compliance: Array, allowed: float
 ) -> tuple[Array, dict[str, float]]:
-    """Return the worst direction, and the largest force [N] along it that each limit allows.
+    """Return the worst direction for tension and deflection, and the forces [N] that they allow.
 
-    The limits are tension and deflection only. ``compliance`` is C_vv [m/N], and ``allowed`` the
-    largest deflection [m].
+    ``polytope`` has the forces that tensions balance. ``compliance`` is C_vv (3, 3) [m/N], and
+    ``allowed`` the largest deflection [m].
     """
     tension = polytope.margin()
     values, vectors = np.linalg.eigh(compliance.T @ compliance)
@@ -180,12 +183,12 @@ def _ratio(allowed: float, compliance: float) -> float:
 def _until_unstable(
     K: Stiffness, u: Array, most: float, low: Array, high: Array, *, worst: bool
 ) -> tuple[Array, float, str]:
-    """Return direction, force [N] and reason at which an arm becomes unstable under a load along u.
+    """Find the smallest load along u at which an arm fails; return direction, force [N] and reason.
 
-    The reason is ``"buckling"`` (K_θ is not positive definite) or ``"elasticity"`` (a least tension
-    leaves the domain of its law). If neither happens up to ``most`` [N], the reason is ``"none"``
-    and the force inf. If ``worst``, u and 26 other directions are examined, and the one of least
-    force is returned.
+    The reason is ``"buckling"`` (K_θ is not positive definite) or ``"elasticity"`` (one of the
+    least tensions leaves the domain of its law). If neither happens up to ``most`` [N], the reason
+    is ``"none"`` and the force inf. If ``worst``, u and 26 other directions are examined, and the
+    one with the smallest load is returned. ``low`` and ``high`` (C,) [N] are the bounds of tension.
     """
     if not K.is_stable:
         return u, 0.0, "buckling"

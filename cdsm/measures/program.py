@@ -1,10 +1,12 @@
 """Linear programs over the cable tensions that balance an arm.
 
-Loads x (k,) act at the tip along the columns of U (3, k), besides the wrench W. Balance (Eq. 13) is
+Forces x (k,) [N] act at the tip along the columns of U (3, k), besides the wrench W. The balance
+(Eq. 13) is
 
     J_Lᵀ F − J_vᵀ U x = J_Xᵀ W − g,   minimum ≤ F ≤ maximum.
 
-All programs below are linear in F and x. A kernel solves and proves most of them, HiGHS the others.
+F and x are the variables. A simplex kernel solves most of the programs and proves the result; HiGHS
+solves the others.
 """
 
 from __future__ import annotations
@@ -24,7 +26,11 @@ from cdsm.tension import tension_ratio
 
 
 class Loads(NamedTuple):
-    """Balance under loads, in dimensionless form; symbols as at the top of the module."""
+    """Balance of an arm under loads x, in dimensionless form.
+
+    The top of the module explains the symbols. The columns of ``A`` belong to the C tensions, then
+    to the k loads.
+    """
 
     A: Array  # [J_Lᵀ, −J_vᵀ U], scaled (nv, C+k)
     b: Array  # torque J_Xᵀ W − g, scaled (nv,)
@@ -35,7 +41,10 @@ class Loads(NamedTuple):
 
     @classmethod
     def of(cls, pose: Posture, low: Array, high: Array, wrench: Array, directions: Array) -> Self:
-        """Build the balance of a posture from directions U (3, k) and bounds (C,) [N]."""
+        """Build the balance of a posture under ``wrench`` W (6,), for loads along U (3, k).
+
+        ``directions`` is U; ``low`` and ``high`` (C,) [N] are the bounds of the tensions.
+        """
         torque = pose.jacobian.T @ wrench - pose.gravity_torque
         motion = pose.jacobian[:3].T @ directions
         return cls.scaled(pose.length_jacobian, motion, torque, low, high, pose.arm.length)
@@ -44,9 +53,10 @@ class Loads(NamedTuple):
     def scaled(
         cls, J: Array, motion: Array, torque: Array, low: Array, high: Array, length: float
     ) -> Self:
-        """Build the balance from J_L, ``motion`` J_vᵀ U (nv, k), torque and bounds (C,) [N].
+        """Build the balance from arrays.
 
-        ``length`` is the length of the arm [m].
+        J is J_L (C, nv), ``motion`` J_vᵀ U (nv, k), ``torque`` J_Xᵀ W − g (nv,) [N m]; ``low`` and
+        ``high`` (C,) [N] are the bounds of the tensions, ``length`` is that of the arm [m].
         """
         A, b, low, high, arm, force = tension_kernels.scaled_balance(J, torque, low, high, length)
         columns = np.hstack([A, -motion / arm])
@@ -56,11 +66,11 @@ class Loads(NamedTuple):
         return cls(columns / lever, b, low, high, lever, force)
 
     def largest(self, along: Array, *, positive: bool = False) -> tuple[float, Array] | None:
-        """Compute the largest a·x of all balanced loads x (k,), and an x that has it.
+        """Maximise a·x over all loads x (k,) [N] that tensions balance; return a·x and x.
 
         a is ``along`` (k,). If ``positive``, only x ≥ 0 is allowed. If a·x is unbounded, the value
-        is inf and x is NaN. Returns None if no load is balanced. Raises SolverError if the solver
-        stops for another reason.
+        is inf and x is NaN. Returns None if tensions balance no load. Raises SolverError if the
+        solver stops for another reason.
         """
         count = self.low.size
         tensions, loads = self.lever[:count], self.lever[count:]

@@ -69,9 +69,9 @@ def measured(
     diameter: float = 0.0,
     threads: int | None = None,
 ) -> dict[str, Array]:
-    """Compute the measures ``names`` of :data:`MEASURED`, (B,) each, at postures q (B, nv) [rad].
+    """Compute measures, (B,) each, at postures q (B, nv) [rad].
 
-    All cables have the ``diameter`` [m].
+    ``names`` are those wanted, out of :data:`MEASURED`. All cables have the ``diameter`` [m].
     """
     found: dict[str, Array] = {}
     if any(name in KINDS for name in names):
@@ -83,7 +83,11 @@ def measured(
 
 
 def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> Array:
-    """Compute exp(Σ μ φ) (B, C) [-], the largest ratio of tensions along a cable, at q (B, nv)."""
+    """Compute exp(Σ μ φ) (B, C) [-] of each cable at postures q (B, nv) [rad].
+
+    This is the largest ratio of two tensions along the cable. The sum is over its holes, with the
+    friction coefficient μ and the wrap angle φ.
+    """
     model, grip = arm._model, np.empty((len(q), len(arm.cables)))
     *routing, _, hole, own = model.chain_arrays
     holes = hole, own, model.chains.cable[hole], model.chains.friction
@@ -98,11 +102,11 @@ def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> A
 def narrowed_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, loss: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Narrow the bounds so that every segment of a cable stays within the given ones.
+    """Narrow the bounds of tension so that every segment of a cable stays within the given ones.
 
-    ``loss`` (B, C) are :func:`friction_losses`; bounds are given as (), (B,) or (B, C) [N]. Return
-    the lower and upper bounds (B, C) [N], and whether they are consistent at each posture (B,). At
-    postures where they are not consistent, the given bounds are returned.
+    ``loss`` (B, C) is the result of :func:`friction_losses`; bounds are given as (), (B,) or (B, C)
+    [N]. Returns the lower and upper bounds (B, C) [N], and at which postures (B,) no lower bound is
+    above its upper bound. At the other postures, the given bounds are returned.
     """
     given = _each_bound(arm, minimum, maximum, loss.shape)
     low, high = given[0] * loss, given[1] / loss
@@ -120,10 +124,11 @@ def payloads(
     directions: Array,
     threads: int | None = None,
 ) -> Array:
-    """Compute the largest forces (B, D) [N] along unit directions (D, 3) that the bounds allow.
+    """Compute the largest forces (B, D) [N] at the tip that tensions within the bounds balance.
 
-    A force is 0 if tensions balance no force in its direction. Each of the postures q (B, nv) has a
-    wrench (B, 6). The bounds are (), (B,) or (B, C) [N].
+    The forces act along the unit ``directions`` (D, 3) at postures q (B, nv) [rad], each with its
+    own ``wrench`` (B, 6). The bounds are (), (B,) or (B, C) [N]. A force is 0 if tensions balance
+    no force in its direction.
     """
     JX, J, torque, low, high = _balances(arm, q, wrench, minimum, maximum, threads)
     motion = np.einsum("nij,di->ndj", JX[:, :3], directions)
@@ -145,8 +150,8 @@ def capacity_margins(
 ) -> Array:
     """Compute :meth:`ForcePolytope.margin` (B,) [N] of the zero force at postures q (B, nv).
 
-    Wrenches and bounds are given as for :func:`payloads`. The margin is 0 if no force is balanced.
-    A posture takes milliseconds.
+    Wrenches and bounds are given as for :func:`payloads`. The margin is 0 if tensions balance no
+    force at all. Each posture takes some milliseconds.
     """
     margin = np.empty(len(q))
     rows = zip(*_balances(arm, q, wrench, minimum, maximum, None), strict=True)

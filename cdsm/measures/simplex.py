@@ -1,4 +1,4 @@
-"""Kernels of small linear programs: the simplex method with bounds (Dantzig, 1963), and its proof.
+"""Kernels for small linear programs: the simplex method with bounds (Dantzig, 1963), and a proof.
 
 Programs here have about ten equations and about twenty variables, so a dense inverse of the basis
 is fastest. A program takes tens of microseconds; a general solver takes a millisecond to begin.
@@ -23,10 +23,10 @@ _AT_LOW, _AT_HIGH, _FREE, _BASIC = 0, 1, 2, 3  # states of a variable
 
 @compiled
 def single_largest(cost: Array, A: Array, b: Array, low: Array, high: Array, x: Array) -> bool:
-    """Maximise cost · x with A x = b, low ≤ x ≤ high; return whether x is proved to be best.
+    """Maximise cost · x with A x = b, low ≤ x ≤ high; return whether x is a proved maximum.
 
-    Fills ``x`` (n,). Returns False if no x is feasible, there is no largest value, or rounding is
-    too large; x is then not valid. ``cost`` (n,) and A (m, n) are of order one.
+    Writes the maximum into ``x`` (n,). Returns False if no x is feasible, cost · x is unbounded, or
+    rounding is too large; x is then not valid. ``cost`` (n,) and A (m, n) must be of order one.
     """
     m, n = A.shape
     # artificial variables n + i take what is missing of equation i; the first phase removes them
@@ -126,9 +126,10 @@ def _proved(
 ) -> bool:
     """Correct x so that A x = b up to rounding; return whether x is then proved to be a maximum.
 
-    The proof: x meets A x = b and its bounds, and no variable can move so that cost · x increases:
-    this follows from ``price``, the multipliers of the equations. ``state``, ``basis``, ``inverse``
-    and ``price`` are the values with which :func:`single_largest` ends.
+    The proof: x meets A x = b and its bounds, and the reduced costs show that no change of a
+    variable increases cost · x. ``price`` (m,) are the multipliers of the equations, from which the
+    reduced costs follow. ``state``, ``basis``, ``inverse`` and ``price`` are the values with which
+    :func:`single_largest` ends.
     """
     m, n = A.shape
     left, size = b.copy(), np.abs(b)
@@ -171,10 +172,11 @@ def payload_rows(
     reach: float,
     force: Array,
 ) -> None:
-    """Fill ``force`` (B, D) [N] with the largest forces of B postures along D directions u.
+    """Fill ``force`` (B, D) [N]: the largest tip forces that tensions balance, in D directions u.
 
-    J is J_L (B, C, nv), ``torque`` J_Xᵀ W − g (B, nv), ``motion`` J_vᵀ u (B, D, nv), ``reach`` the
-    length of the arm [m]. The bounds are (B, C) [N]. Forces without a proof are NaN.
+    J is J_L (B, C, nv) of B postures, ``torque`` J_Xᵀ W − g (B, nv) [N m], ``motion`` J_vᵀ u
+    (B, D, nv), ``reach`` the length of the arm [m]. The bounds of the tensions are (B, C) [N].
+    Forces without a proof are NaN.
     """
     rows, count, nv = J.shape
     columns, x = np.empty((nv, count + 1)), np.empty(count + 1)

@@ -1,4 +1,4 @@
-"""Use of a wire's strength and life: strain, safety factor, bending over the holes."""
+"""How far wires are used: strain, safety against breaking, life under bending over holes."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class WireUse(ReadOnlyState):
     Attributes:
         tension: The tensions and their posture.
         largest: Largest tension along each cable (C,) [N]: F, or more with ``worst_friction``.
-        strain: ε(F) of each cable (C,) [-].
-        safety: Breaking load divided by the largest tension (C,) [-].
+        strain: Strain ε of each cable under ``largest`` (C,) [-].
+        safety: Breaking load divided by ``largest`` (C,) [-].
         bend_ratio: D/d, the diameter of the bend divided by the diameter of the wire [-].
         life_margin: 0.001 divided by the ratio of bearing pressure to strength (C,) [-]; a long
             life needs at least 1.
@@ -132,7 +132,7 @@ def safety(tension: Array, breaking_load: float) -> Array:
 
 
 def strains(arm: Manipulator, tension: Array) -> Array:
-    """Return ε(F) of each cable for tensions (B, C) [N]; NaN outside the domain of its law."""
+    """Return strains ε(F) (B, C) [-] of tensions (B, C) [N]; NaN outside the domain of a law."""
     found = np.full(tension.shape, math.nan)
     for c, cable in enumerate(arm.cables):
         law, F = cable.elasticity, tension[:, c]
@@ -146,9 +146,10 @@ def strains(arm: Manipulator, tension: Array) -> Array:
 def life_margin(
     tension: Array, diameter: float, bend_diameter: float, strength: float = ROPE_WIRE
 ) -> Array:
-    """Return 0.001 S_u/p of tensions F [N], with the bearing pressure p = 2F/(d D); inf at 0 N.
+    """Compute the life margin 0.001 S_u/p (…,) [-] of wires under tensions F (…,) [N]; inf at 0 N.
 
-    S_u is ``strength`` [Pa], d ``diameter`` and D ``bend_diameter`` [m], as in :func:`wire_use`.
+    p = 2F/(d D) is the bearing pressure, S_u ``strength`` [Pa], d ``diameter`` and D
+    ``bend_diameter`` [m], as in :func:`wire_use`.
     """
     with np.errstate(divide="ignore"):
         pressure = 2.0 * tension / (diameter * bend_diameter)

@@ -1,4 +1,4 @@
-"""Equilibria of a slightly pushed arm below and beyond its critical tension."""
+"""Equilibria of an arm that a small force pushes, at tensions below and above buckling."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _UNMOVED: Final = 1e-9
-"""A buckling mode moves the tip if its tip motion/arm length is above this [1/rad]."""
+"""A buckling mode moves the tip if tip motion/joint motion/arm length is above this [1/rad]."""
 
 _AROUND: Final = frozen(np.linspace(0.8, 1.3, 26))
 """Default lower bounds of tension as multiples of the critical bound."""
@@ -34,17 +34,18 @@ _AROUND: Final = frozen(np.linspace(0.8, 1.3, 26))
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Bifurcation(ReadOnlyState):
-    """Equilibria of a slightly pushed arm with locked motors, around its critical tension.
+    """Equilibria of an arm that a small force pushes, around its critical tension.
 
-    Below the critical tension the arm hardly moves. Above it the posture is still an equilibrium,
-    but an unstable one, and the arm comes to rest elsewhere. Made by :func:`bifurcation`.
+    The motors are locked at the posture of ``critical``. Below the critical tension the arm stays
+    near this posture. Above it the posture is an unstable equilibrium, and the push moves the arm
+    to a stable one elsewhere. Made by :func:`bifurcation`.
 
     Attributes:
-        critical: The critical tension, with its posture and wrench.
-        push: The push (6,) in the direction in which buckling moves the tip: force [N], then moment
-            [N m], which is zero.
+        critical: The result of :func:`critical_tension`, with its posture and wrench.
+        push: The push (6,): force [N] along the tip motion of the buckling mode, then zero moment
+            [N m].
         bounds: Lower bounds of tension (n,) [N], ascending.
-        rests: Equilibrium of the pushed arm at each bound.
+        rests: Equilibrium of the pushed arm at each of these bounds.
     """
 
     critical: CriticalTension
@@ -54,7 +55,7 @@ class Bifurcation(ReadOnlyState):
 
     @property
     def displacements(self) -> Array:
-        """Displacement of the tip from its position in ``critical`` at each bound (n, 3) [m]."""
+        """Displacement of the tip from the posture of ``critical`` at each bound (n, 3) [m]."""
         return frozen(np.array([rest.displacement for rest in self.rests]))
 
     def plot(self) -> Figure:
@@ -91,10 +92,11 @@ class Bifurcation(ReadOnlyState):
 def bifurcation(
     critical: CriticalTension, push: float = 1e-3, bounds: ArrayLike | None = None
 ) -> Bifurcation:
-    """Compute the equilibria of a slightly pushed arm, with tensions below and above buckling.
+    """Compute the equilibria of an arm under a small push, at tensions below and above buckling.
 
-    At each bound the motors are locked at the posture of ``critical`` under the least tensions. The
-    force acts at the tip, in the direction in which buckling moves it.
+    For each lower bound of tension, the motors are locked at the posture of ``critical``, with the
+    least tensions that respect the bound. Then the push acts: a force at the tip, in the direction
+    in which the buckling mode moves the tip.
 
     Args:
         critical: Result of :func:`~cdsm.critical_tension` of an arm that buckles.

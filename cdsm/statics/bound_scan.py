@@ -1,7 +1,8 @@
-"""Examine a fixed posture at many lower bounds of the tensions, or under many load factors.
+"""Scan a fixed posture for stability over many lower bounds of tension, or many load factors.
 
-A ``place`` is one lower bound [N] or one load factor [-]. The functions below have an argument
-``at``: a function that returns the stiffness under the least tensions at a place.
+A scan varies one number, which is called ``place`` below: the lower bound of all tensions [N], or
+the load factor [-]. The argument ``at`` is a function of this number. It distributes the least
+tensions and returns the stiffness.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 
 SAMPLES: Final = 96
-"""Number of places that a scan evaluates. A stable range narrower than one step is not seen."""
+"""Number of bounds or factors in a scan. A stable range narrower than one step is not seen."""
 
 PRECISION: Final = 1e-12
-"""Relative precision of a ``place`` found by bisection or root finding."""
+"""Relative precision of a bound or factor that is found by bisection or root finding."""
 
 _ABOVE: Final = 1.0 + 1e-9
 """Factor just above the low end of a domain, because a domain may exclude its low end."""
@@ -30,13 +31,15 @@ _ABOVE: Final = 1.0 + 1e-9
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
 StiffnessAt = Callable[[float], Stiffness]
-"""Function that returns the stiffness at a place."""
+"""Function from a lower bound of tension [N], or a load factor [-], to the stiffness."""
 
 
 def failure_at(at: StiffnessAt, place: float) -> Limit:
-    """Return why the arm fails at a lower bound [N] or load factor ``place``.
+    """Return why the arm fails at the lower bound [N] or load factor [-] ``place``.
 
-    The reason is ``"buckling"``, ``"infeasible"`` or ``"elasticity"``; ``"none"`` if it is stable.
+    The reason is ``"buckling"`` (K_θ is not positive definite), ``"infeasible"`` (no tensions
+    balance the arm), ``"elasticity"`` (a tension is outside the domain of its law), or ``"none"``
+    if the arm is stable. ``at(place)`` computes its stiffness.
     """
     try:
         return "none" if at(place).is_stable else "buckling"
@@ -47,15 +50,15 @@ def failure_at(at: StiffnessAt, place: float) -> Limit:
 
 
 def _balances(at: StiffnessAt, place: float) -> bool:
-    """Return whether tensions in the domains of all elasticities balance the arm at ``place``."""
+    """Return whether tensions within the domains of their laws balance the arm at ``place``."""
     return failure_at(at, place) in ("none", "buckling")
 
 
 def tension_domain(arm: Manipulator) -> tuple[float, float]:
-    """Return the range (low, high) [N] of lower bounds of tension that an arm allows.
+    """Return the range (low, high) [N] in which the lower bound of all tensions may lie.
 
-    It is below the maximum of every cable, and within the domain of every elasticity of a
-    position-controlled cable.
+    ``high`` is at most the maximum of every cable. The range is within the domain of the law of
+    every position-controlled cable.
     """
     domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
     low = max((each.low for each in domains), default=0.0) * _ABOVE
@@ -64,9 +67,10 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
 
 
 def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
-    """Bisect an interval from a, where ``true`` is True, to b, where it is False.
+    """Find by bisection where the condition ``true`` changes from True at a to False at b.
 
-    Returns both ends of an interval of the relative width :data:`PRECISION`.
+    Returns two numbers whose relative difference is :data:`PRECISION`. The condition is True at the
+    first and False at the second.
     """
     nothing = PRECISION**2 * b  # a may be zero, and the condition false right above it
     while b - a > max(PRECISION * b, nothing):
@@ -76,11 +80,11 @@ def last_true(true: Callable[[float], bool], a: float, b: float) -> tuple[float,
 
 
 def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
-    """Return the end [N] of a scan of the lower bound from ``low``, at most ``highest``.
+    """Return where a scan of the lower bound of tension from ``low`` may end, at most ``highest``.
 
-    The scan ends where no tensions balance the arm within the domains of the elasticities. If
-    tensions balance it at every bound, the scan ends where the terms of K_θ that grow with the
-    tension outweigh all others, and so decide whether K_θ is positive definite.
+    All are in [N]. The scan ends where no tensions within the domains of their laws balance the
+    arm. If tensions balance it at every bound, the scan ends where the terms of K_θ that grow with
+    the tension outweigh all others: these terms alone decide whether the arm is stable beyond.
     """
     if math.isinf(highest):
         # At large bounds the tensions grow in proportion to the bound. The active part of K_θ
@@ -110,7 +114,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
 
 
 def log_samples(low: float, high: float) -> Array:
-    """Return bounds (N,) [N] from ``low`` to ``high``, evenly spaced on a log scale.
+    """Return lower bounds of tension (N,) from ``low`` to ``high`` [N], even on a log scale.
 
     The first bound is ``low``. All others are in the four decades below ``high``.
     """

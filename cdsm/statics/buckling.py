@@ -1,11 +1,11 @@
 """Buckling: tension or load makes the joint stiffness of a fixed posture singular.
 
-Cables stiffen an arm by their elasticity. Their tension usually softens it (active part of Eq. 16).
-With stiff cables the elasticity always wins. With soft springs or long leads (lead: the straight
-cable between its actuator and the base disk) there is a critical tension. Above it K_θ is not
-positive definite and the arm buckles under any load. This module keeps the posture fixed and takes
-the tensions of :func:`~cdsm.distribute_tension`. :func:`~cdsm.equilibrium` computes where an arm
-with locked motors moves when it buckles.
+The elasticity of the cables stiffens an arm. Their tension usually softens it (active part of
+Eq. 16). With stiff cables the elasticity always outweighs the tension. With soft springs or long
+leads (lead: the straight cable between its actuator and the base disk) there is a critical tension.
+Above it K_θ is not positive definite and the arm buckles under any load. This module keeps the
+posture fixed and takes the tensions of :func:`~cdsm.distribute_tension`.
+:func:`~cdsm.equilibrium` computes where an arm with locked motors moves when it buckles.
 """
 
 from __future__ import annotations
@@ -34,7 +34,11 @@ from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
 _NOWHERE: Final = 1e6
-"""Largest load factor that is tried. If the arm stays stable under it, the factor is infinite."""
+"""The search for a critical load doubles the load factor while it is below this number.
+
+If the arm is stable under all factors tried, the last of which is above half of it, the critical
+factor is infinite.
+"""
 
 _SHOWN: Final = 10.0  # largest load factor of the curve if the critical factor is infinite
 
@@ -44,8 +48,8 @@ def critical_tension(
 ) -> CriticalTension:
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
-    :func:`~cdsm.stiffness` computes K_θ at the tensions of :func:`~cdsm.distribute_tension` with
-    the lower bound F_min on all cables. The symmetric part of K_θ is examined.
+    F_min is the lower bound of all cables. :func:`~cdsm.distribute_tension` computes the tensions,
+    and :func:`~cdsm.stiffness` computes K_θ, of which the symmetric part is examined.
 
     Args:
         pose: The posture, which stays fixed.
@@ -157,6 +161,9 @@ def critical_load(
 
 
 def _mode(K: Stiffness) -> Array:
-    """Return the unit eigenvector (nv,) of K_θ of its smallest eigenvalue; largest entry > 0."""
+    """Return the buckling mode (nv,): the unit eigenvector of the smallest eigenvalue of K_θ.
+
+    The sign makes its largest entry positive.
+    """
     mode = K.critical_direction
     return frozen(mode * np.sign(mode[abs(mode).argmax()]))

@@ -29,9 +29,10 @@ class CriticalTension(ReadOnlyState):
         minimum: Lower bound of tension [N] at which the arm buckles as the bound rises: the end of
             the first range in :attr:`stable`. It is inf if that range reaches the end of
             :attr:`examined`, and the low end of :attr:`examined` if no range is stable.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at ``minimum``. If the arm
-            does not buckle, at the bound of :attr:`bounds` with the smallest margin.
-        tension: F (C,) [N] at the bound to which ``mode`` belongs.
+        mode: Unit joint motion (nv,) of buckling: the eigenvector of the smallest eigenvalue of K_θ
+            at ``minimum``. If the arm does not buckle, K_θ is taken at the bound with the smallest
+            of :attr:`margins`.
+        tension: F (C,) [N] at the same bound as ``mode``.
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
         examined: Range [N] of the lower bound that was scanned. It ends where no tensions balance
             the arm within the domains of the elasticities. If tensions balance the arm at every
@@ -65,11 +66,11 @@ class CriticalTension(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence if the arm is UNSTABLE at every lower bound; else empty."""
+        """One sentence if the arm is UNSTABLE at every lower bound; otherwise empty."""
         return () if self.stable else (self._verdict,)
 
     def plot(self) -> Figure:
-        """Plot the smallest joint stiffness [N m/rad] against the lower bound of tension [N]."""
+        """Plot the smallest eigenvalue of K_θ [N m/rad] against the lower bound of tension [N]."""
         return cdsm.plots.plot_critical_tension(self)
 
     def to_dict(self) -> dict[str, object]:
@@ -105,13 +106,14 @@ class CriticalLoad(ReadOnlyState):
         wrench: W (6,) that is multiplied by the factor: force [N], then moment [N m].
         carried: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
         factor: Largest factor [-] up to which the arm is balanced and stable; inf if it still is at
-            a factor of one million.
+            a factor of half a million.
         limit: Reason of the failure: ``"buckling"``, ``"infeasible"`` (no tensions balance the
-            load), ``"elasticity"`` (a tension leaves the domain of its cable) or ``"none"``.
-        mode: Unit joint motion (nv,) of the smallest eigenvalue of K_θ at ``factor``.
-        tension: F (C,) [N] at ``factor``.
-        factors: Factors (n,) [-] under which the arm is stable, from zero to ``factor``; to at most
-            ten if ``factor`` is inf.
+            load), ``"elasticity"`` (a tension leaves the domain of its law) or ``"none"``.
+        mode: Unit joint motion (nv,) of buckling: the eigenvector of the smallest eigenvalue of K_θ
+            at ``factor``, or at half a million if ``factor`` is inf.
+        tension: F (C,) [N] at the same factor as ``mode``.
+        factors: Factors (n,) [-] under which the arm is stable, from zero to ``factor``; only those
+            below ten if ``factor`` is inf.
         margins: Smallest eigenvalue of K_θ at each of these factors (n,) [N m/rad].
     """
 
@@ -127,11 +129,11 @@ class CriticalLoad(ReadOnlyState):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence if the arm is UNSTABLE even without the load; else empty."""
+        """One sentence if the arm is UNSTABLE even without the load; otherwise empty."""
         return () if self.factor else (f"UNSTABLE without the load: {self}".partition("\n")[0],)
 
     def plot(self) -> Figure:
-        """Plot the smallest joint stiffness [N m/rad] against the factor of the load."""
+        """Plot the smallest eigenvalue of K_θ [N m/rad] against the factor of the load."""
         return cdsm.plots.plot_critical_load(self)
 
     def to_dict(self) -> dict[str, object]:
@@ -168,7 +170,7 @@ class CriticalLoad(ReadOnlyState):
 
 
 def _describe_mode(names: tuple[str, ...], mode: Array) -> str:
-    """Write the names and entries of the joints with the largest entries in ``mode`` (nv,)."""
+    """Write a buckling ``mode`` (nv,) as text: its largest entries with the names of joints."""
     order = np.argsort(-abs(mode))[:4]
     shares = ", ".join(f"{names[i]} {mode[i]:+.2f}" for i in order)
     return f"softest joint motion: {shares}" + (", …" if len(mode) > len(order) else "")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 _IMMOBILE = 1e-14
-"""Compliance along a direction, divided by the norm of C_vv, below which it is rounding."""
+"""A compliance along a direction is rounding if it is below this part of the norm of C_vv."""
 
 
 @final
@@ -34,16 +34,17 @@ _IMMOBILE = 1e-14
 class Equilibrium(ReadOnlyState):
     """Equilibrium of an arm with locked motors under a load; made by :func:`~cdsm.equilibrium`.
 
-    All arrays are read-only.
+    Joint limits act as stops. All arrays are read-only.
 
     Attributes:
         reference: The posture at which the motors were locked.
         reference_tension: F (C,) [N] at the reference.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        stiffness: K_θ = ∂r/∂q at the equilibrium, with the original lengths of the *reference*. For
-            a pure force it is the exact Hessian of the potential. If no cable is slack and
-            ``original_length`` of the arm is "unstrained", it equals :func:`~cdsm.stiffness` of
-            this posture and tension. It does not include the stops.
+        stiffness: K_θ at the equilibrium, with the original lengths of the *reference*: the
+            derivative by q of the torque J_Lᵀ F + g − J_Xᵀ W, without the stops. For a pure force
+            it is the exact Hessian of the potential. If no cable is slack and ``original_length``
+            of the arm is "unstrained", it equals :func:`~cdsm.stiffness` of this posture and
+            tension.
         reaction: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit, negative
             at an upper limit, zero elsewhere.
         residual: Residual torque J_Lᵀ F + g − J_Xᵀ W − reaction (nv,) [N m].
@@ -82,10 +83,10 @@ class Equilibrium(ReadOnlyState):
 
     @property
     def stable(self) -> bool:
-        """Whether K_θ (symmetric part) is positive definite for the joints without stop reaction.
+        """Whether the symmetric part of K_θ is positive definite for the joints not held by stops.
 
-        It is False for a neutral state, for example if all cables are slack. It is also False if
-        the softest motion is blocked only by stops that have no reaction.
+        It is False for a neutral state, for example if all cables are slack. A joint that touches
+        its stop without a reaction counts as free, even if this stop blocks the unstable motion.
         """
         values = eigenvalues(self.stiffness.joint, self._off_stops)
         return bool((values > FLAT * abs(values).max(initial=0.0)).all())
@@ -94,8 +95,8 @@ class Equilibrium(ReadOnlyState):
     def compliance(self) -> Array:
         """Compliance at the tip (6, 6): tip motion per wrench, with joints at stops fixed.
 
-        C = J_X K_θ⁻¹ J_Xᵀ of the joints without stop reaction. Linear rows and columns are first,
-        in [m/N], [rad/N] and [rad/(N m)].
+        C = J_X K_θ⁻¹ J_Xᵀ, with the rows and columns of the joints without stop reaction. Linear
+        rows and columns of C are first: C_vv [m/N], C_vω [rad/N], C_ωω [rad/(N m)].
 
         Raises:
             SingularStiffness: K_θ of these joints is singular.
@@ -119,7 +120,7 @@ class Equilibrium(ReadOnlyState):
         return frozen(J @ np.linalg.solve(K, J.T))
 
     def along(self, direction: ArrayLike) -> float:
-        """Compute the tip stiffness 1/(uᵀ C_vv u) [N/m] along ``direction``; joints at stops stay.
+        """Compute the tip stiffness 1/(uᵀ C_vv u) [N/m] along u, with joints at stops fixed.
 
         C_vv (3, 3) is the part of :attr:`compliance` that relates displacements to forces.
 
@@ -142,7 +143,7 @@ class Equilibrium(ReadOnlyState):
 
     @property
     def _off_stops(self) -> NDArray[np.intp]:
-        """Indices of the joints without stop reaction."""
+        """Indices (n,) of the joints without stop reaction."""
         return np.flatnonzero(self.reaction == 0.0)
 
     @property
@@ -213,6 +214,9 @@ class Equilibrium(ReadOnlyState):
 
 
 def eigenvalues(K: Array, free: NDArray[np.intp]) -> Array:
-    """Return the eigenvalues of the symmetric part of K (nv, nv) for the joints ``free`` (n,)."""
+    """Return the eigenvalues (n,) of K's symmetric part, restricted to the joints ``free`` (n,).
+
+    ``free`` are indices of rows and columns of K (nv, nv).
+    """
     K = K[np.ix_(free, free)]
     return np.asarray(np.linalg.eigvalsh((K + K.T) / 2.0), dtype=np.float64)

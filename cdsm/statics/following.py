@@ -16,18 +16,22 @@ from cdsm.support.values import Array, frozen
 _FAR = 0.1  # largest joint motion [rad] from one equilibrium to the next in :func:`follow`
 
 _DENSE = 0.02
-"""Distance [rad] of postures whose stability is checked; a shorter unstable part may be missed."""
+"""Distance [rad] between two postures of a path at which stability is checked.
+
+An unstable part of the path that is shorter may be missed.
+"""
 
 _FINEST = 2.0**-12  # relative precision of a buckling load
-_SLIGHT = 1e-9  # smallest part of the load to which _FINEST is relative
+_SLIGHT = 1e-9  # below this part of the load the precision is absolute: this part times _FINEST
 
 
 def follow_load(
     before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
 ) -> Equilibrium:
-    """Follow equilibria under wrench + λ · added from λ = ``reached`` to ``goal``; return the last.
+    """Follow the equilibrium of an arm while its load wrench + λ · added grows; return the last.
 
-    ``before`` is the equilibrium at ``reached``. Raises EquilibriumError if the arm buckles.
+    λ grows from ``reached``, where the equilibrium is ``before``, to ``goal``. ``wrench`` and
+    ``added`` are (6,): force [N], then moment [N m]. Raises EquilibriumError if the arm buckles.
     """
     step = goal - reached
     while reached < goal:
@@ -51,11 +55,12 @@ def follow_load(
 
 
 def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Equilibrium | None:
-    """Find the equilibrium that continues ``before`` under another ``wrench`` (6,), or None.
+    """Find the equilibrium that the arm reaches from ``before`` if the load becomes ``wrench``.
 
-    Returns None if no path of stable postures was found from ``before``; there may be one for a
-    smaller change of the wrench. The search starts at the joint angles ``start`` (nv,) [rad], by
-    default at the angles of ``before``. Raises the errors of :func:`~cdsm.equilibrium`.
+    ``wrench`` is (6,): force [N], then moment [N m]. The search starts at the joint angles
+    ``start`` (nv,) [rad], by default at those of ``before``. Returns None if it finds no path of
+    stable postures to an equilibrium; with a smaller change of the wrench it may find one. Raises
+    the errors of :func:`~cdsm.equilibrium`.
     """
     loaded = LoadedArm(before.reference, before.reference_tension, wrench)
     iterate = loaded.at(before.pose, before.tension)
@@ -71,10 +76,11 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
 
 
 def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:
-    """Return whether the straight path from ``start`` to the equilibrium is short and stable.
+    """Return whether the motion from ``start`` to the result of ``search`` is short and stable.
 
-    K_θ of the joints off their stops is checked at points along the path: an arm that snaps through
-    has an unstable posture there, over which the search may have stepped.
+    Short: no joint moves by more than 0.1 rad. Stable: K_θ of the joints off their stops is
+    positive definite at points along the straight path of joint angles. If it is not, the arm snaps
+    through there, though the search may have stepped over the unstable postures.
     """
     path = search.state.pose.q - start.pose.q
     length = float(abs(path).max())

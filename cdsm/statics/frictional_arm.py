@@ -2,10 +2,11 @@
 
     r(q) = Σ_j T_j g_j + g − J_Xᵀ W,    ∂r/∂q = Σ_j (T_j H_j + g_jᵀ ∂T_j/∂q) + ∂g/∂q − ∂(J_Xᵀ W)/∂q
 
-T_j is the tension of segment j; g_j and H_j are the gradient and the Hessian of its length. g is
-the gravity torque. At a posture the tensions follow from the natural lengths of the segments before
-the move, which are the lengths of their wire at zero strain (:mod:`cdsm.friction.chain_problem`).
-∂r/∂q is not symmetric where cables slide: friction has no potential. Without friction this is
+r is the residual torque and g the gravity torque. T_j is the tension of segment j; g_j and H_j are
+the gradient and the Hessian of its length. The natural length of a segment is the length of its
+wire at zero strain. When the arm moves to a posture, :mod:`cdsm.friction.chain_problem` computes
+the tensions there from the natural lengths before the motion. ∂r/∂q is not symmetric where cables
+slide: friction has no potential. Without friction the states are those of
 :class:`~cdsm.statics.locked_motors.LoadedArm`.
 """
 
@@ -23,10 +24,10 @@ from cdsm.support.values import Array
 
 
 class Settled(NamedTuple):
-    """State of an arm at one posture, after its cables have slipped to the limit of friction.
+    """State of an arm at one posture, after the cables have slipped where friction did not hold.
 
-    The arm need not be balanced: :func:`~cdsm.statics.trust_region.find_rest` searches for the
-    equilibrium among such states.
+    The tensions meet the law of friction at every hole, but need not balance the arm.
+    :func:`~cdsm.statics.trust_region.find_rest` searches for the equilibrium among such states.
     """
 
     pose: Posture
@@ -38,9 +39,10 @@ class Settled(NamedTuple):
     slope: Array  # ∂T/∂q (S, nv) [N/rad]
 
     def holding_back(self, torque: Array | float) -> Settled:
-        """Return this state with ``self.torque`` = r − ``torque`` (nv,) [N m].
+        """Return this state with the attribute ``torque`` = r − the argument (nv,) [N m].
 
-        A search for a state of zero ``self.torque`` then solves r = ``torque``.
+        A search for zero then finds r = the argument: the equilibrium of an arm on whose joints
+        this torque also acts, and so holds back a part of the load.
         """
         return self._replace(torque=self.residual - torque)
 
@@ -55,9 +57,10 @@ class FrictionalArm(NamedTuple):
     forced: Array  # tension of force-controlled cables (C,) [N]; NaN: position-controlled
 
     def moved(self, q: Array, near: Settled) -> Settled:
-        """Compute the state at joint angles ``q`` (nv,) [rad]; ``near`` is a state close to it.
+        """Compute the state at joint angles ``q`` (nv,) [rad].
 
-        Raises CableError if two sites coincide.
+        The search for the tensions starts from ``near``, the state at a posture close by. Raises
+        CableError if two sites coincide.
         """
         pose = near.pose.arm.at(q, check_limits=False)
         return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.pose.q), 0.0))

@@ -1,4 +1,4 @@
-"""Load an arm with friction in its holes slowly: a series of loads and of motor commands."""
+"""Simulate an arm with friction in its holes under a series of slow loads and motor commands."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def load_cycle(
     """Compute the states of an arm with friction under a series of slowly applied loads.
 
     Under a load the arm is in equilibrium, r(q) = Σ T_j g_j + g − J_Xᵀ W = 0 (Eq. 13 by segments),
-    with the tension T_j of segment j and the gradient g_j of its length. At hole j, which bends the
-    cable by φ_j, |ln T_{j+1} − ln T_j| ≤ μ φ_j with the friction coefficient μ. Wire moves through
-    a hole only at this bound, towards the larger tension. So each state depends on all earlier
-    loads. The first state is the reference, with one tension in all segments of a cable, as after
-    shaking the arm. Between two loads the wrench and the commands change linearly and slowly,
-    without inertia. Joint limits are stops. Without friction each load gives the
-    :func:`~cdsm.equilibrium`.
+    with the gravity torque g, the tension T_j of segment j and the gradient g_j of its length. At
+    hole j, which bends the cable by φ_j, |ln T_{j+1} − ln T_j| ≤ μ φ_j with the friction
+    coefficient μ. Wire moves through a hole only at this bound, towards the larger tension. So each
+    state depends on all earlier loads. The first state is the reference, with one tension in all
+    segments of a cable, as after shaking the arm. Between two loads the wrench and the commands
+    change linearly and slowly, without inertia. Joint limits are stops. Without friction each load
+    gives the :func:`~cdsm.equilibrium`.
 
     In rare cases several postures are in equilibrium. Then the result is the one that the search
     from the previous posture finds.
@@ -57,17 +57,17 @@ def load_cycle(
         wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m].
             Before the first load the wrench is that of the ``Tension``, or zero.
         motors: Commands of the motors at each load (n, C): for a position-controlled cable the
-            natural length of wire taken in since the reference [m], positive if it pulls; for a
-            force-controlled cable its tension [N]. Default: 0 m, and the tension F at the
-            reference. A motor cannot take in all wire of its cable.
+            natural length (at zero strain) of wire taken in since the reference [m], positive if
+            the motor pulls; for a force-controlled cable its tension [N]. Default: 0 m, and the
+            tension F at the reference. A motor cannot take in all wire of its cable.
         accuracy: Largest error of the energy balance (work − stored energy − dissipation) of each
-            step, relative to the work, from 1e-12 to 0.1. Steps are divided until the error is
-            smaller. The net work of a thin loop is much less than the work of its steps: there
-            ``print`` says how well the loss is known. Tips and tensions depend on sub-steps only
-            where a hole stops sliding within one: with 1e-3, the tips of 39 random arms were then
-            off by up to 0.5 % of the largest displacement, half of them by less than 0.06 %. A
-            snap-through cannot keep the balance:
-            see ``warnings`` of the result.
+            step, relative to the work, from 1e-12 to 0.1. Steps are divided into sub-steps until
+            the error is smaller. The net work of a thin loop is much less than the work of its
+            steps: for such a loop ``print`` says how well the loss is known. The division changes
+            tips and tensions only if a hole stops sliding within a sub-step: with 1e-3, the tips of
+            39 random arms were then off by up to 0.5 % of the largest displacement, half of them by
+            less than 0.06 %. A snap-through cannot keep the balance: see ``warnings`` of the
+            result.
 
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`; or the posture is beyond a joint limit; or
@@ -101,7 +101,10 @@ def load_cycle(
 
 
 def checked_accuracy(accuracy: float) -> float:
-    """Return the ``accuracy`` of :func:`load_cycle`; InvalidInput if it is out of range."""
+    """Check the argument ``accuracy`` of :func:`load_cycle` and return it.
+
+    Raises InvalidInput if it is not a number from 1e-12 to 0.1.
+    """
     share = scalar("accuracy", accuracy)
     if not _LEAST <= share <= _MOST:
         raise InvalidInput("accuracy", f"{share:g} given; {_LEAST:g} to {_MOST:g} is needed.")
@@ -109,10 +112,11 @@ def checked_accuracy(accuracy: float) -> float:
 
 
 def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) -> SlowLoading:
-    """Return the :class:`SlowLoading` of an arm at its reference, from checked arguments.
+    """Prepare the slow loading of an arm whose motors are locked at ``pose``.
 
-    Its cables have tensions (C,) [N] under ``wrench`` (6,). ``accuracy`` is as for
-    :func:`load_cycle`. Raises InvalidInput if ``pose`` is beyond a joint limit.
+    There the cables have ``tension`` F (C,) [N] under ``wrench`` (6,). ``accuracy`` is as for
+    :func:`load_cycle`. The caller has checked these arguments. Raises InvalidInput if ``pose`` is
+    beyond a joint limit, and ElasticityRangeError if a series spring leaves no wire.
     """
     require_between_stops(pose)
     LoadedArm(pose, tension, wrench)  # refuses a spring that leaves no wire
@@ -124,9 +128,10 @@ def slow_loading(pose: Posture, tension: Array, wrench: Array, accuracy: float) 
 
 
 def _commands(motors: ArrayLike, forced: NDArray[np.bool_], shape: tuple[int, ...]) -> Array:
-    """Check the motor commands (n, C) of all loads, which need this ``shape``, and return them.
+    """Check the commands ``motors`` of :func:`load_cycle`, and return them as an array (n, C).
 
-    ``forced`` (C,) marks the force-controlled cables: their commands are tensions, never negative.
+    ``shape`` is (n, C). ``forced`` (C,) marks the force-controlled cables: their commands are
+    tensions, never negative.
     """
     commands = number_array("motors", motors)
     if commands.shape != shape:
@@ -145,7 +150,11 @@ def _commands(motors: ArrayLike, forced: NDArray[np.bool_], shape: tuple[int, ..
 def _require_wire(
     commands: Array, loading: SlowLoading, state: State, names: Sequence[str]
 ) -> None:
-    """Raise InvalidInput if a motor takes in all wire that its cable has at ``state`` or more."""
+    """Raise InvalidInput if one of the ``commands`` (n, C) would take in all wire of its cable.
+
+    ``state``, the state at the reference, has the length of this wire. ``names`` (C,) are the names
+    of the cables.
+    """
     wire = np.add.reduceat(state.settled.chain.natural, loading.start[:-1])
     beyond = ~loading.forced & (commands >= wire)
     if beyond.any():

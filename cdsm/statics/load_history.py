@@ -30,13 +30,15 @@ _SHOWN = 24
 """Largest number of loads that ``print`` shows; of more loads it shows the first and last ones."""
 
 _SNAP = 0.05
-"""Unaccounted energy of a snap-through, relative to work + stored + dissipated of a step.
+"""An arm snaps through in a step if the unaccounted energy is above this part of the turnover.
 
-The coarsest ``accuracy``, 10 % of the work, leaves less: the work is stored or dissipated, too.
+The turnover is the largest sum |work| + |stored| + dissipated of all steps. Without a snap-through
+even the coarsest ``accuracy``, 10 % of the work, leaves less: the sum counts the work and also the
+energy that it becomes.
 """
 
 _KNOWN = 0.01
-"""Error of the energy balance, relative to the loss, above which ``print`` says it."""
+"""``print`` states the error of the energy balance if it is above this part of the loss."""
 
 
 @final
@@ -44,8 +46,8 @@ _KNOWN = 0.01
 class LoadHistory(ReadOnlyState):
     """States of an arm with friction, load by load; made by :func:`~cdsm.load_cycle`.
 
-    There are n loads. The S segments and P holes are in the order of :attr:`Posture.segments`. All
-    arrays are read-only.
+    There are n loads. The S segments and P holes are in the order of :attr:`Posture.segments`. The
+    natural length of wire is its length at zero strain. All arrays are read-only.
 
     Attributes:
         reference: Posture at which the motors were locked.
@@ -59,8 +61,9 @@ class LoadHistory(ReadOnlyState):
         segment_tensions: T of each segment at each load (n, S) [N].
         slip: Natural length of wire that moved through each hole during the step to each load (n,
             P) [m]; positive towards the end of the cable.
-        sliding: Holes that slide as the load is reached (n, P): 1 towards the end of the cable, −1
-            towards its motor, 0 where the cable sticks or the hole has no friction.
+        sliding: Where the cable slides as the load is reached (n, P): 1 if wire moves through the
+            hole towards the end of the cable, −1 if towards its motor, 0 if the cable sticks or the
+            hole has no friction.
         reaction: Torque of the stops on the joints at each load (n, nv) [N m].
         load_work: Work of the load during the step to each load (n,) [J].
         motor_work: Work of the motors during the same step (n,) [J].
@@ -86,24 +89,25 @@ class LoadHistory(ReadOnlyState):
 
     @cached_property
     def displacement(self) -> Array:
-        """Tip position minus its position at the reference, (n, 3) [m]."""
+        """Displacement of the tip from the reference at each load (n, 3) [m]."""
         return frozen(self.tip - self.reference.tip[:3, 3])
 
     @cached_property
     def unaccounted(self) -> Array:
-        """Work minus stored and dissipated energy (n,) [J].
+        """Work minus stored and dissipated energy in the step to each load (n,) [J].
 
-        This is the error of the integration, and the kinetic energy where the arm snaps through.
+        This is the error of the integration. If the arm snaps through, it is the kinetic energy.
         """
         work = self.load_work + self.motor_work
         return frozen(work - self.stored - self.dissipated)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Loads at which the arm snaps through, with the energy [mJ] that sets it in motion.
+        """Sentences with the loads at which the arm snaps through, and its kinetic energy [mJ].
 
-        At these loads ``unaccounted`` exceeds 5 % of the largest energy turned over in a step. What
-        follows can depend on the steps. Empty if there are none.
+        At these loads ``unaccounted`` exceeds 5 % of the largest sum of work, stored and dissipated
+        energy of a step. All later states can depend on the sub-steps. Empty if the arm never snaps
+        through.
         """
         turned = abs(self.load_work) + abs(self.motor_work) + abs(self.stored) + self.dissipated
         return tuple(
@@ -113,7 +117,7 @@ class LoadHistory(ReadOnlyState):
 
     @cached_property
     def tensions(self) -> tuple[Array, ...]:
-        """Tensions T (n, segments) [N] of each cable, from its motor to its end."""
+        """Tensions of the segments of each cable, from motor to end: one (n, segments) [N] each."""
         cable = self.reference.segments.chains.cable
         parts = np.split(self.segment_tensions, np.flatnonzero(np.diff(cable)) + 1, axis=1)
         return tuple(frozen(part.copy()) for part in parts)
@@ -135,7 +139,7 @@ class LoadHistory(ReadOnlyState):
     def stiffness(self, load: int) -> Stiffness:
         """Compute the tangent stiffness at load number ``load``, from 0; −1 is the last load.
 
-        It is valid as long as cables continue to slide in the same holes.
+        It is valid while the cables continue to slide in the same holes and directions.
         """
         k = self._index(load)
         signs = self.sliding[k]

@@ -1,14 +1,18 @@
-"""Tip positions of a slowly loaded arm with friction, and their change if loads or arm change.
+"""Tip positions of an arm with friction under slow loads, and their first-order changes.
 
-A "rest" is an equilibrium on the way: at a load, or between two loads. The natural length of a
-segment is its length without tension. At a rest, the joint angles q solve r(q, a) = 0: r is the
-residual torque, and a are the natural lengths of the segments at the rest before. Wire that slips
-through holes then changes the natural lengths to A(q, T), with the segment tensions T. They are
-the natural lengths a for the next rest.
+The changes follow from small changes of the loads or of the arm, such as its friction.
 
-A small change of loads or arm is followed from rest to rest. It changes r by δr, q by δq = −K⁻¹ δr
-with K = ∂r/∂q, and A by δA. Holes that slide continue to slide, others continue to stick. So the
-result is the derivative, unless a hole is just about to start or to stop sliding.
+The arm moves through a series of equilibria: one at each load, and some between two loads. The code
+calls each a "rest". The natural length of a segment is the length of its wire at zero strain. At a
+rest, the joint angles q solve r(q, a) = 0, with the residual torque r and the natural lengths a
+(S,) that the S segments had at the rest before. Wire slips through holes while the arm moves to the
+rest. So the natural lengths become A(q, T), with the segment tensions T. They are the a of the next
+rest.
+
+A small change of loads or arm changes r by δr, q by δq = −K⁻¹ δr with K = ∂r/∂q, and A by δA. The
+code computes these changes from rest to rest. It assumes that cables slide in the same holes as
+before the change. So the result is the derivative, unless a cable is just about to start or to stop
+sliding in a hole.
 
 For a change of the loads, the tangents at each rest give δr and δA. For a change of the arm, the
 changed arm is evaluated at the recorded q, without a search for its own equilibrium: its residual
@@ -41,6 +45,8 @@ _SHORTEST = 2.0**-6
 
 
 class _Rest(NamedTuple):
+    """Equilibrium of a :class:`LoadingPath`, at a load or between two loads."""
+
     state: State
     load: int  # index of the load to which the arm is on the way
     part: float  # part of the way from the load before, 1 at the load itself
@@ -50,8 +56,8 @@ class _Rest(NamedTuple):
 class LoadingPath:
     """Equilibria ("rests") of an arm with friction during a series of loads.
 
-    Unless a search fails, the loads alone decide at which points between two loads a rest is
-    computed. So a small change of the arm changes the tips smoothly.
+    The points between two loads at which an equilibrium is computed depend on the loads only,
+    unless a search fails. So a small change of the arm changes the tips smoothly.
     """
 
     loading: SlowLoading
@@ -70,12 +76,14 @@ class LoadingPath:
         parts: int = _PARTS,
         near: LoadingPath | None = None,
     ) -> LoadingPath:
-        """Load an arm that is balanced at a posture under ``wrench`` (6,) by forces (n, 3) [N].
+        """Compute the equilibria of an arm under ``forces`` (n, 3) [N] at its tip, one by one.
 
-        ``tension`` is F (C,) [N] before the first force. ``parts`` is the number of equilibria that
-        are computed over the range of the forces. ``near`` is the path of a similar arm under the
-        same loads: searches that use its joint motions are up to twice as fast. Raises CdsmError if
-        the posture is beyond a joint limit, or no equilibrium was found on the way.
+        Before the first force the arm is balanced at ``pose`` under ``wrench`` (6,), which
+        continues to act, and the cables have the tensions ``tension`` F (C,) [N]. ``parts`` is the
+        number of equilibria that are computed over the range of the forces. ``near`` is the path of
+        a similar arm under the same loads: searches that use its joint motions are up to twice as
+        fast. Raises CdsmError if ``pose`` is beyond a joint limit, or no equilibrium was found on
+        the way.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = state = loading.begin(tension, wrench)
@@ -107,9 +115,10 @@ class LoadingPath:
         return np.array([self.rests[i].state.pose.tip[:3, 3] for i in self.last])
 
     def motion(self, i: int, load: int, part: float) -> Array | None:
-        """Return the joint motion (nv,) [rad] that led to rest ``i``.
+        """Return the joint motion (nv,) [rad] that led to the equilibrium ``self.rests[i]``.
 
-        None if rest ``i`` is not at ``part`` of the way to load number ``load``.
+        Returns None if this equilibrium does not exist, or is not at the part ``part`` [-] of the
+        way to load number ``load``.
         """
         if i < len(self.rests) and self.rests[i][1:] == (load, part):
             return self.rests[i].state.motion
@@ -117,9 +126,10 @@ class LoadingPath:
 
     @cached_property
     def _responses(self) -> list[tuple[Array, Array]]:
-        """Return −K⁻¹ (nv, nv) and ∂A/∂q (S, nv) [m/rad] of each rest.
+        """Return −K⁻¹ (nv, nv) [rad/(N m)] and ∂A/∂q (S, nv) [m/rad] at each equilibrium.
 
-        In −K⁻¹ the entries of joints at stops are 0, in ∂A/∂q the rows of slack segments.
+        The top of the module explains K and A. Rows and columns of −K⁻¹ are 0 for joints at stops,
+        rows of ∂A/∂q for slack segments.
         """
         responses = []
         for state, _, _ in self.rests:
@@ -133,10 +143,10 @@ class LoadingPath:
         return responses
 
     def beside(self, pose: Posture, tension: Array, wrench: Array) -> Array:
-        """Compute the tips (n, 3) [m] of a slightly different arm under the same loads.
+        """Compute to first order the tips (n, 3) [m] of a slightly different arm, same loads.
 
         ``pose`` is the reference posture of that arm, where its cables have ``tension`` F (C,) [N]
-        under ``wrench`` (6,). Each cable has as many segments as in this path.
+        under ``wrench`` (6,). Each cable must have as many segments as in this path.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = loading.begin(tension, wrench)
@@ -154,9 +164,9 @@ class LoadingPath:
         return np.array([tips[i] for i in self.last])
 
     def by_forces(self, direction: Array) -> Array:
-        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N] of all tips and loads.
+        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N]: how a change of load j moves the tip at load i.
 
-        The force f_j [N] along the unit vector ``direction`` (3,) is added to load j.
+        f_j [N] is a force along the unit vector ``direction`` (3,) that is added to load j.
         """
         count, problem, first = len(self.last), self.loading.problem, self.loading.start[:-1]
         each, none = np.eye(count), np.zeros(count)

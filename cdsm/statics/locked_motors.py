@@ -1,4 +1,4 @@
-"""Loaded arm with locked motors: cable tensions F(L) and residual torque."""
+"""Arm with locked motors at any posture: tensions F(L) from cable lengths, residual torque."""
 
 from __future__ import annotations
 
@@ -45,9 +45,10 @@ class Iterate(NamedTuple):
         return self.K.joint
 
     def holding_back(self, torque: Array | float) -> Iterate:
-        """Return this state with ``self.torque`` = r − ``torque`` (nv,) [N m].
+        """Return this state with the attribute ``torque`` = r − the argument (nv,) [N m].
 
-        A search for a state of zero ``self.torque`` then solves r = ``torque``.
+        A search for zero then finds r = the argument: the equilibrium of an arm on whose joints
+        this torque also acts, and so holds back a part of the load.
         """
         return self._replace(torque=self.K.residual - torque)
 
@@ -55,12 +56,12 @@ class Iterate(NamedTuple):
 class LoadedArm:
     """Arm under a wrench W (6,), its motors locked at a reference posture with tensions F (C,) [N].
 
-    A position-controlled cable keeps its original length l_0. Its elongation is its elongation at
-    the reference plus the change of its length. A force-controlled cable keeps its tension. During
-    a search, tensions may leave the domains of their laws: outside, a cable has the stiffness of
-    the nearest bound, or is slack. :meth:`require_domains` refuses a result outside. ``lengths``
-    (C,) [m] are the cable lengths L at which the tensions are F; by default they are the lengths at
-    the reference.
+    It computes the tensions and the residual torque r(q) at other postures. A position-controlled
+    cable keeps its original length l_0. Its elongation is its elongation at the reference plus the
+    change of its length. A force-controlled cable keeps its tension. During a search, tensions may
+    leave the domains of their laws: outside, a cable has the stiffness of the nearest end of the
+    domain, or is slack. :meth:`require_domains` refuses a result outside. ``lengths`` (C,) [m] are
+    the cable lengths L at which the tensions are F; by default the lengths at the reference.
 
     Raises:
         ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the
@@ -95,9 +96,10 @@ class LoadedArm:
         return Iterate(K, K.residual, rounding(K))
 
     def moved(self, q: Array, near: Iterate) -> Iterate:
-        """Compute the state at joint angles ``q`` (nv,) [rad]; ``near`` is a state close to it.
+        """Compute the state at joint angles ``q`` (nv,) [rad].
 
-        Raises CableError if two sites coincide.
+        The search for the tensions starts from ``near``, the state at a posture close by. Raises
+        CableError if two sites coincide.
         """
         before = near.K
         pose = self.reference.arm.at(q, check_limits=False)
@@ -111,10 +113,10 @@ class LoadedArm:
 
 
 def lengths_with(wire: Array, pose: Posture, tension: Array) -> Array:
-    """Return L (C,) [m] at which cables of original lengths ``wire`` have ``tension`` (C,) [N].
+    """Compute the cable lengths L (C,) [m] at which the cables have ``tension`` (C,) [N].
 
-    ``wire`` is l_0 (H,) [m] of the H position-controlled cables. The other cables keep their
-    lengths in ``pose``.
+    ``wire`` are the original lengths l_0 (H,) [m] of the H position-controlled cables. For the
+    other cables the result has their lengths at ``pose``.
     """
     lengths, cables = pose.cable_lengths.copy(), pose.arm.cables
     held = np.flatnonzero(cables.position_controlled)
@@ -131,7 +133,7 @@ def require_domains(
 ) -> None:
     """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws.
 
-    ``groups`` are the laws, each with the indices of its cables; ``where`` begins the message.
+    ``groups`` are pairs: a law, and the indices of its cables. ``where`` begins the error message.
     """
     for law, of in groups:
         F = tension[of]
@@ -151,7 +153,11 @@ def require_domains(
 
 
 def stops(reference: Posture) -> tuple[Array, Array]:
-    """Return the angles (nv,) [rad] of lower and upper stops; ``reference`` is between them."""
+    """Return the angles (nv,) [rad] of the lower and of the upper stops of all joints.
+
+    A stop is at the joint limit, or 1e-6 rad before it if disks touch there. A joint that is nearer
+    to its limit in ``reference`` has the stop at its angle there.
+    """
     arm, q = reference.arm, reference.q
     touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
     if arm.is_serpentine:
@@ -176,8 +182,8 @@ def rounding(K: Stiffness) -> Array:
 def tilt_torque(pose: Posture, tension: Array) -> Array:
     """Compute the error of joint torques (nv,) [N m] per relative error of the site positions.
 
-    An error of a position rotates the segments at the site, the short ones most. ``tension`` [N]
-    has an entry for each segment whose length depends on the joints.
+    An error of a position turns the segments that end at the site, the short ones most. ``tension``
+    [N] has one entry for each segment whose length depends on the joints.
     """
     start, end, over, joint = pose.arm._model.moving
     site, origin = pose._frames.site, pose._frames.origin
@@ -196,9 +202,10 @@ def tilt_torque(pose: Posture, tension: Array) -> Array:
 class _LockedLaw:
     """Tension as a function of length for the n position-controlled cables with one law.
 
-    Outside the domain of the law a cable has the stiffness of the nearest bound. Arrays are (n,):
-    ``free_length`` is l_0 [m], ``series`` is 1/k_series [m/N], ``lengths`` are L [m] and
-    ``tension`` is F [N] at the reference.
+    Outside the domain of the law a cable has the stiffness of the nearest end of the domain.
+    ``cables`` are the indices of the n cables. The other arrays are (n,): ``free_length`` is l_0
+    [m], ``series`` is 1/k_series [m/N], ``lengths`` L [m] and ``tension`` F [N] are those at the
+    reference.
     """
 
     def __init__(
@@ -235,12 +242,15 @@ class _LockedLaw:
         self._start = lengths - self._elongation(tension)  # L where the law begins [m]
 
     def _elongation(self, F: Array) -> Array:
-        """Compute the elongation Δl = l_0 Δε + ΔF/k_series [m] from the law's lower bound to F."""
+        """Compute Δl = l_0 Δε + ΔF/k_series (n,) [m]: elongation from the least tension to F.
+
+        The least tension is the lower end of the domain of the law.
+        """
         wire = self._free_length * (strain_of(self.law, F) - self._least_strain)
         return np.asarray(wire + (F - self.law.domain.low) * self._series)
 
     def _compliance(self, F: Array) -> Array:
-        """Compute the derivative dΔl/dF = l_0/EA(F) + 1/k_series [m/N] of the elongation Δl."""
+        """Compute dΔl/dF = l_0/EA(F) + 1/k_series (n,) [m/N], with the elongation Δl."""
         return np.asarray(self._free_length / rigidity_of(self.law, F) + self._series)
 
     def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 _MASSLESS = 1e-12  # a motion has no mass if its eigenvalue of M is below this part of the largest
 
 _STAND_IN = 0.02
-"""Largest part of a mode's kinetic energy that placeholder masses of links without mass may have.
+"""Largest part of a mode's kinetic energy that placeholder masses of massless links may have.
 
-It changes the frequency by 1 %.
+With this part they lower the frequency by 1 %.
 """
 
 
@@ -107,7 +107,7 @@ class Modes(ReadOnlyState):
         return "\n".join(rows)
 
     def _leading(self, shapes: Array) -> list[str]:
-        """Name the joint that moves most in each shape."""
+        """Return the name of the joint that moves most in each of the ``shapes`` (nv, n)."""
         names = self.stiffness.posture.arm.joint_names
         return [names[i] for i in abs(shapes).argmax(axis=0)]
 
@@ -115,9 +115,10 @@ class Modes(ReadOnlyState):
 def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     """Compute natural frequencies and mode shapes at a posture: K_θ φ = ω² M φ.
 
-    The symmetric part of K_θ is used; only a moment at the tip adds a skew part. The modes describe
-    a small vibration about the posture, without friction and damping. They are valid only if the
-    tensions balance the arm there, see :attr:`Stiffness.residual <cdsm.Stiffness.residual>`.
+    The symmetric part of K_θ is used. A skew part, which a moment at the tip or sliding cables add,
+    is left out. The modes describe a small vibration about the posture, without losses by friction
+    or damping. They are valid only if the tensions balance the arm there, see
+    :attr:`Stiffness.residual <cdsm.Stiffness.residual>`.
 
     Args:
         pose: The posture.
@@ -163,9 +164,9 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
 
 def _stand_in_mass(pose: Posture) -> Array:
-    """Compute the part of M (nv, nv) from placeholder masses.
+    """Compute the part of the mass matrix M (nv, nv) [kg m²] that placeholder masses add.
 
-    Massless links and the crosses of universal joints have such masses.
+    The URDF gives such masses to massless links and to the crosses of universal joints.
     """
     if not pose.arm.is_serpentine:
         return np.zeros((pose.arm.nv, pose.arm.nv))
@@ -182,9 +183,10 @@ def _stand_in_mass(pose: Posture) -> Array:
 
 
 def motions(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
-    """Compute ω² (nv,) [1/s²], ascending, and the shapes φ, columns (nv, nv) with φᵀMφ = 1.
+    """Solve K_θ φ = ω² M φ: return ω² (nv,) [1/s²], ascending, and the shapes φ (nv, nv).
 
-    Raises SingularMass if M is not positive definite.
+    The shapes are columns with φᵀMφ = 1. M is (nv, nv). Raises SingularMass if it is not positive
+    definite.
     """
     # scaled by joint: the mass of the last link may be rounding beside that of the arm
     unit = 1.0 / np.sqrt(M.diagonal())
@@ -206,7 +208,7 @@ def _massless(pose: Posture, motion: Array) -> SingularMass:
 
 
 class Carried(NamedTuple):
-    """Rigid body on a link, in the frame of the link."""
+    """Rigid body that a link carries; its centre and inertia are in the frame of the link."""
 
     link: str
     mass: float  # m [kg]
@@ -215,7 +217,7 @@ class Carried(NamedTuple):
 
 
 def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
-    """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies ``carried`` by links.
+    """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies ``carried`` alone.
 
     M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω). J_v and J_ω are the Jacobians of the velocity of the centre of
     mass and of the angular velocity of a body.

@@ -1,8 +1,8 @@
 """Find the equilibrium of a loaded arm whose motors are locked.
 
-It solves r(q) = 0 for the residual torque r, with ∂r/∂q = K_θ. The tension F(q) of every
-position-controlled cable follows from its elongation, nonlinear elasticity and series springs
-included.
+:func:`equilibrium` solves r(q) = 0 for the residual torque r, with ∂r/∂q = K_θ. The tension F(q) of
+every position-controlled cable follows from its elongation, with nonlinear elasticity and series
+springs.
 """
 
 from __future__ import annotations
@@ -94,9 +94,10 @@ def require_between_stops(pose: Posture) -> None:
 
 
 def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
-    """Return the equilibrium that ``search`` found.
+    """Return the result of a converged ``search`` as an :class:`~cdsm.Equilibrium`.
 
-    Raises ElasticityRangeError if a tension is outside the domain of its law.
+    ``iterations`` is the number to store in it. Raises ElasticityRangeError if a tension is outside
+    the domain of its law.
     """
     K = search.state.K
     loaded.require_domains(K.tension)
@@ -116,11 +117,12 @@ def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> 
 def no_rest(
     reference: Posture, search: RestSearch[Any], reached: float, load: str = "the load"
 ) -> EquilibriumError:
-    """Return the error of a search that found no equilibrium beyond a part ``reached`` of ``load``.
+    """Return the error of a ``search`` that found no equilibrium, to be raised by the caller.
 
-    The error has the torque out of balance at the last iterate. It names the joint where it is
-    largest, and a cable if two neighbouring sites meet: they are 1000 times nearer to each other
-    than at ``reference``.
+    The arm was in equilibrium up to the part ``reached`` [-] of the load, which the error text
+    calls ``load``. The error has the residual torque at the last iterate, and the name of the joint
+    where it is largest. It also names a cable of which two neighbouring sites meet: their distance
+    is less than 1/1000 of that at ``reference``.
     """
     pose = search.state.pose
     residual = frozen(np.where(search.at_stop, 0.0, search.state.torque))

@@ -1,16 +1,18 @@
 """Move an arm with friction in its holes from load to load: sub-steps, work and dissipation.
 
-A sub-step solves r(q) = 0 with the natural lengths at its start. It is exact if no hole stops
-sliding within it: then the path between start and end does not matter. The energy balance shows
-whether this holds, and whether the energies themselves are accurate. Over a sub-step,
+A sub-step solves r(q) = 0 for the residual torque r, from the natural lengths of the segments at
+its start (lengths of wire at zero strain). It is exact if no hole stops sliding within it: then the
+path between start and end does not matter. The energy balance shows whether this holds, and whether
+the energies themselves are accurate. Over a sub-step,
 
     work of load and motors = change of stored energy + dissipation.
 
 The stored energy is a function of the state. The work is ∫ Q·dq with the torque Q = J_Xᵀ W of the
 load, and ∫ P du of a motor that takes in the natural length u, with P = T (1 + ε) − ∫ T dε. The
 dissipation is Σ_j ∫ (P_{j+1} − P_j) ds_j with the slips s_j of the holes. T is the tension of a
-segment and ε its strain. To first order in ε, P is T. The integrals follow from both halves of a
-sub-step by Simpson's rule. A sub-step is halved until both sides agree.
+segment and ε its strain. To first order in ε, P is T. Simpson's rule computes the integrals from
+the start, the middle and the end of a sub-step. A sub-step is halved until both sides of the energy
+balance agree.
 """
 
 from __future__ import annotations
@@ -49,14 +51,14 @@ class Load(NamedTuple):
     motors: Array  # per cable (C,): natural length taken in [m]; or tension [N] of a force motor
 
     def towards(self, other: Load, part: float) -> Load:
-        """Return self + part · (other − self); for part = 1 exactly ``other``."""
+        """Return the load at the part ``part`` (0 to 1) of the straight way to ``other``."""
         if part == 1.0:
             return other
         return Load(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
 
 
 class State(NamedTuple):
-    """An arm in equilibrium under a load. The natural lengths of its segments store its history."""
+    """Equilibrium of an arm under a load. The natural lengths of its segments store the history."""
 
     load: Load
     settled: Settled
@@ -89,7 +91,11 @@ class Passage(NamedTuple):
 
 
 class SlowLoading(NamedTuple):
-    """Arm with friction that is loaded slowly; the fields do not depend on the load."""
+    """Arm with friction that is loaded slowly; :meth:`carry` computes one step from load to load.
+
+    The fields do not depend on the load. ``problem`` models the cables, and ``reference`` is the
+    posture at which the motors are locked.
+    """
 
     problem: ChainProblem
     start: Indices  # first segment of each cable, and the number of segments (C+1,)
@@ -99,7 +105,10 @@ class SlowLoading(NamedTuple):
     accuracy: float  # largest part of the work of a step that may stay unaccounted for
 
     def begin(self, tension: Array, wrench: Array) -> State:
-        """Return the state at the reference; all segments of a cable have its tension (C,) [N]."""
+        """Return the first state: the reference posture under ``wrench`` (6,).
+
+        In each segment the tension is that of its cable in ``tension`` (C,) [N].
+        """
         pose = self.reference
         T = tension[pose.segments.chains.cable]
         natural = self.problem.natural(pose.segments.lengths, T)
@@ -111,9 +120,9 @@ class SlowLoading(NamedTuple):
     def carry(self, before: State, load: Load, what: str) -> tuple[State, Passage]:
         """Change the load of the equilibrium ``before`` to ``load`` in sub-steps.
 
-        Returns the new state, and the energies and slips on the way. Raises EquilibriumError if no
-        equilibrium was found on the way, and ElasticityRangeError if a tension of the new state is
-        outside the domain of its law; their texts name the step as ``what``.
+        Returns the new equilibrium, and the energies and slips on the way. Raises EquilibriumError
+        if no equilibrium was found on the way, and ElasticityRangeError if a tension of the new
+        state is outside the domain of its law. The error texts call the step ``what``.
         """
         first, state = before.load, before
         total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
@@ -153,7 +162,7 @@ class SlowLoading(NamedTuple):
     def arm(self, natural: Array, wrench: Array, motors: Array) -> FrictionalArm:
         """Return the :class:`FrictionalArm` under a wrench (6,) and motor commands (C,).
 
-        ``natural`` (S,) [m] are the natural lengths of its segments before wire slips.
+        ``natural`` (S,) [m] are the natural lengths of the segments before wire slips.
         """
         forced = np.where(self.forced, motors, np.nan)
         return FrictionalArm(self.problem, self.stops, natural, wrench, forced)
@@ -161,10 +170,10 @@ class SlowLoading(NamedTuple):
     def rest(
         self, before: State, load: Load, motion: Array | None = None
     ) -> tuple[State | None, RestSearch[Settled]]:
-        """Find the equilibrium that follows ``before`` under a new load; also return the search.
+        """Find the next equilibrium when the load changes from that of ``before`` to ``load``.
 
-        The equilibrium is None if the search fails. The search starts at the angles of ``before``,
-        plus ``motion`` (nv,) [rad] if it is given.
+        Returns the equilibrium, None if the search fails, and the search. It starts at the angles
+        of ``before``, plus ``motion`` (nv,) [rad] if it is given.
         """
         old, natural = before.settled, before.settled.chain.natural.copy()
         taken = np.where(self.forced, 0.0, load.motors - before.load.motors)
@@ -182,9 +191,10 @@ class SlowLoading(NamedTuple):
         return State(load, search.state, reaction, search.state.pose.q - old.pose.q), search
 
     def _energies(self, start: State, middle: State, end: State) -> tuple[Passage, float]:
-        """Return energies and slips of a sub-step, and the rounding error of its balance [J].
+        """Return energies and slips of a sub-step, and the rounding error of the balance [J].
 
-        The energies follow from the equilibria at start, middle and end.
+        ``start``, ``middle`` and ``end`` are the equilibria of the sub-step. The balance is that of
+        its energies.
         """
         states = (start, middle, end)
         torque = [s.load.wrench @ s.pose.jacobian + s.load.holding for s in states]
@@ -215,7 +225,7 @@ class SlowLoading(NamedTuple):
 def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> Settled | None:
     """Return the state after a joint ``motion`` (nv,) [rad] from ``old``; None if sites coincide.
 
-    Its torque is r − ``holding``.
+    The motion ends at the stops. ``holding`` (nv,) [N m] is subtracted from the residual torque.
     """
     try:
         return arm.moved(np.clip(old.pose.q + motion, *arm.stops), old).holding_back(holding)
@@ -224,9 +234,10 @@ def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> S
 
 
 def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Array) -> Settled:
-    """Return the state after a Newton step with the tangent of ``old`` and the torque of ``start``.
+    """Return the state after a Newton step from ``start``, with the tangent stiffness of ``old``.
 
-    Returns ``start`` if the step does not reduce the torque, which is r − ``holding``.
+    The step reduces the torque, from which ``holding`` (nv,) [N m] is subtracted; if it does not,
+    the result is ``start``.
     """
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
@@ -238,7 +249,10 @@ def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Arra
 
 
 def _work(force: list[Array], place: list[Array]) -> float:
-    """Compute the work ∫ ``force``·d``place`` [J] by Simpson's rule, from start, middle and end."""
+    """Compute the work ∫ ``force``·d``place`` [J] of a sub-step by Simpson's rule.
+
+    Both lists have the values at its start, middle and end.
+    """
     half, whole = place[1] - place[0], place[2] - place[0]
     ends = force[0] @ (4.0 * half - whole) + force[2] @ (3.0 * whole - 4.0 * half)
     return float(ends + 4.0 * (force[1] @ whole)) / 6.0

@@ -1,14 +1,15 @@
 """Find the equilibrium r(q) = 0 between stops: a trust-region search that ends with Newton steps.
 
-The residual torque r need not be the gradient of a potential. So the work ∫ r·dq along a step p
-measures its quality. With K = ∂r/∂q, to the fourth order of its length, the work is
+The residual torque r need not be the gradient of a potential. So the search judges a step p not by
+the change of a potential, but by the work ∫ r·dq along it. With K = ∂r/∂q, the work is
 
-    ½ (r₀ + r₁)·p + (pᵀK₀p − pᵀK₁p)/12.
+    ½ (r₀ + r₁)·p + (pᵀK₀p − pᵀK₁p)/12
 
-Subscripts 0 and 1 denote the start and the end of the step. The formula stays accurate where the
-difference of two potentials would be rounding. If r is a gradient, this is the trust-region method
-with the exact Hessian, which decreases the potential and leaves saddle points. Near the end every
-step is a full Newton step with the complete K, not only its symmetric part.
+to the fourth order of |p|. Subscripts 0 and 1 denote the start and the end of the step. The formula
+stays accurate where the difference of two potentials would be rounding. If r is a gradient, this is
+the trust-region method with the exact Hessian, which decreases the potential and leaves saddle
+points. Near the end every step is a full Newton step with the complete K, not only its symmetric
+part.
 
 scipy's trust-exact does not fit: it has no stops, and it needs a potential, which a moment at the
 tip does not have. BFGS takes thirty times as long to minimise the potential of a pure force
@@ -34,7 +35,7 @@ _FIRST, _WIDEST = 0.2, 0.5
 """Initial and largest trust-region radius [rad]. Longer steps might skip the nearest minimum."""
 
 FLAT = 1e-12
-"""Eigenvalues of K below this part of the largest are rounding: the state is neutral."""
+"""Eigenvalues of K below this part of the largest one are rounding: the arm is neutral there."""
 
 _POOR, _GOOD, _ACCEPTED = 0.25, 0.75, 0.05
 """Ratios of work to predicted work: the radius shrinks below the first, grows above the second, and
@@ -61,9 +62,10 @@ class Iterate(Protocol):
         """Derivative ∂r/∂q of the residual torque r (nv, nv) [N m/rad]."""
 
     def holding_back(self, torque: Array | float) -> Self:
-        """Return this state with ``self.torque`` = r − ``torque`` (nv,) [N m].
+        """Return this state with the attribute ``torque`` = r − the argument (nv,) [N m].
 
-        A search for a state of zero ``self.torque`` then solves r = ``torque``.
+        A search for zero then finds r = the argument: the equilibrium of an arm on whose joints
+        this torque also acts, and so holds back a part of the load.
         """
 
 
@@ -74,14 +76,15 @@ class Loaded(Protocol[State]):
     """Loaded arm as :func:`find_rest` needs it: its state at any joint angles, and its stops."""
 
     def moved(self, q: Array, near: State) -> State:
-        """Compute the state at joint angles ``q`` (nv,) [rad]; ``near`` is a state close to it.
+        """Compute the state at joint angles ``q`` (nv,) [rad].
 
-        Raises CableError if two sites coincide.
+        The search for the tensions starts from ``near``, the state at a posture close by. Raises
+        CableError if two sites coincide.
         """
 
     @property
     def stops(self) -> tuple[Array, Array]:
-        """Lowest and highest angles (nv,) [rad], at which joints rest on stops."""
+        """Lowest and highest joint angles, (nv,) [rad] each, at which stops end the motion."""
 
 
 class RestSearch(NamedTuple, Generic[State]):
@@ -96,7 +99,7 @@ class RestSearch(NamedTuple, Generic[State]):
 
 
 class _Free(NamedTuple):
-    """Free joints of an iterate, which are not at a stop, with their balance and eigenvalues."""
+    """Free joints of an iterate (no stop holds them), with their torques and eigenvalues of K."""
 
     at_stop: NDArray[np.bool_]  # which joints a stop holds (nv,)
     indices: NDArray[np.intp]  # indices of the free joints
@@ -130,8 +133,8 @@ def find_rest(
 ) -> RestSearch[State]:
     """Find the stable posture near ``start`` at which the residual torque r is ``holding``.
 
-    ``holding`` is (nv,) [N m]. A joint at a stop need not be balanced: the stop gives the missing
-    torque.
+    ``holding`` is (nv,) [N m]; with 0 the posture is an equilibrium. A joint at a stop need not be
+    balanced: the stop gives the missing torque.
     """
     stops = loaded.stops
     state, radius = start.holding_back(holding), _FIRST
@@ -173,9 +176,10 @@ def work(before: Iterate, after: Iterate) -> float:
 def _trial(
     state: Iterate, free: _Free, stops: tuple[Array, Array], radius: float
 ) -> tuple[Array, float]:
-    """Return joint angles (nv,) at most ``radius`` from ``state``, and the predicted work [J].
+    """Return the joint angles (nv,) to try next, and the predicted work [J] of the step to them.
 
-    The work is 0 if no step between the stops decreases the quadratic model.
+    The angles are at most ``radius`` [rad] from ``state``. For a step p the quadratic model r·p +
+    ½ pᵀKp predicts the work. It is 0 if no step between the stops decreases the model.
     """
     # at a saddle r is rounding and must not decide the way to leave it
     torque, signs = (0.0 * state.torque, (1.0, -1.0)) if free.balanced else (state.torque, (1.0,))
@@ -190,7 +194,10 @@ def _trial(
 
 
 def _spectrum(stiffness: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Return ascending eigenvalues, and eigenvectors, of K's symmetric part for ``free`` joints."""
+    """Return eigenvalues (ascending) and eigenvectors of K's symmetric part, ``free`` joints only.
+
+    ``stiffness`` is K (nv, nv), ``free`` has the n indices of these joints.
+    """
     K = stiffness[np.ix_(free, free)]
     values, vectors = np.linalg.eigh((K + K.T) / 2.0)
     return values, vectors
@@ -204,10 +211,11 @@ def _descend(
     radius: float,
     sign: float,
 ) -> Array:
-    """Return joint angles (nv,) that decrease the quadratic model; a joint halts at its stop.
+    """Return joint angles (nv,) that decrease the quadratic model r·p + ½ pᵀKp of the work.
 
-    The path from ``state`` is at most ``radius`` [rad] long. ``torque`` is r at ``state``; if it is
-    zero, ``sign`` (±1) chooses between the two opposite ways down.
+    A joint that reaches its stop halts there, and the others go on. The path from ``state`` is at
+    most ``radius`` [rad] long. ``torque`` is r at ``state``; if it is zero, ``sign`` (±1) chooses
+    between the two opposite directions in which the model decreases.
     """
     (lower, upper), q, indices, spectrum = stops, state.pose.q.copy(), free.indices, free.spectrum
     while indices.size and radius > 0.0:

@@ -25,13 +25,13 @@ _SETTLED, _MOST_CYCLES = 0.01, 64
 relative to the stiffness. The second is the largest number of cycles that is tried."""
 
 _GROWTH, _MOST = 1.25, 100.0
-"""Ratio of each trial load to the one before, and of the largest one to the breakaway load."""
+"""Ratio of each trial load to the one before; ratio of the largest one to the breakaway load."""
 
 _HALVINGS = 6  # number of bisections of the load from which the arm slides; they reach 0.4 %
 
 
 def fading(size: float, cycles: int) -> Array:
-    """Return loads (2 cycles,) [N] of changing sign; the amplitude falls linearly from ``size``."""
+    """Return loads (2 cycles,) [N] of alternating sign, whose size falls linearly from ``size``."""
     loads = size * (1.0 - np.arange(2 * cycles) / (2.0 * cycles))
     loads[1::2] *= -1.0
     return loads
@@ -60,7 +60,7 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def stuck(self) -> float:
-        """Tangent stiffness [N/m] along the weight while all cables stick (small weights)."""
+        """Tangent stiffness [N/m] along the weight while it is so small that all cables stick."""
         return self.breakaway.stiffness.along(self.breakaway.direction)
 
     @property
@@ -70,11 +70,11 @@ class WeightFriction(ReadOnlyState):
 
     @cached_property
     def sliding_load(self) -> float:
-        """Weight [N] at which the arm slides: its tangent stiffness is near the frictionless one.
+        """Weight [N] from which the arm slides: its tangent stiffness is near the frictionless one.
 
-        The tangent is then at most 1.25 times :attr:`frictionless`. The load is 0 without friction.
-        It is inf if the arm does not slide up to 100 times the breakaway load, or if no equilibrium
-        is found before, or if a tension leaves the domain of its law before.
+        The tangent stiffness is then at most 1.25 times :attr:`frictionless`. The load is 0 without
+        friction. It is inf if the arm does not slide up to 100 times the breakaway load, or if
+        before that the search finds no equilibrium or a tension leaves the domain of its law.
         """
         first, u = self.breakaway.load, self.breakaway.direction
         if not 0.0 < first < math.inf:
@@ -124,11 +124,11 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def dither_cycles(self) -> int:
-        """Number of dither cycles; doubling it changes the stiffness by at most 1 %.
+        """Number of cycles of the dither; twice as many change :attr:`dithered` by at most 1 %.
 
-        The stiffness is then near :attr:`frictionless_secant`, but not equal, since shaking along
-        the load does not move all cables. The number is 0 without friction, or if ``dithered`` is
-        NaN.
+        :attr:`dithered` is then near :attr:`frictionless_secant`, but not equal, since dither along
+        the load does not move all cables. The number is 0 without friction, or if :attr:`dithered`
+        is NaN.
         """
         return self._dither[0]
 
@@ -150,7 +150,10 @@ class WeightFriction(ReadOnlyState):
         return 0, math.nan
 
     def _dithered_stiffness(self, size: float, cycles: int) -> float:
-        """Compute weight/displacement [N/m] after dither: ``cycles`` from ±``size`` [N] to zero."""
+        """Compute weight/displacement [N/m] after ``cycles`` dither cycles.
+
+        Their amplitude falls from ``size`` [N] to zero.
+        """
         history, u = self.history, np.append(self.breakaway.direction, np.zeros(3))
         last, added = history.wrenches[-1], fading(size, cycles)[:, None] * u
         path = np.vstack([history.wrenches, last + added, last])
@@ -159,7 +162,7 @@ class WeightFriction(ReadOnlyState):
 
     @property
     def _deviation(self) -> float:
-        """Difference of :attr:`dithered` from :attr:`frictionless_secant`, relative to it [%]."""
+        """Error of :attr:`dithered` relative to :attr:`frictionless_secant` [%]."""
         return 100.0 * (self.dithered / self.frictionless_secant - 1.0)
 
     @property

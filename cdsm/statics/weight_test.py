@@ -43,9 +43,9 @@ _DISPLACED = 1e-9
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearPrediction(ReadOnlyState):
-    """Prediction of a weight test by the stiffness without the weight; joints at stops stay there.
+    """Linear prediction of a weight test from the compliance of the arm without the weight.
 
-    ΔF (3,) [N] is the force of the :class:`WeightTest`, and u = ΔF/|ΔF|.
+    Joints at stops are fixed. ΔF (3,) [N] is the force of the :class:`WeightTest`, u = ΔF/|ΔF|.
 
     Attributes:
         displacement: Displacement of the tip C_vv ΔF (3,) [m], with C of
@@ -66,7 +66,7 @@ class WeightTest(ReadOnlyState):
 
     Attributes:
         force: ΔF (3,) [N], the dead force at the full load, base axes.
-        without: Frictionless equilibrium without the weight, under ``wrench`` alone.
+        without: Frictionless equilibrium without the weight, under the wrench that also acts then.
         loaded: Frictionless equilibrium at each step; the last one is under the full load.
         friction: Loads and stiffnesses with friction; None for an arm without friction.
     """
@@ -83,7 +83,7 @@ class WeightTest(ReadOnlyState):
 
     @cached_property
     def stiffness(self) -> float:
-        """Measured |ΔF|/(u·ΔX) [N/m], u = ΔF/|ΔF| (1/C of Eq. 20); inf without motion along u."""
+        """Secant |ΔF|/(u·ΔX) [N/m], u = ΔF/|ΔF| (1/C of Eq. 20); inf without motion along u."""
         return (
             float(np.linalg.norm(self.force)) / self._tip_motion if self._tip_motion else math.inf
         )
@@ -96,7 +96,7 @@ class WeightTest(ReadOnlyState):
 
     @cached_property
     def linear(self) -> LinearPrediction:
-        """Linear prediction by the stiffness without the weight.
+        """Linear prediction of the test from the compliance without the weight.
 
         Raises:
             SingularStiffness: The arm without the weight is about to buckle.
@@ -107,13 +107,13 @@ class WeightTest(ReadOnlyState):
 
     @property
     def settled_first(self) -> bool:
-        """Whether the arm moved to another equilibrium before any weight was hung on it."""
+        """Whether the given tensions did not balance the arm, so that it moved before the test."""
         moved = float(np.linalg.norm(self.without.displacement))
         return moved > _DISPLACED * self.without.pose.arm.length
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence if the arm left its reference before the weight, or is neutral there."""
+        """Sentences if, without the weight, the arm leaves its reference, or is not stable."""
         said = []
         if self.settled_first:
             moved = coordinates(1000.0 * self.without.displacement)
@@ -278,7 +278,7 @@ def weight_test(
 
 
 def _with_friction(test: WeightTest, tension: Tension | ArrayLike) -> WeightTest:
-    """Return the test with the states under friction added, loaded in the same steps."""
+    """Return ``test`` with its field ``friction`` computed, under the same load steps."""
     before, parts = test.without, test.loads / np.linalg.norm(test.force)
     added = np.append(test.force, np.zeros(3))
     path = before.wrench + np.append(0.0, parts)[:, None] * added

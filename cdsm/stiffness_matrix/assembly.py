@@ -40,7 +40,7 @@ def stiffness(
 def checked_tension(
     pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None
 ) -> tuple[Array, Array]:
-    """Check the arguments of :func:`stiffness`; return F (C,) [N] and W (6,)."""
+    """Check the arguments of :func:`stiffness`; return tensions F (C,) [N] and wrench W (6,)."""
     arm = instance("pose", pose, Posture).arm
     if isinstance(tension, Tension):
         if not np.array_equal(tension.posture.q, pose.q):
@@ -71,9 +71,10 @@ def assemble(
     distribution: Tension | None = None,
     free_length: Array | None = None,
 ) -> Stiffness:
-    """Compute K_θ from checked, read-only tensions, wrench and cable stiffnesses (Eq. 16).
+    """Compute K_θ (Eq. 16) from arguments that are checked, and arrays that are read-only.
 
-    ``distribution`` and ``free_length`` are stored in the result; see :class:`Stiffness`.
+    ``tension`` is F (C,) [N], ``wrench`` W (6,) and ``cable_stiffness`` the diagonal of K_L (C,)
+    [N/m]. ``distribution`` and ``free_length`` are stored in the result; see :class:`Stiffness`.
     """
     active, passive, load, parts, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
     return Stiffness(

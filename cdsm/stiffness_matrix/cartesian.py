@@ -61,8 +61,8 @@ class CartesianReadings(ReadOnlyState):
     def cartesian(self) -> Array:
         """Matrix (C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, with the tip free to rotate.
 
-        A diagonal entry is the stiffness if the other two translations are *locked*. It is never
-        less than :meth:`along`, and often several times larger.
+        A diagonal entry is the stiffness if the other two translations are *locked*. For a stable
+        arm it is never less than :meth:`along` that axis, and often several times larger.
 
         Raises:
             SingularStiffness: K_θ is singular, or the tip hardly moves in some direction. In the
@@ -75,7 +75,7 @@ class CartesianReadings(ReadOnlyState):
     def cartesian_in(self, directions: Iterable[Direction]) -> Array:
         """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in some directions only.
 
-        It is for planar arms: their tip cannot leave a plane, so :attr:`cartesian` does not exist.
+        Use it for planar arms: their tip cannot leave a plane, so :attr:`cartesian` does not exist.
 
         Args:
             directions: U, n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3).
@@ -136,7 +136,7 @@ class CartesianReadings(ReadOnlyState):
         return frozen(found["pseudoinverse"].reshape(3, 3))
 
     def _require_mobile(self, u: Array) -> None:
-        """Raise SingularStiffness if a force along a unit direction u (3,) moves no joint."""
+        """Raise SingularStiffness if a tip force along a unit vector u (3,) moves no joint."""
         rows = self.posture.jacobian[:3]
         if not abs(u @ rows).max() > readings.UNMOVED * abs(rows).max():
             raise SingularStiffness(
@@ -156,10 +156,11 @@ class CartesianReadings(ReadOnlyState):
     def _read(
         self, matrix: Array, name: str, directions: Array = _NO_DIRECTIONS
     ) -> tuple[int, dict[str, Array]]:
-        """Compute the quantity ``name`` of ``matrix``, which is K_θ or one of its terms.
+        """Compute the quantity ``name``, such as ``"along"``, from K_θ or one of its terms.
 
-        Returns the status READ, SINGULAR or IMMOBILE of :mod:`cdsm.kernels.readings`, and the
-        values by name. Quantities along directions need the unit vectors ``directions`` (D, 3).
+        ``matrix`` is this K_θ or term (nv, nv). Returns the status READ, SINGULAR or IMMOBILE of
+        :mod:`cdsm.kernels.readings`, and a dict with the values. ``directions`` (D, 3) are unit
+        vectors, for quantities that have a direction.
         """
         status, JX = np.array([[readings.READ]]), self.posture.jacobian
         K, parts, JX = matrix[None, ..., None], self._parts[None, ..., None], JX[None, ..., None]
@@ -196,5 +197,5 @@ class CartesianReadings(ReadOnlyState):
 
 
 def axis_of(u: Array) -> str:
-    """Write a direction (3,) as text, with the sign that makes its largest entry positive."""
+    """Write a direction (3,) as text; of u and −u, the one whose largest entry is positive."""
     return coordinates(np.round(u * np.sign(u[abs(u).argmax()]), 9), "z.3g")

@@ -1,8 +1,9 @@
 """Remedies for an unstable arm: stiffer wires or springs, other tensions or disk offsets.
 
-The symmetric part of K_θ of an unstable arm has a smallest eigenvalue λ ≤ 0. Each remedy multiplies
-one quantity by a factor s and changes no other. For other tension bounds or disk offsets, the
-tensions are distributed again. λ(s) = 0 is solved by bracketing; dλ/d ln s is a central difference.
+An arm is unstable if the smallest eigenvalue λ of the symmetric part of K_θ is not positive. Each
+remedy multiplies one quantity by a factor s and changes no other. After a change of tension bounds
+or disk offsets, the tensions are distributed again. λ(s) = 0 is solved by bracketing; dλ/d ln s is
+a central difference.
 """
 
 from __future__ import annotations
@@ -86,12 +87,16 @@ class Remedy(ReadOnlyState):
 
 
 def find_remedies(K: Stiffness) -> tuple[Remedy, ...]:
-    """Return the remedies of an unstable arm, one for each quantity; empty if the arm is stable."""
+    """Return the remedies of an unstable arm, one per quantity; see :attr:`Stiffness.remedies`.
+
+    Empty for a stable arm; also if K_θ includes friction, or original lengths of another posture,
+    and the arm would be stable without them.
+    """
     return () if K.is_stable else tuple(_remedies(K))
 
 
 def verdict(K: Stiffness) -> str:
-    """Return a sentence that an arm is unstable, with the joint that moves most and the margin."""
+    """Return a sentence about an unstable arm: which joint buckles most, and the margin."""
     arm, motion = K.posture.arm, abs(K.critical_direction)
     return (
         f"UNSTABLE: the arm buckles, {arm.joint_names[int(motion.argmax())]} most; the smallest "
@@ -173,9 +178,10 @@ def _remedy(
 
 
 def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) -> float | None:
-    """Return the factor s at which margin(s) becomes positive; None if none is found.
+    """Return a factor s at which margin(s), the smallest eigenvalue, is zero; None: none found.
 
-    ``factors`` are tried in order, until the margin is positive or cannot be computed.
+    ``factors`` are tried in order, until the margin is positive or cannot be computed. The zero is
+    before the factor with a positive margin.
     """
     from scipy.optimize import brentq  # slow to import
 
@@ -191,7 +197,10 @@ def _first_zero(margin: Callable[[float], float], factors: tuple[float, ...]) ->
 
 
 def _is_in_holes(K: Stiffness) -> bool:
-    """Return whether the cables run through the holes of the disks, as in the arm's geometry."""
+    """Return whether all cables run through the holes of the disks as the geometry defines them.
+
+    Only then can a change of the disk offsets be tried.
+    """
     arm = K.posture.arm
     if not arm.is_serpentine or len(arm.cables) != len(arm.geometry.cables):
         return False
@@ -199,7 +208,10 @@ def _is_in_holes(K: Stiffness) -> bool:
 
 
 def _with_disks(K: Stiffness, factor: float) -> tuple[Cable, ...]:
-    """Return the cables with scaled disk offsets, or raise GeometryError if disks would touch."""
+    """Return the cables of the arm if all disk offsets were multiplied by ``factor``.
+
+    Raises GeometryError if disks would touch at this posture.
+    """
     arm = K.posture.arm
     joints = (
         replace(each, disk_offset=factor * each.disk_offset, limit=None)

@@ -46,10 +46,10 @@ def table(K: Stiffness) -> list[tuple[str, ...]]:
 
 
 def _cartesian_entry(K: Stiffness, i: int) -> float:
-    """Return the diagonal entry i of ``cartesian`` [N/m].
+    """Return the diagonal entry i of :attr:`~cdsm.Stiffness.cartesian` [N/m].
 
-    If ``cartesian`` does not exist, return the entry of axis i in the matrix of ``cartesian_in``
-    for those axes along which the tip can move.
+    If this matrix does not exist, return the entry of axis i in
+    :meth:`~cdsm.Stiffness.cartesian_in` of those axes along which the tip can move.
     """
     try:
         return float(K.cartesian[i, i])
@@ -62,7 +62,7 @@ def _cartesian_entry(K: Stiffness, i: int) -> float:
 
 
 def notes(K: Stiffness) -> tuple[str, ...]:
-    """Return the lines below the table: reasons of missing entries, and the stability."""
+    """Return the lines below the table: why entries are missing, and whether the arm is stable."""
     try:
         _ = K.cartesian
         missing = []
@@ -80,7 +80,10 @@ def notes(K: Stiffness) -> tuple[str, ...]:
 
 
 def missing_leads(K: Stiffness) -> tuple[str, ...]:
-    """Return a line that names the cables whose series springs leave no wire, if there are any."""
+    """Return a line that names the cables whose spring stretches by more than the whole cable.
+
+    They need a longer lead. Empty if there are none.
+    """
     pairs = zip(K.posture.arm.cables, K.free_lengths, strict=True)
     lost = [cable.name for cable, l_0 in pairs if l_0 <= 0.0]
     if not lost:
@@ -102,7 +105,7 @@ def model_of(K: Stiffness) -> str:
 
 
 def numbers(K: Stiffness) -> dict[str, object]:
-    """Return the entries of :meth:`Stiffness.to_dict` for ``K``: numbers and texts by name."""
+    """Return the dict of :meth:`Stiffness.to_dict` for ``K``: numbers and texts by name."""
 
     def read(reading: Callable[[], object]) -> object:
         try:

@@ -1,9 +1,8 @@
 """Derivatives of segment tensions with respect to joint angles, for sticking and sliding cables.
 
 Segment j of length l_j and unstrained length a_j has the tension T_j = f(ε_j), with the strain ε_j
-= l_j/a_j − 1 and the law f of its wire. Let k = ∂T/∂l = EA/a and κ = −∂T/∂a = k (1 + ε). The joint
-angles change by δθ, and wire that slides into the segment lengthens a_j by δa_j. Then T_j changes
-by
+= l_j/a_j − 1 and the law f of its wire. Let k = ∂T/∂l = EA/a and κ = −∂T/∂a = k (1 + ε). If the
+joint angles change by δθ, and the length δa_j of wire slides into the segment, T_j changes by
 
     δT_j = k_j g_j·δθ − κ_j δa_j,   g_j = ∂l_j/∂θ.
 
@@ -39,7 +38,7 @@ Flags = NDArray[np.bool_]
 
 
 def holding(pose: Posture) -> Flags:
-    """Return in which holes (P,) a cable can stick: those with friction where the cable bends."""
+    """Return in which holes a cable can stick (P,): those with friction where the cable bends."""
     segments = pose.segments
     return np.asarray((segments.chains.friction > 0.0) & (segments.wrap > STRAIGHT))
 
@@ -71,9 +70,10 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
 
 
 def first_order_loads(pose: Posture, tension: Array, gradient: Array, motion: Array) -> Array:
-    """Compute the loads W_i (P,) [N] at which cables of a stuck arm begin to slide; inf: never.
+    """Compute the load W_i (P,) [N] at which the cable begins to slide in each hole; inf: never.
 
-    ``tension`` is T (S,) [N], ``gradient`` ∂T/∂θ (S, nv) [N/rad], ``motion`` θ̇ (nv,) [rad/N].
+    All cables stick before. ``tension`` is T (S,) [N], ``gradient`` ∂T/∂θ (S, nv) [N/rad],
+    ``motion`` θ̇ (nv,) [rad/N]; the top of the module explains them.
     """
     segments = pose.segments
     chains, slack = segments.chains, tension == 0.0

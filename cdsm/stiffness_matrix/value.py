@@ -73,9 +73,9 @@ class Stiffness(CartesianReadings):
     def free_lengths(self) -> Array:
         """Original lengths l_0 (C,) [m] of the wires, as used in :attr:`cable_stiffness`.
 
-        The locked motors keep l_0 = (L − ΔF/k_series)/(1 + ε(F)) constant; symbols as in
-        :class:`Cable`. l_0 is negative if the series spring stretches by more than the length of
-        the cable; ``print`` says so. For a force-controlled cable it is L.
+        A locked motor keeps l_0 = (L − ΔF/k_series)/(1 + ε(F)) constant; :class:`Cable` explains
+        the symbols. For a force-controlled cable l_0 is its length L. l_0 is negative if the series
+        spring stretches by more than the length of the cable; ``print`` says so.
         """
         if self.free_length is not None:
             return self.free_length
@@ -103,7 +103,7 @@ class Stiffness(CartesianReadings):
 
     @cached_property
     def critical_direction(self) -> Array:
-        """Unit joint motion (nv,) of the smallest eigenvalue: the arm buckles along it first."""
+        """Unit eigenvector (nv,) of the smallest eigenvalue: the joint motion of buckling."""
         vectors = np.linalg.eigh((self.joint + self.joint.T) / 2.0)[1]
         return frozen(vectors[:, 0].copy())
 
@@ -116,8 +116,8 @@ class Stiffness(CartesianReadings):
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
         If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity and load. ``direction`` is u, an axis or (3,), as for
-        :meth:`along`. Raises the errors of :meth:`along`, and SingularStiffness also if the
+        sum over cables, gravity and load, and so is along(u). ``direction`` is u, an axis or (3,),
+        as for :meth:`along`. Raises the errors of :meth:`along`, and SingularStiffness also if the
         stiffness along u is infinite.
         """
         u = unit_direction("direction", direction)
@@ -146,9 +146,9 @@ class Stiffness(CartesianReadings):
     def remedies(self) -> tuple[Remedy, ...]:
         """Changes that would make an unstable arm stable, each alone; empty for a stable arm.
 
-        They are stiffer wires, stiffer series springs, other lower bounds of the tensions, or other
-        disk offsets. For each, a root search finds the factor at which the smallest eigenvalue of
-        K_θ is zero. The posture and the wrench stay the same. Tensions of your own are not
+        Stiffer wires, stiffer series springs, other lower bounds of the tensions and other disk
+        offsets are tried. For each, a root search finds the factor at which the smallest eigenvalue
+        of K_θ is zero. The posture and the wrench stay the same. Tensions of your own are not
         distributed again: for them only wires and springs are tried. This takes a few tenths of a
         second.
         """
@@ -183,7 +183,9 @@ class Stiffness(CartesianReadings):
         return self
 
     def plot(self) -> Figure:
-        """Plot the arm in mm, cables coloured by tension, with the compliance at its tip.
+        """Plot the arm in mm and, if it is stable, the compliance at its tip as an ellipsoid.
+
+        Cables are coloured by tension if :attr:`distribution` is given.
 
         Raises:
             SingularStiffness: K_θ is singular.

@@ -111,9 +111,9 @@ def distribute_tension(
 def bounds_at(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, worst_friction: bool
 ) -> tuple[Array, Array]:
-    """Return checked bounds ``minimum`` and ``maximum``, each (C,) [N], at a posture.
+    """Check the bounds of the tensions at a posture; return lower and upper ones, (C,) [N] each.
 
-    They are narrowed for friction if ``worst_friction`` is True.
+    If ``worst_friction`` is True, they are narrowed as in :func:`distribute_tension`.
     """
     low, high = checked_bounds(pose.arm, minimum, maximum)
     if flag("worst_friction", worst_friction):
@@ -123,7 +123,10 @@ def bounds_at(
 
 
 def grip(pose: Posture) -> Array:
-    """Compute Σ μ φ (C,) [-] over the holes of each cable, with friction μ and wrap angle φ."""
+    """Compute Σ μ φ (C,) [-] over the holes of each cable: ln of its largest ratio of tensions.
+
+    μ is the friction coefficient of a hole and φ its wrap angle.
+    """
     chains, count = pose.segments.chains, len(pose.arm.cables)
     total = np.bincount(chains.cable[chains.hole], pose.segments.grip, minlength=count)
     return np.asarray(total, dtype=np.float64)
@@ -132,10 +135,10 @@ def grip(pose: Posture) -> Array:
 def checked_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
 ) -> tuple[Array, Array]:
-    """Return ``minimum`` and ``maximum``, checked, each (C,) [N], within the bounds of the cables.
+    """Check ``minimum`` and ``maximum``, narrow them to the bounds that cables define, return both.
 
-    With ``rows`` a bound may also have the shape (rows, C): one row per posture. Invalid bounds
-    raise InvalidInput.
+    Each is (C,) [N]. With ``rows``, a bound may also have the shape (rows, C): one row per posture.
+    Invalid bounds raise InvalidInput.
     """
     cables = arm.cables
     low = bound("minimum", minimum, len(cables), rows)
@@ -167,9 +170,9 @@ def checked_bounds(
 
 
 def _ordered(minimum: object, maximum: object) -> bool:
-    """Return whether both bounds are floats with 0 ≤ minimum ≤ maximum.
+    """Return whether both bounds are floats with 0 ≤ minimum ≤ maximum, minimum finite.
 
-    This is the usual case, which must be fast.
+    In this usual case :func:`checked_bounds` skips its slower checks.
     """
     if not isinstance(minimum, float) or not isinstance(maximum, float):
         return False
@@ -183,7 +186,7 @@ def _named(cable: Cable, row: Sequence[int]) -> str:
 def _with_fixed(
     pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
 ) -> tuple[Array, Array]:
-    """Return the bounds (C,) [N]; for cables in ``fixed``, both are the fixed tension."""
+    """Return the bounds (C,) [N]; for cables in ``fixed``, both are equal to the fixed tension."""
     if not isinstance(fixed, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     names = [cable.name for cable in pose.arm.cables]

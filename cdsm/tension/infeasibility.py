@@ -18,10 +18,10 @@ from cdsm.support.values import frozen
 def explain(
     pose: Posture, problem: Scaled, solver: str, fault: str, free: NDArray[np.bool_]
 ) -> NoReturn:
-    """Find by linear programs why ``solver`` did not solve ``problem``; raise the error.
+    """Find by linear programs why ``solver`` did not solve ``problem``; raise that as an error.
 
     ``free`` (C,) marks the cables without a fixed tension; only their bounds may widen. ``fault``
-    is the solver's result, as text.
+    says in words what the solver returned.
 
     Raises:
         InfeasibleTension: No tensions within the bounds balance the arm.
@@ -68,7 +68,10 @@ def explain(
 
 
 def _widening(problem: Scaled, free: NDArray[np.bool_]) -> float:
-    """Compute how far the bounds of ``free`` cables must widen [N]; inf if that does not help."""
+    """Compute how far bounds must widen [N] until tensions balance the arm; inf if they never do.
+
+    Only the bounds of the cables that ``free`` (C,) marks widen, all by the same force.
+    """
     A, b, lower, upper, _, force_scale = problem
     nv, count = A.shape
     # variables: F, then the widening t: low − t <= F <= high + t, and F >= 0; a fixed
@@ -88,7 +91,7 @@ def _widening(problem: Scaled, free: NDArray[np.bool_]) -> float:
 
 
 def instead(solver: str) -> str:
-    """Return a text that says what to do if a solver fails."""
+    """Return a sentence that says what to do if ``solver`` fails."""
     if solver == "daqp":
         return "Change the posture, the load or the bounds a little, or try another solver."
     return "Use solver='daqp'."

@@ -1,4 +1,4 @@
-"""Find the most even tensions that cause no joint torque."""
+"""Find how even tensions without joint torque can be: the ratio of the smallest to the largest."""
 
 from __future__ import annotations
 

@@ -53,9 +53,10 @@ def installed_solver(solver: str) -> str:
 
 
 def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
-    """Return the verified optimum x (C,) [-] of a dimensionless ``problem``, or why none was found.
+    """Minimise ½‖x‖² under balance and bounds of a dimensionless ``problem``; verify the optimum.
 
-    The reason is a text. Raises SolverError if the solver fails or gives no multipliers.
+    Returns the optimum x (C,) [-], or a text that says why none was found. Raises UnknownName if
+    the solver is not installed, and SolverError if it fails or gives no multipliers.
     """
     import qpsolvers
     from scipy.sparse import csc_matrix
@@ -95,11 +96,11 @@ def solve(problem: tension_kernels.Scaled, solver: str) -> Array | str:
 
 @compiled
 def onto_bounds(x: Array, z: Array, low: Array, high: Array, rounding: float) -> Array:
-    """Return x (n,), with entries at or beyond a bound set exactly to the bound.
+    """Return x (n,) with each entry at or beyond a bound set exactly to this bound.
 
-    Multipliers z (n,) mark active bounds: negative at low, positive at high. A solver misses an
-    active bound by up to ``rounding``; the tension could then lie just outside the domain of its
-    law, which would be an error.
+    The multipliers z (n,) mark the active bounds: negative at ``low``, positive at ``high``. A
+    solver misses an active bound by up to ``rounding``. Without the correction, a tension could lie
+    just outside the domain of its law, which is an error.
     """
     point = np.empty_like(x)
     for j in range(x.shape[0]):
@@ -113,9 +114,9 @@ def onto_bounds(x: Array, z: Array, low: Array, high: Array, rounding: float) ->
 
 
 def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str:
-    """Return why ``point`` is not the optimum of ``problem``, as text; empty if it is.
+    """Return a text that says why ``point`` is not the optimum of ``problem``; empty if it is.
 
-    ``point`` is x with the multipliers y of the balance and z of the bounds.
+    ``point`` is x (C,) with the multipliers y (nv,) of the balance and z (C,) of the bounds.
     """
     # equal to qpsolvers' primal_residual, dual_residual and duality_gap, ten times faster
     primal, dual, gap = tension_kernels.single_optimality(*problem[:4], *point)
@@ -131,10 +132,10 @@ def _shortfall(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> str
 
 
 def _polished(problem: tension_kernels.Scaled, point: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Return x, y and z computed exactly from the bounds that are active at ``point``.
+    """Refine an approximate optimum ``point``: solve exactly with the same active bounds.
 
-    They are the optimum if these bounds are active at the optimum. ``point`` is (x, y, z) as in
-    :func:`_shortfall`, near the optimum.
+    ``point`` and the result are (x, y, z) as in :func:`_shortfall`. The result is the optimum if
+    the bounds that are active at ``point`` are those active at the optimum.
     """
     A, b, low, high, *_ = problem
     x, _, z = point

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tension(ReadOnlyState, Named):
-    """Cable tensions that balance an arm, with the data of their problem.
+    """Cable tensions that balance an arm, with the posture, load and bounds they were computed for.
 
     The keys are the names of the cables: ``tension["cable1_1"]`` [N], ``"cable1_1" in tension``,
     ``dict(tension)``. To index by number, use the array :attr:`values`, equal to
@@ -37,7 +37,8 @@ class Tension(ReadOnlyState, Named):
         minimum: Lower bounds (C,) [N].
         maximum: Upper bounds (C,) [N].
         solver: Name of the requested solver, even if a first guess was optimal.
-        least: Whether the tensions are the smallest; False if they were chosen for a stiffness.
+        least: Whether they are the smallest tensions within the bounds; False if they were planned
+            for a stiffness.
     """
 
     posture: Posture
@@ -60,7 +61,7 @@ class Tension(ReadOnlyState, Named):
         return self.posture.arm.cables.names
 
     def items(self) -> tuple[tuple[str, float], ...]:
-        """Return name and tension [N] of each cable."""
+        """Return pairs of name and tension [N], one for each cable."""
         return tuple(zip(self.keys(), self.values.tolist(), strict=True))
 
     def __getitem__(self, cable: str) -> float:
