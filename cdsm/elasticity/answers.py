@@ -1,4 +1,4 @@
-"""Ask a law, which a user may have written, and check its answers."""
+"""Evaluate a law, which may be user-defined, and check the values that it returns."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ def _answer(
     named: str,
     needed: str,
 ) -> Array:
-    """Return what ``function`` of a law gives at ``tension`` F [N], checked.
+    """Return ``function(tension)`` of a law; raise InvalidInput if the values are not valid.
 
-    Raises InvalidInput if ``function`` fails, or if its answer has another shape than F or a number
-    outside the range ``allowed``. In the message, ``named`` is the name of the answer, with braces
-    in the place of its value, and ``needed`` is a sentence about a valid answer.
+    They are not if ``function`` fails, or its result has another shape than ``tension`` [N] or a
+    number outside the range ``allowed``. ``named`` and ``needed`` are texts for the error: the name
+    of the values, with {} where they are inserted, and a sentence about valid values.
     """
     try:
         answer = np.asarray(function(tension))

@@ -266,7 +266,7 @@ def _stages(
 
 
 def _as_law(curve: Curve, points: Points) -> TabulatedElasticity:
-    """Return a fitted curve as a law: a table of its strains over the range of the points."""
+    """Return a fitted curve as a table of strains, over the range of forces of the points."""
     grid = curve.basis.tensions
     # the ends follow from the fit: noise would shift the extreme forces
     first, last = curve.force(points.strain[[0, -1]])
@@ -288,6 +288,6 @@ def _band(tensions: Array, law: Elasticity, curve: Curve, points: Points) -> Ban
 
 
 def _grid(low: float, high: float, grid: Array) -> Array:
-    """Return ``low``, some tensions of ``grid``, and ``high`` (n,) [N]; about 200 in all."""
+    """Choose about 200 tensions (n,) [N]: ``low``, some of ``grid`` between, and ``high``."""
     inside = grid[(grid > low) & (grid < high)][5 :: len(grid) // _KNOTS]
     return np.array([low, *inside[:-1], high])
