@@ -19,27 +19,27 @@ _FINITE = -LARGEST, LARGEST
 
 
 def rigidity_of(law: Elasticity, tension: Array) -> Array:
-    """Return EA(F) [N] in the shape of F [N]; InvalidInput if the law gives no valid EA."""
+    """Return EA(F) [N] of a law, same shape as F [N]; raise InvalidInput if it is not valid."""
     _, least, most = RANGES["rigidity"]
     needed = "one positive number for each is needed."
     return _answer(law, law.rigidity, tension, (least, most), "rigidity {} N", needed)
 
 
 def strain_of(law: Elasticity, tension: Array) -> Array:
-    """Return ε(F) [-] in the shape of F [N]; InvalidInput if the law gives no valid ε."""
+    """Return ε(F) [-] of a law, same shape as F [N]; raise InvalidInput if it is not valid."""
     needed = "one number for each, zero at the low end of its domain and rising, is needed."
     return _answer(law, law.strain, tension, _STRAIN, "strain {}", needed)
 
 
 def energy_of(law: Elasticity, tension: Array) -> Array:
-    """Return ∫ F dε [N] in the shape of F [N]; InvalidInput if the law gives no valid energy."""
+    """Return ∫ F dε [N] of a law, same shape as F [N]; raise InvalidInput if it is not valid."""
     return _answer(
         law, law.energy, tension, _FINITE, "energy {} N", "one number for each is needed."
     )
 
 
 def slope_of(law: Elasticity, tension: Array) -> Array:
-    """Return dEA/dF [-] in the shape of F [N]; InvalidInput if the law gives no valid slope."""
+    """Return dEA/dF [-] of a law, same shape as F [N]; raise InvalidInput if it is not valid."""
     needed = "one finite number for each is needed."
     return _answer(law, law.rigidity_slope, tension, _FINITE, "slope {} of its rigidity", needed)
 

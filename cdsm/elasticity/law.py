@@ -37,11 +37,11 @@ _SHORTEST: Final = 0.5
 class Elasticity(ABC):
     """Axial elasticity of a cable: its law EA(F).
 
-    All methods take tensions or strains of any shape and return arrays of that shape. A user-
-    defined law must define :attr:`domain`, :meth:`rigidity`, :meth:`strain` and :meth:`energy`.
-    The rigidity must be positive and continuous; its slope may be discontinuous.
-    :class:`~cdsm.Manipulator` samples the rigidity and raises an error if it finds a
-    discontinuity of more than 0.01 %.
+    All methods take tensions or strains of any shape and return arrays of that shape. The law of
+    a user must define :attr:`domain`, :meth:`rigidity`, :meth:`strain` and :meth:`energy`. The
+    rigidity must be positive and continuous; its slope may be discontinuous.
+    :class:`~cdsm.Manipulator` samples the rigidity and raises an error if it finds a discontinuity
+    of more than 0.01 %.
     """
 
     @property

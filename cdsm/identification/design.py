@@ -36,7 +36,7 @@ class Design(NamedTuple):
 
     information: Array  # M_i (n, r, r) of each of n candidates, for r parameters
     known: Array  # M_0 (r, r), the prior information
-    wanted: Array  # L (s, r), which selects s of the parameters
+    wanted: Array  # L (s, r): s wanted combinations of the parameters
     criterion: Criterion  # ``"D"`` or ``"A"``
     tests: int  # number N of tests
 

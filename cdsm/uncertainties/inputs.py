@@ -78,7 +78,10 @@ _found: WeakKeyDictionary[Manipulator, Inputs] = WeakKeyDictionary()
 
 
 def inputs_of(arm: Manipulator) -> Inputs:
-    """Return the inputs of an arm; cached, since finding them takes milliseconds."""
+    """Return the inputs of an arm: the numbers that can have a tolerance, such as hole radii.
+
+    They are cached, since finding them takes milliseconds.
+    """
     inputs = _found.get(arm)
     if inputs is None:
         inputs = _found[arm] = Inputs(arm)

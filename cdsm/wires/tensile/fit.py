@@ -53,7 +53,9 @@ class Stage:
 @final
 @dataclass(frozen=True, eq=False)
 class Band(ReadOnlyState):
-    """Confidence band: it contains EA at each tension with 95 %, given the scatter of the points.
+    """95 % confidence band of EA(F), from the scatter of the points of a test.
+
+    At each tension it contains EA with a probability of 95 %.
 
     The band exp(m ± t s) belongs to a rougher curve than the fitted one: the bias of the rougher
     curve is far below its scatter. m is ln EA of the rougher curve, s the standard deviation of m
@@ -140,7 +142,7 @@ class TensileFit(ReadOnlyState):
 
         The standard uncertainty of EA(F) is half the width of the band of ln EA, divided by 1.96.
         The cables are assumed to be of one spool and share one error; ``of`` are their names, as
-        for :class:`~cdsm.Tolerance`. InvalidInput for a fit by polynomials, which has no band.
+        for :class:`~cdsm.Tolerance`. Raises InvalidInput for a fit by polynomials: it has no band.
         """
         if self.band is None:
             raise InvalidInput("method", "a fit by polynomials has no band; fit by 'monotone'.")
