@@ -38,9 +38,9 @@ class ExperimentPlan(ReadOnlyState):
         counts: Number of repetitions of each candidate (n,).
         even: Repetitions (n,) in a reference plan: as many tests, evenly spaced over the
             candidates.
-        jacobians: For each candidate with m readings, the matrix (m, P) [-] of the derivatives of
-            its readings, in standard deviations, with respect to relative parameters. A relative
-            parameter is divided by its expected value.
+        jacobians: One matrix [-] for each candidate, with a row (P,) for each of its readings: the
+            derivatives of the reading, in standard deviations, with respect to relative parameters.
+            A relative parameter is a parameter divided by its expected value.
         known: Prior knowledge, a diagonal matrix (P, P) [-]: 1/σ of each known relative parameter,
             0 for the others.
         efficiency: Proved lower bound of f/f_best [-]; 1 for the best plan. C is the covariance of
