@@ -4,12 +4,12 @@ Test i has the Fisher information M_i = J_iᵀ J_i (r, r). J_i are the derivativ
 standard deviations, with respect to the r parameters. If each test i is made n_i times, the
 information is M = M_0 + Σ n_i M_i, where M_0 is the prior information. The covariance of the
 parameters is C = M⁻¹. The matrix L (s, r) gives the s wanted quantities, as linear combinations of
-the r parameters. (In other modules L is a cable length.) The criterion of a design is f =
-det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C Lᵀ) (A-optimal). The best design has the largest f.
-Both criteria are concave and homogeneous in the information, so no design of N tests has a larger f
-than
+the r parameters. (In other modules L is a cable length.) The criterion of a design is
+f = det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C Lᵀ) (A-optimal). The best design has the largest
+f. Both criteria are concave and homogeneous in the information, so no design of N tests has a
+larger f than
 
-    f · (tr M_0 G + N max_i tr M_i G) / tr M G,   G = C Lᵀ (L C Lᵀ)⁻¹ L C (D) or C Lᵀ L C (A):
+    f · (tr M_0 G + N max_i tr M_i G) / tr M G,   G = C Lᵀ (L C Lᵀ)⁻¹ L C (D) or C Lᵀ L C (A).
 
 This is the equivalence theorem (Kiefer and Wolfowitz 1960; Pukelsheim, Optimal Design of
 Experiments, 1993, chapter 7). The multiplicative algorithm (Silvey, Titterington and Torsney 1978)
