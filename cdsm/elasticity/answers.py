@@ -1,4 +1,4 @@
-"""Ask a law, which a user may have written, and check its answers."""
+"""Evaluate a law, which may be user-defined, and check the values that it returns."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ _FINITE = -LARGEST, LARGEST
 
 
 def rigidity_of(law: Elasticity, tension: Array) -> Array:
-    """Return EA(F) [N] in the shape of F [N]; InvalidInput if the law gives no valid EA."""
+    """Return EA(F) [N] of a law, same shape as F [N]; raise InvalidInput if it is not valid."""
     _, least, most = RANGES["rigidity"]
     needed = "one positive number for each is needed."
     return _answer(law, law.rigidity, tension, (least, most), "rigidity {} N", needed)
 
 
 def strain_of(law: Elasticity, tension: Array) -> Array:
-    """Return ε(F) [-] in the shape of F [N]; InvalidInput if the law gives no valid ε."""
+    """Return ε(F) [-] of a law, same shape as F [N]; raise InvalidInput if it is not valid."""
     needed = "one number for each, zero at the low end of its domain and rising, is needed."
     return _answer(law, law.strain, tension, _STRAIN, "strain {}", needed)
 
 
 def energy_of(law: Elasticity, tension: Array) -> Array:
-    """Return ∫ F dε [N] in the shape of F [N]; InvalidInput if the law gives no valid energy."""
+    """Return ∫ F dε [N] of a law, same shape as F [N]; raise InvalidInput if it is not valid."""
     return _answer(
         law, law.energy, tension, _FINITE, "energy {} N", "one number for each is needed."
     )
 
 
 def slope_of(law: Elasticity, tension: Array) -> Array:
-    """Return dEA/dF [-] in the shape of F [N]; InvalidInput if the law gives no valid slope."""
+    """Return dEA/dF [-] of a law, same shape as F [N]; raise InvalidInput if it is not valid."""
     needed = "one finite number for each is needed."
     return _answer(law, law.rigidity_slope, tension, _FINITE, "slope {} of its rigidity", needed)
 
@@ -52,11 +52,11 @@ def _answer(
     named: str,
     needed: str,
 ) -> Array:
-    """Return what ``function`` of a law gives at ``tension`` F [N], checked.
+    """Return ``function(tension)`` of a law; raise InvalidInput if the values are not valid.
 
-    Raises InvalidInput if ``function`` fails, or if its answer has another shape than F or a number
-    outside the range ``allowed``. In the message, ``named`` is the name of the answer, with braces
-    in the place of its value, and ``needed`` is a sentence about a valid answer.
+    They are not if ``function`` fails, or its result has another shape than ``tension`` [N] or a
+    number outside the range ``allowed``. ``named`` and ``needed`` are texts for the error: the name
+    of the values, with {} where they are inserted, and a sentence about valid values.
     """
     try:
         answer = np.asarray(function(tension))

@@ -27,11 +27,12 @@ def tension_at(
     slope: Callable[[Array], Array],
     name: str,
 ) -> Array:
-    """Find the tensions F [N] at which an increasing function stretch(F) has the wanted values.
+    """Find the tensions F [N] at which an increasing function, such as a strain, has given values.
 
-    ``wanted`` is a strain [-] or an elongation [m] of any shape; the error calls it ``name``.
-    ``stretch`` is zero or less at the low end of ``domain``, and ``slope`` is its derivative.
-    ElasticityRangeError is raised if a wanted value is not reached in the domain.
+    ``wanted`` are the values of any shape, strains [-] or elongations [m]; the error calls them
+    ``name``. ``stretch`` is the function of F. It is zero or less at the low end of ``domain``;
+    ``slope`` is its derivative. Raises ElasticityRangeError if a wanted value is not reached in the
+    domain.
     """
     low, high, most = *domain, RANGES["tension"].high
     if math.isinf(high):  # an unbounded law: search only as far as needed

@@ -1,6 +1,7 @@
 """The abstract law: rigidity, strain and energy of a cable as functions of its tension.
 
-Its methods ``scaled`` and ``slack_below`` build the two laws that follow it here.
+Two laws that change another law are here, too: one with a scaled rigidity, and one with a slack
+branch.
 """
 
 from __future__ import annotations
@@ -34,12 +35,13 @@ _SHORTEST: Final = 0.5
 
 
 class Elasticity(ABC):
-    """Axial elasticity of a cable. All methods take any shape and return the same shape.
+    """Axial elasticity of a cable: its law EA(F).
 
-    A user-defined law must define :attr:`domain`, :meth:`rigidity`, :meth:`strain` and
-    :meth:`energy`. The rigidity must be positive and continuous; its slope may be
-    discontinuous. :class:`~cdsm.Manipulator` samples the rigidity and raises an error if it finds a
-    discontinuity of more than 0.01 %.
+    All methods take tensions or strains of any shape and return arrays of that shape. The law of
+    a user must define :attr:`domain`, :meth:`rigidity`, :meth:`strain` and :meth:`energy`. The
+    rigidity must be positive and continuous; its slope may be discontinuous.
+    :class:`~cdsm.Manipulator` samples the rigidity and raises an error if it finds a discontinuity
+    of more than 0.01 %.
     """
 
     @property
@@ -62,7 +64,7 @@ class Elasticity(ABC):
 
     @property
     def rest(self) -> float:
-        """Tension [N] at which the strain is zero: the low end of :attr:`domain`."""
+        """Tension [N] at which the strain is zero: by default the low end of :attr:`domain`."""
         return self.domain.low
 
     def slack_below(self) -> Elasticity:
@@ -145,10 +147,10 @@ class Elasticity(ABC):
         )
 
     def secant_rigidity(self, tension: ArrayLike) -> Array:
-        """Compute the secant rigidity ΔF/(Δl/l_0) [N] of Eq. 18 from :attr:`rest`.
+        """Compute the secant rigidity (F − F_0)/(Δl/l_0) [N] of Eq. 18, with F_0 = :attr:`rest`.
 
-        It equals :meth:`rigidity` at :attr:`rest`, and everywhere if EA is constant. Argument and
-        errors are those of :meth:`rigidity`.
+        It equals :meth:`rigidity` at F_0, and everywhere if EA is constant. Argument and errors are
+        those of :meth:`rigidity`.
         """
         values = self.domain.check(tension)
         strain = self.strain(values)
@@ -160,7 +162,7 @@ class Elasticity(ABC):
 @final
 @dataclass(frozen=True)
 class ScaledElasticity(Elasticity):
-    """Law with the rigidity of another law, times a factor: EA(F) = factor · EA_law(F)."""
+    """The law of a stiffer or softer wire: EA(F) = ``factor`` · EA(F) of another ``law``."""
 
     law: Elasticity
     factor: float
@@ -190,11 +192,10 @@ class ScaledElasticity(Elasticity):
 @final
 @dataclass(frozen=True)
 class SlackBelow(Elasticity):
-    """A law continued to 0 N with its rigidity at its low end; see :meth:`Elasticity.slack_below`.
+    """Law continued to 0 N with the rigidity at its low end; see :meth:`Elasticity.slack_below`.
 
     Attributes:
-        law: The law. Within its domain, rigidity, strain and energy are those of the law, bit for
-            bit.
+        law: The law. Within its domain, rigidity, strain and energy are unchanged, bit for bit.
 
     Raises:
         InvalidInput: The wire would be shorter than half its length when it is slack.
@@ -222,7 +223,7 @@ class SlackBelow(Elasticity):
 
     @property
     def rest(self) -> float:
-        """Low end of the law [N], where the strain is zero."""
+        """Tension [N] at which the strain is zero: the low end of ``law``, not 0 N."""
         return self.law.rest
 
     @cached_property
@@ -243,25 +244,29 @@ class SlackBelow(Elasticity):
         return np.where(below < 0.0, 0.0, self.law.rigidity_slope(inside))
 
     def strain(self, tension: ArrayLike) -> Array:
-        """Compute ∫ dF/EA(F) [-] from the low end of the law; negative below it."""
+        """Compute ∫ dF/EA(F) [-] from the low end of ``law`` to F; negative below that end."""
         inside, below = self._split(tension)
         return np.where(below < 0.0, below / self._least, self.law.strain(inside))
 
     def energy(self, tension: ArrayLike) -> Array:
-        """Compute ∫ F dF/EA(F) [N] from the low end of the law; negative below it."""
+        """Compute ∫ F dF/EA(F) [N] from the low end of ``law`` to F; negative below that end."""
         inside, below = self._split(tension)
         slack = below * (2.0 * self.rest + below) / (2.0 * self._least)
         return np.where(below < 0.0, slack, self.law.energy(inside))
 
     def _split(self, tension: ArrayLike) -> tuple[Array, Array]:
-        """Return max(F, low), inside the law, and min(F − low, 0), the part on the slack branch."""
+        """Split tensions F [N] at the low end of ``law``.
+
+        Returns max(F, low), a tension of ``law``, and min(F − low, 0), the rest on the slack
+        branch.
+        """
         values = self.domain.check(tension)
         inside = np.maximum(values, self.law.domain.first)
         return inside, np.where(values < inside, values - self.rest, 0.0)
 
 
 def checked_law(law: object) -> Elasticity:
-    """Return the law of a cable; InvalidInput if it or its domain has a wrong type."""
+    """Return ``law``; raise InvalidInput if it is not an Elasticity, or its domain no Domain."""
     if not isinstance(law, Elasticity):
         raise InvalidInput(
             "elasticity",
@@ -278,7 +283,7 @@ def checked_law(law: object) -> Elasticity:
 
 
 def positive_factor(factor: float) -> float:
-    """Check the factor of :meth:`Elasticity.scaled`; raise InvalidInput if it is not positive."""
+    """Return ``factor``, by which a rigidity is scaled; InvalidInput if it is not positive."""
     number = scalar("factor", factor)
     if not 0.0 < number < math.inf:
         raise InvalidInput("factor", f"{number:g} given; a positive number is needed.")

@@ -40,7 +40,10 @@ class LinearElasticity(Elasticity):
 
     @classmethod
     def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
-        """Compute EA = E π d²/4 of a solid wire, E [Pa], d [m]; InvalidInput if not positive."""
+        """Return the law EA = E π d²/4 of a solid wire, with E [Pa] and the diameter d [m].
+
+        Raises InvalidInput if one of them is not positive.
+        """
         for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
             if scalar(name, value) <= 0.0:
                 raise InvalidInput(name, f"{value:g} given; it must be positive.")

@@ -16,7 +16,7 @@ from cdsm.support.validation import instance, one_of, scalar, text
 
 
 class _Kind(NamedTuple):
-    """Kind of parameter: its unit, and its place in a geometry or a :class:`~cdsm.Cable`."""
+    """One kind of parameter: its unit, and where a geometry or a :class:`~cdsm.Cable` stores it."""
 
     unit: str  # unit shown to the user
     size: float  # size of ``unit`` in SI
@@ -44,10 +44,11 @@ class ArmParameters:
     """Arm as a function of some of its parameters; use it as ``model_of`` of :func:`identify`.
 
     A parameter belongs to all joints or links (``"hole_radius"``), or to one, counted from the base
-    (``"hole_radius@2"``). With a number, ``lead``, ``friction``, ``rigidity`` and ``spring`` belong
-    to the cables of that joint. ``friction`` is μ [-]. ``rigidity`` [-] multiplies EA of the arm's
-    laws. ``spring`` [N/m] is the stiffness in series with each cable. All others are lengths [m] or
-    masses [kg]. A call passes names with @ in a dict: ``parameters(**{"hole_radius@2": 0.025})``.
+    (``"hole_radius@2"``). The parameters ``lead``, ``friction``, ``rigidity`` and ``spring`` belong
+    to all cables, or with a number to the cables that end at that joint. ``friction`` is μ [-].
+    ``rigidity`` [-] multiplies EA of the arm's laws. ``spring`` [N/m] is the stiffness in series
+    with each cable. All others are lengths [m] or masses [kg]. A call passes names with @ in a
+    dict: ``parameters(**{"hole_radius@2": 0.025})``.
 
     Attributes:
         arm: The arm; parameters that are not named keep their values.
@@ -84,7 +85,11 @@ class ArmParameters:
         return self.arm.geometry
 
     def _place(self, name: str) -> tuple[str, tuple[int, ...]]:
-        """Return the kind of the parameter ``name``, and the numbers of its joints."""
+        """Split the ``name`` of a parameter into its kind and the numbers of its joints.
+
+        ``"hole_radius@2"`` gives ``"hole_radius"`` and (2,). Without @ the numbers are those of all
+        joints. Raises UnknownName or InvalidInput if the kind or the joint does not exist.
+        """
         kind, at, number = name.partition("@")
         one_of("parameter of an arm", kind, KINDS)
         joints = len(self.geometry.joints)
@@ -99,7 +104,10 @@ class ArmParameters:
 
     @property
     def present(self) -> dict[str, float]:
-        """Value of each parameter in :attr:`arm`, in SI; the median if its joints differ."""
+        """Value of each parameter in :attr:`arm`, in SI; the median if its joints differ.
+
+        ``rigidity`` is a factor, so its present value is 1.
+        """
         return {name: float(np.median(self._values(name))) for name in self.names}
 
     def __call__(self, **values: float) -> Manipulator:
@@ -153,7 +161,7 @@ class ArmParameters:
         )
 
     def _values(self, name: str) -> list[float]:
-        """Return the values of the parameter ``name`` at its joints, in SI."""
+        """Return the values in SI that the parameter ``name`` has now, at each of its joints."""
         (kind, where), geometry = self._place(name), self.geometry
         if kind == "rigidity":
             return [1.0]
@@ -169,7 +177,11 @@ class ArmParameters:
 
 
 def _joints_of(geometry: Geometry, part: str) -> list[int]:
-    """Return the joint number of each entry of ``part``: ``joints``, ``links`` or ``cables``."""
+    """Return the number of the joint to which each entry of a part of the geometry belongs.
+
+    ``part`` is ``joints``, ``links`` or ``cables``. Link k belongs to joint k, a cable to the joint
+    at which it ends.
+    """
     if part == "cables":
         return [route.joint for route in geometry.cables]
     return list(range(1, len(geometry.joints) + 1))

@@ -3,16 +3,17 @@
 Test i has the Fisher information M_i = J_iᵀ J_i (r, r). J_i are the derivatives of its readings, in
 standard deviations, with respect to the r parameters. If each test i is made n_i times, the
 information is M = M_0 + Σ n_i M_i, where M_0 is the prior information. The covariance of the
-parameters is C = M⁻¹. The matrix L (s, r) selects the s wanted parameters; elsewhere L is a cable
-length. The criterion of a design is f = det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C Lᵀ)
-(A-optimal). Both are concave and homogeneous in the information, so no design of N tests has a
+parameters is C = M⁻¹. The matrix L (s, r) gives the s wanted quantities, as linear combinations of
+the r parameters. (In other modules L is a cable length.) The criterion of a design is
+f = det(L C Lᵀ)^(−1/s) (D-optimal) or f = 1/tr(L C Lᵀ) (A-optimal). The best design has the largest
+f. Both criteria are concave and homogeneous in the information, so no design of N tests has a
 larger f than
 
-    f · (tr M_0 G + N max_i tr M_i G) / tr M G,   G = C Lᵀ (L C Lᵀ)⁻¹ L C (D) or C Lᵀ L C (A):
+    f · (tr M_0 G + N max_i tr M_i G) / tr M G,   G = C Lᵀ (L C Lᵀ)⁻¹ L C (D) or C Lᵀ L C (A).
 
-the equivalence theorem (Kiefer and Wolfowitz 1960; Pukelsheim, Optimal Design of Experiments, 1993,
-chapter 7). Shares of tests are found by the multiplicative algorithm (Silvey, Titterington and
-Torsney 1978), whole tests by exchange (Fedorov 1972).
+This is the equivalence theorem (Kiefer and Wolfowitz 1960; Pukelsheim, Optimal Design of
+Experiments, 1993, chapter 7). The multiplicative algorithm (Silvey, Titterington and Torsney 1978)
+finds the best n_i as real numbers, the exchange algorithm (Fedorov 1972) as whole numbers.
 """
 
 from __future__ import annotations
@@ -35,14 +36,14 @@ class Design(NamedTuple):
 
     information: Array  # M_i (n, r, r) of each of n candidates, for r parameters
     known: Array  # M_0 (r, r), the prior information
-    wanted: Array  # L (s, r), which selects s of the parameters
+    wanted: Array  # L (s, r): s wanted combinations of the parameters
     criterion: Criterion  # ``"D"`` or ``"A"``
     tests: int  # number N of tests
 
     def value(self, M: Array) -> Array:
-        """Compute ln f (…) of information matrices (…, r, r), with f the criterion of the design.
+        """Compute ln f (…) of information matrices M (…, r, r), with the criterion f of the design.
 
-        It is −inf for a singular matrix.
+        A larger f is better. A singular matrix gives −inf.
         """
         regular = np.linalg.cond(M) < 1e14
         C = np.linalg.inv(np.where(regular[..., None, None], M, np.eye(M.shape[-1])))
@@ -54,14 +55,14 @@ class Design(NamedTuple):
         return np.where(regular, found, -np.inf)
 
     def total(self, counts: Array) -> Array:
-        """Compute the information M_0 + Σ n_i M_i (r, r), with n_i = ``counts`` (n,) tests."""
+        """Compute the information M_0 + Σ n_i M_i (r, r); ``counts`` (n,) are the numbers n_i."""
         return np.asarray(self.known + np.tensordot(counts, self.information, 1))
 
     def sensitivities(self, M: Array) -> tuple[Array, float]:
         """Compute tr M_i G (n,), and a proved lower bound of the efficiency f/f_best of a design.
 
-        The gain of one more test i is proportional to tr M_i G. ``M`` (r, r) is the information of
-        the design; the docstring of the module defines G. The bound is between 0 and 1.
+        ``M`` (r, r) is the information of the design. tr M_i G is proportional to the gain from one
+        more test i; the docstring of the module defines G. The bound is between 0 and 1.
         """
         C = np.linalg.inv(M)
         right = C @ self.wanted.T
@@ -74,7 +75,7 @@ class Design(NamedTuple):
         return each, float(np.sum(M * G)) / most
 
     def shares(self) -> Array:
-        """Compute the best repetitions n_i (n,), whose sum is N; they are not whole numbers."""
+        """Compute the best repetitions n_i (n,) of the tests as real numbers, with the sum N."""
         counts = np.full(len(self.information), self.tests / len(self.information))
         power = 1.0 if self.criterion == "D" else 0.5
         for _ in range(_ITERATIONS):
@@ -86,7 +87,11 @@ class Design(NamedTuple):
         return np.asarray(counts)
 
     def whole(self, shares: Array) -> Array:
-        """Round the repetitions ``shares`` (n,), then exchange single tests as long as f rises."""
+        """Compute whole repetitions (n,) from real ones, ``shares`` (n,).
+
+        They are rounded. Then single tests are exchanged for others as long as the criterion f
+        rises.
+        """
         counts = np.floor(shares)
         left = self.tests - int(counts.sum())
         counts[np.argsort(counts - shares)[:left]] += 1.0
@@ -106,7 +111,11 @@ class Design(NamedTuple):
             here = best
 
     def best(self) -> tuple[Array, float]:
-        """Find whole repetitions (n,), and a proved lower bound of f/f_best, between 0 and 1."""
+        """Find the best whole repetitions (n,) of the tests, and a proved lower bound of f/f_best.
+
+        f is the criterion of this design, f_best that of the best possible one. The bound is
+        between 0 and 1.
+        """
         shares = self.shares()
         counts = self.whole(shares)
         M, ideal = self.total(counts), self.total(shares)

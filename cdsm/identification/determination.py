@@ -1,4 +1,8 @@
-"""Which parameters measurements determine: rank, covariance, undetermined combinations."""
+"""Which parameters measurements determine: rank, covariance, undetermined combinations.
+
+To first order, a change dp of the parameters changes the residuals by J dp. Changes in the null
+space of J are undetermined combinations of parameters: they change no residual.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,7 @@ from cdsm.support.values import Array, frozen
 
 @dataclass(frozen=True, eq=False)
 class Determination:
-    """Determined and undetermined combinations of parameters, from derivatives of residuals."""
+    """Which linear combinations of P parameters the measurements determine, from the Jacobian J."""
 
     names: tuple[str, ...]  # names of the parameters p (P,)
     jacobian: Array  # J = ∂r/∂p (n, P) with the residuals r in standard deviations
@@ -24,7 +28,7 @@ class Determination:
 
     @property
     def rank(self) -> int:
-        """Number of combinations of parameters that are determined."""
+        """Number of linear combinations of the parameters that are determined: the rank of J."""
         return int(self.determined.sum())
 
     @cached_property
@@ -38,7 +42,11 @@ class Determination:
 
     @cached_property
     def correlation(self) -> Array:
-        """Correlations (P, P) [-]; ±1 for a pair of which only a combination is determined."""
+        """Correlations (P, P) [-] of the parameters.
+
+        Two undetermined parameters have the correlation of their undetermined combinations: ±1 if
+        there is only one such combination. A determined and an undetermined parameter have 0.
+        """
         firm = self.firm
         matrix = np.where(np.outer(firm, firm), self.covariance, 0.0)
         matrix = np.where(np.outer(~firm, ~firm), self._null_projector, matrix)
@@ -47,23 +55,33 @@ class Determination:
 
     @property
     def firm(self) -> Any:
-        """Whether each parameter is determined (P,)."""
+        """Whether each parameter alone is determined, boolean (P,)."""
         return np.diag(self._null_projector) == 0.0
 
     @property
     def dependent(self) -> Any:
-        """Indices of parameters, one per undetermined combination: fixing them determines all."""
+        """Indices of parameters whose values must be fixed so that all others are determined.
+
+        There is one index for each undetermined combination.
+        """
         return qr(self._null, mode="r", pivoting=True)[1][: len(self._null)]
 
     @property
     def coordinates(self) -> Array:
-        """Matrix A (P, rank): changes A c of the parameters are determined, for every c (rank,)."""
+        """Matrix A (P, rank) whose columns span the determined changes of the parameters.
+
+        So changes A c are determined for every c (rank,).
+        """
         scaled = self._svd[1][self.determined].T
         return np.asarray(scaled / self._column_norms[:, None])
 
     @property
     def open_combinations(self) -> list[str]:
-        """Changes of parameters that change no prediction, as text: "a by +1 and b by -0.3"."""
+        """Undetermined combinations as text, such as "a by +1 and b by -0.3".
+
+        Changing the parameters together by these amounts changes no residual. No amount is above
+        1 % of the range of its parameter.
+        """
         if not len(self._null):
             return []
         # easiest to read: one dependent parameter per combination
@@ -80,7 +98,7 @@ class Determination:
 
     @cached_property
     def _column_norms(self) -> Array:
-        """Norms of the columns of J (P,); inf for a zero column."""
+        """Norms of the columns of J (P,); inf for a column that is zero to rounding."""
         norms = np.linalg.norm(self.jacobian, axis=0)
         # zero column: over its range, the parameter moves no residual by a millionth of its σ
         zero = norms * self.ranges < RANK_TOLERANCE
@@ -97,9 +115,9 @@ class Determination:
 
     @cached_property
     def determined(self) -> Any:
-        """Whether the combination of parameters of each singular value of J is determined.
+        """Whether each singular value of the scaled J is above rounding, boolean.
 
-        It is if the singular value is above rounding.
+        If it is, the combination of parameters in its right singular vector is determined.
         """
         values = self._svd[0]
         return values > RANK_TOLERANCE * max(values[0], RANK_TOLERANCE)
@@ -111,6 +129,9 @@ class Determination:
 
     @cached_property
     def _null_projector(self) -> Array:
-        """Projector (P, P) on the undetermined combinations, with rounding set to zero."""
+        """Orthogonal projector (P, P) onto the undetermined combinations of the scaled parameters.
+
+        Entries that are rounding are set to zero.
+        """
         projector = self._null.T @ self._null
         return np.where(abs(projector) > 1e-8, projector, 0.0)

@@ -64,7 +64,11 @@ def _at_bound(result: Identification, i: int) -> list[str]:
 
 
 def _open_ends(result: Identification, i: int) -> list[str]:
-    """Return a warning, in a list, if the measurements do not limit the interval of parameter i."""
+    """Return a warning for each side on which the 95 % interval of parameter i has no limit.
+
+    There is only one warning if the measurements allow all values within the bounds, and none for a
+    side where the optimum is on the bound, which another warning reports.
+    """
     name, profile, limits = result.names[i], result.profiles[i], result.bounds[i]
     interval = result.confidence()[name]
     ends = [k for k in (0, 1) if math.isinf(interval[k])]
@@ -90,10 +94,11 @@ def _open_ends(result: Identification, i: int) -> list[str]:
 
 
 def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str]:
-    """Return a warning, in a list, if χ² can still fall from ``point``, where a search ended.
+    """Return a list with one warning if a search ended before a minimum of χ², else an empty list.
 
-    This happens, for example, if the model does not exist beyond ``point``. ``point`` (P,) is in
-    the unit cube of ``problem``. ``jacobian`` (n, P) is ∂r/∂point there.
+    ``point`` (P,) is the end of the search, in the unit cube of ``problem``; ``jacobian`` (n, P) is
+    ∂r/∂point there. The warning says by how much χ² can still fall. A search can end early because
+    the model does not exist beyond ``point``.
     """
     r = problem.residuals(point)
     gradient = r @ jacobian
@@ -120,11 +125,11 @@ def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str
 def ambiguous(
     problem: LeastSquares, best: Array, result: Identification, starts: Sequence[Array]
 ) -> list[str]:
-    """Return a warning, in a list, if a search from ``starts`` finds another good minimum of χ².
+    """Return a list with one warning if the measurements fit at another minimum too, else [].
 
-    This minimum is outside the 95 % intervals of ``result``, although its χ² is so low that they
-    should contain it. ``best`` is the optimum of ``result``. All points (P,) are in the unit cube
-    of ``problem``.
+    Searches from ``starts`` look for a minimum outside the 95 % intervals of ``result``, with a χ²
+    so low that the intervals should contain it. ``best`` is the optimum of ``result``. All points
+    (P,) are in the unit cube of ``problem``.
     """
     intervals = np.array(list(result.confidence().values()))
     other = other_minimum(problem, best, intervals, result._rise(0.95, scaled=False), starts)

@@ -49,8 +49,8 @@ def plan_experiment(
     Each combination of posture, direction and weight is a candidate: a :class:`WeightLoop` from
     zero force to the weight and back. The plan gives the number of repetitions of each candidate.
     It minimises det C (D-optimal: the volume of the confidence region) or tr C (A-optimal: the sum
-    of relative variances) of the covariance C of the wanted parameters. A proved bound limits how
-    much better any other plan could be.
+    of relative variances) of the covariance C of the wanted parameters. ``efficiency``
+    of the plan is a proved bound on how much better another choice of as many tests could be.
 
     The plan uses derivatives at the expected values. If the identified values differ much from
     them, plan again.
@@ -182,7 +182,11 @@ def _checked_parameters(parameters: Mapping[str, float]) -> dict[str, float]:
 def _wanted(
     values: dict[str, float], wanted: Sequence[str] | None, known: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Return the names of the parameters to determine; check them and the names in ``known``."""
+    """Return the names of the parameters to determine: ``wanted``, or all if None.
+
+    Raises UnknownName if ``wanted`` or ``known`` has a name that is not in ``values``, InvalidInput
+    if ``wanted`` is empty.
+    """
     chosen = tuple(values) if wanted is None else tuple(wanted)
     for kind, given in (("wanted", chosen), ("known", known)):
         for name in given:
@@ -193,7 +197,10 @@ def _wanted(
 
 
 def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
-    """Return the prior knowledge (P, P) [-]: on the diagonal |p|/σ if p is known to σ, else 0."""
+    """Return the prior knowledge as rows of a Jacobian, a diagonal matrix (P, P) [-].
+
+    The entry of a parameter p is |p|/σ if p is known with the standard deviation σ, else 0.
+    """
     weights = dict.fromkeys(values, 0.0)
     for name, std in known.items():
         if not (sigma := scalar(f"known[{name!r}]", std)) > 0.0:
@@ -205,10 +212,11 @@ def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
 def _followed(
     model_of: Callable[..., Manipulator], values: dict[str, float], candidates: Sequence[WeightLoop]
 ) -> tuple[tuple[WeightLoop, ...], list[Array], tuple[tuple[str, str], ...]]:
-    """Return the loops that can be tested, the derivatives of each, and why others cannot be.
+    """Compute the derivatives of the readings of all candidates.
 
-    The derivatives are the :func:`_rows` of the loop. A reason is a pair (label of the loop, text
-    of the error).
+    Returns the loops that can be tested, their derivatives (see :func:`_rows`), and a pair (label
+    of the loop, text of the error) for each loop that cannot be tested. Raises InvalidInput if no
+    loop can be tested.
     """
     rows, failures = list[Array](), dict[str, str]()
     for loop in track(candidates, "following the candidates"):
@@ -236,7 +244,10 @@ def _candidates(
     steps: int,
     **shared: Any,
 ) -> list[WeightLoop]:
-    """Return a loop for each posture, direction and weight; ``shared`` are other fields of it."""
+    """Return a loop for each combination of posture, direction and weight.
+
+    ``shared`` are fields of :class:`WeightLoop` that all loops have in common.
+    """
     angles, forces = number_array("postures", postures), number_array("weights", weights, "force")
     if angles.ndim != 2 or not angles.size:
         raise InvalidInput(
@@ -274,9 +285,10 @@ def _named(u: Array) -> str:
 def _rows(
     model_of: Callable[..., Manipulator], values: dict[str, float], loop: WeightLoop
 ) -> Array:
-    """Compute ∂r/∂ln p (m, P) of the residuals r, in standard deviations, of a loop.
+    """Compute ∂r/∂ln p (m, P) of one planned loop by central differences.
 
-    p are the parameters ``values`` of ``model_of``. Central differences are used.
+    r are the residuals of its m readings in standard deviations, p the parameters ``values`` of
+    ``model_of``.
     """
     exact = loop.simulated(Model.of(model_of, None, (loop,)).arm(values))
     model = Model.of(model_of, None, (exact,)).weighted(values)

@@ -38,17 +38,20 @@ class ExperimentPlan(ReadOnlyState):
         counts: Number of repetitions of each candidate (n,).
         even: Repetitions (n,) in a reference plan: as many tests, evenly spaced over the
             candidates.
-        jacobians: Derivatives [-] of the readings of each candidate, in standard deviations, with
-            respect to relative parameters, which are divided by their expected values: a row (P,)
-            for each reading.
-        known: Prior knowledge (P, P) [-]: 1/σ of relative parameters on the diagonal.
-        efficiency: Proved lower bound of f/f_best [-], 1 for the best plan. With the covariance C
-            of the s wanted parameters, f is det(C)^(−1/s) for ``"D"`` and 1/tr C for ``"A"``. So
-            the mean variance (geometric or arithmetic) is at most 1/efficiency times as large as in
-            the best plan. 0 if the tests are too few to determine the wanted parameters.
-        sensitivities: Gain of one more test of each candidate, relative to the largest gain (n,)
-            [-].
-        open_combinations: Combinations of relative parameters that no candidate determines.
+        jacobians: One matrix [-] for each candidate, with a row (P,) for each of its readings: the
+            derivatives of the reading, in standard deviations, with respect to relative parameters.
+            A relative parameter is a parameter divided by its expected value.
+        known: Prior knowledge, a diagonal matrix (P, P) [-]: 1/σ of each known relative parameter,
+            0 for the others.
+        efficiency: Proved lower bound of f/f_best [-]; 1 for the best plan. C is the covariance of
+            those s wanted parameters that the candidates determine. f is det(C)^(−1/s) for
+            ``"D"`` and 1/tr C for ``"A"``. So the mean variance (geometric or arithmetic) is at
+            most 1/efficiency times as large as in the best plan. It is 0 if the planned tests
+            determine less than all candidates together.
+        sensitivities: Gain of f by one more test of each candidate, relative to the largest gain
+            (n,) [-]; 0 for all if ``efficiency`` is 0.
+        open_combinations: Texts that name the combinations of relative parameters that no candidate
+            determines, such as "a by +0.01 and b by -0.01".
         failures: Label and reason of each candidate that cannot be tested.
     """
 
@@ -73,17 +76,20 @@ class ExperimentPlan(ReadOnlyState):
 
     @property
     def even_tests(self) -> tuple[WeightLoop, ...]:
-        """The loops of the reference plan: as many as ``tests``, evenly spaced over candidates."""
+        """Loops of a reference plan: as many as ``tests``, evenly spaced over the candidates."""
         return self._tests(self.even)
 
     @cached_property
     def std(self) -> Array:
-        """Expected standard deviations of the parameters (P,) [m, kg, …]; inf if undetermined."""
+        """Expected standard deviations of the parameters (P,) after the planned tests [m, kg, …].
+
+        They are inf for an undetermined parameter.
+        """
         return self._std(self.counts)
 
     @cached_property
     def even_std(self) -> Array:
-        """Standard deviations of the parameters (P,) [m, kg, N/m, …] if ``even_tests`` are made."""
+        """Expected standard deviations (P,) after the reference plan ``even_tests`` [m, kg, …]."""
         return self._std(self.even)
 
     @property
@@ -93,7 +99,10 @@ class ExperimentPlan(ReadOnlyState):
 
     @property
     def factors(self) -> dict[str, float]:
-        """``even_std`` divided by ``std`` [-], by wanted parameter; NaN if it is undetermined."""
+        """Factor by which the plan beats the reference plan [-], for each wanted parameter by name.
+
+        It is ``even_std`` divided by ``std``; NaN if the plan does not determine the parameter.
+        """
         found = zip(self.names, self.even_std, self.std, strict=True)
         return {
             name: float(even / std) if math.isfinite(std) else math.nan
@@ -138,7 +147,7 @@ class ExperimentPlan(ReadOnlyState):
         )
 
     def plot(self) -> Figure:
-        """Plot the intervals to expect, and how useful each candidate is."""
+        """Plot the expected 95 % intervals, and the gain from repeating each candidate."""
         from cdsm.plots.measured import plot_experiment_plan  # matplotlib imports slowly
 
         return plot_experiment_plan(self)

@@ -1,11 +1,13 @@
 """Compute confidence intervals by profile likelihood.
 
-The profile of a parameter p_i is the rise of χ² as p_i leaves its best value:
+The profile of a parameter p_i is the rise Δχ² of the least χ² when p_i is fixed at another value
+than the best one:
 
     Δχ²(p_i) = min over the other parameters of χ² − least χ²
 
-The interval of p_i contains all values with a small Δχ². It is the same whether the search uses the
-parameter or its logarithm. Source: Bates and Watts, Nonlinear Regression Analysis, 1988, chapter 6.
+The interval of p_i contains all values whose Δχ² is at most a quantile. It is the same whether the
+search uses the parameter or its logarithm. Source: Bates and Watts, Nonlinear Regression Analysis,
+1988, chapter 6.
 """
 
 from __future__ import annotations
@@ -46,7 +48,7 @@ _SEARCHED = 50  # largest number of evaluations of such a fit, without those of 
 
 
 class LowerOptimumError(Exception):
-    """Error of a profile: χ² at ``point`` is lower than at the supposed optimum."""
+    """A profile has found a ``point`` with a lower χ² than the supposed optimum."""
 
     def __init__(self, point: Array) -> None:
         self.point = point
@@ -78,10 +80,10 @@ class Profile(ReadOnlyState):
     def crossing(self, rise: float, side: Side) -> float | None:
         """Find the farthest value of the parameter on one ``side`` where Δχ² is at most ``rise``.
 
-        ``side`` is −1 for values below the best one, 1 for values above. Between the values, Δχ² is
-        a cubic in the searched parameter (or its logarithm). If Δχ² stays below ``rise`` up to the
-        bound or the end of the model, the result is −inf or inf. It is None if the profile was
-        computed only for values of Δχ² below ``rise``.
+        ``side`` is −1 for values below the best one, 1 for values above. Between two stored values,
+        Δχ² is a cubic in the parameter, or in its logarithm if that was searched. If Δχ² stays
+        below ``rise`` up to the bound, or as far as the model exists, the result is −inf or inf. It
+        is None if the profile was computed only for values of Δχ² below ``rise``.
         """
         outward = slice(self.best, None, side)
         values, height = self.values[outward], self.rise[outward]
@@ -95,9 +97,9 @@ class Profile(ReadOnlyState):
 
 
 def _crossing(u: Array, height: Array, slope: Array, rise: float) -> float:
-    """Find where the cubic between u[0] and u[1] equals ``rise``.
+    """Find u between u[0] and u[1] where the cubic of a profile equals ``rise``.
 
-    ``height`` and ``slope`` are its values and slopes at both ends (2,).
+    ``height`` and ``slope`` (2,) are the values and slopes of the cubic at both ends.
     """
     width = u[1] - u[0]
     cubic = CubicHermiteSpline((0.0, 1.0), height - rise, width * slope)
@@ -107,12 +109,13 @@ def _crossing(u: Array, height: Array, slope: Array, rise: float) -> float:
 def other_minimum(
     problem: LeastSquares, best: Array, intervals: Array, rise: float, starts: Sequence[Array]
 ) -> Array | None:
-    """Search for another minimum of χ², within ``rise`` of the least χ² and outside ``intervals``.
+    """Search for another minimum of χ² that fits about as well; return None if none is found.
 
-    Such a minimum refutes the intervals (P, 2) of all parameters, since they belong to only one of
-    several minima. Searches begin at the points of ``starts`` outside the intervals. All points are
-    in the unit cube. Return None if no search finds such a minimum. Raises LowerOptimumError if χ²
-    is lower at the minimum than at ``best``.
+    It counts if its χ² is at most ``rise`` above the least χ², and it is outside the confidence
+    ``intervals`` (P, 2). Such a minimum refutes all intervals, since they belong to only one of
+    several minima. Searches begin at those ``starts`` that are outside the intervals. ``starts``,
+    ``best`` and the result are points (P,) in the unit cube. Raises LowerOptimumError if χ² is
+    lower at the minimum than at ``best``.
     """
 
     def outside(point: Array) -> bool:
@@ -131,7 +134,10 @@ def other_minimum(
 
 
 class _Knot(NamedTuple):
-    """Point on a profile, with derivatives with respect to u, the fixed parameter in 0…1."""
+    """Point on the profile of a parameter, with the derivatives of Δχ².
+
+    u is the fixed parameter, scaled to 0…1 between its bounds.
+    """
 
     point: Array  # in the unit cube (P,)
     rise: float  # Δχ² [-]
@@ -156,7 +162,7 @@ class Profiler:
         """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ².
 
         Also return points (P,) in the unit cube, at most one on each side, where Δχ² falls again
-        after it has exceeded the value ``exact[0]``. Another minimum of χ² may be near them.
+        after it has exceeded ``exact[0]``. Another minimum of χ² may be near them.
         """
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
@@ -175,9 +181,9 @@ class Profiler:
     def _falls(self, knots: list[_Knot], side: Side) -> list[Array]:
         """Return a list of at most one point: the lowest knot at which the profile falls again.
 
-        ``knots`` is the profile on one ``side``, from the optimum outward. The profile falls again
-        at a knot if Δχ² was above ``exact[0]`` at the knot before, and is lower here or has a
-        falling slope.
+        ``knots`` are the computed points of the profile on one ``side``, from the optimum outward.
+        The profile falls again at a knot if Δχ² was above ``exact[0]`` at the knot before, and is
+        lower here or has a falling slope.
         """
         falling = [
             knot
@@ -187,7 +193,7 @@ class Profiler:
         return [min(falling, key=lambda knot: knot.rise).point] if falling else []
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
-        """Compute the knots on one side, from the optimum outward, and the reason why they end.
+        """Compute the profile on one side: its points from the optimum outward, and why they end.
 
         The reason is empty if Δχ² reaches ``far``.
         """
@@ -203,9 +209,9 @@ class Profiler:
         return knots, ""
 
     def _next(self, here: _Knot, side: Side, goal: float) -> _Knot | str:
-        """Compute a knot beyond ``here`` on one ``side``, near where Δχ² reaches ``goal``.
+        """Compute the next point of the profile, beyond ``here``, near where Δχ² reaches ``goal``.
 
-        If there is no such knot, the reason is returned as text.
+        If there is no such point, return the reason as text.
         """
         u = float(here.point[self.i])
         room = 1.0 - u if side > 0 else u
@@ -223,7 +229,10 @@ class Profiler:
         return knot
 
     def _refine(self, knots: list[_Knot], goal: float) -> None:
-        """Add knots until Δχ² at one is so near ``goal`` that the cubic is accurate."""
+        """Insert points into ``knots`` until one has nearly Δχ² = ``goal``.
+
+        The cubic between the points is then accurate there.
+        """
         for _ in range(_REFINEMENTS):
             last = max(k for k, knot in enumerate(knots) if knot.rise < goal)
             pair = knots[last : last + 2]
@@ -238,7 +247,12 @@ class Profiler:
             knots.insert(last + 1, between)
 
     def _moved(self, here: _Knot, step: float) -> _Knot | str:
-        """Compute the knot one ``step`` of u along the tangent; if it cannot exist, return why."""
+        """Compute the point of the profile one ``step`` in u away from ``here``.
+
+        u is the fixed parameter in 0…1. The search for the other parameters begins on the tangent.
+        If the point cannot exist, return the reason as text. Raises LowerOptimumError if χ² is
+        lower there than at the optimum.
+        """
         problem, others = self.problem, self.others
         point = np.clip(here.point + step * here.tangent, 0.0, 1.0)
         if (failure := problem.failure(point)) is not None:

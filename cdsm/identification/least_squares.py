@@ -44,7 +44,7 @@ class NoModelError(Exception):
 
 @contextmanager
 def no_model(where: str = "") -> Iterator[None]:
-    """Turn a CdsmError into a NoModelError; its text begins with ``where``."""
+    """Context in which a CdsmError becomes a NoModelError, whose text begins with ``where``."""
     try:
         yield
     except CdsmError as error:
@@ -52,7 +52,11 @@ def no_model(where: str = "") -> Iterator[None]:
 
 
 class Box:
-    """Bounds (P, 2) of the parameters, and the map from the unit cube to the parameters."""
+    """Map between the P parameters within their bounds (P, 2) and the unit cube.
+
+    A parameter whose bounds are positive and a factor of 100 or more apart is mapped by its
+    logarithm.
+    """
 
     def __init__(self, bounds: Array) -> None:
         self.bounds = bounds
@@ -62,7 +66,7 @@ class Box:
         self._size = self._scaled(self.high) - self._start
 
     def _scaled(self, values: Array) -> Array:
-        """Return the parameters, or the logarithms of those that are searched logarithmically."""
+        """Return the parameters (P,); those that are searched logarithmically as logarithms."""
         return np.asarray(np.log(values, out=values.copy(), where=self._by_log))
 
     def parameters(self, point: Array) -> Array:
@@ -74,19 +78,20 @@ class Box:
         return np.asarray(np.clip(values, self.low, self.high))
 
     def point(self, values: Array) -> Array:
-        """Compute the point of the unit cube: inverse of :meth:`parameters`."""
+        """Compute the point of the unit cube (P,) for ``values`` (P,) of the parameters."""
         return np.asarray(np.clip((self._scaled(values) - self._start) / self._size, 0.0, 1.0))
 
     def derivative(self, point: Array) -> Array:
-        """Compute the derivative (P,) of each parameter with respect to its entry of ``point``."""
+        """Compute ∂parameter/∂point (P,) of each parameter at a ``point`` of the unit cube."""
         return np.where(self._by_log, self.parameters(point) * self._size, self._size)
 
 
 class LeastSquares:
-    """Problem min Σ r² over the unit cube of the scaled parameters.
+    """Problem min Σ r² over the unit cube, to which the parameters are scaled by their bounds.
 
     Args:
-        residuals_of: Function from parameters by name to r (n,). May raise :class:`NoModelError`.
+        residuals_of: Function that takes the parameters by name and returns r (n,). It may raise
+            :class:`NoModelError`.
         count: Number n of residuals.
         bounds: (low, high) of each parameter.
         beside: Function (here, moved) that returns r (n,) at the parameters ``moved``, to first
@@ -109,24 +114,24 @@ class LeastSquares:
 
     @property
     def followed(self) -> bool:
-        """Whether finite differences use ``beside``, whose residuals are of first order only."""
+        """Whether finite differences use the function ``beside``, which is exact to first order."""
         return self._beside is not None
 
     def parameters(self, point: Array) -> dict[str, float]:
-        """Compute the parameters by name at a point of the unit cube."""
+        """Compute the parameters by name at a ``point`` (P,) of the unit cube."""
         return dict(zip(self.names, self.box.parameters(point).tolist(), strict=True))
 
     def describe(self, point: Array) -> str:
-        """Write the parameters at a point as text."""
+        """Write the parameters at a ``point`` (P,) of the unit cube as text: "a = 1.2, b = 3"."""
         return ", ".join(f"{name} = {x:.6g}" for name, x in self.parameters(point).items())
 
     def residuals(self, point: Array) -> Array:
-        """Compute the residuals r (n,) at a point; they are inf where the model does not exist."""
+        """Compute the residuals r (n,) at a point (P,) of the unit cube; inf without a model."""
         found = self._cached(point.tobytes())
         return np.full(self.count, math.inf) if isinstance(found, NoModelError) else found.copy()
 
     def failure(self, point: Array) -> NoModelError | None:
-        """Return the error that explains why the model has no residuals at a point, or None."""
+        """Return why the model does not exist at a point (P,) of the unit cube, or None."""
         found = self._cached(point.tobytes())
         return found if isinstance(found, NoModelError) else None
 
@@ -148,7 +153,8 @@ class LeastSquares:
 
         If ``over`` is given, only the columns of these parameters are computed. Near a bound, or
         where the model ceases to exist, central differences become one-sided second-order
-        differences.
+        differences. Raises InvalidInput if the model exists at the point, but on neither side of
+        it.
         """
         chosen = range(len(self.names)) if over is None else over
         return np.column_stack([self._column(point, i, central) for i in chosen])
@@ -157,7 +163,7 @@ class LeastSquares:
         here, step = self.residuals(point), _CENTRAL if central else _ONE_SIDED
 
         def at(k: int) -> Array | None:
-            """Compute the residuals k steps away; None beyond the bounds or without a model."""
+            """Compute the residuals (n,) k steps away; None beyond a bound, or without a model."""
             moved = point.copy()
             moved[i] += k * step
             if not 0.0 <= moved[i] <= 1.0:

@@ -96,12 +96,12 @@ class WeightLoop:
 
     @property
     def informative(self) -> int:
-        """Number of independent readings: one less per axis, since each axis has a free offset."""
+        """Number of independent readings; each axis has one less, since its zero is unknown."""
         return (len(self.forces) - 1) * len(self.axes)
 
     @property
     def applied(self) -> Array:
-        """Forces (n, 3) [N] in base axes."""
+        """Applied forces as vectors (n, 3) [N] in base axes."""
         return np.outer(self.forces, self._unit)
 
     @property
@@ -111,11 +111,11 @@ class WeightLoop:
     def simulated(
         self, arm: Manipulator, random: np.random.Generator | int | None = None
     ) -> WeightLoop:
-        """Return the same loop with the readings (n,) that an arm gives, along the direction.
+        """Return the same loop with simulated readings (n,) [m] of an arm, along the direction.
 
         Args:
             arm: The arm, with friction in its holes.
-            random: Source of the errors of readings, forces and tensions, or the seed of one. None:
+            random: Generator of random errors of readings, forces and tensions, or its seed. None:
                 without errors.
 
         Raises:
@@ -142,32 +142,33 @@ class WeightLoop:
 
 
 def measured(measurement: Measurement | WeightLoop) -> Array:
-    """Return the numbers of ``measurement``: a stiffness (1,) [N/m], or readings (m,) [m]."""
+    """Return the measured numbers: a stiffness (1,) [N/m], or the readings of a loop (m,) [m]."""
     if isinstance(measurement, WeightLoop):
         return np.array(measurement.displacements).ravel()
     return np.array([measurement.value])
 
 
 class Weights:
-    """Statistical weights of the readings of a loop; each axis has an unknown offset.
+    """Statistical weights of the m readings of a loop; each axis has an unknown offset.
 
-    e (m,) are the errors predicted − measured of the m readings, and V (m, m) is their covariance.
-    Z z adds the offset z of each axis. χ² is the least (e + Z z)ᵀ V⁻¹ (e + Z z) over all z. It is a
-    quadratic form in e; R is the symmetric square root of its matrix, so χ² = |R e|². An entry of
-    R e is the residual of one reading, in standard deviations.
+    e (m,) are the errors, predicted − measured, and V (m, m) is their covariance. The matrix Z (m,
+    k) adds the offsets z (k,) of the k axes to the readings. χ² is the least value of (e + Z z)ᵀ
+    V⁻¹ (e + Z z) over all z. With the matrix R of these weights, χ² = |R e|². An entry of R e is
+    the residual of one reading, in standard deviations.
 
     Attributes:
-        root: R (m, m) [1/m]; the readings are sorted by force, then axis.
-        zero: Matrix (k, m) that gives the offsets of the k axes from the errors: −z = ``zero`` e.
+        root: R (m, m) [1/m], symmetric; the readings are sorted by force, then axis.
+        zero: Matrix (k, m) that gives the best offsets from the errors: z = −``zero`` e.
     """
 
     def __init__(
         self, loop: WeightLoop, by_forces: Array | None = None, by_tensions: Array | None = None
     ) -> None:
-        """Compute the weights from the standard deviations that the loop gives.
+        """Compute the weights from the standard deviations of the loop.
 
-        ``by_forces`` (m, n) and ``by_tensions`` (m, C) are derivatives of readings. The errors of
-        forces or tensions are ignored if their derivatives are None.
+        ``by_forces`` (m, n) and ``by_tensions`` (m, C) [m/N] are the derivatives of the readings
+        with respect to the n forces and C tensions. The errors of forces or tensions are ignored if
+        their derivatives are None.
         """
         axes = len(loop.axes)
         covariance = loop.displacement_std**2 * np.eye(len(loop.forces) * axes)

@@ -58,7 +58,7 @@ def read_loops(
 
     Args:
         path: The file.
-        arm: The arm: it has the joints and cables that the columns name.
+        arm: The arm, whose joints and cables the columns name.
         displacement_std: Standard deviation of a reading [m].
         force_std: Standard deviation of a force [N].
         tension_std: Standard deviation of each tension [N].
@@ -178,9 +178,9 @@ class _Reader:
         return row[1][column.at] if column.at < len(row[1]) else ""
 
     def _same(self, rows: list[tuple[int, list[str]]], column: _Column) -> str:
-        """Return the cell of ``column`` in the first row.
+        """Return the cell of ``column`` in the first of ``rows``, the rows of one test.
 
-        Raises FileError if a later row has another text in this column; empty cells are allowed.
+        Raises FileError if a later row has another text in this column; it may be empty.
         """
         first = self._cell(rows[0], column)
         for row in rows[1:]:

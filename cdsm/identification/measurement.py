@@ -1,4 +1,4 @@
-"""Stiffness measured on an arm."""
+"""The measured stiffness of an arm, as input of an identification."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Measurement:
         tension: Cable tensions (C,) [N]. Give either ``tension`` or ``minimum``.
         minimum: Lower bound of the tensions [N], one number or (C,).
             :func:`~cdsm.distribute_tension` then balances the model at these angles.
-        std: Standard deviation of the value [N/m].
+        std: Standard deviation of the value [N/m]; it is required.
         wrench: W (6,) at ``tool0`` without the measuring force, base axes: force [N], moment [N m].
         label: Name in reports and figures.
         force: Magnitude of the measuring force [N], added to ``wrench``. The value is then the
@@ -79,9 +79,10 @@ class Measurement:
 
 
 def checked_conditions(given: Measurement | WeightLoop) -> dict[str, object]:
-    """Check direction, wrench, angles and tensions of a measurement; return them by field name.
+    """Check label, direction, wrench, angles and tensions of a measurement or a loop.
 
-    The values are tuples of numbers, as the fields store them; ``minimum`` may be one number.
+    Returns the last four by field name, as tuples of numbers; ``minimum`` may be one number. Raises
+    InvalidInput.
     """
     if (given.tension is None) == (given.minimum is None):
         raise InvalidInput(
@@ -117,5 +118,5 @@ def _numbers(name: str, value: object, meaning: str) -> tuple[float, ...]:
 
 
 def label(i: int, measurement: Measurement | WeightLoop) -> str:
-    """Return the name of a measurement: its label, or its index in the list."""
+    """Return the name of measurement number ``i``: its label, or "[i]" if it has none."""
     return measurement.label or f"[{i}]"

@@ -1,4 +1,7 @@
-"""Predict measured stiffnesses and loops of weight tests from a model of the arm."""
+"""Predict measured stiffnesses and loops of weight tests from a model of the arm.
+
+The differences from the measurements are the residuals that :func:`identify` minimises.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,7 @@ class UserFaultError(Exception):
 
 @dataclass(frozen=True)
 class Model:
-    """Model of all measurements, as a function of the parameters."""
+    """Predictions and residuals of all measurements, as functions of the parameters of the arm."""
 
     model_of: Callable[..., Manipulator]  # function that builds the arm from the parameters
     # function that gives the tensions, or None
@@ -58,16 +61,18 @@ class Model:
         tension_of: Callable[..., Tension | ArrayLike] | None,
         measurements: tuple[Measurement | WeightLoop, ...],
     ) -> Model:
-        """Return the model of ``measurements`` with weights for the errors of readings only.
+        """Return the model of ``measurements``.
 
-        ``tension_of`` may be None: each measurement then gives its tensions.
+        The weights of the loops account for errors of the readings; :meth:`weighted` adds those of
+        forces and tensions. If ``tension_of`` is None, the tensions follow from the fields of each
+        measurement.
         """
         weights = (Weights(each) if isinstance(each, WeightLoop) else None for each in measurements)
         return cls(model_of, tension_of, measurements, tuple(weights))
 
     @property
     def count(self) -> int:
-        """Number of all residuals."""
+        """Number n of residuals: one for each stiffness, and one for each reading of a loop."""
         return sum(len(measured(each)) for each in self.measurements)
 
     @property
@@ -77,16 +82,16 @@ class Model:
 
     @property
     def inexact_loads(self) -> bool:
-        """Whether a loop has errors of forces or tensions, so that weights depend on the model."""
+        """Whether a loop has errors of forces or tensions; weights then depend on parameters."""
         return any(loop.force_std or loop.tension_std for loop in self.loops)
 
     def weighted(self, parameters: Parameters) -> Model:
-        """Return the same model, whose weights contain all errors of the loops.
+        """Return the same model with weights that account for all errors of the loops.
 
-        The covariance of the readings is V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ. A and B are the
-        derivatives of the readings with respect to forces and tensions, at ``parameters``. σ, σ_f
-        and σ_F are the standard deviations of readings, forces and tensions. With friction, a force
-        also changes all later readings.
+        The covariance of the readings of a loop is V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ. A and B are
+        the derivatives of the readings with respect to forces and tensions, at ``parameters``. σ,
+        σ_f and σ_F are the standard deviations of readings, forces and tensions. With friction, a
+        force also changes all later readings.
         """
         arm = self.arm(parameters)
         paths = self._paths_at(parameters, arm)
@@ -103,10 +108,10 @@ class Model:
         return self.weigh(self.predict(parameters)[1])
 
     def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
-        """Compute the residuals (n,) for slightly changed parameters ``moved``, to first order.
+        """Compute the residuals (n,) for parameters ``moved`` near ``here``, to first order.
 
-        The residuals of loops follow from their equilibria for the parameters ``here``. No other
-        equilibria are searched for, so this is ten times as fast as :meth:`residuals`.
+        Equilibria of the loops are searched for only at the parameters ``here``; those for
+        ``moved`` are linearised about them. This is ten times as fast as :meth:`residuals`.
         """
         return self.weigh(self.predict(moved, here)[1])
 
@@ -115,9 +120,9 @@ class Model:
     ) -> tuple[Manipulator, list[Array]]:
         """Build the arm of ``parameters``; predict each stiffness (1,) [N/m] or loop (m,) [m].
 
-        The predicted displacements of a loop are relative to the tip without the forces. They are
-        exact unless ``near`` is given: then they are computed to first order from the equilibria at
-        the parameters ``near``.
+        The predictions of a loop are displacements of the tip from its position without the forces.
+        If ``near`` is given, they are linearised about the equilibria at the parameters ``near``;
+        otherwise they are exact.
         """
         arm = self.arm(parameters)
         paths = self._paths_at(near) if near else self._paths_at(parameters, arm)
@@ -139,7 +144,7 @@ class Model:
         return arm, predicted
 
     def weigh(self, predicted: list[Array]) -> Array:
-        """Compute the residuals (n,) [-], in units of σ, from the result of :meth:`predict`."""
+        """Compute the residuals (n,) in standard deviations from a result of :meth:`predict`."""
         rows = []
         for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
             if isinstance(each, WeightLoop):
@@ -150,7 +155,10 @@ class Model:
         return np.concatenate(rows)
 
     def as_read(self, predicted: list[Array]) -> Array:
-        """Return the numbers (n,) [N/m, m] of :meth:`predict`, plus the fitted offsets of loops."""
+        """Convert predictions of :meth:`predict` to numbers (n,) [N/m, m] as they would be read.
+
+        The predictions of a loop get the fitted offset of each axis.
+        """
         rows = []
         for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
             if weights is not None:
@@ -172,7 +180,8 @@ class Model:
     ) -> list[LoadingPath | None]:
         """Return the equilibria of each loop for ``parameters``; None for a measured stiffness.
 
-        The equilibria for the last 8 sets of parameters are stored.
+        The equilibria for the last 8 sets of parameters are stored. ``arm`` is the arm of
+        ``parameters``, if it is already built.
         """
         key = tuple(parameters.values())
         if key not in self._paths:
@@ -211,11 +220,11 @@ class Model:
         return stiffness(pose, tension, wrench)
 
     def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
-        """Compute the derivatives of the readings of ``loop`` from its equilibria ``path``.
+        """Compute the derivatives of the m readings of ``loop`` from its equilibria ``path``.
 
-        The first array (m, n) [m/N] has the derivatives with respect to the forces, the second one
-        (m, C) [m/N] with respect to the tensions. The first has no columns if the forces are exact,
-        the second none if the tensions are exact.
+        The first array (m, n) [m/N] has the derivatives with respect to the n forces, the second
+        one (m, C) [m/N] with respect to the C tensions. An array has no columns if the loop gives
+        forces or tensions without errors.
         """
         u, axes, pose = unit_direction("direction", loop.direction), loop.axes, path.start.pose
         by_forces = np.zeros((len(loop.forces) * len(axes), 0))

@@ -79,7 +79,10 @@ class Identification(ReadOnlyState):
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom: n − :attr:`rank`, minus one offset for each axis of each loop."""
+        """Degrees of freedom of χ²: n − :attr:`rank` − number of offsets.
+
+        Each axis of a loop has one fitted offset.
+        """
         loops = (each for each in self.measurements if isinstance(each, WeightLoop))
         zeros = sum(len(loop.axes) for loop in loops)
         return len(self.predicted) - zeros - self.rank
@@ -110,7 +113,7 @@ class Identification(ReadOnlyState):
 
     @property
     def correlation(self) -> Array:
-        """Correlations (P, P) [-]; ±1 for a pair of which only a combination is determined."""
+        """Correlations (P, P) [-]; ±1 for two parameters with only one combination determined."""
         return self._determination.correlation
 
     def confidence(
@@ -121,15 +124,16 @@ class Identification(ReadOnlyState):
         It contains the true value with the probability ``level``.
 
         The interval of p_i follows from profile likelihood: fix p_i, fit the other parameters
-        within their bounds, and require Δχ² ≤ q². q is the quantile of a normal variable. For a
-        linear model the interval is value ± q·std. For other models it may be asymmetric. A limit
-        is -inf or inf if Δχ² stays below q² up to the bound of the parameter, or as far as the
-        model exists. Then the measurements set no limit, and :attr:`warnings` report it at 95 %.
+        within their bounds; the interval has all p_i where χ² rises by Δχ² ≤ q². q is the quantile
+        of a normal variable. For a linear model the interval is value ± q·std. For other models it
+        may be asymmetric. A limit is -inf or inf if Δχ² stays below q² up to the bound of the
+        parameter, or as far as the model exists. Then the measurements set no limit, and
+        :attr:`warnings` report it at 95 %.
 
         No parameter has a limit if the fit is not an optimum, or if another minimum of χ² outside
         the 95 % intervals fits as well; :attr:`warnings` say so. Searches for such a minimum start
-        where a profile falls again, and at several points if no start is given. A minimum that no
-        search reaches stays unknown.
+        where Δχ² falls again along p_i, and at several points if :func:`identify` has no ``start``.
+        A minimum that no search reaches stays unknown.
 
         Measured in 500 simulated experiments with loops (5 µm, 0.05 N): the 95 % intervals of
         friction, EA, springs, two hole radii and a disk offset, identified together, hold the true
@@ -199,7 +203,10 @@ class Identification(ReadOnlyState):
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
 
     def _nonlinear_rows(self) -> list[str]:
-        """Return a line, in a list, that names the parameters whose interval is not ±1.96 std."""
+        """Return the line that names parameters whose 95 % interval differs much from ±1.96 std.
+
+        The list is empty if there is no such parameter.
+        """
         low, high = np.array(list(self.confidence().values())).T
         ratio = (high - low) / (2.0 * math.sqrt(self._rise(0.95, scaled=False)) * self.std)
         chosen = np.isfinite(ratio) & ((ratio > _LINEAR) | (ratio < 1.0 / _LINEAR))
@@ -237,7 +244,7 @@ class Identification(ReadOnlyState):
 
     @cached_property
     def _rows(self) -> list[Measurement | WeightLoop]:
-        """For each of the n measured numbers, the measurement to which it belongs."""
+        """The measurement to which each of the n measured numbers belongs."""
         return [each for each in self.measurements for _ in measured(each)]
 
     @cached_property
@@ -246,7 +253,7 @@ class Identification(ReadOnlyState):
 
     @property
     def _labels(self) -> list[str]:
-        """Name of each of the n measured numbers, a stiffness or a reading of a loop."""
+        """Name of each of the n measured numbers: the label, and for loops the force's number."""
         names = []
         for i, each in enumerate(self.measurements):
             own = label(i, each)
@@ -265,7 +272,7 @@ class Identification(ReadOnlyState):
         )
 
     def _rise(self, level: float, *, scaled: bool) -> float:
-        """Compute Δχ² [-] at the limits of the confidence intervals of this ``level``.
+        """Compute Δχ² [-], the rise of χ² at the limits of a confidence interval of this ``level``.
 
         :meth:`confidence` explains ``scaled``.
         """
@@ -278,7 +285,10 @@ class Identification(ReadOnlyState):
 
     @property
     def _goals(self) -> tuple[list[float], float]:
-        """Δχ² [-] at the limits of the 95 % intervals, ascending, and Δχ² at which profiles end."""
+        """Values of Δχ² [-] that profiles reach: at the 95 % limits, ascending, and at the end.
+
+        The 95 % limits are those with and without ``scaled``; see :meth:`confidence`.
+        """
         exact, far = [self._rise(0.95, scaled=False)], self._rise(0.999, scaled=False)
         if self.freedom:
             exact.append(self._rise(0.95, scaled=True))
@@ -288,6 +298,6 @@ class Identification(ReadOnlyState):
 
 
 def _row(name: str, *cells: object) -> str:
-    """Write a row of a table: ``name`` and ``cells``. Numbers have four digits."""
+    """Write one line of a table: ``name`` and ``cells``; floats have four digits."""
     texts = (f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)
     return f"{name:<22}" + "".join(f"{text:>12}" for text in texts)

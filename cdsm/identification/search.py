@@ -58,12 +58,13 @@ def identify(
 
     With ``arm = model_of(**p)``, the prediction K_i(p) is ``stiffness(arm.at(angles), tension,
     wrench).along(direction)``. For a measurement with a ``force`` it is ``weight_test(
-    arm.at(angles), tension, force, wrench=wrench).stiffness``. A step is shortened where the arm is
-    unstable, buckles under the force, or a tension leaves the domain of a law.
+    arm.at(angles), tension, force, wrench=wrench).stiffness``. The search shortens a step that
+    leads to an unstable arm, to one that buckles under the force, or to a tension outside the
+    domain of a law.
 
     A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
     its width determines the friction. Errors of its forces and tensions are converted to correlated
-    errors of its readings. Derivatives of loops need no search for equilibria.
+    errors of its readings.
 
     The search predicts all measurements about 50 P times, the profiles of
     :meth:`Identification.confidence` about 20 P² times. A measurement with a force takes ten times
@@ -179,10 +180,10 @@ def _checked_bounds(free: Mapping[str, tuple[float, float]]) -> dict[str, tuple[
 
 
 def check_call(name: str, function: object, positional: int, names: Sequence[str]) -> None:
-    """Raise UnknownName or InvalidInput if ``function`` does not take these arguments.
+    """Raise UnknownName or InvalidInput if ``function`` cannot be called with these arguments.
 
-    The arguments are ``positional`` positional ones, and one keyword argument for each of
-    ``names``. The error calls the function ``name``.
+    They are ``positional`` positional arguments, and one keyword argument for each of ``names``.
+    The error calls the function ``name``.
     """
     if not callable(function):
         raise InvalidInput(name, f"{function!r} given; a function is needed.")
@@ -208,10 +209,10 @@ def check_call(name: str, function: object, positional: int, names: Sequence[str
 
 
 def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Array]:
-    """Choose points of the unit cube of ``problem`` to search from, where the model exists.
+    """Choose the points (P,) of the unit cube of ``problem`` from which searches start.
 
-    If ``start`` is given, it is the only point. Raises InvalidInput if the model exists at none of
-    the points.
+    The only point is ``start`` if it is given; otherwise the points are the three with the least χ²
+    of 24 points spread over the cube. Raises InvalidInput if the model exists at none of them.
     """
     count = len(problem.names)
     if start is None:
@@ -249,7 +250,10 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
 
 
 def _optima(problem: LeastSquares, starts: Sequence[Array]) -> list[Array]:
-    """Search from each of ``starts``; return the optima, with the best one first and refined."""
+    """Search for a minimum of χ² from each of ``starts``; return the points found, best first.
+
+    The best point is refined by a second search with central differences.
+    """
     coarse, fine = (_OF_LOOPS, _OF_LOOPS) if problem.followed else (_COARSE, _FINE)
     found = [
         problem.search(point, method="trf", tolerances=coarse, most=_EVALUATIONS)
@@ -267,7 +271,10 @@ def _optima(problem: LeastSquares, starts: Sequence[Array]) -> list[Array]:
 def _result(
     model: Model, problem: LeastSquares, best: Array, ends: Sequence[Array]
 ) -> Identification:
-    """Compute the result at the optimum ``best``; ``ends`` are the ends of the other searches."""
+    """Build the result at the optimum ``best``: profiles, confidence intervals and warnings.
+
+    ``ends`` are the ends of the other searches, where another minimum may be.
+    """
     values = problem.parameters(best)
     arm, predicted = model.predict(values)
     jacobian = problem.jacobian(best, central=True)

@@ -1,4 +1,4 @@
-"""Tolerances of an arm, one or more for each source of uncertainty, and their TOML."""
+"""Tolerances of all sources of uncertainty of an arm, such as hole radii, and their TOML."""
 
 from __future__ import annotations
 
@@ -98,14 +98,17 @@ class Tolerances:
                 raise InvalidInput(name, said) from None
 
     def parts(self, source: str) -> tuple[Tolerance, ...]:
-        """Return the tolerances of a source that are not zero; UnknownName for another name."""
+        """Return the tolerances of a ``source``, such as ``"hole_radius"``, that are not zero.
+
+        Raises UnknownName if there is no such source.
+        """
         value = getattr(self, one_of("source of uncertainty", source, SOURCES))
         every = value if isinstance(value, tuple) else (value,)
         return tuple(each for each in every if each.is_given)
 
     @cached_property
     def given(self) -> Mapping[str, tuple[Tolerance, ...]]:
-        """All tolerances that are not zero, by source."""
+        """All tolerances that are not zero, by source of uncertainty."""
         return {name: parts for name in SOURCES if (parts := self.parts(name))}
 
     def __repr__(self) -> str:
@@ -148,9 +151,9 @@ SOURCES = tuple(field.name for field in fields(Tolerances))
 
 
 def _require_size(source: str, tolerance: Tolerance) -> None:
-    """Raise InvalidInput if the tolerance of ``source`` is too large.
+    """Raise InvalidInput if a tolerance is too large for its ``source`` of uncertainty.
 
-    Also raise it if the source is not rigidity but the tolerance has ``tensions``.
+    Also raise it if the tolerance depends on ``tensions`` and the source is not ``rigidity``.
     """
     if tolerance.tensions is not None and source != "rigidity":
         raise InvalidInput(source, "does not depend on tensions; give one standard.")
@@ -166,7 +169,7 @@ def _require_size(source: str, tolerance: Tolerance) -> None:
 
 
 def from_table(table: Mapping[str, Any]) -> Tolerances:
-    """Build tolerances from a parsed TOML table; raise GeometryError with every fault."""
+    """Build tolerances from a parsed TOML table; raise GeometryError that lists every fault."""
     found: dict[str, Any] = {}
     faults = []
     for name, value in table.items():
@@ -184,7 +187,10 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
 
 
 def _tolerance(name: str, value: object) -> Tolerance:
-    """Build one tolerance from a number or a table; CdsmError if it is invalid."""
+    """Build the tolerance of the source ``name`` from a number or a TOML table.
+
+    Raises CdsmError if it is invalid.
+    """
     if not isinstance(value, dict):
         return Tolerance(value, correlation=float(name in COMMON))  # type: ignore[arg-type]
     for key in value:

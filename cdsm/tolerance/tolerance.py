@@ -1,4 +1,4 @@
-"""Tolerance of inputs of one kind: standard uncertainty, distribution, correlation."""
+"""Tolerance of inputs of one kind, such as hole radii: standard uncertainty and distribution."""
 
 from __future__ import annotations
 
@@ -88,7 +88,8 @@ class Tolerance(ReadOnlyState):
     ) -> Self:
         """Return the tolerance of inputs that are surely within ±a of their value.
 
-        The standard uncertainty is a/√3 (uniform) or a/√6 (triangular); JCGM 100, 4.3.7 and 4.3.9.
+        a is ``half_width``. The standard uncertainty is a/√3 (uniform) or a/√6 (triangular); JCGM
+        100, 4.3.7 and 4.3.9.
 
         Args:
             half_width: a, in the unit of the inputs.
@@ -110,7 +111,9 @@ class Tolerance(ReadOnlyState):
         return standard > 0.0 if isinstance(standard, float) else bool(standard.any())
 
     def at(self, tension: Array) -> float | Array:
-        """Return the standard uncertainty: one number, or (C,) at tensions (C,) [N] if it varies.
+        """Return the standard uncertainty: one number, or (C,) if it depends on tension.
+
+        ``tension`` (C,) are the tensions of the cables [N].
 
         Raises:
             InvalidInput: A tension is outside the range of :attr:`tensions`.
@@ -128,7 +131,10 @@ class Tolerance(ReadOnlyState):
         return np.asarray(np.interp(tension, self.tensions, self.standard))
 
     def matrix(self, count: int) -> Array:
-        """Return R (n, n), the correlations of n = ``count`` inputs; InvalidInput for another n."""
+        """Return the matrix R (n, n) of the correlations of n = ``count`` inputs.
+
+        Raises InvalidInput if :attr:`correlation` is a matrix of another size.
+        """
         if isinstance(self.correlation, float):
             return self.correlation + (1.0 - self.correlation) * np.eye(count)
         matrix = self.correlation
@@ -141,11 +147,11 @@ class Tolerance(ReadOnlyState):
         return matrix
 
     def variance(self, values: Array) -> float:
-        """Compute the variance vᵀ R v of a sum of n correlated errors.
+        """Compute the variance vᵀ R v of the sum of n correlated errors.
 
-        v (n,) are the standard deviations of the errors with their signs, ``values``; R is
-        :meth:`matrix`. For one correlation ρ, vᵀ R v = (1 − ρ) v·v + ρ (Σ v)². InvalidInput if the
-        size of R is not n.
+        v (n,) is ``values``: the standard deviations of the errors, with their signs in the sum. R
+        is :meth:`matrix`. For one correlation ρ, vᵀ R v = (1 − ρ) v·v + ρ (Σ v)². Raises
+        InvalidInput if the size of R is not n.
         """
         rho = self.correlation
         if isinstance(rho, float):
@@ -172,7 +178,7 @@ class Tolerance(ReadOnlyState):
 
 
 def _correlation(value: object) -> float | Array:
-    """Check one correlation or a matrix of correlations; return a float or a read-only (n, n)."""
+    """Check one correlation or a matrix (n, n); return a float, or the matrix as read-only."""
     matrix = number_array("correlation", value)  # type: ignore[arg-type]
     if matrix.ndim == 0:
         if not 0.0 <= matrix <= 1.0:

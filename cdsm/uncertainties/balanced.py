@@ -1,6 +1,7 @@
-"""Derivatives of the least tensions, and of the critical tension, by the inputs of an arm.
+"""Derivatives of the least tensions and of the critical tension with respect to the inputs.
 
-The critical tension is the lower bound of the tensions at which the arm buckles.
+An input is a number that can have a tolerance, such as the radius of one hole. The critical tension
+is the lower bound of the tensions at which the arm buckles.
 
 This module computes the change Σ y_c dF_c of a weighted sum of the least tensions F (Eq. 17), with
 constant weights y, for small changes of the arm. The cables balance the torque τ = J_Xᵀ W − g
@@ -10,10 +11,10 @@ where λ (nv,) solves B Bᵀ λ = τ − B_b F_b. With μ = (B Bᵀ)⁻¹ B y_f 
 
     Σ y_c dF_c = r·dBᵀ λ + μ·(dτ − dJ_Lᵀ F).
 
-Each term is the change of a mechanical power at constant tensions and joint velocity, so the kernel
-of the stiffness computes it too: the power Σ r_c L̇_c at the velocity λ, and the power of the
-residual torque J_Lᵀ F − τ at the velocity −μ. The formula holds while the same cables stay at their
-bounds.
+Both terms are changes of a mechanical power at constant tensions and joint velocity: the power
+Σ r_c L̇_c at the velocity λ, and the power of the residual torque J_Lᵀ F − τ at the velocity −μ. So
+the kernel :mod:`cdsm.kernels.sensitivity`, which differentiates the stiffness, computes them too.
+The formula holds while the same cables stay at their bounds.
 """
 
 from __future__ import annotations
@@ -37,7 +38,10 @@ _DETERMINED = 1e-12
 
 
 class Balance(NamedTuple):
-    """Least tensions, and which cables are free; the module's docstring explains the symbols."""
+    """Least tensions of an arm, with the free cables: those between their bounds.
+
+    The docstring of the module explains the symbols.
+    """
 
     tension: Tension
     free: NDArray[np.bool_]  # (C,)
@@ -63,14 +67,19 @@ class Balance(NamedTuple):
         return cls(tension, free, np.linalg.inv(B @ B.T))
 
     def multipliers(self, weights: Array) -> Array:
-        """Compute μ = (B Bᵀ)⁻¹ B y_f (nv,); y are the ``weights`` (C,)."""
+        """Compute μ = (B Bᵀ)⁻¹ B y_f (nv,); y are the ``weights`` (C,).
+
+        μ is the derivative of the weighted sum of tensions Σ y_c F_c with respect to the torques
+        that they balance. The columns of B are those of J_Lᵀ for the free cables f.
+        """
         B = self.tension.posture.length_jacobian[self.free].T
         return np.asarray(self.inverse @ (B @ weights[self.free]))
 
     def by_bounds(self, weights: Array, low: Array, high: Array) -> Array:
-        """Compute Σ y_c dF_c (n,) for n changes of the bounds; y are the ``weights`` (C,).
+        """Compute the change Σ y_c dF_c (n,) for n changes of the bounds of the tensions F.
 
-        ``low`` and ``high`` (C, n) are the changes of the lower and upper bounds.
+        y are the ``weights`` (C,); ``low`` and ``high`` (C, n) [N] are the changes of the lower and
+        upper bounds.
         """
         F, J = self.tension.values, self.tension.posture.length_jacobian
         at_low = F - self.tension.minimum <= OPTIMALITY * F.max(initial=0.0)
@@ -78,10 +87,11 @@ class Balance(NamedTuple):
         return np.asarray((weights - J @ self.multipliers(weights))[~self.free] @ moved)
 
     def gradient(self, inputs: Inputs, weights: Array) -> dict[str, Array]:
-        """Compute the derivatives of Σ y_c F_c with respect to ``inputs``; y are ``weights`` (C,).
+        """Compute the derivatives of a weighted sum Σ y_c F_c of the least tensions.
 
-        There is an array for each source, such as ``hole_radius``. The derivatives with respect to
-        inputs of wires, such as rigidity and lead, are 0.
+        y are the ``weights`` (C,). The derivatives are with respect to ``inputs``, in an array for
+        each source of uncertainty, such as ``hole_radius``. The derivatives with respect to inputs
+        of wires, such as rigidity and lead, are 0.
         """
         F, free = self.tension.values, self.free
         B = self.tension.posture.length_jacobian[free].T
@@ -98,9 +108,9 @@ class Balance(NamedTuple):
     ) -> dict[str, Array]:
         """Compute the derivatives of the power Σ p_c L̇_c with respect to ``inputs``.
 
-        There is an array for each source, such as ``hole_radius``. p is ``weights`` (C,) [N],
-        ``motion`` (nv,) is the joint velocity. ``loaded`` is 1 to add the power of gravity and
-        load, otherwise 0.
+        The cable forces p are ``weights`` (C,) [N], ``motion`` (nv,) is the joint velocity.
+        ``loaded`` is 1 to subtract the power of gravity and load, otherwise 0. The result has an
+        array for each source of uncertainty, such as ``hole_radius``.
         """
         none = np.zeros_like(weights)
         given = none, none, none, weights, self.tension.wrench, 0.0, loaded
@@ -110,13 +120,13 @@ class Balance(NamedTuple):
 def buckling_gradient(
     balance: Balance, inputs: Inputs, margin: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Compute the derivatives of the critical tension F_min, at which λ_min(K_θ) = 0.
+    """Compute the derivatives of the critical tension F_min, the bound at which λ_min(K_θ) = 0.
 
-    There is an array for each source of ``inputs``, such as ``hole_radius``. ``balance`` belongs to
-    the tensions at F_min. ``margin`` has the derivatives ∂λ of λ_min at constant tensions, in
-    arrays by source, and y = ∂λ/∂F under the key ``tension``. Then
-    dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The derivative with respect to measured
-    tensions is 0.
+    They are with respect to ``inputs``, in an array for each source of uncertainty, such as
+    ``hole_radius``. ``balance`` has the least tensions with the lower bound F_min. ``margin`` has
+    the derivatives ∂λ of λ_min at constant tensions, in arrays by source, and y = ∂λ/∂F under the
+    key ``tension``. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The derivative with
+    respect to measured tensions is 0.
     """
     weights = margin["tension"]
     moved, every = balance.gradient(inputs, weights), np.ones((len(weights), 1))

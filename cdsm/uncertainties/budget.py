@@ -1,4 +1,8 @@
-"""Uncertainty budget of a reading: its standard uncertainty and the contribution of each source."""
+"""Uncertainty budget of a reading: its standard uncertainty and the contribution of each source.
+
+A reading is one number of an arm, such as its stiffness along a direction. A source is a kind of
+inputs with errors, such as all hole radii.
+"""
 
 from __future__ import annotations
 
@@ -49,8 +53,8 @@ class Uncertainty(ReadOnlyState):
         standard_uncertainty: u_c = √Σ u_i² over the sources [N/m], [N m/rad], [m] or [N].
         contributions: u_i of each source that has a tolerance, largest first [N/m], [N m/rad], [m]
             or [N].
-        sensitivities: Partial derivatives (n,) of the value with respect to the n inputs of each
-            source, in the unit of the value per [-], [rad], [m], [N] or [kg].
+        sensitivities: For each source, the partial derivatives (n,) of the value with respect to
+            its n inputs, in the unit of the value per [-], [rad], [m], [N] or [kg].
     """
 
     question: Question
@@ -62,7 +66,7 @@ class Uncertainty(ReadOnlyState):
 
     @cached_property
     def parts(self) -> Mapping[str, tuple[Part, ...]]:
-        """Groups of inputs that share a tolerance, by source such as ``hole_radius``."""
+        """Groups of inputs that share a tolerance, by source, such as ``hole_radius``."""
         return self.question.parts(self.tolerances)
 
     @property
@@ -72,7 +76,7 @@ class Uncertainty(ReadOnlyState):
 
     @cached_property
     def nonlinearity(self) -> float:
-        """RMS error of the linear approximation over 100 drawn arms, relative to u_c [-].
+        """RMS error of the linear approximation over 100 random arms, relative to u_c [-].
 
         The standard uncertainty of Monte Carlo differs from u_c by at most this fraction. It is inf
         if the reading does not exist for one of the arms.
@@ -90,7 +94,7 @@ class Uncertainty(ReadOnlyState):
         return float(np.sqrt(np.mean(left**2))) / max(self.standard_uncertainty, rounding)
 
     def _drawn(self, rng: np.random.Generator, draws: int) -> dict[str, Array]:
-        """Draw errors (draws, n) of the n inputs of each source that has a tolerance."""
+        """Draw random errors (draws, n) of the n inputs of each source that has a tolerance."""
         labels = self.question.labels
         return {name: draw(own, rng, draws, len(labels[name])) for name, own in self.parts.items()}
 
@@ -114,7 +118,10 @@ class Uncertainty(ReadOnlyState):
         return self.value - half, self.value + half
 
     def largest_inputs(self, count: int = 5) -> tuple[tuple[str, str, float], ...]:
-        """Return source, name and |∂f/∂x| u(x) of the ``count`` inputs x that contribute most."""
+        """Return the ``count`` inputs that contribute most: source, name and contribution.
+
+        The contribution of an input x to the uncertainty of the value f is |∂f/∂x| u(x), in SI.
+        """
         labels = self.question.labels
         each = [
             (source, name, abs(float(g)) * float(u))
@@ -142,7 +149,7 @@ class Uncertainty(ReadOnlyState):
         }
 
     def plot(self) -> Figure:
-        """Draw the contributions, one bar per source."""
+        """Plot the contributions to the standard uncertainty, one bar per source."""
         return cdsm.plots.plot_uncertainty(self)
 
     def __repr__(self) -> str:
@@ -178,7 +185,10 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def _unstable(self) -> tuple[str, ...]:
-        """Warning if the reading is a stiffness of an unstable arm, which no weight can measure."""
+        """Warning, in a tuple, if the reading is a stiffness and the arm is unstable.
+
+        No weight can measure such a stiffness. Otherwise the tuple is empty.
+        """
         K = self.question.stiffness
         read = self.question.of in ("along", "stuck", "margin")
         return (verdict(K),) if read and not K.is_stable else ()
@@ -195,7 +205,10 @@ class Uncertainty(ReadOnlyState):
 
     @property
     def shown(self) -> str:
-        """Value and standard uncertainty, with two digits, in the unit shown to the user."""
+        """Text "value ± standard uncertainty" in the unit shown to the user, without the unit.
+
+        The uncertainty has two digits.
+        """
         return with_uncertainty(self.value, self.standard_uncertainty, self.question.unit[1])
 
     @property
@@ -217,10 +230,12 @@ def uncertainty(
 
         u_c² = Σ_s σ_s² g_sᵀ R_s g_s
 
-    Source s (such as all hole radii) has the standard uncertainty σ_s, the correlations R_s of its
-    inputs, and the exact partial derivatives g_s of the reading with respect to them. For
-    ``"tension"`` and ``"critical_tension"`` the tensions are distributed anew for every arm; cables
-    at a bound stay there. For all other readings the tensions are measured: they are inputs too.
+    A reading is one number of the arm, such as its stiffness along a direction. Each source s of
+    uncertainty (such as all hole radii) has the standard uncertainty σ_s, the correlations R_s of
+    its inputs, and the exact partial derivatives g_s of the reading with respect to these inputs.
+    For ``"tension"`` and ``"critical_tension"``, each arm with errors has its own least tensions;
+    cables at a bound stay there. For all other readings the tensions are measured: they are inputs
+    with errors, too.
 
     Args:
         pose: The posture.
@@ -241,8 +256,8 @@ def uncertainty(
 
     Raises:
         InvalidInput: An argument has the wrong type or shape; ``direction`` or ``cable`` is missing
-            or not wanted; the arm does not have one of the sources; the tensions have no gradient;
-            the arm does not buckle.
+            or not wanted; the arm does not have one of the sources; so many cables are at a bound
+            that the least tensions have no derivative; or the arm does not buckle.
         UnknownName: ``of`` or ``cable`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.
@@ -275,7 +290,7 @@ def uncertainty(
 
 
 def checked_probability(probability: float) -> float:
-    """Check that a probability is between 0 and 1, and return it."""
+    """Return ``probability``; raise InvalidInput if it is not between 0 and 1."""
     p = scalar("probability", probability)
     if not 0.0 < p < 1.0:
         raise InvalidInput("probability", f"{p:g} given; a number between 0 and 1 is needed.")

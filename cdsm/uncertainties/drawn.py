@@ -1,4 +1,4 @@
-"""Many arms drawn within the tolerances: their stiffnesses, and tensions that balance them."""
+"""Many arms with random errors within the tolerances: their stiffnesses and balancing tensions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LONGEST = 0.2  # longest step relative to the tension
 
 
 class Drawn(NamedTuple):
-    """Arrays of N arms drawn at random; made by :meth:`DrawnArms.evaluate`."""
+    """Stiffness, tip and torques of N arms with random errors; see :class:`DrawnArms`."""
 
     joint: Array  # K_θ (N, nv, nv) [N m/rad]
     tip_rows: Array  # J_v (N, 3, nv) [m/rad]
@@ -34,9 +34,9 @@ class Drawn(NamedTuple):
 
 
 class DrawnArms:
-    """N arms drawn at random around the arm of K.
+    """N arms that differ from the arm of the stiffness ``K`` by random ``errors`` of their inputs.
 
-    ``errors`` has an array (N, inputs) for each source, such as ``hole_radius``.
+    ``errors`` has an array (N, inputs) for each source of uncertainty, such as ``hole_radius``.
     """
 
     def __init__(self, K: Stiffness, errors: Mapping[str, Array]) -> None:
@@ -68,9 +68,9 @@ class DrawnArms:
         )
 
     def evaluate(self, tension: Array | None = None) -> Drawn:
-        """Compute stiffness, tip and torques of all arms under tensions (N, C) [N].
+        """Compute stiffness, tip and torques of all N arms under tensions (N, C) [N].
 
-        The default tensions are the tensions of K with the drawn errors.
+        If ``tension`` is None, they are the tensions of K plus their random errors.
         """
         F = self._tension if tension is None else tension
         rigidity, strain = laws_at(self._K, F)
@@ -92,10 +92,11 @@ class DrawnArms:
         return found
 
     def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
-        """Compute the least tensions (N, C) [N] that balance the arms.
+        """Compute the least tensions (N, C) [N] that balance the N arms.
 
         ``minimum`` (N,) [N] is the lower bound of all cables of each arm; None: the lower bounds of
-        the nominal arm. ``drawn`` is the result of :meth:`evaluate`; None: it is computed here.
+        the arm without errors. ``drawn`` is a result of :meth:`evaluate`; None: it is computed
+        here.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.
@@ -118,10 +119,12 @@ class DrawnArms:
         return tension
 
     def critical(self, start: float) -> Array:
-        """Find the lower bounds (N,) [N] at which the arms buckle; ``start`` is the nominal one.
+        """Find the critical tension of each arm (N,) [N]: the lower bound at which it buckles.
+
+        ``start`` [N] is that of the arm without errors.
 
         Raises:
-            InvalidInput: An arm does not buckle near the nominal critical tension.
+            InvalidInput: An arm does not buckle near ``start``.
         """
         arms, root = self.evaluate(), np.full(self._count, start)
 
@@ -148,15 +151,18 @@ class DrawnArms:
 
 
 def margins(joint: Array) -> Array:
-    """Compute λ_min (N,) [N m/rad] of the symmetric part of each K_θ, ``joint`` (N, nv, nv)."""
+    """Compute the smallest eigenvalue (N,) [N m/rad] of the symmetric part of each K_θ.
+
+    ``joint`` (N, nv, nv) are the matrices K_θ.
+    """
     return np.asarray(np.linalg.eigvalsh((joint + joint.transpose(0, 2, 1)) / 2.0)[:, 0])
 
 
 def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
-    """Return EA [N] and ε [-] (…, C) of each cable at ``tension`` (…, C) [N].
+    """Return EA [N] and strain ε [-] (…, C) of each cable at ``tension`` (…, C) [N].
 
-    The laws are those of the cables of the arm of ``K``. ε is 0 if ``original_length`` of this arm
-    is not ``"unstrained"``.
+    The cables are those of the arm of ``K``. ε is 0 if ``original_length`` of this arm is not
+    ``"unstrained"``. Raises ElasticityRangeError if a tension is outside the domain of its law.
     """
     arm = K.posture.arm
     laws = arm._model.laws

@@ -34,7 +34,10 @@ _ON_DISKS = ("hole_radius", "hole_angle", "disk_offset", "link_length")
 
 
 class Places(NamedTuple):
-    """All points that define an arm, in the frames of its joints [m]."""
+    """All points that define an arm [m], each in the frame of the joint that moves it.
+
+    The origin of a joint is in the frame of its parent joint.
+    """
 
     site: Array  # cable sites (…, P, 3)
     origin: Array  # origin of each joint in its parent (…, nv+1, 3)
@@ -58,7 +61,10 @@ class Places(NamedTuple):
 
 
 def rotations(pose: Posture) -> Array:
-    """Return the rotation of each joint's frame (nv+1, 3, 3) in base axes; row 0 is the base."""
+    """Return the rotation matrices of all joint frames in base axes (nv+1, 3, 3).
+
+    Row 0 is the base.
+    """
     tree = pose.arm._model.tree
     found = np.tile(np.eye(3), (len(tree.parent), 1, 1))
     for i in tree.order.tolist():
@@ -72,7 +78,10 @@ _found: WeakKeyDictionary[Manipulator, Inputs] = WeakKeyDictionary()
 
 
 def inputs_of(arm: Manipulator) -> Inputs:
-    """Return the inputs of an arm; cached, since finding them takes milliseconds."""
+    """Return the inputs of an arm: the numbers that can have a tolerance, such as hole radii.
+
+    They are cached, since finding them takes milliseconds.
+    """
     inputs = _found.get(arm)
     if inputs is None:
         inputs = _found[arm] = Inputs(arm)
@@ -80,17 +89,17 @@ def inputs_of(arm: Manipulator) -> Inputs:
 
 
 class Inputs:
-    """Inputs of an arm: all numbers that can have a tolerance.
+    """Inputs of an arm: all numbers that can have a tolerance, such as the radius of one hole.
 
-    Inputs of one kind belong to one *source*; for example, all hole radii belong to
+    Inputs of one kind belong to one *source* of uncertainty; for example, all hole radii belong to
     ``hole_radius``.
 
     Attributes:
         places: Points of the arm without errors; they have n coordinates.
         first: Index of the first site of each cable, then the number of sites, (C+1,).
-        link_rows: Index of the joint that moves each link with a mass (links,); 0 is the base.
+        link_rows: Number of the joint that moves each link with a mass (links,); 0 is the base.
         labels: Names of the inputs of each source.
-        columns: Columns of :attr:`map` of each source that moves points.
+        columns: Columns of :attr:`map` that belong to each source that moves points.
         map: Sparse matrix (n, inputs) of the derivatives of the n coordinates with respect to the
             inputs of these sources.
     """
@@ -132,13 +141,14 @@ class Inputs:
         self._transposed = csr_matrix(self.map.T)
 
     def zeros(self) -> dict[str, Array]:
-        """Return an array of zeros for each source, with an entry for each of its inputs."""
+        """Return an array of zeros for each source of uncertainty, with an entry for each input."""
         return {source: np.zeros(len(names)) for source, names in self.labels.items()}
 
     def by_source(self, by_place: Places) -> dict[str, Array]:
-        """Return the derivatives of a quantity with respect to the inputs, an array per source.
+        """Convert derivatives with respect to points to derivatives with respect to inputs.
 
-        ``by_place`` has the derivatives with respect to the coordinates of the arm's points.
+        ``by_place`` has the derivatives of a quantity with respect to the coordinates of the arm's
+        points. The result has an array for each source of uncertainty that moves points.
         """
         by_input = self._transposed @ by_place.stacked()
         return {source: by_input[columns] for source, columns in self.columns.items()}
@@ -146,10 +156,12 @@ class Inputs:
     def gradient(
         self, pose: Posture, motion: Array, velocity: Array, *given: Any
     ) -> tuple[dict[str, Array], Array, Array]:
-        """Compute the derivatives of Ψ, see :func:`~cdsm.kernels.sensitivity.single_gradient`.
+        """Compute the derivatives of Ψ = zᵀ K_θ z + … with respect to all inputs.
 
-        ``given`` are the arguments of this kernel from ``tension`` on. The result has an array for
-        each source (0 for inputs of wires), and the derivatives by F (C,) and k (C,).
+        :func:`~cdsm.kernels.sensitivity.single_gradient` defines Ψ; ``motion`` is z (nv,),
+        ``velocity`` is v (3,), and ``given`` are its arguments from ``tension`` on. The result has
+        an array for each source of uncertainty (0 for inputs of wires), and the derivatives with
+        respect to the tensions F (C,) and the cable stiffnesses k (C,).
         """
         model = pose.arm._model
         arguments = model.tree, model.routing, model.masses, pose.q, self.first, motion, velocity
@@ -160,8 +172,8 @@ class Inputs:
     def displaced(self, errors: Mapping[str, Array]) -> Array:
         """Convert errors of the inputs of N arms to displacements (N, n) [m] of their points.
 
-        ``errors`` has an array (N, inputs) for each source; a source that is missing has no errors.
-        The n coordinates are in the order of :meth:`Places.stacked`.
+        ``errors`` has an array (N, inputs) for each source of uncertainty; a source that is missing
+        has no errors. The n coordinates are in the order of :meth:`Places.stacked`.
         """
         count = len(next(iter(errors.values())))
         every = np.zeros((count, self.map.shape[1]))
@@ -171,7 +183,11 @@ class Inputs:
         return np.asarray((self.map @ every.T).T)
 
     def require(self, tolerances: Tolerances, arm: Manipulator) -> None:
-        """Raise InvalidInput if the arm lacks a source of ``tolerances``, or one is too large."""
+        """Raise InvalidInput if ``tolerances`` do not fit the arm.
+
+        They do not if the arm has no inputs of one of the sources, such as springs, or if the
+        standard uncertainty of a length is above 0.1 times the length of the arm.
+        """
         for name, parts in tolerances.given.items():
             if not self.labels.get(name):
                 lacks = {
@@ -192,9 +208,10 @@ class Inputs:
                 )
 
     def _disks(self, arm: Manipulator, sites: list[str]) -> dict[str, csr_matrix]:
-        """Add the names of the inputs of holes, disks and links; return their parts of :attr:`map`.
+        """Find how the inputs of holes, disks and links move the points of the arm.
 
-        ``sites`` has an entry for each cable site of the arm.
+        Returns the columns of :attr:`map` for each source, and adds the names of the inputs to
+        :attr:`labels`. ``sites`` are the names of all cable sites.
         """
         body, (P, rows) = arm._model.body, (len(sites), arm.nv + 1)
         end, origin, centre = 3 * P + 6 * rows, 3 * P, 3 * P + 3 * rows

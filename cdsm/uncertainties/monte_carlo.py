@@ -1,4 +1,7 @@
-"""Monte Carlo runs: a reading of many arms, each drawn within the tolerances (JCGM 101)."""
+"""Monte Carlo runs: a reading of many arms with random errors within the tolerances (JCGM 101).
+
+A reading is one number of an arm, such as its stiffness along a direction.
+"""
 
 from __future__ import annotations
 
@@ -42,11 +45,11 @@ AGREES = 0.1
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MonteCarlo(ReadOnlyState):
-    """Values of a reading for drawn arms; made by :func:`monte_carlo`.
+    """Values of a reading for many arms with random errors; made by :func:`monte_carlo`.
 
     Attributes:
         budget: Uncertainty of the same reading to first order.
-        values: The reading of each drawn arm (n,) [N/m], [N m/rad], [m] or [N].
+        values: The reading of each arm (n,) [N/m], [N m/rad], [m] or [N].
         seed: Seed of the random numbers.
     """
 
@@ -65,7 +68,7 @@ class MonteCarlo(ReadOnlyState):
         return float(self.values.std(ddof=1))
 
     def interval(self, probability: float = 0.95) -> tuple[float, float]:
-        """Return the interval (low, high) that contains the part ``probability`` of the values.
+        """Return the interval (low, high) that contains the fraction ``probability`` of the values.
 
         As many values are below the interval as above it (JCGM 101, 7.7). Raises InvalidInput if
         ``probability`` is not between 0 and 1.
@@ -78,7 +81,8 @@ class MonteCarlo(ReadOnlyState):
     def agrees(self) -> bool:
         """Whether first-order error propagation and Monte Carlo agree (JCGM 101, clause 8).
 
-        Both ends of their 95 % intervals are at most 10 % of the standard uncertainty apart.
+        They agree if each end of the 95 % interval of one differs from that of the other by at most
+        10 % of the standard uncertainty.
         """
         both = zip(self.interval(), self.budget.interval(), strict=True)
         return all(abs(a - b) <= AGREES * self.standard_uncertainty for a, b in both)
@@ -86,8 +90,9 @@ class MonteCarlo(ReadOnlyState):
     def to_xarray(self) -> xarray.Dataset:
         """Return the values and the errors of all inputs as a Dataset with dimension ``draw``.
 
-        The errors are drawn again from the seed. Each source has one variable, labelled with the
-        names of its inputs. Tools for sensitivity analysis need such samples.
+        Each source of uncertainty has one variable of errors, labelled with the names of its
+        inputs. Tools for sensitivity analysis need such samples. The errors are not stored, but
+        drawn again from the seed.
 
         Raises:
             MissingExtra: xarray is not installed (extra ``sweep``).
@@ -109,7 +114,7 @@ class MonteCarlo(ReadOnlyState):
         return xarray.Dataset(variables, attrs={"seed": self.seed})
 
     def plot(self) -> Figure:
-        """Draw the histogram of the values and the normal distribution of :attr:`budget`."""
+        """Plot the histogram of the values and the normal distribution of :attr:`budget`."""
         return cdsm.plots.plot_monte_carlo(self)
 
     def __repr__(self) -> str:
@@ -149,10 +154,11 @@ def monte_carlo(
     store: str | os.PathLike[str] | None = None,
     progress: bool = True,
 ) -> MonteCarlo:
-    """Compute a reading for many arms, drawn within the tolerances (JCGM 101).
+    """Compute a reading for many arms with random errors within the tolerances (JCGM 101).
 
-    Each draw has its own angles, tensions, rigidities, leads, holes, disks, links and masses. The
-    same seed gives the same bits on any number of threads, even after an interruption.
+    A reading is one number of the arm, such as its stiffness along a direction. Each arm has its
+    own angles, tensions, rigidities, leads, holes, disks, links and masses. The same seed gives the
+    same values to the last bit on any number of threads, even after an interruption.
 
     Args:
         pose: The posture.
@@ -202,19 +208,26 @@ def monte_carlo(
 
 
 def _blocks(count: int) -> list[tuple[int, int]]:
-    """Return the number and the size of each block of ``count`` draws in total."""
+    """Split ``count`` draws into blocks; return the number (from 0) and the size of each."""
     return [(start // _BLOCK, min(_BLOCK, count - start)) for start in range(0, count, _BLOCK)]
 
 
 def _errors(budget: Uncertainty, seed: int, block: tuple[int, int]) -> dict[str, Array]:
-    """Draw errors of the arms of a block: an array (arms, inputs) per source."""
+    """Draw the random errors of the arms of one block: an array (arms, inputs) per source.
+
+    A ``block`` is (number, size). Its errors depend only on ``seed`` and its number.
+    """
     number, count = block
     errors = budget._drawn(np.random.default_rng([seed, number]), _BLOCK)
     return {source: drawn[:count] for source, drawn in errors.items()}
 
 
 def _block(budget: Uncertainty, seed: int, folder: Path | None, block: tuple[int, int]) -> Array:
-    """Compute the readings (arms,) of the arms of a block, or read its file."""
+    """Return the readings (arms,) of the arms of one ``block`` (number, size).
+
+    They are read from the file of the block in ``folder``, if it exists; otherwise they are
+    computed and written to it.
+    """
     number, count = block
     path = None if folder is None else folder / f"{number:06d}.npy"
     if path is not None and path.exists():
@@ -228,9 +241,10 @@ def _block(budget: Uncertainty, seed: int, folder: Path | None, block: tuple[int
 
 
 def _open_store(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Path:
-    """Create the folder ``store``; raise FileError if it has a run with other arguments.
+    """Create the folder ``store`` for the files of one run, and return it.
 
-    ``budget`` and ``seed`` identify a run.
+    Raises FileError if the folder has another run: another reading, other tolerances or another
+    seed.
     """
     folder = make_folder(store)
     parts = [budget.question.of, repr(budget.value), repr(budget.standard_uncertainty), str(seed)]

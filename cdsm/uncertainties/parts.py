@@ -1,4 +1,8 @@
-"""Tolerances of an arm's inputs: the variance of a reading that they cause, and drawn errors."""
+"""Assign tolerances to the inputs of an arm; compute variances of a reading and random errors.
+
+An input is a number that can have a tolerance, such as the radius of one hole; a reading is a
+number computed from all inputs, such as a stiffness.
+"""
 
 from __future__ import annotations
 
@@ -18,25 +22,26 @@ _ALL = slice(None)
 
 
 class Part(NamedTuple):
-    """Inputs of one source that share a tolerance, and their standard uncertainties."""
+    """Inputs of one source of uncertainty that share a tolerance, with standard uncertainties."""
 
     inputs: slice | Indices  # indices of the inputs; a slice if they are all inputs of the source
     standard: float | Array  # standard uncertainty: one number for all, or (k,)
     tolerance: Tolerance
 
     def variance(self, sensitivity: Array) -> float:
-        """Compute the variance gᵀ σ R σ g of a reading that the inputs cause (JCGM 100, Eq. 13).
+        """Compute the variance gᵀ σ R σ g of a reading that the k inputs cause (JCGM 100, Eq. 13).
 
-        g (k,) is ``sensitivity``, the partial derivatives of the reading with respect to the k
-        inputs; σ are the standard uncertainties, R the correlations.
+        g (k,) is ``sensitivity``, the partial derivatives of the reading with respect to the
+        inputs. σ is the diagonal matrix of the standard uncertainties, R (k, k) the correlations.
         """
         return self.tolerance.variance(self.standard * sensitivity)
 
     def draw(self, rng: np.random.Generator, errors: Array) -> None:
-        """Draw the errors of the inputs and write them to their columns of ``errors`` (draws, n).
+        """Draw random errors of the inputs into their columns of ``errors`` (draws, n).
 
-        Correlated errors that are not normal are sums of independent ones: each input has its exact
-        standard uncertainty and correlations; for 0 < ρ < 1 its distribution is only approximate.
+        Correlated errors are sums of independent ones, so each input has its exact standard
+        uncertainty and correlations. Their distribution is only approximate if it is not normal,
+        and the correlation is a matrix or between 0 and 1.
         """
         tolerance, rho = self.tolerance, self.tolerance.correlation
         draws, count = errors[:, self.inputs].shape
@@ -56,15 +61,15 @@ class Part(NamedTuple):
 def parts_of(
     tolerances: Tolerances, labels: Mapping[str, Sequence[str]], tension: Array
 ) -> dict[str, tuple[Part, ...]]:
-    """Find the inputs of each tolerance by name, and their standard uncertainties.
+    """Find the inputs to which each tolerance belongs, and their standard uncertainties.
 
-    The keys are the sources, such as ``hole_radius``. ``labels`` are the names of the inputs of
-    each source. A standard uncertainty may depend on the ``tension`` (C,) [N].
+    The keys are the sources of uncertainty, such as ``hole_radius``. ``labels`` are the names of
+    the inputs of each source. A standard uncertainty may depend on the ``tension`` (C,) [N].
 
     Raises:
         InvalidInput: No input has the name that a tolerance gives, or two tolerances belong to one
-            input; or a tension is outside the range for which a tolerance is given, or so near to
-            slack that its rigidity is not known.
+            input; or a tension is outside the range for which a tolerance is given, or the standard
+            uncertainty is too large at a tension, as near to slack.
     """
     found: dict[str, tuple[Part, ...]] = {}
     for source, given in tolerances.given.items():
@@ -94,7 +99,7 @@ def parts_of(
 
 
 def variance(parts: Sequence[Part], sensitivity: Array) -> float:
-    """Compute the variance of a reading that the inputs of one source cause.
+    """Compute the variance of a reading that the n inputs of one source of uncertainty cause.
 
     ``sensitivity`` (n,) are the partial derivatives of the reading with respect to these inputs.
     """
@@ -102,7 +107,7 @@ def variance(parts: Sequence[Part], sensitivity: Array) -> float:
 
 
 def standards(parts: Sequence[Part], count: int) -> Array:
-    """Return the standard uncertainty (count,) of each of ``count`` inputs of a source."""
+    """Return the standard uncertainties (count,) of all ``count`` inputs of one source."""
     found = np.zeros(count)
     for part in parts:
         found[part.inputs] = part.standard
@@ -110,7 +115,7 @@ def standards(parts: Sequence[Part], count: int) -> Array:
 
 
 def draw(parts: Sequence[Part], rng: np.random.Generator, draws: int, count: int) -> Array:
-    """Draw errors (draws, count) of all ``count`` inputs of a source."""
+    """Draw random errors (draws, count) of all ``count`` inputs of one source of uncertainty."""
     errors = np.zeros((draws, count))
     for part in parts:
         part.draw(rng, errors)
@@ -118,9 +123,9 @@ def draw(parts: Sequence[Part], rng: np.random.Generator, draws: int, count: int
 
 
 def _matching(source: str, pattern: str, names: Sequence[str]) -> Indices:
-    """Return the indices of ``names`` that match ``pattern``.
+    """Return the indices of the ``names`` that match ``pattern``, such as ``"cable1_*"``.
 
-    Raises InvalidInput, which names ``source``, if no name matches.
+    Raises InvalidInput if no name matches; the error names the ``source`` of uncertainty.
     """
     found = np.flatnonzero([fnmatchcase(name, pattern) for name in names])
     if not found.size:
@@ -131,7 +136,7 @@ def _matching(source: str, pattern: str, names: Sequence[str]) -> Indices:
 
 
 def _standardised(tolerance: Tolerance, rng: np.random.Generator, shape: tuple[int, int]) -> Array:
-    """Draw errors (``shape``) with the distribution of ``tolerance`` and standard deviation one."""
+    """Draw random numbers (``shape``) with the distribution of ``tolerance`` and unit variance."""
     if tolerance.distribution == "normal":
         return rng.standard_normal(shape)
     width = WIDTH[tolerance.distribution]

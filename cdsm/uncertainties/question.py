@@ -1,4 +1,4 @@
-"""Check the arguments of an uncertainty budget or a Monte Carlo run: reading and tolerances."""
+"""Check the arguments of an uncertainty budget or a Monte Carlo run."""
 
 from __future__ import annotations
 
@@ -44,7 +44,11 @@ def checked_question(
     cable: str | None,
     wrench: ArrayLike | None,
 ) -> Question:
-    """Check the arguments of :func:`uncertainty`, and return the reading that they describe."""
+    """Check the arguments of :func:`uncertainty`; return the reading they describe, with its arm.
+
+    For the reading ``critical_tension`` the critical tension is computed, for ``stuck`` the
+    equivalent arm. Raises the errors of :func:`uncertainty`.
+    """
     one_of("reading", of, READINGS)
     K = stiffness(pose, tension, wrench)
     for name, value, wanted in (

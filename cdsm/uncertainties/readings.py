@@ -1,7 +1,8 @@
 """Compute the readings of an arm that can have an uncertainty, and their derivatives.
 
-Each reading has two independent computations: the gradient with respect to all inputs, for the
-budget, and the values of many drawn arms, for Monte Carlo. The tests compare them.
+A reading is one number of an arm, such as its stiffness along a direction. Two independent
+computations of each reading exist: its derivatives with respect to all inputs, for the budget, and
+its values for many arms with random errors, for Monte Carlo. The tests compare them.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _NOWHERE = np.zeros(3)
 
 @dataclass(frozen=True, eq=False)
 class Question(ReadOnlyState):
-    """A number read off an arm, in SI; its uncertainty is wanted.
+    """Reading whose uncertainty is asked for: one number of an arm, such as a stiffness.
 
     Attributes:
         of: Name of the reading: ``"along"``, ``"stuck"``, ``"margin"``, ``"tip"``, ``"tension"`` or
@@ -52,7 +53,7 @@ class Question(ReadOnlyState):
 
     @property
     def labels(self) -> Mapping[str, Sequence[str]]:
-        """Names of the inputs of each source."""
+        """Names of the inputs of each source of uncertainty: for ``hole_radius``, the holes."""
         return (self.ties or inputs_of(self.stiffness.posture.arm)).labels
 
     @property
@@ -71,7 +72,7 @@ class Question(ReadOnlyState):
 
     @property
     def name(self) -> str:
-        """Name of the reading, with its direction or cable."""
+        """Name of the reading as text, with its direction or cable."""
         if self.direction is not None:
             what = {"along": "stiffness", "stuck": "stuck stiffness"}.get(self.of, "tip")
             return f"{what} along {coordinates(self.direction)}"
@@ -80,7 +81,10 @@ class Question(ReadOnlyState):
         return "smallest joint stiffness" if self.of == "margin" else "critical lower bound"
 
     def parts(self, tolerances: Tolerances) -> dict[str, tuple[Part, ...]]:
-        """Find the inputs of each tolerance; see :func:`~cdsm.uncertainties.parts.parts_of`."""
+        """Find the inputs to which each tolerance belongs, by source of uncertainty.
+
+        :func:`~cdsm.uncertainties.parts.parts_of` explains the result.
+        """
         tension = (self.ties or self.stiffness).tension
         return parts_of(tolerances, self.labels, tension)
 
@@ -91,7 +95,7 @@ class Question(ReadOnlyState):
         return self.stiffness._along(self.direction)
 
     def value(self) -> float:
-        """Return the value of the reading for the nominal arm, in SI."""
+        """Return the value of the reading for the arm without errors, in SI."""
         K = self.stiffness
         if self.of == "tension":
             return float(K.tension[self.cable])
@@ -105,7 +109,11 @@ class Question(ReadOnlyState):
         return float(self.direction @ K.posture.tip[:3, 3])
 
     def gradient(self) -> dict[str, Array]:
-        """Compute the derivatives of the reading: an array (n,) for the n inputs of each source."""
+        """Compute the derivatives of the reading with respect to all inputs.
+
+        The result has an array (n,) for the n inputs of each source of uncertainty. Raises
+        InvalidInput if the reading is a tension without a gradient.
+        """
         K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
         if self.of in ("along", "stuck"):
             assert self.direction is not None
@@ -124,7 +132,9 @@ class Question(ReadOnlyState):
         return buckling_gradient(Balance.of(K.distribution), inputs, margin)
 
     def at(self, errors: Mapping[str, Array]) -> Array:
-        """Compute the reading of N arms (N,); ``errors`` has an array (N, inputs) for each source.
+        """Compute the reading of N arms with errors (N,), in SI.
+
+        ``errors`` has an array (N, inputs) for each source of uncertainty.
 
         Raises:
             ElasticityRangeError: A tension leaves the domain of its cable's law.
@@ -149,9 +159,10 @@ class Question(ReadOnlyState):
 def _along_gradient(
     K: Stiffness, inputs: Inputs, u: Array, along: float, motion: Array
 ) -> dict[str, Array]:
-    """Compute the derivatives of ``along`` = 1/(uᵀ C_vv u): an array for each source of ``inputs``.
+    """Compute the derivatives of the stiffness along u, ``along`` = 1/(uᵀ C_vv u).
 
-    ``motion`` (nv,) is K_θ⁻¹ J_vᵀ u.
+    C_vv is the translational compliance of the tip, ``motion`` (nv,) is K_θ⁻¹ J_vᵀ u. The result
+    has an array for each source of ``inputs``.
     """
     right, towards = along * motion, along * u  # d(1/c) = −dc/c² with c = uᵀ C_vv u = 1/along
     if not K.wrench[3:].any():
@@ -168,8 +179,8 @@ def _along_gradient(
 def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> dict[str, Array]:
     """Compute the derivatives of zᵀ K_θ z − 2 u·J_v z: an array for each source of ``inputs``.
 
-    z is ``motion`` (nv,), u is ``direction`` (3,); both are constant. For z = K_θ⁻¹ J_vᵀ u the
-    derivatives are those of −uᵀ C_vv u.
+    The joint motion z is ``motion`` (nv,), u is ``direction`` (3,); both are constant. For z =
+    K_θ⁻¹ J_vᵀ u the derivatives are those of −uᵀ C_vv u.
     """
     pose, F, k = K.posture, K.tension, K.cable_stiffness
     laws = pose.arm._model.laws
@@ -191,11 +202,11 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
 
 
 def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
-    """Compute ∂/∂q (nv,) of −m·(ω_r × ω_l)/2, the bilinear form of the skew part of K_θ.
+    """Compute the derivatives with respect to q (nv,) of −m·(ω_r × ω_l)/2.
 
-    K_θ has a skew part if the load has a moment m. ω_l and ω_r are the angular velocities of the
-    tip for the joint motions ``left`` and ``right``. Joint i turns the part of ω that comes from
-    joint i and the joints after it.
+    If the load has a moment m, K_θ has a skew part, and this is its bilinear form. ω_l and ω_r are
+    the angular velocities of the tip for the joint motions ``left`` and ``right``. A change of
+    joint angle i turns those parts of them that come from joint i and the joints after it.
     """
     turns, chain = K.posture.jacobian[3:], K.posture.arm._model.masses.tip_joints
     moment, found = K.wrench[3:], np.zeros(left.size)
@@ -210,7 +221,10 @@ def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
 
 
 def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, Array]:
-    """Compute the derivatives of the tip's coordinate along ``direction``: an array per source."""
+    """Compute the derivatives of the tip's coordinate along ``direction``.
+
+    The result has an array for each source of ``inputs``.
+    """
     pose, tree, masses = K.posture, K.posture.arm._model.tree, K.posture.arm._model.masses
     # a point that moves by δ in a frame of rotation R moves the tip by R δ
     along = direction @ rotations(pose)
@@ -224,9 +238,10 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
 
 
 def _stretched_slope(K: Stiffness, strain: Array) -> Array:
-    """Compute d(EA (1 + ε))/dF = EA′ (1 + ε) + 1 (C,) [-] at the tensions of K; ε is ``strain``.
+    """Compute the slope d(EA (1 + ε))/dF = EA′ (1 + ε) + 1 (C,) [-] at the tensions of K.
 
-    It is EA′ if ``original_length`` of the arm is not ``"unstrained"``.
+    EA (1 + ε) is the stiffness of a wire times its stretched length; ε is ``strain`` (C,). If
+    ``original_length`` of the arm is not ``"unstrained"``, ε counts as zero and the slope is EA′.
     """
     arm = K.posture.arm
     slope = np.zeros_like(strain)

@@ -27,7 +27,11 @@ from cdsm.uncertainties.inputs import inputs_of
 
 
 class Ties(NamedTuple):
-    """Correspondence between the inputs of an arm and the inputs of its arm of blocks."""
+    """Correspondence between the inputs of an arm and of its equivalent arm of blocks.
+
+    In that arm each block is a cable of its own. A block is a piece of a cable between two holes in
+    which the cable sticks.
+    """
 
     labels: Mapping[str, Sequence[str]]  # names of the inputs of the arm, by source
     tension: Array  # tensions of the cables of the arm (C,) [N]
@@ -35,14 +39,21 @@ class Ties(NamedTuple):
     inputs: Mapping[str, Indices]
 
     def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
-        """Convert derivatives by inputs of the arm of blocks to derivatives by the arm's inputs."""
+        """Convert derivatives with respect to inputs of the arm of blocks to those of the arm.
+
+        Inputs of the arm of blocks that are one input of the arm add up. Both mappings have an
+        array for each source of uncertainty, such as ``hole_radius``.
+        """
         found = {source: np.zeros(len(names)) for source, names in self.labels.items()}
         for source, at in self.inputs.items():
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
         return found
 
     def scatter(self, errors: Mapping[str, Array]) -> dict[str, Array]:
-        """Convert errors (N, inputs) of the arm's inputs to errors of the arm of blocks."""
+        """Convert errors (N, inputs) of the arm's inputs to errors of the arm of blocks.
+
+        Both mappings have an array for each source of uncertainty, such as ``hole_radius``.
+        """
         found = {}
         for source, drawn in errors.items():
             at = self.inputs[source]
@@ -51,9 +62,10 @@ class Ties(NamedTuple):
 
 
 def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
-    """Return the arm of blocks at a posture, the tensions of its blocks [N], and its :class:`Ties`.
+    """Build the arm of blocks at a posture: a block is a piece of cable between sticking holes.
 
-    ``tension`` is F (C,) [N] of the cables of the arm.
+    ``tension`` is F (C,) [N] of the cables of the arm. Returns the posture of the arm of blocks,
+    the tensions of its blocks [N], and the :class:`Ties` between the two arms.
     """
     arm, chains = pose.arm, pose.segments.chains
     sticks = holding(pose)
@@ -95,10 +107,11 @@ def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
 def _matching_inputs(
     arm: Manipulator, stuck: Manipulator, names: Mapping[str, str], behind: Sequence[bool]
 ) -> dict[str, Indices]:
-    """Find the index of the arm's input for each input of the arm of blocks ``stuck``, by name.
+    """Find the index of the arm's input that belongs to each input of the arm of blocks.
 
-    ``names`` maps names of blocks and of their sites to names in the arm. ``behind`` marks the
-    blocks that begin at a sticking hole. They have no lead; its index is −1.
+    ``stuck`` is the arm of blocks. ``names`` maps names of blocks and of their sites to names in
+    the arm. ``behind`` marks the blocks that begin at a sticking hole. They have no lead, so they
+    get the index −1 there.
     """
     theirs, found = inputs_of(arm).labels, {}
     for source, labels in inputs_of(stuck).labels.items():

@@ -9,9 +9,9 @@ from cdsm.support.values import Array
 
 
 def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
-    """Write ``value ± uncertainty``, both given in SI, in a unit that is ``size`` in SI.
+    """Write ``value ± uncertainty``, given in SI, in a unit of the given ``size`` in SI.
 
-    The uncertainty has two digits.
+    The uncertainty has two digits; the unit is not written.
     """
     u, places = uncertainty / size, 4
     if 0.0 < u < math.inf:
@@ -32,6 +32,9 @@ _SHOWN = {
 
 
 def shown(source: str, standards: Array) -> str:
-    """Write the range of standard uncertainties ``standards`` (n,) in the unit of ``source``."""
+    """Write the standard uncertainties (n,) of a source of uncertainty as text: "0.1 to 0.2 mm".
+
+    ``standards`` are in SI. The text has the unit shown to the user.
+    """
     size, unit = _SHOWN.get(source, (1e-3, " mm"))
     return span(standards / size, "{:.3g}".format) + unit

@@ -33,15 +33,16 @@ Wire = Elasticity | str | float | os.PathLike[str]
 
 
 def as_wire(wire: Wire) -> Elasticity:
-    """Return the law of a wire.
+    """Return the law EA(F) of a wire that is given in one of several ways.
 
     Args:
         wire: A law, a name of :data:`WIRES`, a constant rigidity EA [N], or the path of a TOML file
-            that :func:`~cdsm.write_elasticity` writes.
+            as :func:`~cdsm.write_elasticity` writes it.
 
     Raises:
         UnknownName: No wire has this name.
-        InvalidInput: The rigidity is not a positive number of :data:`RANGES`.
+        InvalidInput: ``wire`` is of another type, or its rigidity is outside its range in
+            :data:`RANGES`.
         FileError: The file cannot be read or does not describe an elasticity.
     """
     if isinstance(wire, Elasticity):
@@ -58,7 +59,7 @@ def as_wire(wire: Wire) -> Elasticity:
 
 
 def name_of(law: Elasticity) -> str | None:
-    """Return the name of a law in :data:`WIRES`, or None."""
+    """Return the name under which :data:`WIRES` has a law, or None if it does not have it."""
     return next((name for name, known in WIRES.items() if known == law), None)
 
 
@@ -80,7 +81,11 @@ def label(law: Elasticity) -> str:
 
 
 def wires_text(cables: Iterable[Cable]) -> str:
-    """Return a text with the wires of cables, the springs in series, and how many have each."""
+    """Describe the wires of cables and the springs in series with them, as text.
+
+    If there are two or three kinds, the text says how many cables have each; more kinds are only
+    counted.
+    """
     counts = Counter(
         label(cable.elasticity)
         + (

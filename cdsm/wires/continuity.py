@@ -1,4 +1,4 @@
-"""Search for discontinuities of a user-defined law. K_θ needs a continuous EA(F)."""
+"""Search for discontinuities of a user-defined law, since K_θ needs a continuous EA(F)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _JUMP = 1e-4  # share of EA: a smaller step counts as rounding of the law
 
 
 class Jump(NamedTuple):
-    """Discontinuity of EA."""
+    """Discontinuity of the rigidity EA(F) of a law."""
 
     tension: float  # at which it is [N]
     below: float  # EA just below this tension [N]
@@ -29,7 +29,7 @@ def find_jump(law: Elasticity) -> Jump | None:
     EA is sampled at 257 tensions. Each interval is then halved, and the half with the larger change
     of EA is kept, until the change is below 1e-4 of EA or the interval is as narrow as rounding. A
     discontinuity much smaller than the change of EA over an interval may be missed. If the law
-    raises an error, return None, because its first use reports the error.
+    raises an error, the result is None: the first use of the law will report that error.
     """
     if isinstance(law, SlackBelow):
         law = law.law

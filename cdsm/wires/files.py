@@ -54,7 +54,10 @@ _KINDS: dict[str, tuple[type[Elasticity], type[_Linear | _Strand | _Tabulated]]]
 
 
 def table_of(elasticity: Elasticity) -> list[str]:
-    """Return the lines of the TOML table of an elasticity; InvalidInput for an unknown kind."""
+    """Return the lines of a TOML table that describes an elasticity.
+
+    Raises InvalidInput if it is not a linear, strand or tabulated one.
+    """
     if isinstance(elasticity, SlackBelow):
         return [*table_of(elasticity.law), "slack_below = true"]
     for law, entry in _KINDS.values():

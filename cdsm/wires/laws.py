@@ -112,7 +112,7 @@ class StrandElasticity(Elasticity):
         return Domain(self.low, self.high, low_included=False)
 
     def polynomial(self, tension: ArrayLike) -> Array:
-        """Evaluate the polynomials [N] at F of any shape, even beyond the domain.
+        """Evaluate the polynomials EA(F) [N] at F of any shape, even beyond the domain.
 
         Raises InvalidInput if ``tension`` is not finite numbers.
         """
@@ -166,7 +166,7 @@ class StrandElasticity(Elasticity):
 
     @cached_property
     def panels(self) -> Panels:
-        """Panels for the numerical integration of the strain."""
+        """Panels (intervals of tension) for the numerical integration of strain and energy."""
         return panels(self.coefficients, (self.low, *self.joins, self.high))
 
     def _integral(self, tension: ArrayLike, power: int) -> Array:
@@ -188,10 +188,11 @@ class StrandElasticity(Elasticity):
 class TabulatedElasticity(Elasticity):
     """Strain as an increasing function of tension, through measured points of any wire.
 
-    Between two points, the chord has the slope c = Δε/ΔF, and the curve has dε/dF = c N/D²: a c at
-    the first point, b c at the second. N = b θ² + 2 θ θ' + a θ'² and D = θ² + (a + b) θ θ' + θ'²,
-    where θ rises with F from 0 to 1, and θ' = 1 − θ (Gregory and Delbourgo, IMA J. Numer. Anal. 2,
-    1982). Strain and its inverse are C1. EA = 1/(dε/dF) is continuous and positive.
+    Between two points, the chord has the slope c = Δε/ΔF, and the curve has the slope dε/dF =
+    c N/D², which is a c at the first point and b c at the second. N = b θ² + 2 θ θ' + a θ'² and
+    D = θ² + (a + b) θ θ' + θ'², where θ rises with F from 0 to 1, and θ' = 1 − θ (Gregory and
+    Delbourgo, IMA J. Numer. Anal. 2, 1982). Strain and its inverse are C1. EA = 1/(dε/dF) is
+    continuous and positive.
 
     The slopes at the points follow from ln EA of the chords. Each chord's ln EA is assigned to the
     middle of its strain, and interpolated to the strains of the points. From the last middle to an
@@ -204,7 +205,8 @@ class TabulatedElasticity(Elasticity):
     The error of EA in the last interval, from five or more exact points of a wire that stiffens
     (Eq. 19, power laws, exponential toes), is 2 % for even steps, 8 % for steps that grow up to
     twofold, 9 % for steps of 1, 2, 5, 10, … N, and 25 % or more for steps that grow faster. It is
-    up to 31 % if EA levels off between the last two points. Points do not show how EA rises at 0 N.
+    up to 31 % if EA levels off between the last two points. If the first point is at 0 N, the
+    points do not determine EA near 0 N.
 
     Attributes:
         tensions: Tensions F of the points [N], ascending from 0 or more.

@@ -1,9 +1,12 @@
 """Integrate Fⁿ dF/p(F) over piecewise polynomials p, to rounding, by a Gauss rule on panels.
 
+With p = EA, n = 0 gives the strain of a wire and n = 1 its energy. A panel is an interval of F.
+
 1/p is analytic except at the roots of p. For an interval, take the ellipse whose foci are the two
 ends and which passes through the nearest root. ρ is the sum of its half-axes, divided by the
 half-width of the interval. The error of a Gauss rule on the interval falls by ρ² per node. So the
-panels are chosen from the roots. On a part of a panel the rule is even more accurate.
+panels are chosen from the roots, with ρ of 6 or more where possible. On a part of a panel the rule
+is even more accurate.
 
 scipy's quad takes about 300 times as long (tests/benchmarks/test_equilibrium_speed.py). Bisection,
 until rules of 12 and 24 nodes agree, needs no roots. But near a root, the rounding of p keeps the
@@ -37,12 +40,19 @@ _NARROWEST = 4  # width of a panel in units in the last place; panels shrink tow
 
 
 def coefficient_table(rows: Sequence[Sequence[float]]) -> Array:
-    """Return coefficients as an array (powers, polynomials); each of ``rows`` is a polynomial."""
+    """Return the coefficients of several polynomials as one array (powers, polynomials).
+
+    Each of ``rows`` has the coefficients of a polynomial, lowest power first. Missing powers are
+    zero.
+    """
     return np.array(list(zip_longest(*rows, fillvalue=0.0)))
 
 
 def piecewise(joins: Array, table: Array, F: Array) -> Array:
-    """Evaluate piecewise polynomials at F of any shape; column i of ``table`` ends at join i."""
+    """Evaluate a piecewise polynomial at F of any shape.
+
+    Column i of ``table`` (powers, polynomials) is the polynomial up to join i, lowest power first.
+    """
     return np.asarray(_polynomials(joins, table, F.ravel()).reshape(F.shape))
 
 
@@ -66,7 +76,8 @@ def _horner(table: Array, column: int, F: float) -> float:
 def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) -> Array:
     """Integrate Fⁿ dF/p(F), n = ``power``, from the low end of the panels to each F (N,).
 
-    ``edges``, ``table`` (its ``coefficients``) and ``before`` are fields of :class:`Panels`.
+    ``edges``, ``table`` and ``before`` are the fields ``edges``, ``coefficients`` and ``before`` of
+    :class:`Panels`.
     """
     result = np.empty(F.shape[0])
     for i in range(F.shape[0]):
@@ -82,7 +93,10 @@ def _integrals(edges: Array, table: Array, before: Array, power: int, F: Array) 
 
 
 class Panels(NamedTuple):
-    """Panels from the low end of a law up to :attr:`end`; made by :func:`panels`."""
+    """Intervals (panels) of tension on which a Gauss rule integrates; made by :func:`panels`.
+
+    They reach from the low end of a law to its high end, or to :attr:`end`.
+    """
 
     edges: Array  # tensions at which the panels begin and end (P+1,) [N]
     coefficients: Array  # of the polynomial on each panel, lowest power first, (powers, P)
@@ -91,7 +105,11 @@ class Panels(NamedTuple):
 
     @property
     def pieces(self) -> tuple[Array, Array]:
-        """Edges (3, P) and coefficients (powers, P) of the panels, as kernels need them."""
+        """Edges (3, P) and coefficients (powers, P) of the panels, as kernels need them.
+
+        The rows of the edges are the low and the high end of each panel [N], and the strain at its
+        low end [-].
+        """
         return np.array([self.edges[:-1], self.edges[1:], self.before[0]]), self.coefficients
 
     def integral(self, F: Array, power: int) -> Array:
@@ -104,9 +122,9 @@ class Panels(NamedTuple):
 
 
 def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
-    """Return panels on which a Gauss rule integrates Fⁿ dF/p to rounding, for polynomials p.
+    """Return panels on which a Gauss rule integrates Fⁿ dF/p(F) to rounding, for polynomials p.
 
-    ``rows`` are the coefficients of each p, lowest power first. The range of polynomial i is from
+    ``rows`` are the coefficients of each p, lowest power first. Polynomial i is valid from
     ``edges[i]`` to ``edges[i + 1]`` [N]. The panels end where p is no longer positive.
     """
     ends: list[float] = [edges[0]]
@@ -127,9 +145,10 @@ def panels(rows: Sequence[Sequence[float]], edges: Sequence[float]) -> Panels:
 
 
 def _significant(row: Sequence[float], high: float) -> list[float]:
-    """Return a polynomial without the highest powers whose terms are negligible up to ``high``.
+    """Return the coefficients of a polynomial without negligible highest powers.
 
-    These terms would cause roots that overflow.
+    A term is negligible if it is below 1e-30 of the largest one at F = ``high``. Such terms would
+    cause roots that overflow.
     """
     sizes = abs(np.array(row)) * high ** np.arange(len(row))
     last = np.flatnonzero(sizes > _NEGLIGIBLE * sizes.max()).max(initial=0)
@@ -137,7 +156,7 @@ def _significant(row: Sequence[float], high: float) -> list[float]:
 
 
 def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[float]:
-    """Return the upper ends of the panels from ``low`` to ``high``, chosen by the roots of p."""
+    """Choose panels from ``low`` to ``high`` by the ``roots`` of p; return their upper ends."""
     narrowest = _NARROWEST * np.spacing(high)
     ends: list[float] = []
     intervals = [(low, high)] if low < high else []
@@ -153,7 +172,7 @@ def _panel_ends(roots: NDArray[np.complex128], low: float, high: float) -> list[
 
 
 def _end_of_positive(p: Polynomial, low: float, high: float) -> float:
-    """Return the first F from low to high with p(F) below its rounding error; inf if none."""
+    """Return the first F in [low, high] where p(F) is not above its rounding error; inf if none."""
     rounding = Polynomial(_ROUNDING * abs(p.coef))  # high and low are not negative
     turns = np.sort(p.deriv().roots().real)
     before = low

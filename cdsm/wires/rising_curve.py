@@ -1,4 +1,4 @@
-"""Increasing C1 curve through points. The slopes of the nearby chords bound its slope.
+"""Increasing C1 curve through points; its slope stays near those of the nearby chords.
 
 Between two points, the curve is the rational quadratic of Gregory and Delbourgo (IMA J. Numer.
 Anal. 2, 1982):
@@ -13,8 +13,9 @@ For a wire, x is the tension, y the strain, and EA = 1/y'.
 
 scipy's monotone interpolators bound y' from above, but EA needs a bound from below. With points of
 Eq. 19 at 2.3, 5, 10, 20, 50, … N the median error of EA is 0.51 % for this curve, 0.77 % for PCHIP
-and 0.58 % for Akima. Next to the low end, where the wire is soft, it is 134, 209 and 185 %. For
-uneven steps EA is up to 1.02 times the EA of the chords nearby, with PCHIP 2.0 times.
+and 0.58 % for Akima. At 2.34 N, next to the low end, where the wire is soft, the error is 134, 210
+and 185 %. For uneven steps EA is up to 1.02 times the EA of the chords nearby, with PCHIP 2.0
+times.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ _NODES, _WEIGHTS = (leggauss(24)[0] + 1.0) / 2.0, leggauss(24)[1] / 2.0
 
 
 class RisingCurve:
-    """Curve through n points with ascending x and y (n,), in n − 1 pieces.
+    """Increasing C1 curve through n points with ascending x and y (n,), in n − 1 pieces.
 
-    A point belongs to the piece below it. ``chords`` are the slopes (n − 1,) of the straight lines
-    between neighbouring points.
+    At a point, the piece below it is evaluated. ``chords`` are the slopes (n − 1,) of the straight
+    lines between neighbouring points.
     """
 
     def __init__(self, x: Array, y: Array) -> None:
@@ -52,37 +53,41 @@ class RisingCurve:
         return np.asarray(self._y[k] + self._rise[k] * (t * (t + a * u) / D))
 
     def slope(self, x: Array) -> Array:
-        """Compute the derivative y' > 0, same shape as x."""
+        """Compute the derivative y' at x, which is positive; same shape as x."""
         k, t, u, a, b, D = self._locate(x)
         return np.asarray(self.chords[k] * (b * t * t + 2.0 * t * u + a * u * u) / D**2)
 
     def second_derivative(self, x: Array) -> Array:
-        """Compute the second derivative y'', same shape as x. It is discontinuous at the points."""
+        """Compute the second derivative y'' at x, same shape. It is discontinuous at the points."""
         k, t, u, a, b, D = self._locate(x)
         N = b * t * t + 2.0 * t * u + a * u * u
         dN, dD = 2.0 * ((b - 1.0) * t + (1.0 - a) * u), (a + b - 2.0) * (u - t)
         return np.asarray(self.chords[k] / self._widths[k] * (dN * D - 2.0 * N * dD) / D**3)
 
     def moment(self, x: Array) -> Array:
-        """Integrate x dy from the first point, exact to rounding; same shape as x."""
+        """Compute ∫ x dy from the first point to x, exact to rounding; same shape as x."""
         k = self._piece(x)
         return np.asarray(self._moments[k] + self._moment(k, x))
 
     @property
     def pieces(self) -> tuple[Array, Array]:
-        """Edges (3, n − 1) and coefficients (4, n − 1) of the pieces, as kernels need them."""
+        """Edges (3, n − 1) and coefficients (4, n − 1) of the pieces, as kernels need them.
+
+        The rows of the edges are the x of both ends and y at the lower one; those of the
+        coefficients c, Δy, a and b of the module's docstring.
+        """
         edges = np.array([self._x[:-1], self._x[1:], self._y[:-1]])
         return edges, np.array([self.chords, self._rise, *self._ends])
 
     @cached_property
     def _ends(self) -> Array:
-        """Slopes a and b (2, n − 1) at both ends of each piece, divided by the chord's slope."""
+        """Slopes a and b (2, n − 1) at both ends of each piece, divided by that of its chord."""
         slopes = slopes_at_points(self.chords, self._rise)
         return np.array([slopes[:-1], slopes[1:]]) / self.chords
 
     @cached_property
     def _moments(self) -> Array:
-        """Integrals ∫ x dy up to the beginning of each piece (n − 1,)."""
+        """Integral ∫ x dy from the first point to the lower end of each piece (n − 1,)."""
         whole = self._moment(np.arange(len(self._rise)), self._x[1:])
         return np.cumsum(whole) - whole
 
@@ -95,7 +100,10 @@ class RisingCurve:
         return np.searchsorted(self._x[1:-1], x)
 
     def _locate(self, x: Array) -> tuple[NDArray[np.intp], Array, Array, Array, Array, Array]:
-        """Return the index of the piece at x, and its θ, θ', a, b and D, defined in the module."""
+        """Return the index of the piece in which each x is, with θ, θ', a, b and D there.
+
+        The docstring of the module defines these symbols.
+        """
         k = self._piece(x)
         t, u = (x - self._x[k]) / self._widths[k], (self._x[k + 1] - x) / self._widths[k]
         a, b = self._ends[:, k]
@@ -103,12 +111,13 @@ class RisingCurve:
 
 
 def slopes_at_points(chords: Array, rise: Array) -> Array:
-    """Compute the slopes (n,) at n points from the slopes and rises Δy (n − 1,) of the chords.
+    """Compute the slopes (n,) of a curve at n points from the slopes (n − 1,) of its chords.
 
-    The logarithm of a chord's slope is assigned to the middle of its y, as in
-    :class:`~cdsm.TabulatedElasticity`. At an inner point, the logarithm is the mean of two
-    parabolas through three chords each, limited to the range of the two neighbouring chords. At an
-    end it follows one parabola, and its change from the last chord is limited.
+    ``rise`` (n − 1,) is Δy of each chord. The logarithm of a chord's slope is assigned to the
+    middle of its y, as in :class:`~cdsm.TabulatedElasticity`. At an inner point, the logarithm is
+    the mean of two parabolas through three chords each, limited to the range of the two
+    neighbouring chords. At an end it follows one parabola, and its change from the last chord is
+    limited.
     """
     if len(chords) == 1:
         return np.repeat(chords, 2)

@@ -1,4 +1,4 @@
-"""Build B-splines of log EA as a function of the tensions of a test."""
+"""Build B-splines for log EA as a function of the tension, for the fit of a tensile test."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ class Basis(NamedTuple):
     def of(cls, points: Points, noise: float) -> Basis:
         """Build splines from F_0, 3 ``noise`` [N] below the first force, to the largest force.
 
-        The knots are equally spaced in the mean of log(F − F_0 + corner) and F, each scaled to 0…1.
-        The corner is a small force well above the noise. Up to it, knots are nearly equally spaced
-        in F; far above it, they become wider.
+        F_0 is not below zero. The knots are equally spaced in the mean of log(F − F_0 + corner) and
+        F, each scaled to 0…1. The corner is F_0, but at least 8 times the noise and 0.5 % of the
+        largest force. From F_0 up to F_0 + corner, the knots are nearly equally spaced in F; far
+        above, they are wider apart.
         """
         low, high = max(float(points.force[0]) - 3.0 * noise, 0.0), float(points.force.max())
         corner = max(low, 8.0 * noise, 5e-3 * high)

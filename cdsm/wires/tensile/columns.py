@@ -1,4 +1,4 @@
-"""Find the columns of a tensile test in a testing machine's table, in several languages."""
+"""Find the columns of displacement and force in a testing machine's table, in nine languages."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _FIRST_LINES = 50  # lines among which the header stands
 
 
 class Column(NamedTuple):
-    """Column of a table: its index, its name and unit in the header, and what it measures."""
+    """Column of a table: index, name and unit from the header, and the kind of its quantity."""
 
     at: int
     name: str
@@ -66,7 +66,7 @@ class Column(NamedTuple):
 
 
 class Header(NamedTuple):
-    """Header of a table."""
+    """Header of a table: its line number, its columns, and the first row of data below it."""
 
     line: int  # number in the file
     columns: list[Column]
@@ -79,8 +79,8 @@ class Header(NamedTuple):
 def find_header(table: Table, wanted: Sequence[str | int] | None) -> tuple[Header, Column, Column]:
     """Find the header of a table, and its columns of displacement (or strain) and force.
 
-    ``wanted`` are the names or numbers of these two columns; None: the words of the header decide.
-    If several of the first 50 lines name both, the one above the most rows of numbers is the
+    ``wanted`` are the names or numbers of these two columns; None: known words in the header name
+    them. If several of the first 50 lines name both, the one above the most rows of numbers is the
     header, since some machines write a table of results above the points. Raises TensileTestError
     if no header names both, or the header names one of them twice.
     """
@@ -120,13 +120,13 @@ def _is_data(table: Table, k: int) -> bool:
 
 
 def _rows_of_data(table: Table, first: int) -> int:
-    """Count the rows of numbers from row ``first`` of a table to the first other row."""
+    """Count the consecutive rows of numbers that begin at row ``first`` of a table."""
     rows = range(first, len(table.rows))
     return next((k for k in rows if not _is_data(table, k)), len(table.rows)) - first
 
 
 def _header(table: Table, k: int) -> Header:
-    """Read row k of a table as a header; the row below it may have the units."""
+    """Read row k of a table as a header; the row below may have the units of the columns."""
     below = table.rows[k + 1][1] if k + 1 < len(table.rows) else []
     units = [cell.strip("[]() ") for cell in below]
     has_units = not _KNOWN.isdisjoint(units)
@@ -139,7 +139,7 @@ def _header(table: Table, k: int) -> Header:
 
 
 def _numbered(table: Table) -> Header:
-    """Return a header that numbers the columns, for a table without names."""
+    """Return a header with the names "column 1", "column 2", … for columns chosen by number."""
     first = next((k for k in range(len(table.rows)) if _is_data(table, k)), 0)
     line, cells = table.rows[first]
     columns = [Column(at, f"column {at + 1}", None, None) for at in range(len(cells))]
@@ -147,9 +147,9 @@ def _numbered(table: Table) -> Header:
 
 
 def _column(at: int, cell: str, below: str) -> Column:
-    """Read cell ``at`` of a header: name, unit and kind of its column.
+    """Read cell number ``at`` of a header: name, unit and kind of its column.
 
-    The unit stands in brackets, or as the last word of the cell, or in the next row: ``below``.
+    The unit is in brackets, or is the last word of the cell, or is in the cell below: ``below``.
     """
     groups = [each.strip() for each in re.findall(r"[\[(]([^\])]*)[\])]", cell)]
     name = re.sub(r"\s*[\[(][^\])]*[\])]", "", cell).strip()
@@ -168,7 +168,10 @@ def _column(at: int, cell: str, below: str) -> Column:
 
 
 def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list[Column]]:
-    """Return two lists: columns that may be the displacement, and that may be the force."""
+    """Return the columns that may be the displacement, and those that may be the force.
+
+    They are those that ``wanted`` names, or if None, those named by known words.
+    """
     if wanted is not None:
         return [_wanted(header, name, kind) for name, kind in zip(wanted, _BOTH, strict=True)]
 
@@ -180,7 +183,10 @@ def _candidates(header: Header, wanted: Sequence[str | int] | None) -> list[list
 
 
 def _wanted(header: Header, name: str | int, kind: str) -> list[Column]:
-    """Return the columns that have this name, or this number from 1 on, with their kind set."""
+    """Return the columns with the given name, or number from 1 on, and set their ``kind``.
+
+    A column of displacement becomes one of strain if its unit is one of strains.
+    """
     if str(name).isdigit():
         found = [column for column in header.columns if column.at == int(name) - 1]
     else:

@@ -53,7 +53,9 @@ class Stage:
 @final
 @dataclass(frozen=True, eq=False)
 class Band(ReadOnlyState):
-    """Confidence band: it contains EA at each tension with 95 %, given the scatter of the points.
+    """95 % confidence band of EA(F), from the scatter of the points of a test.
+
+    At each tension it contains EA with a probability of 95 %.
 
     The band exp(m ± t s) belongs to a rougher curve than the fitted one: the bias of the rougher
     curve is far below its scatter. m is ln EA of the rougher curve, s the standard deviation of m
@@ -140,7 +142,7 @@ class TensileFit(ReadOnlyState):
 
         The standard uncertainty of EA(F) is half the width of the band of ln EA, divided by 1.96.
         The cables are assumed to be of one spool and share one error; ``of`` are their names, as
-        for :class:`~cdsm.Tolerance`. InvalidInput for a fit by polynomials, which has no band.
+        for :class:`~cdsm.Tolerance`. Raises InvalidInput for a fit by polynomials: it has no band.
         """
         if self.band is None:
             raise InvalidInput("method", "a fit by polynomials has no band; fit by 'monotone'.")
@@ -266,7 +268,7 @@ def _stages(
 
 
 def _as_law(curve: Curve, points: Points) -> TabulatedElasticity:
-    """Return a fitted curve as a law: a table of its strains over the range of the points."""
+    """Return a fitted curve as a table of strains, over the range of forces of the points."""
     grid = curve.basis.tensions
     # the ends follow from the fit: noise would shift the extreme forces
     first, last = curve.force(points.strain[[0, -1]])
@@ -288,6 +290,6 @@ def _band(tensions: Array, law: Elasticity, curve: Curve, points: Points) -> Ban
 
 
 def _grid(low: float, high: float, grid: Array) -> Array:
-    """Return ``low``, some tensions of ``grid``, and ``high`` (n,) [N]; about 200 in all."""
+    """Choose about 200 tensions (n,) [N]: ``low``, some of ``grid`` between, and ``high``."""
     inside = grid[(grid > low) & (grid < high)][5 :: len(grid) // _KNOTS]
     return np.array([low, *inside[:-1], high])

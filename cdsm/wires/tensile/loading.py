@@ -33,9 +33,9 @@ _MISTAKEN = (  # mistake, then factors that correct force, displacement and gaug
 
 @dataclass(frozen=True)
 class Points:
-    """Points of a test, each the average of one or more recorded points.
+    """Points of a test; each is the average of one or more recorded points.
 
-    Recorded points are averaged if their strains are equal, or if there are too many of them.
+    Recorded points are averaged if their strains are equal, or if there are more than 800 of them.
     """
 
     strain: Array  # rising (n,) [-]
@@ -47,7 +47,7 @@ class Points:
         return Points(self.strain[kept], self.force[kept], self.count[kept])
 
     def means(self, group: NDArray[np.intp]) -> Points:
-        """Return the mean point of each group; ``group`` (n,) has the group of each point."""
+        """Return the mean point of each group; ``group`` (n,) has each point's group."""
         count = np.asarray(np.bincount(group, self.count), np.float64)
         strain, force = (
             np.bincount(group, self.count * each) / count for each in (self.strain, self.force)
@@ -56,7 +56,11 @@ class Points:
 
 
 def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
-    """Return the points of a test to fit, their noise [N] (one σ), and notes on ignored points."""
+    """Select the points of a test to fit: those of loading, without outliers and slack.
+
+    Returns the points, the standard deviation of the noise of their forces [N], and notes on the
+    points that are left out. Raises TensileTestError if they cannot be fitted.
+    """
     notes: list[str] = []
     _require(test.force.size, "points are given")
     outlier = _outliers(test.force)
@@ -119,7 +123,7 @@ def loading(test: TensileTest) -> tuple[Points, float, tuple[str, ...]]:
 def _outliers(values: Array) -> NDArray[np.bool_]:
     """Return for each of n values whether it is an outlier: alone and far from its neighbours.
 
-    A real peak is not an outlier: the steps between the values before and after it are large, too.
+    A real peak is not an outlier: the values on either side of it change fast, too.
     """
     # extrapolate the missing neighbour at each end
     first, last = 2.0 * values[1] - values[2], 2.0 * values[-2] - values[-3]
@@ -134,7 +138,7 @@ def _outliers(values: Array) -> NDArray[np.bool_]:
 
 
 def local_noise(errors: Array) -> Array:
-    """Estimate the standard deviation (n,) of errors (n,) around each of them.
+    """Estimate the local standard deviation (n,) of n errors, from those nearby.
 
     It is at least the standard deviation of all errors.
     """
@@ -145,7 +149,7 @@ def local_noise(errors: Array) -> Array:
 
 
 def _slips(points: Points, gauge_length: float, least: float) -> list[str]:
-    """Return a note for each place where the force falls by more than ``least`` [N]."""
+    """Return a note for each slip of a grip: a fall of the force by more than ``least`` [N]."""
     highest = np.maximum.accumulate(points.force)
     fall = highest - points.force
     notes = []
@@ -164,7 +168,7 @@ def _slack(points: Points, noise: float, least: float) -> int:
     """Count the points at the beginning of the test at which the wire is slack.
 
     At these points the force does not rise significantly. ``noise`` is the standard deviation of a
-    force [N]; ``least`` [N] replaces it where it is smaller.
+    force [N]; it is assumed to be at least ``least`` [N].
     """
     slope, error = _trends(points, noise, least)
     flat = np.flatnonzero(slope <= _SURE * error)
@@ -179,10 +183,10 @@ def _slack(points: Points, noise: float, least: float) -> int:
 
 
 def _trends(points: Points, noise: float, least: float) -> tuple[Array, Array]:
-    """Fit a line to the first n points, for each n; return its slopes and their standard errors.
+    """Fit a line to the first n points, for each n; return the slopes and their standard errors.
 
     Both are in N per point. The error follows from the ``noise`` of a force [N], or from the
-    scatter of the n points if that is smaller; it is assumed to be at least ``least`` [N].
+    scatter of the n points if that is smaller, but at least from ``least`` [N].
     """
     w, x, y = points.count, np.arange(len(points.force)), points.force - points.force[0]
     total = np.cumsum(w)
@@ -227,9 +231,9 @@ def _check_rigidity(points: Points, gauge_length: float) -> None:
 
 
 def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
-    """Return a sentence on mistakes that explain an implausible rigidity [N] or strain ``reach``.
+    """Return a sentence that names mistakes of units or gauge length that explain the data.
 
-    They are mistakes in the units or in the gauge length.
+    The ``rigidity`` [N] or the span of the strain, ``reach`` [-], is implausible.
     """
     found = []
     low, high = _GAUGES
@@ -246,7 +250,10 @@ def _likely(rigidity: float, reach: float, gauge_length: float) -> str:
 
 
 def _is_loading(strain: Array) -> NDArray[np.bool_]:
-    """Return for each strain whether it is at least the largest earlier one, less its noise."""
+    """Return for each strain whether it is at least the largest one before, within the noise.
+
+    Other points belong to unloading and reloading.
+    """
     jitter = 4.0 * _MAD * float(np.median(abs(np.diff(strain, 2)))) / np.sqrt(6.0)
     jitter = min(jitter, 0.005 * float(np.ptp(strain)))
     kept: NDArray[np.bool_] = strain >= np.maximum.accumulate(strain) - jitter
@@ -254,7 +261,10 @@ def _is_loading(strain: Array) -> NDArray[np.bool_]:
 
 
 def _noise(points: Points) -> float:
-    """Estimate the noise of a force [N] from distances of points to lines between neighbours."""
+    """Estimate the noise of a force [N] (one σ) from the scatter about neighbouring points.
+
+    The error of a point is its distance from the line between its two neighbours.
+    """
     before, at, after = points.strain[:-2], points.strain[1:-1], points.strain[2:]
     share = (at - before) / (after - before)
     error = points.force[1:-1] - (1.0 - share) * points.force[:-2] - share * points.force[2:]

@@ -21,9 +21,10 @@ _FEWEST = 2 * _HALF + 2 * (_DEGREE + 1)  # points: twice as many slopes as coeff
 
 
 def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[str, ...]]:
-    """Fit two polynomials EA(F) that meet at ``join`` [N], or one, to measured slopes.
+    """Fit two polynomials EA(F) that meet at ``join`` [N] to measured slopes; if few points, one.
 
     Return the law on the longest range where EA > 0, and a note if this is not the whole range.
+    Raises TensileTestError if there are too few points, or EA > 0 on less than half of the range.
     """
     if len(points.force) < _FEWEST:
         raise TensileTestError(
@@ -55,8 +56,8 @@ def polynomials(points: Points, join: float) -> tuple[StrandElasticity, tuple[st
 def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[float, float]]:
     """Find the ranges of tension [N] where a piecewise polynomial is positive.
 
-    Each of ``rows`` has the coefficients of one polynomial, valid from one of ``edges`` [N] to the
-    next.
+    ``rows`` has the coefficients of each polynomial, lowest power first. Polynomial i is valid from
+    ``edges[i]`` to ``edges[i + 1]`` [N].
     """
     tensions = np.linspace(edges[0], edges[-1], 400)
     values = piecewise(np.array(edges[1:-1]), coefficient_table(rows), tensions)
@@ -79,7 +80,11 @@ def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[f
 
 
 def _joins_of(points: Points, join: float) -> tuple[float, ...]:
-    """Return (``join``,), or () if one side of it has too few points or too narrow a range."""
+    """Return (``join``,), or () if the points allow only one polynomial.
+
+    That is so if there are too few points below or above the join, or their range of forces is too
+    narrow.
+    """
     below = int(np.count_nonzero(points.force <= join))
     enough = 2 * (_DEGREE + 1)
     low, high = float(points.force.min()), float(points.force.max())
@@ -89,10 +94,11 @@ def _joins_of(points: Points, join: float) -> tuple[float, ...]:
 
 
 def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]:
-    """Fit one polynomial per range to slopes against force; return them, lowest power first.
+    """Fit polynomials EA(F) to measured slopes; return their coefficients, lowest power first.
 
-    Two ranges share the value v at the join. With y = F − join, the polynomials are v + Σ a_k yᵏ
-    and v + Σ b_k yᵏ: one linear least-squares problem in v, a and b.
+    There is one polynomial for each range between ``joins`` [N]. Two polynomials share the value v
+    at the join. With y = F − join, they are v + Σ a_k yᵏ and v + Σ b_k yᵏ: one linear least-squares
+    problem in v, a and b.
     """
     slopes, forces = _slopes(points)
     if not joins:
@@ -111,7 +117,10 @@ def _coefficients(points: Points, joins: tuple[float, ...]) -> list[list[float]]
 
 
 def _slopes(points: Points) -> tuple[Array, Array]:
-    """Fit a line through each point and its neighbours. Return slope dF/dε and mean force [N]."""
+    """Fit a line through each point and its three neighbours on either side.
+
+    Returns the slopes dF/dε [N] and the mean forces [N].
+    """
     window = 2 * _HALF + 1
     strain, force = (
         np.lib.stride_tricks.sliding_window_view(each, window)

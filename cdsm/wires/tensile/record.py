@@ -144,7 +144,10 @@ def read_tensile_csv(
 
 
 def _scale(column: Column, given: str | None) -> float:
-    """Return the factor that converts a column to SI, from its unit or the unit ``given``."""
+    """Return the factor that converts a column to SI, from its own unit or the unit ``given``.
+
+    Raises TensileTestError if there is no unit, it is not known, or the two differ.
+    """
     kind = column.kind or ""
     known, keyword = UNITS[kind], "force_unit" if kind == "force" else "displacement_unit"
     for each in (column.unit, given):
@@ -205,6 +208,6 @@ def _gauge_length(table: Table, header: Header, given: float | None) -> float | 
 
 
 def _length(table: Table, text: str) -> float:
-    """Return the number of a gauge length; NaN if the marks of the table leave it unclear."""
+    """Read the number of a gauge length; NaN if it is not clear which mark is the decimal one."""
     found = set(readings(text, table.marks) or readings(text, ",."))
     return found.pop() if len(found) == 1 else math.nan

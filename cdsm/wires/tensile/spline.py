@@ -1,8 +1,8 @@
 """Fit a smooth, positive rigidity EA(F) to noisy points of force against strain.
 
 log EA is a cubic B-spline in a coordinate that spreads small and large tensions. So EA > 0 and F(ε)
-is C1 for all data. The fit compares forces at the measured strains. Difference quotients would be
-mostly noise. The smoothing follows from the data by restricted likelihood.
+is C1 for all data. The fit compares forces at the measured strains, since difference quotients
+would be mostly noise. The smoothing follows from the data by restricted likelihood.
 
 On 12 tests of the strand (300 points from 5 to 600 N, noise of 1 N), EA is 1.7 % off (root mean
 square). The slope of scipy's ``make_smoothing_spline`` of force against strain is 2.0 % off with
@@ -37,14 +37,17 @@ def _running_integral(values: Array, tensions: Array, axis: int = -1) -> Array:
 
 
 def _neighbours(values: Array) -> Array:
-    """Sum values (n,) over the NEAR points around each point, itself included; reflect the ends."""
+    """Compute for each of n values the sum of the 41 values around it, itself included.
+
+    Beyond the ends the values are mirrored; fewer than 41 values are all summed.
+    """
     near = min(NEAR, len(values))
     padded = np.pad(values, (near // 2, near - 1 - near // 2), mode="reflect")
     return np.convolve(padded, np.ones(near), mode="valid")
 
 
 def _least_variance(points: Points) -> float:
-    """Compute the variance [N²] below which the forces of a test are taken as exact."""
+    """Compute the variance [N²] of a force below which the forces of a test count as exact."""
     return (1e-6 * float(np.ptp(points.force))) ** 2
 
 
@@ -66,9 +69,9 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class Curve:
-    """Fitted curve, given by log EA on a grid of tensions and by the strain at one of them.
+    """Fitted curve of force against strain: log EA on a grid of tensions, and one strain.
 
-    The tension with the given strain is the anchor. It is chosen where the wire is stiff: at a soft
+    The tension whose strain is given is the anchor. It is chosen where the wire is stiff: at a soft
     end, any change of EA would shift the rest of the curve, and the fit would converge slowly.
     """
 
@@ -85,7 +88,7 @@ class Curve:
 
     @cached_property
     def strain(self) -> Array:
-        """Strain ε (g,) [-] on the grid, counted from the same zero as the measured strain."""
+        """Strain ε (g,) [-] on the grid, with the same zero as the measured strain."""
         stretch = _running_integral(1.0 / self.rigidity, self.basis.tensions)
         return np.asarray(self.anchor_strain + stretch - stretch[self.anchor])
 
@@ -144,7 +147,7 @@ class Curve:
         return of(found.x)
 
     def spread(self, points: Points) -> Spread:
-        """Compute the uncertainty of the curve from its residuals at the points."""
+        """Compute the uncertainty of the curve from its residuals at the ``points``."""
         rows, error = self._linearised(points)
         inverse, leverage = self._inverse(rows)
         freedom = float(max(len(error) - leverage.sum(), 1.0))
@@ -162,10 +165,10 @@ class Curve:
     def interval(self, points: Points, probability: float) -> tuple[Array, Array]:
         """Compute a confidence interval of log EA at each tension of the grid: middle, half-width.
 
-        It contains log EA with a ``probability`` from 0 to 1. The most likely curve is smooth, so
-        it is biased where EA bends. The interval therefore belongs to a rougher curve, with
-        :data:`_ROUGHER` times less smoothing than the likelihood allows: its bias is far below its
-        scatter. Scatter and degrees of freedom are those of the neighbouring points.
+        It contains log EA with the given ``probability`` from 0 to 1. The most likely curve is
+        smooth, so it is biased where EA bends. The interval therefore belongs to a rougher curve,
+        with :data:`_ROUGHER` times less smoothing than the likelihood allows: its bias is far below
+        its scatter. Scatter and degrees of freedom are those of the neighbouring points.
         """
         loosest = self.loosest(points)
         rough = replace(loosest, smoothing=loosest.smoothing / _ROUGHER).refitted(points)
@@ -181,9 +184,9 @@ class Curve:
         return np.asarray(splines @ rough.coefficients), np.asarray(half)
 
     def _inverse(self, rows: Array) -> tuple[Array, Array]:
-        """Return N⁻¹ of the penalised normal matrix N (k + 1, k + 1), and the leverage of each row.
+        """Return N⁻¹ of the normal matrix N = rowsᵀ rows + penalty, and the leverage of each row.
 
-        N is rowsᵀ rows + penalty.
+        N is (k + 1, k + 1). ``rows`` (n, k + 1) are the weighted derivatives of the n forces.
         """
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
@@ -206,7 +209,7 @@ class Curve:
         return chosen
 
     def _likelihood(self, points: Points) -> float:
-        """Compute −2 log of the restricted likelihood (REML) of the smoothing, up to a constant.
+        """Compute −2 log of the restricted likelihood (REML) of the smoothing, plus a constant.
 
         The force is linearised in the coefficients and the anchor strain.
         """
@@ -229,16 +232,21 @@ class Curve:
         return np.pad(self.smoothing * self.basis.roughness, (0, 1))
 
     def _linearised(self, points: Points) -> tuple[Array, Array]:
-        """Return :meth:`jacobian` and the residuals of the force (n,) [N], both weighted.
+        """Return the weighted derivatives (n, k + 1) and residuals (n,) [N] of the n forces.
 
-        The weight of a point is √(number of recorded points that it averages).
+        The derivatives are those of :meth:`jacobian`. The weight of a point is √(number of recorded
+        points that it averages).
         """
         weight = np.sqrt(points.count)
         error = weight * (points.force - self.force(points.strain))
         return weight[:, None] * self.jacobian(points.strain), error
 
     def _factored(self, rows: Array) -> tuple[tuple[Array, bool], Array]:
-        """Return the Cholesky factor of N_ij/(s_i s_j), s = √diag N; N is rowsᵀ rows + penalty."""
+        """Return the Cholesky factor of the normal matrix N = rowsᵀ rows + penalty, scaled.
+
+        The factor is that of N_ij/(s_i s_j) with s = √diag N, the second result. ``rows`` (n, k +
+        1) are the weighted derivatives of the n forces.
+        """
         normal = rows.T @ rows + self._penalty
         # strain and log EA are orders apart
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
@@ -247,7 +255,10 @@ class Curve:
 
 
 def fit_curve(points: Points, noise: float) -> Curve:
-    """Fit a curve; restricted likelihood sets its smoothing (Fellner-Schall iteration)."""
+    """Fit a curve to points with ``noise`` [N] in their forces (one σ).
+
+    Restricted likelihood sets its smoothing (Fellner-Schall iteration).
+    """
     basis = Basis.of(points, noise)
     tensions, size = basis.tensions, basis.splines.shape[1]
     # start from secants so coarse that they are positive

@@ -1,4 +1,4 @@
-"""Find the end of pre-tensioning, the yield, and reasons to doubt a fit."""
+"""Find where a tensile test leaves pre-tensioning, where it yields, and reasons to doubt a fit."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ _STEP = 1.25  # ratio of tensions to compute the exponent; a smaller one takes n
 
 
 def yield_onset(tensions: Array, rigidity: Array, deviation: Array) -> float | None:
-    """Find the tension [N] from which EA stays below 0.8 of its largest value; None if uncertain.
+    """Find the tension [N] from which EA stays below 0.8 of its largest value: the yield.
 
-    The arguments are F (g,) [N], EA (g,) [N] and the standard deviation of log EA (g,) [-].
+    The arguments are F (g,) [N], EA (g,) [N] and the standard deviation of log EA (g,) [-]. The
+    result is None if EA does not fall so far beyond its uncertainty.
     """
     level = np.log(rigidity)
     # the plateau is where EA is certain: noise at an uncertain end must not count as plateau
@@ -38,7 +39,8 @@ def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float 
     """Find the tension [N] where pre-tensioning ends: beyond it, EA grows slower than √F.
 
     √F is midway from EA ∝ F to constant EA. None if EA nowhere grows faster than √F, beyond its
-    uncertainty. The arguments are those of :func:`yield_onset`.
+    uncertainty. The arguments are F (g,) [N], EA (g,) [N] and the standard deviation of log EA (g,)
+    [-].
     """
     level = np.log(rigidity)
     inner = (tensions > _STEP * tensions[0]) & (tensions < tensions[-1] / _STEP) & (tensions > 0)
@@ -58,7 +60,10 @@ def pretension_end(tensions: Array, rigidity: Array, deviation: Array) -> float 
 
 
 def refuse_jumps(curve: Curve, points: Points) -> None:
-    """Raise TensileTestError if EA is above ten times the slope of the steepest measured chord."""
+    """Raise TensileTestError if the force seems to jump, so that no smooth curve follows it.
+
+    It does if EA is above ten times the slope of the steepest chord between neighbouring points.
+    """
     first, last = curve.force(points.strain[[0, -1]])
     inside = (curve.basis.tensions >= first) & (curve.basis.tensions <= last)
     steepest = int(np.where(inside, curve.rigidity, 0.0).argmax())
@@ -72,7 +77,7 @@ def refuse_jumps(curve: Curve, points: Points) -> None:
 
 
 def doubts(points: Points, spread: Spread, gauge_length: float) -> tuple[str, ...]:
-    """Return one sentence for each reason to doubt the fit: a far point, correlated residuals."""
+    """Return a sentence for each reason to doubt a fit: a point far off, correlated residuals."""
     errors, reach = spread.errors, float(np.ptp(points.force))
     notes = []
     times = abs(errors) / np.maximum(local_noise(errors), _SEEN * reach)
