@@ -35,7 +35,7 @@ The remaining error is about ten times its square. The relative rounding of a te
 """
 
 
-class Chain(NamedTuple):
+class ChainSolution(NamedTuple):
     """State of all cables at a posture, after wire has slipped through holes.
 
     Each field has one value per segment (S,).
@@ -97,7 +97,7 @@ class ChainProblem:
 
     def settle(
         self, length: Array, natural: Array, ratio: Array, forced: Array, near: Array
-    ) -> Chain:
+    ) -> ChainSolution:
         """Compute the tensions and slips of all segments when their lengths become ``length``.
 
         ``length`` (S,) [m] are the new lengths, ``natural`` (S,) [m] the natural lengths before
@@ -135,7 +135,7 @@ class ChainProblem:
         if slack.any():  # the wire of a slack cable moves freely: it spreads evenly over segments
             surplus = np.add.reduceat(after, first) / np.add.reduceat(wire, first)
             after = np.where(slack, wire * surplus[self._cable], after)
-        return Chain(new, after, slip, slides, stretch, compliance)
+        return ChainSolution(new, after, slip, slides, stretch, compliance)
 
     def natural(self, length: Array, tension: Array) -> Array:
         """Compute the natural lengths (S,) [m] from lengths (S,) [m] and tensions (S,) [N]."""
@@ -144,7 +144,7 @@ class ChainProblem:
         return np.asarray(wire / (base + softness * tension))
 
     def tangent(
-        self, chain: Chain, forced: Array, gradient: Array, friction_gradient: Array
+        self, chain: ChainSolution, forced: Array, gradient: Array, friction_gradient: Array
     ) -> Array:
         """Compute ∂T/∂θ (S, nv) [N/rad] of the cables in the state ``chain``.
 

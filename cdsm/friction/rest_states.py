@@ -45,7 +45,7 @@ from cdsm.support.values import Array, frozen
 _CELLS = 8192  # number of tension intervals; within each, the strain is only known to increase
 
 
-class End(NamedTuple):
+class Maximum(NamedTuple):
     """Maximum of a linear program over the polyhedron."""
 
     value: float  # the solver's answer
@@ -106,7 +106,7 @@ class RestStates:
         self._pose, self._near, self._tip, self._tension = pose, near, far.tip, F
         self._bends = bends
 
-    def displacement(self, u: Array) -> End:
+    def displacement(self, u: Array) -> Maximum:
         """Compute the largest displacement [m] of the tip along a unit direction u (3,).
 
         ``value`` and ``reach`` of the result are those of the linear program. ``bound`` includes
@@ -114,7 +114,7 @@ class RestStates:
         """
         near, cost = self._near, np.zeros(self._program[-1].size)
         cost[: near.joints.size] = (u @ self._pose.jacobian[:3]) * near.joints
-        found = self._largest(cost)
+        found = self._maximum(cost)
         tip_joints = self._pose.arm._model.masses.tip_joints
         force = np.append(u, np.zeros(3))
         curved = single_load_stiffness(self._pose.jacobian, force, tip_joints)
@@ -127,7 +127,7 @@ class RestStates:
         for j in chosen:
             cost = np.zeros(self._program[-1].size)
             cost[self._near.joints.size + j] = 1.0
-            ends = np.array([-self._largest(-cost).bound, self._largest(cost).bound])
+            ends = np.array([-self._maximum(-cost).bound, self._maximum(cost).bound])
             bounds.append(self._tension[j] + self._near.tensions[j] * ends)
         return frozen(np.maximum(np.array(bounds), 0.0))
 
@@ -156,19 +156,19 @@ class RestStates:
             np.append(low, -bound),
             np.append(high, bound),
         )
-        return self._largest(np.append(np.zeros(low.size), 1.0), widened).bound
+        return self._maximum(np.append(np.zeros(low.size), 1.0), widened).bound
 
-    def _largest(self, cost: Array, program: tuple[Any, ...] | None = None) -> End:
+    def _maximum(self, cost: Array, program: tuple[Any, ...] | None = None) -> Maximum:
         """Maximise cost · x over the polyhedron, or under the constraints of ``program``."""
         scale = float(abs(cost).max())
         if scale == 0.0:
-            return End(0.0, 0.0, 0.0)
+            return Maximum(0.0, 0.0, 0.0)
         found, bound = proved_largest(cost / scale, *(program or self._program))
         if found.status != OPTIMAL:
             raise SolverError("highs", f"finds no state of rest: {found.message}")
         states = self._near.joints.size + self._near.tensions.size
         reach = float(abs(found.x[:states]).max())
-        return End(-scale * found.fun, scale * bound, reach)
+        return Maximum(-scale * found.fun, scale * bound, reach)
 
 
 def _locked(

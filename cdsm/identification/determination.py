@@ -47,19 +47,19 @@ class Determination:
         Two undetermined parameters have the correlation of their undetermined combinations: ±1 if
         there is only one such combination. A determined and an undetermined parameter have 0.
         """
-        firm = self.firm
-        matrix = np.where(np.outer(firm, firm), self.covariance, 0.0)
-        matrix = np.where(np.outer(~firm, ~firm), self._null_projector, matrix)
+        is_determined = self.is_determined
+        matrix = np.where(np.outer(is_determined, is_determined), self.covariance, 0.0)
+        matrix = np.where(np.outer(~is_determined, ~is_determined), self._null_projector, matrix)
         root = np.sqrt(np.diag(matrix))
         return frozen(np.clip(matrix / np.outer(root, root), -1.0, 1.0))
 
     @property
-    def firm(self) -> Any:
+    def is_determined(self) -> Any:
         """Whether each parameter alone is determined, boolean (P,)."""
         return np.diag(self._null_projector) == 0.0
 
     @property
-    def dependent(self) -> Any:
+    def to_fix(self) -> Any:
         """Indices of parameters whose values must be fixed so that all others are determined.
 
         There is one index for each undetermined combination.
@@ -85,7 +85,7 @@ class Determination:
         if not len(self._null):
             return []
         # easiest to read: one dependent parameter per combination
-        null = np.linalg.solve(self._null[:, self.dependent], self._null)
+        null = np.linalg.solve(self._null[:, self.to_fix], self._null)
         scale = np.where(np.isinf(self._column_norms), 1.0, self._column_norms)
         written = []
         for row in null:

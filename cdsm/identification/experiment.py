@@ -125,7 +125,7 @@ def plan_tests(
     with progress_allowed(progress):
         usable, rows, failures = _followed(model_of, values, candidates)
     whole = Determination(names, np.vstack([*rows, prior]), np.ones(len(names)))
-    settled = [name for name in chosen if whole.firm[names.index(name)]]
+    settled = [name for name in chosen if whole.is_determined[names.index(name)]]
     if not settled:
         raise InvalidInput(
             "wanted",

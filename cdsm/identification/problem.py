@@ -154,7 +154,7 @@ class Model:
                 rows.append((found - each.value) / each.std)
         return np.concatenate(rows)
 
-    def as_read(self, predicted: list[Array]) -> Array:
+    def with_offsets(self, predicted: list[Array]) -> Array:
         """Convert predictions of :meth:`predict` to numbers (n,) [N/m, m] as they would be read.
 
         The predictions of a loop get the fitted offset of each axis.

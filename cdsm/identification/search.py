@@ -283,14 +283,14 @@ def _result(
         values=frozen(np.array(list(values.values()))),
         bounds=frozen(problem.box.bounds),
         measurements=model.measurements,
-        predicted=frozen(model.as_read(predicted)),
+        predicted=frozen(model.with_offsets(predicted)),
         residuals=frozen(model.weigh(predicted)),
         jacobian=frozen(jacobian / problem.box.derivative(best)),
         arm=arm,
         warnings=(),
         profiles=(),
     )
-    follow = [j for j in range(best.size) if j not in result._determination.dependent]
+    follow = [j for j in range(best.size) if j not in result._determination.to_fix]
     profiles, starts = list[Profile | None](), list(ends)
     for i in track(range(best.size), "finding the confidence of the parameters"):
         profile = None

@@ -33,7 +33,7 @@ from cdsm.support.validation import NO_WRENCH, bound, instance, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, distribute_tension
 
-_NOWHERE: Final = 1e6
+_LARGEST_FACTOR: Final = 1e6
 """The search for a critical load doubles the load factor while it is below this number.
 
 If the arm is stable under all factors tried, the last of which is above half of it, the critical
@@ -132,10 +132,10 @@ def critical_load(
     stable = [0.0]
     if limit == "none":
         end = 1e-3
-        while end < _NOWHERE and failure_at(at, end) == "none":
+        while end < _LARGEST_FACTOR and failure_at(at, end) == "none":
             stable.append(end)
             end *= 2.0
-        if end < _NOWHERE:
+        if end < _LARGEST_FACTOR:
             # the doubling may have stepped over the first failure
             places = np.linspace(0.0, end, SAMPLES).tolist()
             first = next(i for i, place in enumerate(places) if failure_at(at, place) != "none")
@@ -145,7 +145,7 @@ def critical_load(
             limit = failure_at(at, beyond)
         else:
             factor = math.inf
-    K = at(min(factor, _NOWHERE / 2.0))
+    K = at(min(factor, _LARGEST_FACTOR / 2.0))
     factors = [each for each in stable if each < _SHOWN or math.isfinite(factor)]
     return CriticalLoad(
         posture=pose,

@@ -16,14 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.friction.chain_problem import Chain, ChainProblem
+from cdsm.friction.chain_problem import ChainProblem, ChainSolution
 from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.posture import Posture
 from cdsm.statics.locked_motors import ROUNDING, tilt_torque
 from cdsm.support.values import Array
 
 
-class Settled(NamedTuple):
+class FrictionalState(NamedTuple):
     """State of an arm at one posture, after the cables have slipped where friction did not hold.
 
     The tensions meet the law of friction at every hole, but need not balance the arm.
@@ -31,14 +31,14 @@ class Settled(NamedTuple):
     """
 
     pose: Posture
-    chain: Chain
+    chain: ChainSolution
     residual: Array  # r (nv,) [N m]
-    torque: Array  # r minus the torque of holding_back (nv,) [N m]
+    torque: Array  # r minus the torque of with_external_torque (nv,) [N m]
     rounding: Array  # rounding of r (nv,) [N m]
     stiffness: Array  # ∂r/∂q (nv, nv) [N m/rad]
     slope: Array  # ∂T/∂q (S, nv) [N/rad]
 
-    def holding_back(self, torque: Array | float) -> Settled:
+    def with_external_torque(self, torque: Array | float) -> FrictionalState:
         """Return this state with the attribute ``torque`` = r − the argument (nv,) [N m].
 
         A search for zero then finds r = the argument: the equilibrium of an arm on whose joints
@@ -56,7 +56,7 @@ class FrictionalArm(NamedTuple):
     wrench: Array  # W (6,): force [N], then moment [N m]
     forced: Array  # tension of force-controlled cables (C,) [N]; NaN: position-controlled
 
-    def moved(self, q: Array, near: Settled) -> Settled:
+    def moved(self, q: Array, near: FrictionalState) -> FrictionalState:
         """Compute the state at joint angles ``q`` (nv,) [rad].
 
         The search for the tensions starts from ``near``, the state at a posture close by. Raises
@@ -65,7 +65,7 @@ class FrictionalArm(NamedTuple):
         pose = near.pose.arm.at(q, check_limits=False)
         return self.at(pose, np.maximum(near.chain.tension + near.slope @ (q - near.pose.q), 0.0))
 
-    def settled(self, pose: Posture, near: Array) -> Chain:
+    def settled(self, pose: Posture, near: Array) -> ChainSolution:
         """Compute the tensions and slips of all segments at a posture.
 
         The search for the tensions starts at ``near`` (S,) [N].
@@ -78,7 +78,7 @@ class FrictionalArm(NamedTuple):
         torque = tension @ pose.segments.length_jacobian
         return np.asarray(torque + pose.gravity_torque - self.wrench @ pose.jacobian)
 
-    def at(self, pose: Posture, near: Array) -> Settled:
+    def at(self, pose: Posture, near: Array) -> FrictionalState:
         """Compute the state at a posture; the search for tensions starts at ``near`` (S,) [N]."""
         chain, segments = self.settled(pose, near), pose.segments
         holes, nv, T = segments.chains, pose.q.size, chain.tension
@@ -108,4 +108,4 @@ class FrictionalArm(NamedTuple):
         terms = (T + rounded) @ abs(J) + abs(self.wrench) @ abs(pose.jacobian)
         terms += abs(pose.gravity_torque) + abs(K) @ abs(pose.q)
         terms += tilt_torque(pose, T[segment[:-1, 0]])
-        return Settled(pose, chain, residual, residual, ROUNDING * terms, K, slope)
+        return FrictionalState(pose, chain, residual, residual, ROUNDING * terms, K, slope)

@@ -13,7 +13,7 @@ from cdsm.posture import Posture
 from cdsm.statics.load_history import LoadHistory
 from cdsm.statics.locked_motors import LoadedArm, stops
 from cdsm.statics.rest_search import require_between_stops
-from cdsm.statics.slow_loading import Load, Passage, SlowLoading, State
+from cdsm.statics.slow_loading import Load, SlowLoading, State, StepEnergies
 from cdsm.stiffness_matrix import checked_tension
 from cdsm.support.progress import track
 from cdsm.support.validation import WRENCH, number_array, scalar
@@ -172,7 +172,7 @@ def _labelled(
     wrench: Array,
     wrenches: Array,
     commands: Array,
-    history: Sequence[tuple[State, Passage]],
+    history: Sequence[tuple[State, StepEnergies]],
 ) -> LoadHistory:
     chains = pose.segments.chains
     states, passages = zip(*history, strict=True)

@@ -31,7 +31,7 @@ class Iterate(NamedTuple):
     """State of an arm at one posture, balanced or not, in the search for equilibrium."""
 
     K: Stiffness  # with the original lengths of the reference; its residual is r(q)
-    torque: Array  # r minus the torque of holding_back (nv,) [N m]
+    torque: Array  # r minus the torque of with_external_torque (nv,) [N m]
     rounding: Array  # rounding of r (nv,) [N m]
 
     @property
@@ -44,7 +44,7 @@ class Iterate(NamedTuple):
         """K_θ (nv, nv) [N m/rad]."""
         return self.K.joint
 
-    def holding_back(self, torque: Array | float) -> Iterate:
+    def with_external_torque(self, torque: Array | float) -> Iterate:
         """Return this state with the attribute ``torque`` = r − the argument (nv,) [N m].
 
         A search for zero then finds r = the argument: the equilibrium of an arm on whose joints

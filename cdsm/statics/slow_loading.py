@@ -27,7 +27,7 @@ from cdsm.errors import CdsmError
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.kernels.tree import Indices
 from cdsm.posture import Posture
-from cdsm.statics.frictional_arm import FrictionalArm, Settled
+from cdsm.statics.frictional_arm import FrictionalArm, FrictionalState
 from cdsm.statics.locked_motors import require_domains
 from cdsm.statics.rest_search import no_rest
 from cdsm.statics.trust_region import RestSearch, find_rest
@@ -61,7 +61,7 @@ class State(NamedTuple):
     """Equilibrium of an arm under a load. The natural lengths of its segments store the history."""
 
     load: Load
-    settled: Settled
+    settled: FrictionalState
     reaction: Array  # torque of the stops (nv,) [N m]
     motion: Array  # motion of the joints that led here (nv,) [rad]
 
@@ -71,7 +71,7 @@ class State(NamedTuple):
         return self.settled.pose
 
 
-class Passage(NamedTuple):
+class StepEnergies(NamedTuple):
     """Energies [J] and slips [m] of the step from one load to another."""
 
     load_work: float
@@ -85,9 +85,9 @@ class Passage(NamedTuple):
         """Work that is neither stored nor dissipated [J]."""
         return self.load_work + self.motor_work - self.stored - self.dissipated
 
-    def joined(self, other: Passage) -> Passage:
+    def joined(self, other: StepEnergies) -> StepEnergies:
         """Return the sum of this passage and ``other``, which follows it."""
-        return Passage(*map(operator.add, self, other))
+        return StepEnergies(*map(operator.add, self, other))
 
 
 class SlowLoading(NamedTuple):
@@ -117,7 +117,7 @@ class SlowLoading(NamedTuple):
         none = np.zeros(pose.q.size)
         return State(Load(wrench, settled.residual, motors), settled, none, none)
 
-    def carry(self, before: State, load: Load, what: str) -> tuple[State, Passage]:
+    def carry(self, before: State, load: Load, what: str) -> tuple[State, StepEnergies]:
         """Change the load of the equilibrium ``before`` to ``load`` in sub-steps.
 
         Returns the new equilibrium, and the energies and slips on the way. Raises EquilibriumError
@@ -125,7 +125,7 @@ class SlowLoading(NamedTuple):
         state is outside the domain of its law. The error texts call the step ``what``.
         """
         first, state = before.load, before
-        total = Passage(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
+        total = StepEnergies(0.0, 0.0, 0.0, 0.0, np.zeros(before.settled.chain.slip.size))
         reached, part, turnover = 0.0, 1.0, 0.0
         while reached < 1.0:
             goal = min(1.0, reached + part)
@@ -169,7 +169,7 @@ class SlowLoading(NamedTuple):
 
     def rest(
         self, before: State, load: Load, motion: Array | None = None
-    ) -> tuple[State | None, RestSearch[Settled]]:
+    ) -> tuple[State | None, RestSearch[FrictionalState]]:
         """Find the next equilibrium when the load changes from that of ``before`` to ``load``.
 
         Returns the equilibrium, None if the search fails, and the search. It starts at the angles
@@ -181,7 +181,7 @@ class SlowLoading(NamedTuple):
         arm = self.arm(natural, load.wrench, load.motors)
         start = None if motion is None else _guess(arm, old, motion, load.holding)
         if start is None:
-            start = arm.at(old.pose, old.chain.tension).holding_back(load.holding)
+            start = arm.at(old.pose, old.chain.tension).with_external_torque(load.holding)
             if before.motion @ start.torque < 0.0:  # goes on the same way: sliding holes slide on
                 start = _newton_step(arm, old, start, load.holding)
         search = find_rest(arm, start, load.holding)
@@ -190,7 +190,7 @@ class SlowLoading(NamedTuple):
         reaction = np.where(search.at_stop, search.state.torque, 0.0)
         return State(load, search.state, reaction, search.state.pose.q - old.pose.q), search
 
-    def _energies(self, start: State, middle: State, end: State) -> tuple[Passage, float]:
+    def _energies(self, start: State, middle: State, end: State) -> tuple[StepEnergies, float]:
         """Return energies and slips of a sub-step, and the rounding error of the balance [J].
 
         ``start``, ``middle`` and ``end`` are the equilibria of the sub-step. The balance is that of
@@ -203,7 +203,7 @@ class SlowLoading(NamedTuple):
         wire = [-np.add.reduceat(s.settled.chain.natural, first) for s in states]
         half, other = middle.settled.chain.slip, end.settled.chain.slip
         before, after = self._stored(start), self._stored(end)
-        passage = Passage(
+        passage = StepEnergies(
             load_work=_work(torque, [s.pose.q for s in states]),
             motor_work=_work([p[first] for p in P], wire),
             stored=after - before,
@@ -222,18 +222,24 @@ class SlowLoading(NamedTuple):
         return weight + self.problem.stored(chain.natural, chain.tension)
 
 
-def _guess(arm: FrictionalArm, old: Settled, motion: Array, holding: Array) -> Settled | None:
+def _guess(
+    arm: FrictionalArm, old: FrictionalState, motion: Array, holding: Array
+) -> FrictionalState | None:
     """Return the state after a joint ``motion`` (nv,) [rad] from ``old``; None if sites coincide.
 
     The motion ends at the stops. ``holding`` (nv,) [N m] is subtracted from the residual torque.
     """
     try:
-        return arm.moved(np.clip(old.pose.q + motion, *arm.stops), old).holding_back(holding)
+        return arm.moved(np.clip(old.pose.q + motion, *arm.stops), old).with_external_torque(
+            holding
+        )
     except CdsmError:
         return None
 
 
-def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Array) -> Settled:
+def _newton_step(
+    arm: FrictionalArm, old: FrictionalState, start: FrictionalState, holding: Array
+) -> FrictionalState:
     """Return the state after a Newton step from ``start``, with the tangent stiffness of ``old``.
 
     The step reduces the torque, from which ``holding`` (nv,) [N m] is subtracted; if it does not,
@@ -242,7 +248,9 @@ def _newton_step(arm: FrictionalArm, old: Settled, start: Settled, holding: Arra
     try:
         step = np.linalg.solve(old.stiffness, -start.torque)
         near = start._replace(slope=old.slope)
-        guess = arm.moved(np.clip(old.pose.q + step, *arm.stops), near).holding_back(holding)
+        guess = arm.moved(np.clip(old.pose.q + step, *arm.stops), near).with_external_torque(
+            holding
+        )
     except (CdsmError, np.linalg.LinAlgError):  # sites meet, or about to buckle
         return start
     return guess if np.linalg.norm(guess.torque) < np.linalg.norm(start.torque) else start

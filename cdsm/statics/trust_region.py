@@ -51,7 +51,7 @@ class Iterate(Protocol):
 
     @property
     def torque(self) -> Array:
-        """Residual torque r minus the torque of :meth:`holding_back` (nv,) [N m]."""
+        """Residual torque r minus the torque of :meth:`with_external_torque` (nv,) [N m]."""
 
     @property
     def rounding(self) -> Array:
@@ -61,7 +61,7 @@ class Iterate(Protocol):
     def stiffness(self) -> Array:
         """Derivative ∂r/∂q of the residual torque r (nv, nv) [N m/rad]."""
 
-    def holding_back(self, torque: Array | float) -> Self:
+    def with_external_torque(self, torque: Array | float) -> Self:
         """Return this state with the attribute ``torque`` = r − the argument (nv,) [N m].
 
         A search for zero then finds r = the argument: the equilibrium of an arm on whose joints
@@ -137,7 +137,7 @@ def find_rest(
     balanced: the stop gives the missing torque.
     """
     stops = loaded.stops
-    state, radius = start.holding_back(holding), _FIRST
+    state, radius = start.with_external_torque(holding), _FIRST
     free = _Free.of(state, *stops)
     history, convex = [free.imbalance], free.lowest > free.flat
     for iteration in range(_ATTEMPTS):
@@ -150,7 +150,7 @@ def find_rest(
             radius /= 4.0
             continue
         try:
-            trial = loaded.moved(q, state).holding_back(holding)
+            trial = loaded.moved(q, state).with_external_torque(holding)
             quality = work(state, trial) / expected
         except CdsmError:  # for example, two sites of a cable coincide
             quality = -math.inf

@@ -23,7 +23,7 @@ from cdsm.uncertainties.balanced import Balance, buckling_gradient
 from cdsm.uncertainties.drawn import DrawnArms, laws_at, margins
 from cdsm.uncertainties.inputs import Inputs, Places, inputs_of, rotations
 from cdsm.uncertainties.parts import Part, parts_of
-from cdsm.uncertainties.stuck import Ties
+from cdsm.uncertainties.stuck import InputMap
 
 Reading = Literal["along", "stuck", "margin", "tip", "tension", "critical_tension"]
 
@@ -49,7 +49,7 @@ class Question(ReadOnlyState):
     stiffness: Stiffness
     direction: Array | None = None
     cable: int | None = None
-    ties: Ties | None = None
+    ties: InputMap | None = None
 
     @property
     def labels(self) -> Mapping[str, Sequence[str]]:
@@ -118,7 +118,7 @@ class Question(ReadOnlyState):
         if self.of in ("along", "stuck"):
             assert self.direction is not None
             gradient = _along_gradient(K, inputs, self.direction, *self._along)
-            return gradient if self.ties is None else self.ties.gather(gradient)
+            return gradient if self.ties is None else self.ties.to_arm(gradient)
         if self.of == "tip":
             assert self.direction is not None
             return _tip_gradient(K, inputs, self.direction)
@@ -140,7 +140,7 @@ class Question(ReadOnlyState):
             ElasticityRangeError: A tension leaves the domain of its cable's law.
             InvalidInput: No tensions balance an arm, or it does not buckle (critical tension only).
         """
-        arms = DrawnArms(self.stiffness, self.ties.scatter(errors) if self.ties else errors)
+        arms = DrawnArms(self.stiffness, self.ties.to_blocks(errors) if self.ties else errors)
         if self.of == "tension":
             return np.asarray(arms.distributed()[:, self.cable])
         if self.of == "critical_tension":

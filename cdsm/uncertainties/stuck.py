@@ -26,7 +26,7 @@ from cdsm.support.values import Array
 from cdsm.uncertainties.inputs import inputs_of
 
 
-class Ties(NamedTuple):
+class InputMap(NamedTuple):
     """Correspondence between the inputs of an arm and of its equivalent arm of blocks.
 
     In that arm each block is a cable of its own. A block is a piece of a cable between two holes in
@@ -38,7 +38,7 @@ class Ties(NamedTuple):
     # index of the arm's input for each input of the arm of blocks; −1 if there is none
     inputs: Mapping[str, Indices]
 
-    def gather(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
+    def to_arm(self, gradient: Mapping[str, Array]) -> dict[str, Array]:
         """Convert derivatives with respect to inputs of the arm of blocks to those of the arm.
 
         Inputs of the arm of blocks that are one input of the arm add up. Both mappings have an
@@ -49,7 +49,7 @@ class Ties(NamedTuple):
             np.add.at(found[source], at[at >= 0], gradient[source][at >= 0])
         return found
 
-    def scatter(self, errors: Mapping[str, Array]) -> dict[str, Array]:
+    def to_blocks(self, errors: Mapping[str, Array]) -> dict[str, Array]:
         """Convert errors (N, inputs) of the arm's inputs to errors of the arm of blocks.
 
         Both mappings have an array for each source of uncertainty, such as ``hole_radius``.
@@ -61,11 +61,11 @@ class Ties(NamedTuple):
         return found
 
 
-def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
+def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, InputMap]:
     """Build the arm of blocks at a posture: a block is a piece of cable between sticking holes.
 
     ``tension`` is F (C,) [N] of the cables of the arm. Returns the posture of the arm of blocks,
-    the tensions of its blocks [N], and the :class:`Ties` between the two arms.
+    the tensions of its blocks [N], and the :class:`InputMap` between the two arms.
     """
     arm, chains = pose.arm, pose.segments.chains
     sticks = holding(pose)
@@ -100,7 +100,7 @@ def blocks_of(pose: Posture, tension: Array) -> tuple[Posture, Array, Ties]:
             blocks.append(block)
             own.append(c)
     stuck = arm.with_cables(blocks)
-    ties = Ties(inputs_of(arm).labels, tension, _matching_inputs(arm, stuck, names, behind))
+    ties = InputMap(inputs_of(arm).labels, tension, _matching_inputs(arm, stuck, names, behind))
     return stuck.at(pose.q, check_limits=False), tension[own], ties
 
 
