@@ -67,9 +67,9 @@ class StiffnessGradient(ReadOnlyState):
     def margin(self) -> Array:
         """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], with the unit eigenvector v of λ_min.
 
-        λ_min is the smallest eigenvalue of the symmetric part of K_θ. If it is a multiple
-        eigenvalue, it has no gradient. The result then belongs to one eigenvector v of it; its
-        product with ΔF is an upper bound of the change of λ_min, to first order.
+        λ_min is the smallest eigenvalue of the symmetric part of K_θ. A multiple eigenvalue has no
+        gradient. The result then belongs to one of its eigenvectors; the product with ΔF is an
+        upper bound of the change of λ_min, to first order.
         """
         v = self.stiffness.critical_direction[:, None]
         return frozen(self._projected(v, v)[:, 0, 0])

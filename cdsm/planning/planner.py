@@ -83,12 +83,12 @@ class Planner:
         return least if smaller else best
 
     def _within_range(self, u: Array, target: float) -> ConstraintValues:
-        """Return the point of least ‖F‖ with ``target`` [N/m] along u (3,): the second attempt.
+        """Return the point of least ‖F‖ with ``target`` [N/m] along u (3,), from a second attempt.
 
-        It is made if the searches from the usual starts fail. It finds the softest and the stiffest
-        arm, and searches from the points between them that hit the target. Raises
-        UnreachableStiffness if the target is outside the range of stiffness that searches find, or
-        if no search hits it.
+        The planner makes this attempt if the searches from the usual starts fail. It finds the
+        softest and the stiffest arm, and searches from the points between them that hit the target.
+        Raises UnreachableStiffness if the target is outside the range of stiffness that searches
+        find, or if no search hits it.
         """
         softest, stiffest = range_ends(self.model, u, _RANGE_STARTS, self.seed)
         low = 0.0 if softest.open else softest.value

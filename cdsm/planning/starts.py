@@ -19,7 +19,7 @@ _NO_GAIN = 1e-9  # a gain of reserve below this part of the scale of K_θ is not
 
 
 class StartPoints:
-    """Stable tensions in a bounded region, from which searches start.
+    """Tensions in a bounded region under which the arm is stable; searches start from them.
 
     The search for corners of the region goes in the directions of higher and of lower tension of
     each cable, and in ``directions`` random directions. Raises SingularStiffness if no stable
