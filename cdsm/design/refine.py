@@ -107,7 +107,7 @@ def refine_design(
 
 
 class _PostureNotHeld(Exception):
-    """SLSQP tries a design that does not hold all postures."""
+    """SLSQP has tried a design that does not hold all postures."""
 
 
 class _SmoothProblem:
