@@ -109,7 +109,7 @@ class Evaluation:
 
     @cached_property
     def reserve_gradient(self) -> Array:
-        """Derivatives of :attr:`reserve`, λ_min − floor, with respect to the tensions (C,) [m/rad²]."""
+        """Derivatives (C,) [m/rad²] of :attr:`reserve`, λ_min − floor, by the tensions."""
         return self.mode_gradient(self.eigenvectors[:, :1])
 
     def mode_gradient(self, v: Array) -> Array:
@@ -118,7 +118,7 @@ class Evaluation:
         return kernels.form_by_tension(*self.model.geometry, self.spring_slopes[0], v, v)[:, 0, 0]
 
     def reserve_hessian(self) -> Array:
-        """Return the second derivatives (C, C) [m/(N rad²)] of :attr:`reserve`, λ_min − floor, by F.
+        """Return the second derivatives (C, C) [m/(N rad²)] of :attr:`reserve` by the tensions.
 
         Entry cd is 2 Σ_j (vᵀ ∂_c K_θ v_j)(v_jᵀ ∂_d K_θ v)/(λ − λ_j) + δ_cd k″_c (J_c·v)². v is the
         eigenvector of the smallest eigenvalue λ, v_j are the other eigenvectors. ∂_c is ∂/∂F_c, J_c
@@ -178,7 +178,7 @@ class Constraints:
     single: tuple[Array, float] | None = None  # u (3,) and target [N/m] of one direction
 
     def at(self, evaluation: Evaluation) -> ConstraintValues:
-        """Return the constraint values c at the tensions of ``evaluation``; the arm must be stable."""
+        """Return the constraint values c at the tensions of ``evaluation``, which must be stable."""
         return ConstraintValues(self, evaluation)
 
 
