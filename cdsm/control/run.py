@@ -58,8 +58,8 @@ class TrackingRun(ReadOnlyState):
         angles: True joint angles (n, nv) [rad]; [m] for prismatic joints.
         estimated_angles: Angles that the controller estimated before each step (n, nv) [rad].
         tips: True tip positions (n, 3) [m].
-        wanted_tension: Tensions at the motors that the outer loop plans, or without it the plan
-            (n, C) [N].
+        wanted_tension: Tensions at the motors (n, C) [N] that the outer loop plans; without such a
+            loop, those of the plan.
         commanded_tension: Tensions that the motor commands give (n, C) [N], within the bounds.
         commanded_wire: Commanded wire to pay out (n, C) [m].
         measured_tension: Readings of the load cells before each step (n, C) [N].

@@ -104,9 +104,10 @@ class _Arm:
             self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter, 1)
 
     def _evaluated(self, loads: Array) -> tuple[Batch, NDArray[np.bool_]]:
-        """Evaluate the R pairs of posture and load; also return which are stable (R,).
+        """Compute tip, tensions, margin, compliance and lengths for R pairs of posture and load.
 
-        ``loads`` (R, 6) [N, N m] replaces the loads of the problem.
+        Also return which pairs are stable (R,). ``loads`` (R, 6) [N, N m] replaces the loads of the
+        problem.
         """
         found = evaluate(
             self.arm,

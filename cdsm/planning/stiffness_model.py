@@ -178,7 +178,7 @@ class Constraints:
     single: tuple[Array, float] | None = None  # u (3,) and target [N/m] of one direction
 
     def at(self, evaluation: Evaluation) -> ConstraintValues:
-        """Return the constraint values c at the tensions of ``evaluation``, which must be stable."""
+        """Return the constraint values c at the tensions of ``evaluation``; it must be stable."""
         return ConstraintValues(self, evaluation)
 
 
