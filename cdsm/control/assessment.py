@@ -7,7 +7,8 @@ this stiffness if the load is shaken before and after (:func:`hung_weight`). Wit
 weights measure the stuck arm, which is several times stiffer.
 
 The band is the interval around this equilibrium in which friction can let the tip rest, whatever
-loads came before. It is proved, not simulated (:func:`cdsm.friction.band.rest_band`).
+loads came before. Linear programs prove it (:func:`cdsm.friction.band.rest_band`); if they cannot,
+the band is NaN.
 """
 
 from __future__ import annotations

@@ -181,10 +181,9 @@ Compute = Callable[[Array], Iterable[Found]]
 
 @contextmanager
 def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[Compute]:
-    """Context manager: a function that evaluates designs (D, n), in processes or on a cluster.
+    """Open a context with a function that evaluates designs (D, n), and returns results in order.
 
-    There are ``jobs`` processes; with a ``client``, the cluster is used. The function returns the
-    results in the order of the designs.
+    The function uses ``jobs`` processes, or the cluster of ``client`` if it is given.
     """
     whole_number("jobs", jobs, 1)
     if client is not None:
