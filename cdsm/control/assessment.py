@@ -1,10 +1,14 @@
-"""Compute true stiffness and proved band of a plant in a given state; hang a weight on the plant.
+"""True stiffness of a plant in a given state, the band of its tip, and a test with a hung weight.
 
 With friction, the measured stiffness depends on the size and on the history of the load. Here the
 true stiffness of a state is the frictionless K_θ at the equilibrium that the arm would have without
 friction, with the same wire in every cable and the same load. A weight hung on the arm measures
 this stiffness if the load is shaken before and after (:func:`hung_weight`). Without shaking, small
 weights measure the stuck arm, which is several times stiffer.
+
+The band is the interval around this equilibrium in which friction can let the tip rest, whatever
+loads came before. Linear programs prove it (:func:`cdsm.friction.band.rest_band`); if they cannot,
+the band is NaN.
 """
 
 from __future__ import annotations
@@ -34,7 +38,7 @@ _DISPLACED: Final = 1e-3  # displacement that the weight causes, over the length
 
 
 class Assessment(NamedTuple):
-    """True stiffness of a plant in one state, and the band in which friction lets its tip rest.
+    """True stiffness of a plant in one state, and the band in which friction can let its tip rest.
 
     Values that do not exist are NaN.
     """
@@ -47,9 +51,10 @@ class Assessment(NamedTuple):
 
 
 def assess(state: PlantState, wrench: Array, directions: Array, *, banded: bool) -> Assessment:
-    """Compute the true stiffness of a state under ``wrench`` (6,) along each of D ``directions``.
+    """Compute the true stiffness [N/m] of a state along each of ``directions`` (D, 3).
 
-    If ``banded`` is True, also compute the proved band along the first direction.
+    ``wrench`` (6,) is the load. If ``banded`` is True, also compute the proved band of the tip
+    along the first direction.
     """
     nan = math.nan
     try:
@@ -72,7 +77,9 @@ def _along(K: Stiffness, u: Array) -> float:
 
 
 def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
-    """Return K_θ at the equilibrium without friction, with the wire of ``state`` under ``wrench``.
+    """Return K_θ at the equilibrium that the arm of ``state`` would have without friction.
+
+    The cables have the wire of ``state``, and ``wrench`` (6,) is the load.
 
     Raises:
         EquilibriumError: There is no equilibrium: the arm buckles.
@@ -94,10 +101,11 @@ def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
 
     ``state`` is the state of the plant before the weight is hung.
 
-    The load is shaken along u, first without the weight and then with it. Its first amplitude is
-    three times the breakaway load; it fades in four cycles. The weight moves the tip by about 0.1 %
-    of the arm's length. The result is NaN if no equilibrium is found on the way or the arm is about
-    to buckle, and inf if the tip cannot move along u.
+    If the arm has friction, the load is shaken along u, first without the weight and then with it.
+    The first amplitude is three times the breakaway load, at which the first cable slides; the
+    shaking fades in four cycles. The weight moves the tip by about 0.1 % of the arm's length. The
+    result is NaN if no equilibrium is found on the way or the arm is about to buckle, and inf if
+    the tip cannot move along u.
     """
     arm, load, tips = plant.arm, state.state.load, []
     try:

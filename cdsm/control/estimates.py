@@ -1,14 +1,15 @@
 """Estimate joint angles from wire and tension at the motors, with stretch and friction.
 
-A cable with the wire l_0 and the tension F at its motor has the length
+A cable with the paid-out wire l_0 and the tension F at its motor has the length
 
     L(q) = l_0 (1 + ε̄/s) + (F − F_rest)/k_series,   ε̄ = Σ_j l_j ε(ρ_j F)/Σ_j l_j,
 
-with the length l_j and the tension ρ_j F of segment j, the strain ε of the law, and the tension
-F_rest at which the series spring has no elongation. The rigidity factor s is the actual rigidity of
-all wires divided by the rigidity of their laws. There are more cables than joints, so the cable
-lengths give the angles and s: the rigidity is calibrated while the arm moves. All steps together
-give s (recursive least squares); the last step gives the angles.
+with the length l_j and the tension ρ_j F of segment j, the strain ε of the law, the stiffness
+k_series of the series spring, and the tension F_rest at which this spring has no elongation. The
+rigidity factor s is the actual rigidity of all wires divided by the rigidity of their laws. There
+are more cables than joints, so the cable lengths give the angles and s: the rigidity is calibrated
+while the arm moves. All steps together give s (recursive least squares); the last step gives the
+angles.
 
 ρ_j is the tension of segment j divided by the tension at the motor; friction makes it differ from
 1. The estimate contains the length of wire in each segment. At each step wire slides through the
@@ -109,9 +110,10 @@ class Observer:
         return self._after_sliding(before, pose, F, x, variance)
 
     def gain(self, estimate: Estimate, reading: Reading) -> Array:
-        """Compute κ = −∂F/∂l_0 (C,) [N/m] at the estimated posture and the tensions of a reading.
+        """Compute κ = −∂F/∂l_0 (C,) [N/m], the rise of each tension per length of wire taken in.
 
-        The derivative is taken at constant cable lengths. κ is 0 for force-controlled cables.
+        The derivative is taken at the estimated posture, at constant cable lengths and at the
+        tensions of ``reading``. κ is 0 for force-controlled cables.
         """
         F = np.clip(reading.tension, *self._domains)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
@@ -121,10 +123,10 @@ class Observer:
     def _after_sliding(
         self, before: Estimate, pose: Posture, F: Array, softness: float, variance: float
     ) -> Estimate:
-        """Return the estimate at a new posture, after the wire has slid through the holes.
+        """Return the estimate at a new posture, after wire has slid through the holes.
 
-        ``before`` is the previous estimate, with the wire in each segment. ``F`` (C,) [N] are the
-        tensions at the motors. The new estimate stores ``softness`` and ``variance``.
+        ``before`` is the previous estimate, which has the wire in each segment. ``F`` (C,) [N] are
+        the tensions at the motors. The new estimate stores ``softness`` and ``variance``.
         """
         segments = pose.segments
         chains, near = segments.chains, before.shares * F[segments.chains.cable]
@@ -138,10 +140,12 @@ class Observer:
         return Estimate(pose, means * F, means, force, softness, variance, natural, shares)
 
     def _tip_force(self, pose: Posture, tension: Array) -> Array:
-        """Compute the force f (3,) [N] at the tip that best balances tensions T (S,) [N].
+        """Compute the force f (3,) [N] at the tip that best balances the tensions T (S,) [N].
 
-        f solves J_vᵀ f = Σ_j T_j g_j + g by weighted least squares, with the gravity torque g and
-        the gradient g_j of the length of segment j. The weights follow from noise and friction.
+        T are the tensions of all segments. f solves J_vᵀ f = Σ_j T_j g_j + g by weighted least
+        squares, with the translational rows J_v of the tip Jacobian, the gravity torque g and the
+        gradient g_j of the length of segment j. The weights follow from the errors of the load
+        cells and from friction.
         """
         segments, J = pose.segments, pose.length_jacobian
         F = tension[segments.chains.start[:-1]]
@@ -153,7 +157,11 @@ class Observer:
         return np.asarray(np.linalg.lstsq(rows, wanted, rcond=None)[0])
 
     def _mean_strain(self, pose: Posture, shares: Array, F: Array) -> Array:
-        """Compute the mean strain ε̄ (C,) [-] of each cable by its law; ``shares`` are ρ (S,)."""
+        """Compute the mean strain ε̄ (C,) [-] of each cable by its law.
+
+        ``F`` (C,) [N] are the tensions at the motors. ``shares`` ρ (S,) are the tensions of the
+        segments, divided by the tension at the motor.
+        """
         segments = pose.segments
         chains = segments.chains
         strain = np.zeros(segments.lengths.size)
@@ -165,7 +173,10 @@ class Observer:
         return np.asarray(total / pose.cable_lengths)
 
     def _compliance(self, wire: Array, F: Array) -> Array:
-        """Compute dL/dF (C,) [m/N] at constant ``wire``, the length l_0 (C,) [m] paid out."""
+        """Compute how much cables lengthen with their tensions, dL/dF (C,) [m/N], by their laws.
+
+        The paid-out ``wire`` l_0 (C,) [m] is constant.
+        """
         soft = np.array(self.arm._model.laws.series)
         for law, of in self._problem.laws:
             soft[of] += wire[of] / rigidity_of(law, F[of])

@@ -1,9 +1,10 @@
 """Stiffness measured with the motors: they move the tip, and sensors give its displacement.
 
-A force f at the tip causes the joint torques J_vᵀ f. Changes x of the tensions cause the same
-torques if −J_Lᵀ x = J_vᵀ f. Motors that pay out the wire −x/κ, with κ = −∂F/∂l_0 of each cable,
-move the joints as f does. The controller estimates the posture before and after from wire and
-tension, and so measures the stiffness with its own sensors.
+A force f at the tip causes the joint torques J_vᵀ f, with the translational rows J_v of the tip
+Jacobian. Changes x of the tensions cause the same torques if −J_Lᵀ x = J_vᵀ f. Motors that pay out
+the wire −x/κ, with κ = −∂F/∂l_0 of each cable, move the joints as f does. The controller estimates
+the posture before and after from wire and tension, and so measures the stiffness with its own
+sensors.
 
 Without friction the result is the stiffness. With friction the result is too high: friction reduces
 the effect of the motors on the joints, and the estimated posture does not include all of this
@@ -34,9 +35,10 @@ _READINGS: Final = 64  # number of load cell readings that are averaged at rest
 
 
 def virtual_force(pose: Posture, gain: Array, force: Array) -> Array:
-    """Compute the wire (C,) [m] to pay out to move the joints as a force (3,) [N] at the tip would.
+    """Compute the wire (C,) [m] that motors pay out to imitate a ``force`` (3,) [N] at the tip.
 
-    ``gain`` is κ of each cable (C,) [N/m]; 0 for force-controlled cables.
+    The wire moves the joints as the force would. ``gain`` is κ = −∂F/∂l_0 of each cable (C,) [N/m];
+    0 for force-controlled cables.
     """
     locked = gain > 0.0
     J, wire = pose.length_jacobian[locked], np.zeros(gain.size)
@@ -58,10 +60,10 @@ def felt_stiffness(
     """Move the tip along ±u (3,) with the motors; return the measured stiffness [N/m].
 
     ``state`` does not change, since the plant moves a copy. The tip moves by 0.5 % of the arm's
-    length. It moves less if a tension would otherwise cover more than half of the distance to one
-    of its ``bounds`` (lower, upper). ``observer`` updates ``estimate`` with readings, whose noise
-    comes from ``random``. The result is NaN if no equilibrium is found, if the estimated arm is
-    unstable, or if a tension is at its bound.
+    length either way. It moves less if a tension would otherwise cover more than half of the
+    distance to one of its ``bounds`` (lower, upper). ``observer`` updates ``estimate`` with
+    readings, whose noise comes from ``random``. The result is NaN if no equilibrium is found, if
+    the estimated arm is unstable, or if a tension is at its bound.
     """
     wire, F = observer.sensors.read([state.true], random)
     gain = observer.gain(estimate, Reading(wire, F))

@@ -2,9 +2,10 @@
 
 The motor of a position-controlled cable keeps the length of wire that it has paid out, l_0,
 constant. A law computes the next l_0. At a constant posture, a change of l_0 changes the tension by
-−k Δl_0, so each command corresponds to a tension, F + k (l_0 measured − l_0 commanded). No law
-commands a tension below its lower bound, where the cable may be slack, or above its upper bound. A
-user-defined law is any function of a :class:`Moment` that returns ``limited(moment, wire)``.
+−k Δl_0, so each command corresponds to a tension, F measured + k (l_0 measured − l_0 commanded). No
+law commands a tension below its lower bound, where the cable may be slack, or above its upper
+bound. A user-defined law is any function of a :class:`Moment` that returns
+``limited(moment, wire)``.
 """
 
 from __future__ import annotations
@@ -79,7 +80,8 @@ class Moment(NamedTuple):
         command: Wire commanded at the previous step (C,) [m].
         minimum: Lower bounds of the tensions (C,) [N].
         maximum: Upper bounds of the tensions (C,) [N].
-        forced: Whether a mixed law controls the tension of each cable (C,), not its wire.
+        forced: True for each cable (C,) whose tension a mixed law controls; of the others it
+            controls the length of wire.
     """
 
     reference: Reference
@@ -97,7 +99,7 @@ Law = Callable[[Moment], Command]
 
 
 def limited(moment: Moment, wire: Array) -> Command:
-    """Return the command to pay out ``wire`` (C,) [m], changed where a tension would leave a bound.
+    """Return the command to pay out ``wire`` (C,) [m], changed to keep tensions within bounds.
 
     The commanded tensions follow from the measured tensions and the change of wire at constant
     posture. Raises InvalidInput if ``wire`` is not one number per cable.
@@ -134,16 +136,20 @@ def checked_command(command: object, moment: Moment, names: Sequence[str]) -> Co
 
 
 def feedforward(moment: Moment) -> Command:
-    """Pay out the wire of the plan, which includes its stretch; this law needs no sensor."""
+    """Pay out the lengths of wire of the plan; this law needs no sensor.
+
+    The planned l_0 allow for the stretch of the wires under the planned tensions.
+    """
     return _clamped(moment, moment.reference.wire, moment.reference.tension)
 
 
 def tension_control(moment: Moment) -> Command:
-    """Keep all cable tensions at their planned values by PI control, plus planned changes of l_0.
+    """Control all cable tensions by PI control, in addition to the planned changes of l_0.
 
-    In each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the error e = F planned − F measured. P
-    and I are PROPORTIONAL and INTEGRAL. Every cable needs a load cell. No motor controls a length,
-    so an arm without springs in its joints drifts slowly from its posture.
+    In each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the error e = F planned − F measured,
+    its change Δe since the previous step, and the cable stiffness k. P and I are PROPORTIONAL and
+    INTEGRAL. Every cable needs a load cell. No motor controls a length, so an arm without springs
+    in its joints drifts slowly from its posture.
     """
     return limited(moment, _regulated(moment))
 
@@ -167,7 +173,11 @@ LAWS: Final[dict[str, Law]] = {
 
 
 def _regulated(moment: Moment) -> Array:
-    """Return the wire (C,) [m] to pay out: incremental PI control of the tension of each cable."""
+    """Return the wire (C,) [m] to pay out if PI control holds the tension of each cable.
+
+    It is the previous command plus the planned change of wire and the correction of the tension
+    error, as :func:`tension_control` describes.
+    """
     now, before, k = moment.reference, moment.reference_before, moment.reference.stiffness
     error = now.tension - moment.reading.tension
     last = before.tension - moment.reading_before.tension

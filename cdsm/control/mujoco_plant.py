@@ -1,8 +1,8 @@
 """Plant with inertia and damping: MuJoCo simulates the exported model of the arm.
 
 Each cable of the exported model is an actuator of constant stiffness, since MuJoCo has no other.
-Here the stiffness and force of each actuator are set to the tangent of the cable's law ten times
-per step of control. So the arm has the same equilibria as in cdsm. Cables slide freely in holes.
+Here, ten times per step of control, each actuator gets the force and the tangent stiffness of its
+cable. So the arm has the same equilibria as in cdsm. Cables slide freely in holes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _TANGENTS: Final = 10  # number of updates of the motors' tangents and of the lo
 
 
 class MuJoCoState(NamedTuple):
-    """State of a :class:`MuJoCoPlant`."""
+    """State of a :class:`MuJoCoPlant` after a step of control."""
 
     model: Any  # mujoco.MjModel
     pose: Posture  # true posture
@@ -122,7 +122,11 @@ class MuJoCoPlant:
             model.actuator_biasprm[motor, :3] = k * lengths[c] - F[c], -k, 0.0
 
     def _tensions(self, lengths: Array, command: Command) -> Array:
-        """Compute F (C,) [N] from cable lengths (C,) [m] and the commanded wire."""
+        """Compute F (C,) [N] from cable lengths (C,) [m], leads included, and the command.
+
+        A position-controlled cable has the commanded wire, a force-controlled one the commanded
+        tension.
+        """
         F = command.tension.copy()
         for c, cable in enumerate(self.arm.cables):
             if cable.control == "position":

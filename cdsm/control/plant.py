@@ -1,4 +1,4 @@
-"""Plants, the arms that a loop controls: the protocol, and a quasi-static arm with friction."""
+"""Plants: the arms that a control loop moves. Protocol, and a quasi-static arm with friction."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Plant(Protocol[AnyState]):
         """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
 
     def move(self, state: AnyState, command: Command, wrench: Array) -> AnyState:
-        """Return the state after ``state``, when the motors have executed a command.
+        """Return the state after ``state``, when the motors have executed ``command``.
 
         ``wrench`` (6,) is the load: force [N], then moment [N m].
 
@@ -53,7 +53,7 @@ class Plant(Protocol[AnyState]):
 
 
 class SlowState(NamedTuple):
-    """State of a :class:`SlowPlant`, with its history: the wire in each segment."""
+    """State of a :class:`SlowPlant`; the wire in each segment depends on all earlier loads."""
 
     loading: SlowLoading  # the arm
     reference_wire: Array  # l_0 (C,) [m] at the posture where the plant began
@@ -105,7 +105,10 @@ class SlowPlant:
         return SlowState(loading, wire, loading.begin(tension, wrench))
 
     def move(self, state: SlowState, command: Command, wrench: Array) -> SlowState:
-        """Return the next state, see :meth:`Plant.move`; EquilibriumError if the arm buckles."""
+        """Return the state after ``state``, as :meth:`Plant.move` describes.
+
+        Raises EquilibriumError if the arm buckles.
+        """
         loading = state.loading
         taken_in = state.reference_wire - command.wire
         motors = np.where(loading.forced, command.tension, taken_in)
@@ -120,7 +123,10 @@ class SlowPlant:
 
 
 def require_unstrained(name: str, arm: Manipulator) -> None:
-    """Raise InvalidInput about ``name`` unless it is an arm of "unstrained" lengths."""
+    """Raise InvalidInput unless ``arm`` is a Manipulator with "unstrained" original lengths.
+
+    ``name`` is the argument that the error names.
+    """
     if instance(name, arm, Manipulator).original_length != "unstrained":
         raise InvalidInput(
             name, 'has original_length = "stretched"; motors pay out unstrained lengths.'

@@ -44,7 +44,9 @@ class TrackingRun(ReadOnlyState):
     There are n steps, C cables and D wanted directions. With friction, the true stiffness of a
     state is the frictionless stiffness at the equilibrium that the arm would have without friction,
     with the same wire and load. It is NaN if there is no such equilibrium. :meth:`hung_weight`
-    measures this stiffness: it shakes the load, which ends the effect of friction.
+    measures this stiffness: it shakes the load, which ends the effect of friction. The band is the
+    interval around this equilibrium in which friction can let the tip rest, whatever loads came
+    before.
 
     Attributes:
         plan: The plan that was followed.
@@ -56,7 +58,8 @@ class TrackingRun(ReadOnlyState):
         angles: True joint angles (n, nv) [rad]; [m] for prismatic joints.
         estimated_angles: Angles that the controller estimated before each step (n, nv) [rad].
         tips: True tip positions (n, 3) [m].
-        wanted_tension: Tensions at the motors that the outer loop wants (n, C) [N].
+        wanted_tension: Tensions at the motors (n, C) [N] that the outer loop plans; without such a
+            loop, those of the plan.
         commanded_tension: Tensions that the motor commands give (n, C) [N], within the bounds.
         commanded_wire: Commanded wire to pay out (n, C) [m].
         measured_tension: Readings of the load cells before each step (n, C) [N].
@@ -75,8 +78,8 @@ class TrackingRun(ReadOnlyState):
         estimated_force: Force at the tip that the controller estimated (n, 3) [N].
         rigidity: Estimated rigidity of the wires, divided by the rigidity of their laws (n,) [-].
         short: Whether the outer loop found no tensions within the bounds that give the target (n,).
-        refused: The reason, by number of the step, if the outer loop could not plan tensions and
-            kept the previous ones.
+        refused: For each step at which the outer loop could not plan tensions and kept the previous
+            ones: the number of the step, and the reason.
         outcome: ``"completed"``; ``"lost"``: the loop is unstable, so the tip left its path or the
             plant diverged; ``"no rest"``: the arm buckled; ``"wire"``: a tension left the domain of
             its law.
@@ -142,7 +145,7 @@ class TrackingRun(ReadOnlyState):
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """Whether the tip is inside the proved band (B,), for the B steps that have such a band."""
+        """Whether the tip is inside the band (B,), for the B steps that have a proved band."""
         low, high = self.band[self.proved].T
         moved = self.displacement[self.proved]
         return frozen(np.asarray((low - _ROUNDING <= moved) & (moved <= high + _ROUNDING)))

@@ -1,4 +1,4 @@
-"""Compute the references at each step from a plan; choose the tension-controlled cables."""
+"""Reference of each control step, interpolated from a plan; choice of tension-controlled cables."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdsm.support.values import Array
 
 
 class Schedule(NamedTuple):
-    """References at n steps, linearly interpolated between the samples of a plan."""
+    """Reference values at n control steps, linearly interpolated between the samples of a plan."""
 
     references: tuple[Reference, ...]  # reference of each step
     directions: Array  # unit directions u (D, 3), base axes
@@ -28,7 +28,7 @@ class Schedule(NamedTuple):
 
     @classmethod
     def of(cls, plan: PathPlan, steps: int) -> Self:
-        """Divide the path between two samples of a complete plan into ``steps`` equal steps."""
+        """Interpolate a complete plan, with ``steps`` equal steps from each sample to the next."""
         size = len(plan.planned)
         at = np.linspace(0.0, size - 1.0, (size - 1) * steps + 1)
         before = np.minimum(at.astype(int), max(size - 2, 0))
@@ -54,7 +54,7 @@ class Schedule(NamedTuple):
 
 
 def checked_plan(plan: PathPlan) -> Manipulator:
-    """Check that a plan is complete and has directions; return its arm."""
+    """Check that all samples are planned, for stiffness along directions; return the arm."""
     if plan.direction is None:
         raise InvalidInput("plan", "is one of cartesian; plan a stiffness along directions.")
     if not plan.complete:
@@ -70,8 +70,8 @@ def checked_plan(plan: PathPlan) -> Manipulator:
 def tension_controlled(plan: PathPlan, names: Sequence[str] | None) -> NDArray[np.bool_]:
     """Return which cables (C,) a mixed law controls by tension: ``names``, or a default choice.
 
-    The lengths of the other cables give the posture. By default there are nv other cables, chosen
-    by a pivoted QR decomposition of J_Lᵀ at the first sample.
+    The lengths of the other cables determine the posture. By default there are nv other cables. A
+    pivoted QR decomposition of J_Lᵀ at the first sample chooses them.
     """
     cables = plan.arm.cables.names
     if names is not None:

@@ -29,7 +29,7 @@ class Sensors:
         tension_noise: Standard deviation [N] of the Gaussian noise of a load cell, which is cut off
             at ± four standard deviations.
         tension_bias: Constant error of all load cells [N].
-        delay: Steps of control by which all readings are late.
+        delay: Number of control steps by which all readings are late.
 
     Raises:
         InvalidInput: A value is negative or not a number, or the delay is not a whole number.

@@ -21,7 +21,7 @@ _SOFTER = 5e-3  # change of the estimated softness 1/s from which the arm is bui
 
 
 class Replanned(NamedTuple):
-    """Tensions that the outer loop plans at one step."""
+    """Result of the outer loop at one step: the planned tensions, or why there are none."""
 
     reference: Reference  # planned tensions at the motors, and the wire for them
     mean: Array  # mean tensions along each cable (C,) [N], from which the stiffness follows
@@ -33,7 +33,7 @@ class Replanned(NamedTuple):
 class StiffnessLoop:
     """Planner of the tensions that give the target stiffness and are nearest to the previous ones.
 
-    If the rate does not allow these tensions, it plans the tensions within the rate whose stiffness
+    If no tensions within the rate give the target, it plans those within the rate whose stiffness
     is nearest to the target.
     """
 
@@ -88,9 +88,10 @@ class StiffnessLoop:
         return Replanned(reference, mean, refused, short)
 
     def _with_softness(self, softness: float) -> Manipulator:
-        """Return the arm with the rigidity of its wires divided by the estimated ``softness``.
+        """Return the arm with the rigidity of its wires divided by the estimated ``softness`` 1/s.
 
-        Raises InvalidInput if the softness is not positive.
+        A new arm is built only if the softness has changed by more than 0.005. Raises InvalidInput
+        if the softness is not positive.
         """
         if softness <= 0.0:  # far from the posture of the plan, readings fit no wire
             raise InvalidInput(

@@ -4,10 +4,12 @@ At a known posture the force f, and the tensions T of all segments, meet
 
     Σ_j T_j g_j + g − J_vᵀ f = 0,   exp(−μ φ) T_j ≤ T_{j+1} ≤ exp(μ φ) T_j,   |T_1 − F| ≤ error,
 
-with the measured tension F of each cable, the gradient g_j of the length of segment j, the gravity
-torque g, the friction coefficient μ and the wrap angle φ of each hole. This is a polyhedron; the
-largest and the least u·f in it are two linear programs. The multipliers of each give a bound by
-weak duality, which holds even if the solver's answer is not exact.
+with the measured tension F of each cable and its largest error, the tension T_1 of the segment at
+the motor, the gradient g_j of the length of segment j, the gravity torque g, the translational rows
+J_v of the tip Jacobian, the friction coefficient μ and the wrap angle φ of each hole. These
+conditions describe a polyhedron. The largest and the least force along a direction u in it are the
+solutions of two linear programs. The multipliers of each give a bound by weak duality, which holds
+even if the solver's answer is not exact.
 """
 
 from __future__ import annotations
@@ -70,12 +72,13 @@ class TipForce(ReadOnlyState):
 def tip_force(
     pose: Posture, tension: ArrayLike, direction: Direction, error: float = 0.0
 ) -> TipForce:
-    """Bound the force on the tip along a direction from motor tensions; the load has no moment.
+    """Bound the force at the tip along a direction from the tensions at the motors.
 
-    The bounds hold for each state of the cables that friction admits, if ``pose`` has the true
-    posture, friction and masses. Measure the posture by joint encoders or a camera. A posture that
-    :func:`track` estimates proves nothing: friction changes the strain between the holes, which the
-    motors do not measure. So ``estimated_force`` of :class:`TrackingRun` has no bounds.
+    The load must have no moment. The bounds hold for each state of the cables that friction admits,
+    if ``pose`` has the true posture, friction and masses. Measure the posture by joint encoders or
+    a camera. A posture that :func:`track` estimates proves nothing: friction changes the strain
+    between the holes, which the motors do not measure. So ``estimated_force`` of
+    :class:`TrackingRun` has no bounds.
 
     Args:
         pose: The true posture.
@@ -84,8 +87,8 @@ def tip_force(
         error: Largest error of each measured tension [N].
 
     Raises:
-        InvalidInput: An argument is invalid; or no force at the tip and no friction balance these
-            tensions, so that posture, tensions or error are wrong.
+        InvalidInput: An argument is invalid; or no force at the tip balances these tensions, with
+            any friction, so that posture, tensions or error are wrong.
         SolverError: The solver fails on a linear program.
     """
     segments = instance("pose", pose, Posture).segments

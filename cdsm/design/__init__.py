@@ -1,1 +1,1 @@
-"""Design of an arm: a problem as a value, searches over it, and their results."""
+"""Design of an arm: the design problem, searches for the best designs, and their results."""

@@ -1,7 +1,8 @@
-"""Chain rule from the inputs of an arm to the variables of a design problem.
+"""Chain rule: derivatives with respect to design variables, from those with respect to inputs.
 
-A variable, such as a hole radius, moves many inputs of the arm at once, such as holes and disks. It
-may also move the postures, if they are random within the joint limits, and the bounds of the
+Inputs are the numbers that describe an arm: each hole radius, disk offset, lead, link length, link
+mass and so on. One variable, such as the hole radius of all joints, changes many inputs at once. It
+may also change the postures, if they are random within the joint limits, and the bounds of the
 tensions.
 """
 
@@ -50,9 +51,10 @@ class Chain:
         self._moved = still.moved(self.inputs.displaced(by_variable))
 
     def at(self, tension: Tension, loss: Array) -> Posed:
-        """Return the chain rule at the posture and load of the least tensions ``tension``.
+        """Return the chain rule at one posture and load: those of the least tensions ``tension``.
 
-        ``loss`` (C,) [-] is exp(Σ μ φ) of each cable, or 1 if ``worst_friction`` is False.
+        ``loss`` (C,) [-] is exp(Σ μ φ) of each cable, the factor by which friction (coefficient μ,
+        wrap angle φ) narrows its bounds. It is 1 if ``worst_friction`` is False.
         """
         pose = tension.posture
         turned, grip = pose.q[:, None] * self._limits, np.zeros_like(self._bound)
@@ -61,10 +63,11 @@ class Chain:
         return Posed(self, Balance.of(tension), turned, grip, loss[:, None] * self._bound)
 
     def apply(self, by_input: dict[str, Array]) -> Array:
-        """Compute a quantity's derivatives (n,) with respect to the variables, at constant bounds.
+        """Compute the derivatives (n,) of a quantity with respect to the variables.
 
-        ``by_input`` has an array for each kind of input, such as ``link_mass``: the derivatives of
-        the quantity with respect to these inputs of the arm.
+        The bounds of the tensions are constant. ``by_input`` has an array for each kind of input,
+        such as ``link_mass``: the derivatives of the quantity with respect to these inputs of the
+        arm.
         """
         return np.array(
             [
@@ -82,7 +85,7 @@ class Chain:
 
 
 class Posed(NamedTuple):
-    """Chain rule at a posture under a load; the least tensions change with the variables.
+    """Chain rule at one posture and load; the least tensions change with the variables.
 
     All derivatives are with respect to the n variables.
     """
@@ -116,9 +119,10 @@ def _joints(arm: Manipulator, variable: Variable) -> list[int]:
 
 
 def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
-    """Return (dλ/dx)/λ (nv,) of the joint limits λ for a variable x.
+    """Return the relative change (dλ/dx)/λ (nv,) of the joint limits λ per change of a variable x.
 
-    λ is 2 atan(h/R), unless the geometry gives it; then the result is 0.
+    At λ = 2 atan(h/R) neighbouring disks touch; h is the disk offset, and R the radius of the disk.
+    The result is 0 if the geometry gives the limit of a joint.
     """
     geometry, joints = arm.geometry, _joints(arm, variable)
     found = []
@@ -135,7 +139,10 @@ def _limit_slopes(arm: Manipulator, variable: Variable) -> Array:
 
 
 def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, Array]:
-    """Return the derivatives of the inputs with respect to a variable, by kind of input."""
+    """Return the derivatives of all inputs with respect to a variable.
+
+    The result has an array for each kind of input that changes, such as ``link_mass``.
+    """
     geometry, of, joints = arm.geometry, variable.of, _joints(arm, variable)
     labels = inputs.labels
     disks = [disk.joint - 1 for disk in geometry.disks]

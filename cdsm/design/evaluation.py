@@ -40,7 +40,7 @@ class Designs(ReadOnlyState, Named):
         values: Quantities (D, m) in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; a column for each
             of ``problem.measures``. A constrained quantity includes its margin for
             ``problem.tolerances``. NaN if a quantity does not exist.
-        faults: The reason why no arm can be built from each design; empty if it can be built.
+        faults: For each design the reason why no arm can be built from it; empty if one can.
     """
 
     problem: DesignProblem
@@ -67,8 +67,8 @@ class Designs(ReadOnlyState, Named):
     def violations(self) -> Array:
         """Violation of each constraint, divided by its limit (D, 1 + constraints) [-]; 0 if met.
 
-        Column 0 is the fraction of all pairs of posture and load that are not held. It is 0 if the
-        problem does not require that all are held.
+        Column 0 is the fraction of all pairs of posture and load that are not held: not balanced,
+        or unstable. It is 0 if the problem does not require that all are held.
         """
         return violations(self.problem, self.values)
 
@@ -93,7 +93,10 @@ class Designs(ReadOnlyState, Named):
         return csv_text(["design", *columns], ([i, *row] for i, row in rows))
 
     def _columns(self) -> dict[str, Sequence[Any]]:
-        """Return a column for each variable and quantity, by its heading (name, margin, unit)."""
+        """Return a column for each variable and quantity, by its heading.
+
+        The heading has the name, the margin for tolerances if there is one, and the unit.
+        """
         rows = [self.problem.values(each) for each in self.designs]
         found: dict[str, Sequence[Any]] = {}
         for variable, column in zip(self.problem.variables, zip(*rows, strict=True), strict=True):
@@ -162,7 +165,7 @@ def evaluate_designs(
 
 
 def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Designs:
-    """Build the :class:`Designs` from designs ``rows`` (D, n) and their quantities ``found``."""
+    """Build :class:`Designs` from ``rows``, the designs (D, n), and ``found``, their quantities."""
     width = len(problem.measures)
     return Designs(
         problem=problem,
@@ -178,9 +181,9 @@ Compute = Callable[[Array], Iterable[Found]]
 
 @contextmanager
 def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[Compute]:
-    """Yield a function that evaluates designs (D, n), in ``jobs`` processes or on a cluster.
+    """Open a context with a function that evaluates designs (D, n), and returns results in order.
 
-    It returns the results in the order of the designs.
+    The function uses ``jobs`` processes, or the cluster of ``client`` if it is given.
     """
     whole_number("jobs", jobs, 1)
     if client is not None:

@@ -89,7 +89,7 @@ all postures and loads that are held, except for ``workspace``, ``held`` and ``w
 
 @dataclass(frozen=True)
 class Measure:
-    """A quantity of a design.
+    """A quantity of a design, such as its mass or its stiffness along a direction.
 
     Attributes:
         of: Name of the quantity, a key of :data:`KINDS`.
@@ -129,7 +129,7 @@ class Measure:
 
     @property
     def unit(self) -> tuple[str, float]:
-        """Unit shown to the user, and its size in SI."""
+        """Unit shown to the user, such as ``mm``, and its size in SI."""
         return KINDS[self.of].shown
 
     def shown(self, value: float) -> str:
@@ -223,7 +223,11 @@ class Constraint(Measure):
 
     @property
     def _scale(self) -> float:
-        """Magnitude of the limit, by which violations are divided; negative for ``at_most``."""
+        """Number by which violations are divided: the magnitude of the limit.
+
+        If the limit is 0, it is the size of the unit shown to the user. It is negative for
+        ``at_most``.
+        """
         size = abs(self.limit) or self.unit[1]
         return size if self.at_most is None else -size
 
@@ -234,6 +238,9 @@ class Constraint(Measure):
         return f"{which} {self.shown(self.limit)}"
 
     def violation(self, value: float) -> float:
-        """Return how far a value violates the limit, divided by the limit [-]; 0 if it does not."""
+        """Return how far a value [SI] violates the limit, divided by the limit [-].
+
+        It is 0 if the limit is met, and inf for NaN.
+        """
         far = (value - self.limit) / self._scale
         return max(0.0, -far) if far == far else float("inf")

@@ -1,9 +1,9 @@
 """Derivatives of the quantities of a design with respect to its continuous variables.
 
-The kernel of sensitivities gives the derivatives of a stiffness with respect to every hole, disk,
-link, lead and mass at constant tensions, and with respect to the tensions. The least tensions
-depend on the design, and so do their bounds, which friction narrows. The chain rule adds the
-effects of both. All these derivatives are exact.
+A kernel (:mod:`cdsm.kernels.sensitivity`) gives the derivatives of a stiffness with respect to
+every hole, disk, link, lead and mass at constant tensions, and with respect to the tensions. The
+least tensions depend on the design, and so do their bounds, which friction narrows. The chain rule
+adds both effects. All these derivatives are exact.
 
 The margin for tolerances contains such derivatives, so its own derivatives are second derivatives.
 They are central differences of exact first derivatives, or one-sided ones at an end of a range; the
@@ -102,7 +102,7 @@ def _stable(tension: Tension) -> Stiffness:
 
 
 def _margins(problem: DesignProblem, design: Array, measure: Measure) -> Array:
-    """Compute the margin for tolerances of each row (R,) of :func:`rows_and_gradients`."""
+    """Compute the margins for tolerances (R,) in the R cases of :func:`rows_and_gradients`."""
     found = []
     arm = quiet_arm(problem, design)
     for tension, loss in balanced(problem, design, arm, problem.loads):
@@ -145,9 +145,11 @@ def _reading(K: Stiffness, measure: Measure, posed: Posed, force: Array) -> tupl
 def _displacement(K: Stiffness, force: Array) -> tuple[float, dict[str, Array]]:
     """Return the displacement |C_vv f| [m] of the tip by a force f (3,) [N], and its derivatives.
 
-    There is an array of derivatives for each kind of input, such as ``link_mass``, and for
-    ``tension``. With the unit vectors n of the displacement and f̂ of the force, and
-    c(u) = uᵀ C_vv u, |C_vv f| = |f| nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.
+    C_vv is the translational block of the compliance. There is an array of derivatives for each
+    kind of input, such as ``link_mass``, and for ``tension``. With c(u) = uᵀ C_vv u, whose
+    derivatives are known, and the unit vectors n of the displacement and f̂ of the force,
+
+        |C_vv f| = |f| nᵀ C_vv f̂ = |f| (c(n + f̂) − c(n − f̂))/4.
     """
     size = float(np.linalg.norm(force))
     moved = K.compliance[:3, :3] @ force

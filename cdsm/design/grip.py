@@ -1,8 +1,10 @@
-"""Compute the derivatives of Σ μ φ of each cable; friction narrows its bounds by exp(Σ μ φ).
+"""Derivatives of Σ μ φ of each cable: friction coefficient μ times wrap angle φ, over its holes.
+
+Friction narrows the bounds of the tension of a cable by the factor exp(Σ μ φ).
 
 A cable runs from a point a through a hole b to a point c. Its segments have the unit directions u
-and v and the lengths ℓ_u and ℓ_v. If the points move, the wrap angle φ of the hole changes by the
-formula of :mod:`cdsm.kernels.chains`,
+and v and the lengths ℓ_u and ℓ_v. If the points move by da, db and dc, the wrap angle φ of the hole
+changes by the formula of :mod:`cdsm.kernels.chains`,
 
     dφ = −(p·(db − da)/ℓ_u + q·(dc − db)/ℓ_v),
 
@@ -56,7 +58,7 @@ def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> 
 
 
 def _motion(pose: Posture, moved: Places) -> Array:
-    """Return the derivatives (n, P, 3) of the cable sites in base axes, at constant angles."""
+    """Return the derivatives (n, P, 3) of the P cable sites in base axes, at constant angles."""
     tree, row = pose.arm._model.tree, pose.arm._model.routing.row
     rotation, origin = rotations(pose), np.zeros_like(moved.origin)
     for i in tree.order.tolist():

@@ -1,4 +1,4 @@
-"""Raise the error if no design meets all constraints, with the violations of the nearest design."""
+"""Error of a search in which no design meets all constraints: what the nearest design misses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from cdsm.support.format import plural
 
 
 def explain(designs: Designs) -> NoReturn:
-    """Raise InfeasibleDesign with the design that has the smallest sum of violations."""
+    """Raise InfeasibleDesign, with the design of the smallest sum of violations.
+
+    The error says in words which constraints this design violates, and by how much.
+    """
     problem, missed = designs.problem, designs.violations
     total = np.where(np.isfinite(missed), missed, np.inf).sum(axis=1)
     arms = np.array([not fault for fault in designs.faults])
@@ -61,7 +64,7 @@ def explain(designs: Designs) -> NoReturn:
 
 
 def _first_reason(designs: Designs, best: int) -> str:
-    """Return the first posture where design ``best`` is not balanced or not stable, and why."""
+    """Return, as text, the first posture at which design ``best`` is not held, and the reason."""
     problem, row = designs.problem, designs.designs[best]
     held, loads = 0, len(problem.loads)
     try:

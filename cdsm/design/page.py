@@ -1,4 +1,4 @@
-"""Build the page of a search: its front, on which a click shows the arm and numbers of a design."""
+"""HTML page of a search: a plot of the front; a click on a design shows its arm and its numbers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ choose(document.body.dataset.compromise);
 
 
 def page_of(found: DesignSearch) -> Document:
-    """Return the page of a search in HTML; it needs no other file and no network."""
+    """Return the HTML page of a search; it needs no other file and no network."""
     arms, count = [], len(found.front)
     shown = found._spread(_SHOWN)
     for i, picture in zip(shown, _pictures(found, shown), strict=True):
@@ -75,7 +75,10 @@ def page_of(found: DesignSearch) -> Document:
 
 
 def _pictures(found: DesignSearch, shown: list[int]) -> list[str]:
-    """Draw the designs ``shown`` of the front at the first posture, to one scale, as data URLs."""
+    """Draw the arms of the designs ``shown`` of the front; return PNG pictures as data URLs.
+
+    Each arm is drawn at the first posture, all to one scale.
+    """
     poses = []
     for number in shown:
         arm = found.arm(number)

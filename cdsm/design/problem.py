@@ -164,7 +164,10 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def bounds(self) -> Array:
-        """Smallest and largest value of each variable (n, 2) in SI; for choices, their indices."""
+        """Smallest and largest value of each variable (n, 2) in SI.
+
+        For a variable with choices, they are the indices of the first and the last choice.
+        """
         return frozen(
             np.array(
                 [
@@ -252,7 +255,10 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def start(self) -> Array | None:
-        """:attr:`arm` as a design (n,) [m, rad, N, -]; None if a variable is outside its range."""
+        """The design (n,) [m, rad, N, -] of the given :attr:`arm`.
+
+        It is None if the value of a variable in this arm is outside its range.
+        """
         found = []
         for variable, (low, high) in zip(self.variables, self.bounds.tolist(), strict=True):
             value: Value | None = present(variable, self.arm.geometry, self.minimum)
@@ -286,9 +292,9 @@ class DesignProblem(ReadOnlyState):
 
 
 def _with_holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
-    """Return the sites of ``cable`` with the friction and the wrap of the holes of ``other``.
+    """Return the sites of ``cable``, with the friction and the wrap of the holes of ``other``.
 
-    A hole that ``other`` does not pass gets the friction of the nearest hole that it passes.
+    A hole that only ``cable`` passes gets the friction of the nearest hole that ``other`` passes.
     """
     sites, known = list(cable.sites), other._holes
     for i in cable._holes if known else ():

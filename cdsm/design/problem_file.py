@@ -120,7 +120,7 @@ def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
 
     Raises:
         FileError: The file, or one that it names, cannot be read, or does not describe a design
-            problem; lists every fault.
+            problem; the error lists every fault.
     """
     text = read_text(path)
     folder = Path(path).parent

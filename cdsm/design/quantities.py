@@ -40,14 +40,17 @@ _SURE: dict[str, tuple[Reading, float]] = {
 
 
 class Found(NamedTuple):
-    """Quantities (m,) of one design, and the reason why no arm can be built from it, or ``""``."""
+    """Quantities of one design, in SI: ``values`` (m,).
+
+    ``fault`` is the reason why no arm can be built from the design, or empty.
+    """
 
     values: Array
     fault: str = ""
 
 
 def measure(problem: DesignProblem, row: Array) -> Found:
-    """Compute the quantities of one design ``row`` (n,)."""
+    """Compute the quantities of one design ``row`` (n,), in the order of ``problem.measures``."""
     try:
         arm = quiet_arm(problem, row)
     except CdsmError as error:
@@ -68,7 +71,8 @@ def balanced(
 ) -> Iterator[tuple[Tension, Array]]:
     """Yield the least tensions at each posture under each of ``loads`` (n, 6) [N, N m].
 
-    Each item also has exp(Σ μ φ) of the cables (C,), which is 1 without ``worst_friction``.
+    Each item also has exp(Σ μ φ) of the cables (C,), the factor by which friction (coefficient μ,
+    wrap angle φ) narrows their bounds. It is 1 without ``worst_friction``.
     """
     bounds, worst = (problem.minimum_of(design), problem.maximum), problem.worst_friction
     for q in problem.postures_of(arm):
@@ -100,9 +104,10 @@ class _Arm:
             self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter, 1)
 
     def _evaluated(self, loads: Array) -> tuple[Batch, NDArray[np.bool_]]:
-        """Evaluate the R pairs of posture and load; also return which are stable (R,).
+        """Compute tip, tensions, margin, compliance and lengths for R pairs of posture and load.
 
-        ``loads`` (R, 6) [N, N m] replaces the loads of the problem.
+        Also return which pairs are stable (R,). ``loads`` (R, 6) [N, N m] replaces the loads of the
+        problem.
         """
         found = evaluate(
             self.arm,
@@ -121,7 +126,10 @@ class _Arm:
         return np.array([self._value(each) for each in self.problem.measures])
 
     def rows(self, each: Measure) -> Array:
-        """Return a quantity that depends on tensions, for each posture and load that is held."""
+        """Return a quantity that depends on tensions, in SI, for each held posture and load.
+
+        They are held if tensions within the bounds balance the arm, and the arm is stable.
+        """
         held, problem = self.held, self.problem
         C = self.found["compliance"][held][:, :3, :3]
         if each.of == "stiffness":
@@ -179,7 +187,7 @@ class _Arm:
         return float(rows[worst]) + self._margin(each, worst)
 
     def _margin(self, each: Measure, worst: int) -> float:
-        """Return the margin ± coverage · u of a quantity, or 0 if it has none.
+        """Return the margin for tolerances of a quantity, ± coverage · u, or 0 if it has none.
 
         u is the standard uncertainty at the worst posture and load, which have the index ``worst``
         in :meth:`rows`.
@@ -196,14 +204,18 @@ class _Arm:
 def has_margin(problem: DesignProblem, each: Measure) -> bool:
     """Whether a quantity has a margin for tolerances.
 
-    It has one if a constraint is on it, the problem has tolerances, and it is one of :data:`_SURE`.
+    It has one if a constraint is on it, the problem has tolerances, and the quantity is
+    ``stiffness``, ``margin`` or ``motor_force``.
     """
     bounded = any(constraint.key == each.key for constraint in problem.constraints)
     return bounded and problem.tolerances is not None and each.of in _SURE
 
 
 def with_margin(problem: DesignProblem, each: Measure, words: str) -> str:
-    """Return ``words`` for a quantity, followed by its margin, if any: ``stiffness - 2 u``."""
+    """Return ``words``, the name of a quantity, followed by its margin if it has one.
+
+    For example, the result is ``stiffness - 2 u``.
+    """
     if not has_margin(problem, each):
         return words
     return f"{words} {'+' if _SURE[each.of][1] > 0.0 else '-'} {problem.coverage:g} u"
@@ -212,9 +224,11 @@ def with_margin(problem: DesignProblem, each: Measure, words: str) -> str:
 def margin(
     problem: DesignProblem, each: Measure, tension: Tension, loss: Array, cable: int | None
 ) -> float:
-    """Compute the margin ± coverage · u of a quantity; adding it makes the quantity worse.
+    """Compute the margin for tolerances of a quantity, ± coverage · u.
 
-    ``cable`` is the index of a cable for ``motor_force``, else None. ``loss`` (C,) is exp(Σ μ φ).
+    u is its standard uncertainty. The sign is that for which adding the margin makes the quantity
+    worse. ``cable`` is the index of a cable for ``motor_force``, else None. ``loss`` (C,) has the
+    factor exp(Σ μ φ) of each cable, the largest ratio of tensions along it.
     """
     of, sign = _SURE[each.of]
     found = uncertainty(

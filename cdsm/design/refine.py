@@ -107,11 +107,11 @@ def refine_design(
 
 
 class _PostureNotHeld(Exception):
-    """SLSQP tries a design that does not hold all postures."""
+    """SLSQP has tried a design that does not hold all postures."""
 
 
 class _SmoothProblem:
-    """The smooth problem: min t with all conditions c(y) + a t ≥ 0, at every posture and load.
+    """The smooth problem of SLSQP: min t with c(y) + a t ≥ 0 at every posture and load.
 
     y (n,) is the design, with each variable scaled to 0…1. The first conditions have a = 1 and
     belong to the objective: t − s · objective/``scale`` ≥ 0, with s = −1 if it is maximised, else
@@ -147,7 +147,7 @@ class _SmoothProblem:
         return found
 
     def conditions(self, z: Array) -> Array:
-        """Compute c + a t (R,) at z = (y, t); −10 if the design does not hold all postures."""
+        """Compute the conditions c + a t (R,) at z = (y, t); −10 if a posture is not held."""
         try:
             return np.asarray(self.rows(z[:-1])[0] + z[-1] * self._raised)
         except _PostureNotHeld:  # the line search then takes a smaller step

@@ -77,9 +77,10 @@ class DesignSearch(ReadOnlyState):
 
     @property
     def compromise(self) -> int:
-        """Index into ``front`` of the design that is nearest to the best value of each objective.
+        """Index into ``front`` of the design nearest to the ideal point.
 
-        Differences are divided by the range of each objective on the front.
+        The ideal point has the best value of each objective on the front. Differences are divided
+        by the range of each objective on the front.
         """
         goals = self.evaluated._goals[self.front]
         size = np.ptp(goals, axis=0)
@@ -239,7 +240,7 @@ class DesignSearch(ReadOnlyState):
         return [f"{name} [{unit}]" if unit else name for name, unit in words]
 
     def _table(self, shown: Sequence[int]) -> list[list[str]]:
-        """Return head and rows of designs ``shown`` of the front, in units shown to the user."""
+        """Return header and rows for the designs ``shown`` of the front, in units for the user."""
         problem = self.problem
         keys = [with_margin(problem, each, each.key) for each in problem.measures]
         rows = [["design", *(variable.name for variable in problem.variables), *keys]]

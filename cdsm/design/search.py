@@ -117,7 +117,7 @@ def best_of(evaluated: Designs, seed: int, history: Iterable[DesignProgress]) ->
 
 
 def pareto(designs: Designs) -> Indices:
-    """Return the rows (m,) of the feasible designs that no other feasible design dominates.
+    """Return the indices (m,) of the feasible designs that no other feasible design dominates.
 
     They are sorted by the first objective, the best first. Of designs with equal objectives, only
     the first is returned.
@@ -135,7 +135,10 @@ def pareto(designs: Designs) -> Indices:
 
 
 def progress_of(problem: DesignProblem, generation: int, values: Array) -> DesignProgress:
-    """Return the state of a search after a generation, from quantities (D, m) of all designs."""
+    """Return the state of a search after a generation.
+
+    ``values`` (D, m) are the quantities of all designs so far.
+    """
     missed = violations(problem, values).sum(axis=1)
     feasible = missed == 0.0
     first = problem.objectives[0]

@@ -1,7 +1,7 @@
 """Record of the designs that a search has evaluated, so that a stopped search can resume.
 
-The file has one line for the problem and one for each design, with all bits of its numbers. A
-search with the same seed asks for the same designs again, and reads the recorded ones.
+The file has one line for the problem and one for each design. Numbers are written exactly, with all
+bits. A search with the same seed asks for the same designs again, and gets the recorded results.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _MEANING = "deflection: without the load; all: held postures"
 
 
 class Store:
-    """Evaluated designs, which are looked up by the exact bits of their numbers.
+    """Record of evaluated designs; a design is found by the exact bits of its numbers.
 
     Args:
         path: The file; None keeps them in memory.
@@ -109,7 +109,7 @@ class Store:
 
 
 def digest(problem: DesignProblem) -> str:
-    """Return a digest of everything on which the quantities of a problem depend."""
+    """Return a hash (SHA-256) of everything on which the quantities of a problem depend."""
     poses = poses_of(problem.arm, problem.postures)
     rest = [each.name for each in fields(problem) if each.name not in ("arm", "postures", "loads")]
     parts = [

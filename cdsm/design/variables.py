@@ -1,4 +1,4 @@
-"""Design variables: quantities of an arm that a search may choose, and the changed arm."""
+"""Design variables: quantities of an arm that a search may choose, and the geometry they give."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ class Variable:
 
     Attributes:
         of: ``"hole_radius"``, ``"disk_offset"``, ``"link_length"`` [m]: of one joint or of all
-            joints; a link keeps its mass per length. ``"lead"`` [m]: of the cables of one joint or
-            of all joints. ``"phase"`` [rad]: angle added to the hole angles of the same cables.
+            joints; a link keeps its mass per length. ``"lead"`` [m], and ``"phase"`` [rad], an
+            angle added to the hole angles: of the cables of one joint or of all joints.
             ``"hole_angle"`` [rad]: of one cable. ``"end"``: number of the joint at which one cable
             ends. ``"cables_per_joint"``: number of evenly spaced cables of each joint. ``"wire"``:
             wire of all cables. ``"minimum"`` [N]: lower bound of all tensions.
         low: Smallest value, in SI: [m], [rad] or [N]; None with ``choices``.
         high: Largest value, in SI: [m], [rad] or [N]; None with ``choices``.
-        at: Number of the joint, or name of the cable, that is changed; None: all.
+        at: Number of the joint, from 1, or name of the cable, that is changed; None: all.
         choices: Values to choose from, instead of a range; always needed for a wire.
 
     Raises:
@@ -246,12 +246,12 @@ def present(variable: Variable, geometry: Geometry, minimum: float) -> float:
 
 
 def _common(values: Sequence[float]) -> float:
-    """Return the value of all ``values``; NaN if they differ or there is none."""
+    """Return the common value of all ``values``; NaN if they differ or there is none."""
     return values[0] if len(set(values)) == 1 else math.nan
 
 
 def check(variable: Variable, geometry: Geometry) -> None:
-    """Raise an error if the arm lacks the joint or the cable of a variable."""
+    """Raise InvalidInput or UnknownName if the arm lacks the joint or the cable of a variable."""
     if isinstance(variable.at, str):
         one_of("cable", variable.at, geometry.cable_names)
     elif variable.at is not None:

@@ -1,4 +1,8 @@
-"""Compute tensions that balance an arm within bounds and domains, and solve small QPs over them."""
+"""The set of tensions that balance an arm within limits, and a solver of small quadratic programs.
+
+Admissible tensions balance the arm (Eq. 13). They lie within the bounds of the caller, and within
+the domain of each elasticity: the tensions for which EA(F) is defined.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,7 @@ _FLAT = 1e-10  # singular values of J_Lᵀ below this part of the largest count 
 
 
 class Optimum(NamedTuple):
-    """Solution x of :func:`solve`, with multipliers y of A x = b and z ≥ 0 of G x ≤ h."""
+    """Solution x of the QP of :func:`solve`, with multipliers y of A x = b and z ≥ 0 of G x ≤ h."""
 
     x: Array
     y: Array
@@ -32,7 +36,10 @@ class Optimum(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Admissible:
-    """The set of admissible tensions F (C,) [N]: J_Lᵀ F = J_Xᵀ W − g (Eq. 13), low ≤ F ≤ high."""
+    """The set of admissible tensions F (C,) [N] at a posture under a load.
+
+    F balances the arm, J_Lᵀ F = J_Xᵀ W − g (Eq. 13), and low ≤ F ≤ high.
+    """
 
     least: Tension  # the least admissible tensions (Eq. 17), with the bounds of the caller
     low: Array  # lower bounds (C,) [N], within the domains of the elasticities
@@ -53,9 +60,10 @@ class Admissible:
         ]
 
     def piece(self, F: Array) -> tuple[Array, Array]:
-        """Return the bounds (C,) [N] of the range without kinks that contains F (C,) [N].
+        """Return the bounds (C,) [N] of the box around F (C,) [N] in which no EA(F) has a kink.
 
-        A tension exactly at a kink belongs to the range below, whose slope of EA is used there.
+        A tension exactly at a kink belongs to the box below the kink, so the slope of EA below the
+        kink is used.
         """
         low, high = self.low.copy(), self.high.copy()
         for c, kink in self.kinks:
@@ -66,16 +74,17 @@ class Admissible:
         return low, high
 
     def imbalance(self, F: Array) -> Array:
-        """Return how far tensions F (C,) [N] are from balancing the arm (r,) [N]; zero if they do.
+        """Return the error (r,) [N] of the balance under F (C,) [N]; zero if F balances the arm.
 
-        It is the least tensions minus F, projected onto the row space of J_Lᵀ.
+        It is the least tensions minus F, in the orthonormal basis ``rows`` of the row space of
+        J_Lᵀ.
         """
         return np.asarray(self.rows @ (self.least.values - F))
 
     def nearest(self, wanted: Array, low: Array, high: Array) -> Array | None:
-        """Return the tensions (C,) [N] nearest to ``wanted`` that balance the arm.
+        """Return the tensions (C,) [N] nearest to ``wanted`` (C,) that balance the arm.
 
-        They are within the bounds ``low`` and ``high`` (C,) [N]. The result is None if no tensions
+        They lie within the bounds ``low`` and ``high`` (C,) [N]. The result is None if no tensions
         within these bounds balance the arm.
         """
         size = max(self.scale, float(abs(wanted).max()))
@@ -88,7 +97,7 @@ class Admissible:
         return None if found is None else np.minimum(np.maximum(found.x * size, low), high)
 
     def within(self, change: Array, F: Array) -> Admissible | None:
-        """Return the admissible tensions within F ± ``change`` (C,) [N]; None if there are none."""
+        """Return the set of admissible tensions within F ± ``change`` (C,) [N]; None if empty."""
         low, high = np.maximum(self.low, F - change), np.minimum(self.high, F + change)
         least = self.nearest(np.zeros_like(F), low, high) if (low <= high).all() else None
         if least is None:
@@ -96,7 +105,7 @@ class Admissible:
         return replace(self, least=replace(self.least, values=frozen(least)), low=low, high=high)
 
     def tension(self, F: Array) -> Tension:
-        """Convert F (C,) [N] to a :class:`Tension`; correct rounding errors of its balance."""
+        """Return F (C,) [N] as a :class:`Tension`, without the rounding errors of its balance."""
         exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
         values = frozen(F if exact is None else exact)
         return replace(self.least, values=values, least=False)
@@ -105,7 +114,7 @@ class Admissible:
 def admissible(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike
 ) -> Admissible:
-    """Find the admissible tensions at a posture.
+    """Find the set of admissible tensions at a posture under a load.
 
     :func:`~cdsm.distribute_tension` explains the arguments.
 

@@ -23,7 +23,7 @@ _BACK = 50  # largest number of earlier samples that are planned again for a lat
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Target of one sample of a path, and its tensions once it is planned."""
+    """One sample of a path: its target, and its tensions once they are planned."""
 
     index: int
     model: StiffnessModel  # K_θ over the admissible tensions at the sample
@@ -33,7 +33,7 @@ class Sample:
 
 @dataclass(eq=False)
 class Follower:
-    """Planner of a path, sample by sample; it keeps the planned samples."""
+    """Planner that takes the samples of a path one after the other, and stores the planned ones."""
 
     rate: Array  # largest change of a tension per step (C,) [N]; may hold inf
     starts: int  # number of starting tensions of a search from scratch
@@ -41,12 +41,13 @@ class Follower:
     planned: list[Sample] = field(default_factory=list)
 
     def add(self, sample: Sample) -> InfeasibleSample | None:
-        """Plan one more sample. Return None if it succeeds, else the reason of the failure.
+        """Plan the next sample; return None if this succeeds, else the sample with the reason.
 
-        The plan takes the least tensions that hit the target and that the rate allows after the
-        last planned sample. If only other tensions hit the target, earlier samples are planned
-        again so that the rate allows these tensions. Raises UnreachableStiffness or
-        SingularStiffness if no tensions hit the target, even with an unlimited rate.
+        The tensions are the least ones that hit the target and that the rate allows: each differs
+        from the tension of the last planned sample by at most ``rate`` per step. If only other
+        tensions hit the target, earlier samples are planned again, so that the rate then allows
+        these tensions. Raises UnreachableStiffness or SingularStiffness if no tensions hit the
+        target, even with an unlimited rate.
         """
         region = sample.model.region
         last = self.planned[-1] if self.planned else None
@@ -68,9 +69,11 @@ class Follower:
     def _near(
         self, region: Admissible | None, sample: Sample, other: Sample | None
     ) -> Admissible | None:
-        """Keep the tensions of ``region`` at ``sample`` that the rate allows from ``other``.
+        """Return the part of ``region`` at ``sample`` that the rate allows.
 
-        If ``other`` is None, ``region`` is returned. The result is None if no tensions remain.
+        Each tension may differ from that of the sample ``other`` by ``rate`` times the number of
+        steps between both samples. If ``other`` is None, return ``region``. Return None if no
+        admissible tensions remain.
         """
         if region is None or other is None:
             return region
@@ -79,18 +82,19 @@ class Follower:
     def _search(
         self, sample: Sample, region: Admissible | None, start: Array, centre: Array | float = 0.0
     ) -> Sample | None:
-        """Plan a sample by one search of ``region`` from ``start``; None if it misses the target.
+        """Search ``region`` once for tensions that hit the target; return the planned sample.
 
-        The search finds the tensions on target that are nearest to ``centre`` (C,) [N].
+        The search begins at ``start`` (C,) [N]. Of the tensions that hit the target, it takes those
+        nearest to ``centre`` (C,) [N]; 0 gives the least ones. Return None if it misses the target.
         """
         found = _search(sample.model, region, sample.constraints, start, centre)
         return replace(sample, F=found[0]) if found and found[1] else None
 
     def _from_scratch(self, sample: Sample) -> Sample | None:
-        """Plan a sample as if it were the only one.
+        """Plan a sample without regard to the samples before it.
 
-        Return None if no search hits all of several targets. Raises UnreachableStiffness if none
-        hits a single target.
+        If no search hits the target, return None if ``sample`` has several targets, and raise
+        UnreachableStiffness if it has a single one.
         """
         found = Planner(sample.model, sample.constraints, self.starts, self.seed).least()
         if found is None:
@@ -100,9 +104,10 @@ class Follower:
     def _replan_towards(self, goal: Sample) -> bool:
         """Plan the last samples again so that the rate allows ``goal``; return whether it succeeds.
 
-        The loop runs backwards. The tensions of each sample are within the rate from the tensions
-        of its successor, and as near as possible to the tensions of its predecessor. The loop ends
-        at the first sample whose tensions are within the rate from both.
+        The loop goes backwards from the last planned sample. Each sample gets tensions from which
+        the rate allows those of the next sample. Of these tensions, it gets those nearest to the
+        tensions of the sample before. The loop ends when the rate also allows the change from the
+        sample before. At most 50 samples are planned again.
         """
         later = [goal]
         for k in reversed(range(max(len(self.planned) - _BACK, 0), len(self.planned))):

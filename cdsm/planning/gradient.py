@@ -1,7 +1,8 @@
 """Exact derivatives of a :class:`Stiffness` with respect to the cable tensions.
 
-With rows R of the tip Jacobian, the tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ changes by Mᵀ ∂K_θ M.
-M = K_θ⁻¹ Rᵀ X is the joint motion per unit motion of the tip.
+R (r, nv) are rows of the tip Jacobian, and X = (R K_θ⁻¹ Rᵀ)⁻¹ (r, r) is the tip stiffness. If K_θ
+changes by ∂K_θ, X changes by Mᵀ ∂K_θ M. M = K_θ⁻¹ Rᵀ X is the joint motion per unit motion of the
+tip. If a moment acts on the tip, K_θ is not symmetric, and the left factor is (K_θ⁻ᵀ Rᵀ Xᵀ)ᵀ.
 """
 
 from __future__ import annotations
@@ -64,18 +65,18 @@ class StiffnessGradient(ReadOnlyState):
 
     @cached_property
     def margin(self) -> Array:
-        """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], where v is the critical direction.
+        """∂λ_min/∂F = vᵀ ∂K_θ/∂F v (C,) [m/rad²], with the unit eigenvector v of λ_min.
 
-        If λ_min is a multiple eigenvalue, it has no gradient. The result is then computed with one
-        v of the eigenspace. Its product with ΔF is an upper bound of the change of λ_min, to first
-        order.
+        λ_min is the smallest eigenvalue of the symmetric part of K_θ. A multiple eigenvalue has no
+        gradient. The result then belongs to one of its eigenvectors; the product with ΔF is an
+        upper bound of the change of λ_min, to first order.
         """
         v = self.stiffness.critical_direction[:, None]
         return frozen(self._projected(v, v)[:, 0, 0])
 
     @cached_property
     def cartesian(self) -> Array:
-        """∂(C_vv)⁻¹/∂F (C, 3, 3) [1/m].
+        """∂(C_vv)⁻¹/∂F (C, 3, 3) [1/m], with the translational block C_vv of the compliance.
 
         Raises:
             SingularStiffness: K_θ is singular, or the tip hardly moves in some direction.
@@ -83,10 +84,11 @@ class StiffnessGradient(ReadOnlyState):
         return frozen(self._through(self.stiffness.posture.jacobian[:3], self.stiffness.cartesian))
 
     def along(self, direction: Direction) -> Array:
-        """Return ∂s/∂F = s² wᵀ ∂K_θ/∂F w (C,) [1/m] of s = ``K.along(u)``, with w = K_θ⁻¹ J_vᵀ u.
+        """Return ∂s/∂F (C,) [1/m] of the stiffness s = ``K.along(u)``, u being ``direction``.
 
-        Raises InvalidInput if ``direction`` is not an axis or a nonzero (3,), and SingularStiffness
-        if K_θ is singular or the tip cannot move along u.
+        ∂s/∂F = s² (K_θ⁻ᵀ J_vᵀ u)ᵀ ∂K_θ/∂F (K_θ⁻¹ J_vᵀ u), with the translational rows J_v of the
+        tip Jacobian. Raises InvalidInput if ``direction`` is not an axis or a nonzero (3,), and
+        SingularStiffness if K_θ is singular or the tip cannot move along u.
         """
         u = unit_direction("direction", direction)
         self.stiffness._require_mobile(u)
@@ -94,7 +96,10 @@ class StiffnessGradient(ReadOnlyState):
         return frozen(self._through(rows, np.array([[self.stiffness.along(u)]]))[:, 0, 0])
 
     def _through(self, rows: Array, X: Array) -> Array:
-        """Return ∂X/∂F (C, r, r) of tip stiffness X (r, r) for rows (r, nv) of the tip Jacobian."""
+        """Return ∂X/∂F (C, r, r) of the tip stiffness X (r, r).
+
+        ``rows`` (r, nv) are the rows of the tip Jacobian that belong to X.
+        """
         K = self.stiffness.joint
         right = np.linalg.solve(K, rows.T) @ X
         left = np.linalg.solve(K.T, rows.T) @ X.T  # differs from right only if a moment acts

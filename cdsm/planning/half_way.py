@@ -17,7 +17,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class HalfWay(ReadOnlyState):
-    """Arm half-way between a planned sample and the next sample.
+    """Equilibrium and stiffness of an arm half-way between a planned sample and the next sample.
 
     A position-controlled cable has the mean of its two original lengths l_0. A force-controlled
     cable has the mean of its two tensions. The mean of the two wrenches acts. The arm is in
@@ -29,8 +29,8 @@ class HalfWay(ReadOnlyState):
         target: Mean of the two targets [N/m]: (), (n,) or (3, 3).
         stiffness: K_θ at the equilibrium; None without equilibrium.
         achieved: ``along`` or ``cartesian`` [N/m], (), (n,) or (3, 3); None without equilibrium.
-        misfit: ‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``; inf
-            without equilibrium.
+        misfit: ‖achieved/target − 1‖ [-], or ‖S − target‖/‖target‖ with the symmetric part S of
+            ``cartesian``; inf without equilibrium.
         reason: Why no equilibrium was found; otherwise empty.
     """
 
@@ -52,7 +52,7 @@ def half_way(
     target: Array,
     directions: Array | None,
 ) -> HalfWay:
-    """Compute the arm half-way between sample number ``index`` and the next sample.
+    """Compute the equilibrium half-way between sample number ``index`` and the next sample.
 
     ``ends`` are the stiffnesses of both samples. ``unstrained`` (H,) [m] are the means of the
     original lengths l_0 of the H position-controlled cables, and ``target`` [N/m] is the mean of

@@ -1,9 +1,11 @@
-"""Numba kernels of the searches. In numpy a plan would take 1.4 times as long (5 joints).
+"""Numba kernels of the searches for tensions: K_θ, the tip stiffness, and their derivatives.
+
+In numpy a plan would take 1.4 times as long (5 joints).
 
 Shapes: C cables, nv joint angles, r rows of the tip Jacobian, n constraints. J_c and H_c are the
 gradient (row c of ``length_jacobian``) and the Hessian (entry c of ``hessian``) of the length of
 cable c. k_c is its stiffness (``springs``), k′_c = dk_c/dF_c (``slope``) and k″_c = d²k_c/dF_c²
-(``bend``).
+(``bend``). So ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ.
 """
 
 from __future__ import annotations
@@ -21,10 +23,12 @@ _CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it
 def stiffness_at(
     constant: Array, hessian: Array, length_jacobian: Array, tension: Array, springs: Array
 ) -> tuple[Array, Array, Array]:
-    """Return K_θ = constant + Σ (F_c H_c + k_c J_c J_cᵀ), and its eigenvalues and eigenvectors.
+    """Return K_θ = constant + Σ_c (F_c H_c + k_c J_c J_cᵀ), its eigenvalues and its eigenvectors.
 
-    Eigenvalues and eigenvectors belong to the symmetric part of K_θ. ``constant`` (nv, nv) is the
-    sum of the terms of gravity and load, ``tension`` (C,) [N] contains F.
+    H_c (``hessian``, (C, nv, nv)) and J_c (``length_jacobian``, (C, nv)) are the Hessian and the
+    gradient of the length of cable c, F_c (``tension``, (C,)) [N] its tension, and k_c
+    (``springs``, (C,)) [N/m] its stiffness. ``constant`` (nv, nv) is the sum of the terms of
+    gravity and load. The eigenvalues and eigenvectors are those of the symmetric part of K_θ.
     """
     K = constant.copy()
     count, nv = length_jacobian.shape
@@ -39,7 +43,7 @@ def stiffness_at(
 
 @compiled
 def _inverse(A: Array) -> Array:
-    """Return A⁻¹; unlike ``np.linalg.inv``, with the same bits in numba and in Python."""
+    """Return A⁻¹; unlike ``np.linalg.inv``, it has the same bits in numba and in plain Python."""
     n = len(A)
     M = np.zeros((n, 2 * n, 1))
     for i in range(n):
@@ -52,7 +56,12 @@ def _inverse(A: Array) -> Array:
 
 @compiled
 def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
-    """Return X = (R K_θ⁻¹ Rᵀ)⁻¹, K_θ⁻¹ Rᵀ X, K_θ⁻ᵀ Rᵀ Xᵀ and K_θ⁻¹, with R = ``rows`` (r, nv)."""
+    """Return the tip stiffness X, the matrices right and left, and K_θ⁻¹.
+
+    X = (R K_θ⁻¹ Rᵀ)⁻¹ (r, r) with ``rows`` R (r, nv) of the tip Jacobian. right = K_θ⁻¹ Rᵀ X (nv,
+    r) is the joint motion per unit motion of the tip, and left = K_θ⁻ᵀ Rᵀ Xᵀ (nv, r). A change ∂K_θ
+    changes X by leftᵀ ∂K_θ right.
+    """
     inverse = _inverse(K)
     soft = np.dot(inverse, rows.T)
     X = _inverse(np.dot(rows, soft))
@@ -65,7 +74,11 @@ def tip_stiffness(K: Array, rows: Array) -> tuple[Array, Array, Array, Array]:
 def _torques_by_tension(
     hessian: Array, length_jacobian: Array, slope: Array, motion: Array
 ) -> Array:
-    """Return (∂K_θ/∂F_c) m = (H_c + k′_c J_c J_cᵀ) m (C, nv, b) for columns m of motion (nv, b)."""
+    """Return (∂K_θ/∂F_c) m (C, nv, b) for joint motions m, the columns of ``motion`` (nv, b).
+
+    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ, with the Hessian H_c and the gradient J_c of the length of
+    cable c, and ``slope`` k′ = dk/dF (C,) [1/m] of the cable stiffnesses.
+    """
     count, nv = length_jacobian.shape
     columns = motion.shape[1]
     result = np.zeros((count, nv, columns))
@@ -87,7 +100,11 @@ def _torques_by_tension(
 def form_by_tension(
     hessian: Array, length_jacobian: Array, slope: Array, left: Array, right: Array
 ) -> Array:
-    """Return leftᵀ (∂K_θ/∂F_c) right (C, a, b) for left (nv, a) and right (nv, b)."""
+    """Return leftᵀ (∂K_θ/∂F_c) right (C, a, b) for ``left`` (nv, a) and ``right`` (nv, b).
+
+    ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ, with the Hessian H_c and the gradient J_c of the length of
+    cable c, and ``slope`` k′ = dk/dF (C,) [1/m] of the cable stiffnesses.
+    """
     torques = _torques_by_tension(hessian, length_jacobian, slope, right)
     count, nv, columns = torques.shape
     result = np.zeros((count, left.shape[1], columns))
@@ -103,9 +120,11 @@ def form_by_tension(
 def constraint_jacobian(
     hessian: Array, length_jacobian: Array, slope: Array, weights: Array, left: Array, right: Array
 ) -> Array:
-    """Return the derivatives Σ_ab E_ab (leftᵀ (∂K_θ/∂F_c) right)_ab (n, C) of n constraints.
+    """Return the derivatives (n, C) of n constraints with respect to the tensions.
 
-    E (n, r, r) are the ``weights``; ``left`` and ``right`` (nv, r) come from :func:`tip_stiffness`.
+    Constraint j is Σ_ab E_j,ab X_ab, with ``weights`` E (n, r, r) and the tip stiffness X (r, r).
+    So its derivative is Σ_ab E_j,ab (leftᵀ (∂K_θ/∂F_c) right)_ab, with ``left`` and ``right`` (nv,
+    r) from :func:`tip_stiffness`.
     """
     rates = form_by_tension(hessian, length_jacobian, slope, left, right)
     result = np.zeros((weights.shape[0], rates.shape[0]))
@@ -129,9 +148,11 @@ def constraint_hessian(
     left: Array,
     right: Array,
 ) -> Array:
-    """Return ∂²(Σ Y_ij X_ij)/∂F² (C, C) for weights Y (r, r) and the tip stiffness X (r, r).
+    """Return ∂²(Σ_ij Y_ij X_ij)/∂F² (C, C) for weights Y (r, r) and the tip stiffness X (r, r).
 
-    ``left``, ``right`` and ``inverse`` come from :func:`tip_stiffness` with the same ``rows``.
+    ``slope`` and ``bend`` (C,) are the first and second derivative of the cable stiffnesses with
+    respect to the tension. ``left``, ``right`` and ``inverse`` come from :func:`tip_stiffness` with
+    the same ``rows``.
     """
     left_torques = _torques_by_tension(hessian, length_jacobian, slope, left)
     right_torques = _torques_by_tension(hessian, length_jacobian, slope, right)
@@ -161,7 +182,7 @@ def constraint_hessian(
 
 @compiled
 def convex(W: Array, null: Array, normals: Array) -> Array:
-    """Return a positive definite matrix (C, C) that replaces the curvature W.
+    """Return a positive definite matrix (C, C) that replaces the Hessian ``W`` (C, C) in a QP.
 
     On admissible steps w, wᵀ W w stays the same, except that small and negative curvatures are
     raised. All other steps get a positive curvature. Admissible steps keep the balance, so they are

@@ -26,9 +26,11 @@ def checked_starts(starts: object, seed: object) -> tuple[int, int]:
 def target_constraints(
     model: StiffnessModel, directions: Array | None, target: Array
 ) -> Constraints:
-    """Build the constraints along = target [N/m], or cartesian = target if directions are None.
+    """Build the constraints that ``K.along(u)`` of each direction u has the ``target`` [N/m].
 
-    Raises SingularStiffness if the tip cannot move along a direction.
+    If ``directions`` is None, the constraints are ``K.cartesian`` = ``target`` (3, 3). Raises
+    SingularStiffness if the tip cannot move along a direction, or if ``K.cartesian`` does not
+    exist.
     """
     K = stiffness(model.pose, model.region.least)
     if directions is None:
@@ -42,7 +44,7 @@ def target_constraints(
 
 
 def along_constraints(model: StiffnessModel, directions: Array, targets: Array) -> Constraints:
-    """Build the constraints along/target − 1 for directions (m, 3) and targets (m,) [N/m]."""
+    """Build the constraints along(u)/target − 1 = 0 for directions u (m, 3), targets (m,) [N/m]."""
     parts = tuple(
         Constraint(u[None] @ model.pose.jacobian[:3], np.full((1, 1, 1), 1.0 / target))
         for u, target in zip(directions, targets.tolist(), strict=True)
@@ -51,7 +53,7 @@ def along_constraints(model: StiffnessModel, directions: Array, targets: Array) 
 
 
 def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
-    """Build the constraints (cartesian − target)/‖target‖ for a target (3, 3) [N/m].
+    """Build the constraints (cartesian − target)/‖target‖ = 0 for a target (3, 3) [N/m].
 
     There are 6 constraints, one for each entry of the symmetric part of this matrix. Entries off
     the diagonal have a factor √2, so the norm of the 6 values is the norm of the symmetric part.
@@ -64,7 +66,11 @@ def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
 
 
 def achieved(K: Stiffness, directions: Array | None) -> Array:
-    """Return ``K.along`` [N/m] of ``directions``, () or (n,); ``K.cartesian`` (3, 3) for None."""
+    """Return the stiffness [N/m] that a plan has reached.
+
+    It is ``K.along(u)`` of each direction u: () for ``directions`` (3,), (n,) for (n, 3). If
+    ``directions`` is None, it is ``K.cartesian`` (3, 3).
+    """
     if directions is None:
         return K.cartesian
     along = [K.along(u) for u in directions.reshape(-1, 3)]
@@ -72,10 +78,10 @@ def achieved(K: Stiffness, directions: Array | None) -> Array:
 
 
 def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
-    """Return ‖achieved/target − 1‖ [-].
+    """Return the relative error of a stiffness, ‖achieved/target − 1‖ [-].
 
-    If ``directions`` is None, return ‖S − target‖/‖target‖ [-] instead, where S is the symmetric
-    part of ``achieved``.
+    If ``directions`` is None, it is ‖S − target‖/‖target‖ [-] instead, where S is the symmetric
+    part of ``achieved`` (3, 3).
     """
     if directions is None:
         off = (achieved + achieved.T) / 2.0 - target
@@ -84,7 +90,11 @@ def misfit(achieved: Array, target: Array, directions: Array | None) -> float:
 
 
 def unstable(arm: Manipulator, problem: str, mode: Array) -> SingularStiffness:
-    """Build the error of an arm that no tensions make stable, with its softest ``mode`` (nv,)."""
+    """Build the error that no tensions make the arm stable.
+
+    ``problem`` begins the message. ``mode`` (nv,) is the joint motion of least stiffness, and its
+    largest entry tells the joint that buckles.
+    """
     mode = mode * np.sign(mode[abs(mode).argmax()])
     remedy = "Change the bounds, the posture or the load, take stiffer cables, or lower margin."
     if all(cable.control == "force" for cable in arm.cables):

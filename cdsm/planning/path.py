@@ -60,17 +60,16 @@ def plan_path(
 ) -> PathPlan:
     """Plan tensions for a wanted stiffness along a path: min ‖F_i‖² with along(u) = target_i.
 
-    Each of S samples is planned as :func:`~cdsm.planning.plan.plan_stiffness` does. The search
+    :func:`~cdsm.planning.plan.plan_stiffness` describes the plan of each of S samples. The search
     starts from the tensions of the sample before, or from scratch if that fails. An infeasible
     sample does not stop the path: ``infeasible`` of the result lists it with its reason.
 
-    The rate limits the change of every tension between a planned sample and the planned sample
-    before it: k·rate if they are k samples apart. If no tensions within this limit hit the target
-    although others do, up to 50 earlier samples are planned again, backwards, so that they still
-    hit their targets and lead to this sample. If this fails, the sample has the status ``"rate"``,
-    and the next sample may change the tensions by one rate more. So after a jump of the target,
-    samples have this status until the rate allows the new tensions. If the arm must follow
-    meanwhile, give a ramp instead of a jump.
+    Between two planned samples that are k samples apart, no tension changes by more than k·rate.
+    If no tensions within this limit hit the target although others do, up to 50 earlier samples are
+    planned again, backwards, so that they still hit their targets and lead to this sample. If this
+    fails, the sample has the status ``"rate"``, and the next sample may change the tensions by one
+    rate more. So after a jump of the target, samples have this status until the rate allows the new
+    tensions. If the arm must follow meanwhile, give a ramp instead of a jump.
 
     The plan hits the targets at the samples. ``between`` of the result gives the stiffness half-way
     between two samples. Its misfit is of second order in the step between samples.
@@ -183,7 +182,10 @@ def checked_rate(arm: Manipulator, rate: ArrayLike) -> Array:
 
 
 def _per_sample(name: str, value: ArrayLike, tail: tuple[int, ...], size: int) -> Array:
-    """Return the values (S, …) of S = ``size`` samples; one value of shape ``tail`` is repeated."""
+    """Return one value per sample, (S, *tail) with S = ``size``.
+
+    ``value`` has this shape, or the shape ``tail``; then it is repeated for each sample.
+    """
     given = number_array(name, value)
     if given.shape not in (tail, (size, *tail)):
         raise InvalidInput(

@@ -94,9 +94,9 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def steps(self) -> Array:
-        """Largest change of a tension per step since the planned sample before (P,) [N].
+        """Largest change of any tension per step, from one planned sample to the next (P,) [N].
 
-        The first entry is 0.
+        Entry i is the change up to planned sample i; the first entry is 0.
         """
         changes = np.zeros(len(self.planned))
         moved = abs(np.diff(self.tensions, axis=0)).max(axis=1, initial=0.0)
@@ -124,7 +124,7 @@ class PathPlan(ReadOnlyState):
 
     @cached_property
     def between(self) -> tuple[HalfWay, ...]:
-        """Arm half-way between each pair of neighbouring samples that are both planned.
+        """Equilibrium half-way between each pair of neighbouring samples that are both planned.
 
         The motors are assumed to move at constant speed. With half the step between samples, the
         misfit falls to a quarter. The first use takes a few milliseconds per pair.
@@ -163,7 +163,7 @@ class PathPlan(ReadOnlyState):
         return cdsm.plots.plot_path_plan(self)
 
     def to_dict(self) -> dict[str, object]:
-        """Return the plan in SI for JSON, with units in the keys: a row per planned sample."""
+        """Return the plan in SI for JSON, with units in the keys; a row per planned sample."""
         numbers = {
             "cables": self.arm.cables.names,
             "target_N_per_m": self.target,

@@ -41,12 +41,13 @@ class StiffnessPlan(ReadOnlyState):
     """Tensions for a wanted stiffness, with the target; made by :func:`plan_stiffness`.
 
     Attributes:
-        tension: The tensions. If several are equally near to the target, they have the least ‖F‖.
+        tension: The planned tensions: of those equally near to the target, the ones of least ‖F‖.
         stiffness: K_θ under these tensions.
         direction: Unit directions u in base axes, (3,) or (n, 3); None for ``cartesian``.
         target: The target [N/m]: a number, one per direction (n,), or (3, 3).
         achieved: ``stiffness.along`` () or (n,), or ``stiffness.cartesian`` (3, 3) [N/m].
-        floor: Smallest eigenvalue of K_θ that counted as stable [N m/rad].
+        floor: Limit of the smallest eigenvalue of K_θ; below it an arm counts as unstable
+            [N m/rad].
         efforts: ‖F‖ (S,) [N] at the end of each search that hit the target, ascending. The first
             belongs to ``tension``.
         iterations: Iterations of all searches.
@@ -151,9 +152,9 @@ def plan_stiffness(
     ``reached`` is False.
 
     The searches are local. With the laws of this library they usually end at the same effort ‖F‖.
-    With one user-defined law, the effort found was 3.6 % above the least. A ``spread`` above zero
-    shows that the searches ended at different efforts. A ``spread`` of zero does not prove that the
-    least effort was found. More ``starts`` help.
+    With one user-defined law, the effort found was 3.6 % above the least. If ``spread`` is above
+    zero, the searches ended at different efforts, and more ``starts`` help. A ``spread`` of zero
+    does not prove that the least effort was found.
 
     Args:
         pose: The posture.

@@ -1,4 +1,4 @@
-"""Search from several starts for the least tensions that hit a target.
+"""Search from several starts for the least tensions that hit a target stiffness.
 
 The search is local, so the tensions found may exceed the least ones;
 :func:`~cdsm.planning.plan.plan_stiffness` says by how much.
@@ -37,7 +37,9 @@ _AS_NEAR = 1e-8  # misses up to this count as zero: next to buckling a search ma
 class Planner:
     """Search, from several starts, for the tensions F of least ‖F‖ with constraints c(F) = 0.
 
-    ``efforts`` are ‖F‖ [N] at the end of each search that hit the target, ascending.
+    A result is a point: :class:`ConstraintValues`, with the tensions in ``evaluation.F``. c are the
+    relative misses of the targets. ``efforts`` are ‖F‖ [N] at the end of each search that hit the
+    target, ascending.
     """
 
     def __init__(
@@ -53,9 +55,9 @@ class Planner:
         self._ends: list[ConstraintValues] = []
 
     def least(self) -> ConstraintValues | None:
-        """Return the constraint values at the tensions of least ‖F‖ that hit all targets.
+        """Return the point of least ‖F‖ that hits all targets.
 
-        If there are none, return None for several targets, and raise UnreachableStiffness for one.
+        If there is none, return None for several targets, and raise UnreachableStiffness for one.
         """
         found = self._best(self._starts())
         if found is None and self.constraints.single is not None:
@@ -63,9 +65,9 @@ class Planner:
         return found
 
     def nearest(self) -> ConstraintValues:
-        """Return the constraint values at the tensions with the least sum of squared misses found.
+        """Return the point with the least sum of squared misses c that the searches find.
 
-        Among tensions with this sum, those of least ‖F‖ are chosen.
+        Of the points with this sum, it is the one of least ‖F‖.
         """
         program = replace(self.program, objective=NEAREST)
 
@@ -81,8 +83,10 @@ class Planner:
         return least if smaller else best
 
     def _within_range(self, u: Array, target: float) -> ConstraintValues:
-        """Return the constraint values at the least tensions that hit ``target`` [N/m] along u.
+        """Return the point of least ‖F‖ with ``target`` [N/m] along u (3,), from a second attempt.
 
+        The planner makes this attempt if the searches from the usual starts fail. It finds the
+        softest and the stiffest arm, and searches from the points between them that hit the target.
         Raises UnreachableStiffness if the target is outside the range of stiffness that searches
         find, or if no search hits it.
         """
@@ -112,9 +116,9 @@ class Planner:
         return found
 
     def _best(self, points: Iterable[Evaluation]) -> ConstraintValues | None:
-        """Search from all ``points``; return the best result that hits the targets, or None.
+        """Search from each of ``points``; return the best point that hits all targets, or None.
 
-        The best result has the least ‖F‖. It is given as its constraint values.
+        The best point has the least ‖F‖.
         """
         begin = list(points)
         near = [
@@ -133,7 +137,7 @@ class Planner:
         return hits[0]
 
     def _nearly_hit(self, seen: list[ConstraintValues]) -> ConstraintValues | None:
-        """Return the point of ``seen`` nearest to the target; None if it misses by more than 1e-6.
+        """Return the point of ``seen`` nearest to a single target; None if the miss exceeds 1e-6.
 
         Misses are relative. Of the points that miss by at most 1e-8, the one of least ‖F‖ is taken.
         """
@@ -163,7 +167,7 @@ class Planner:
     def _crossings(
         self, hub: Evaluation, others: list[Evaluation], precision: float = 1e-2
     ) -> list[Evaluation]:
-        """Find stable points that hit the target, on the straight lines from ``hub`` to ``others``.
+        """Find stable points that hit a single target, on the lines from ``hub`` to ``others``.
 
         The point of least ‖F‖ is first. ``precision`` is the largest relative error of the distance
         of a point from ``hub``.
@@ -187,14 +191,18 @@ class Planner:
         return sorted(stable, key=lambda point: float(point.F @ point.F))
 
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
-        """Find stable points on target, on lines between points of ``seen`` below and above it."""
+        """Find stable points that hit a single target, on lines between points of ``seen``.
+
+        Each line connects one of the 6 nearest points below the target with one of the 6 nearest
+        above.
+        """
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]
         above = [place.evaluation for place in order if place.values[0] > 0.0][:_SIDES]
         return [place for one in below for place in self._crossings(one, above, 1e-15)]
 
     def _miss(self, point: Evaluation) -> float:
-        """Return along/target − 1 [-] for a single target; −1 if the arm is unstable there."""
+        """Return c = along/target − 1 [-] for a single target; −1 if the arm is unstable."""
         return float(self.constraints.at(point).values[0]) if point.reserve >= 0.0 else -1.0
 
     def _search(self, program: Program, point: Evaluation) -> ConstraintValues:

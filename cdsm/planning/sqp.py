@@ -2,14 +2,16 @@ r"""Sequential quadratic programming over the admissible tensions of a stable ar
 
     min f(F)   subject to   c(F) = 0,  J_Lᵀ F = τ,  low ≤ F ≤ high,  λ_min(K_θ(F)) ≥ floor.
 
-Only c and the last condition, reserve = λ_min − floor ≥ 0, are nonlinear. Every iterate balances
-the arm and is stable, so K_θ can be inverted there. scipy's SLSQP with the same gradients ends at
-the same tensions (tests/planning/test_sqp.py), but needs twice the evaluations, sometimes a hundred
-times as many. SLSQP with finite differences takes three times as long
+c are the constraints on the stiffness, τ = J_Xᵀ W − g is the torque that the cables balance. Only c
+and the last condition, reserve = λ_min − floor ≥ 0, are nonlinear. Every iterate balances the arm
+and is stable, so K_θ can be inverted there. scipy's SLSQP with the same gradients ends at the same
+tensions (tests/planning/test_sqp.py), but needs twice the evaluations, sometimes a hundred times as
+many. SLSQP with finite differences takes three times as long
 (tests/benchmarks/test_planning_speed.py).
 
-**The quadratic program of a step.** Let d = ΔF/size, g = ∂f/∂d and G = ∂c/∂d. The Lagrangian is
-L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve
+**The quadratic program of a step.** Let d = ΔF/size with the largest tension ``size``, g = ∂f/∂d
+and G = ∂c/∂d. The Lagrangian is L = f + y·c − z·reserve, with the multipliers y and z of the step
+before. Solve
 
     min ½ dᵀ W d + g·d + ρ Σ(s + t) + ½ ρ Σ(s² + t²)
     subject to  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
@@ -81,7 +83,7 @@ NEAREST: Final = Objective(square=1.0)
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Nonlinear program over the tensions."""
+    """Nonlinear program: minimise an objective over the admissible tensions of a stable arm."""
 
     region: Admissible  # the admissible tensions
     anchor: Evaluation  # stable point well inside, towards which steps are moved back
@@ -91,7 +93,11 @@ class Program:
     centre: Array | float = 0.0  # tensions (C,) [N] at which the effort is zero, or 0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return the merit of a point: f; if f is the effort, f + ``price`` · (‖c‖₁ + ½ ‖c‖²)."""
+        """Return the merit of a point, which a search reduces: the objective f.
+
+        If f is the effort, the penalty ``price`` · (‖c‖₁ + ½ ‖c‖²) of the constraint values c is
+        added.
+        """
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit
@@ -99,7 +105,10 @@ class Program:
         return self.objective.linear * float(c.sum()) + 0.5 * self.objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
-        """Return whether all |c| ≤ 1e-9 [-] at a point; True if the objective is not the effort."""
+        """Return whether all constraint values |c| are at most 1e-9 [-] at a point.
+
+        It is True for other objectives than the effort: they have no constraint c = 0.
+        """
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
@@ -115,7 +124,10 @@ class Program:
 
 
 def search(program: Program, start: Evaluation) -> ConstraintValues:
-    """Find a local optimum of ``program``, also across kinks, from the stable point ``start``."""
+    """Find a local optimum of ``program`` from the stable point ``start``.
+
+    The search also crosses kinks of the rigidities EA(F); see the module's docstring.
+    """
     best = _search(program, start, in_piece=False)
     for _ in range(_CROSSINGS):
         for F in _beyond_kinks(program.region, best.evaluation.F):
@@ -130,7 +142,10 @@ def search(program: Program, start: Evaluation) -> ConstraintValues:
 
 
 def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
-    """Yield F (C,) [N] moved beyond the kinks at which it lies: beyond all, then beyond each."""
+    """Yield F (C,) [N], moved just across the kinks of EA(F) at which its tensions lie.
+
+    First the tensions of all these cables are moved together, then each one alone.
+    """
     at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
     for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
         beyond = F.copy()
@@ -140,7 +155,10 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 
 
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
-    """Find a local optimum of ``program``; if ``in_piece``, between the kinks around ``start``."""
+    """Find a local optimum of ``program`` from the stable point ``start``.
+
+    If ``in_piece`` is True, the tensions stay between the kinks of EA(F) around ``start``.
+    """
     region, iterate = program.region, program.constraints.at(start)
     multipliers = np.zeros(iterate.values.size if program.objective.effort else 0)
     step, radius = _Step(np.zeros_like(start.F), multipliers, 0.0, 0.0, _FIRST_PRICE), _FIRST_RADIUS
@@ -180,7 +198,7 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> Constrain
 
 
 class _Step(NamedTuple):
-    """Step of a search: the solution of its quadratic program."""
+    """Step of a search: the solution of the quadratic program at an iterate."""
 
     d: Array  # ΔF/size (C,)
     y: Array  # multipliers of c
@@ -190,10 +208,10 @@ class _Step(NamedTuple):
 
 
 class _LocalModel:
-    """Quadratic model of the program at an iterate, as a function of the scaled step d = ΔF/size.
+    """Quadratic program at an iterate, for the step d = ΔF/size.
 
-    ``before`` is the previous step. ``bounds`` (low, high) limit the tensions [N], and ``radius``
-    limits |d_c| of each cable.
+    ``size`` [N] is of the order of the tensions. ``before`` is the previous step. ``bounds`` (low,
+    high) limit the tensions [N], and ``radius`` limits |d_c| of each cable.
     """
 
     def __init__(
@@ -227,9 +245,10 @@ class _LocalModel:
         self.W = kernels.convex(W, program.region.null, normals)
 
     def step(self, price: float, c: Array) -> _Step:
-        """Solve the quadratic program for constraint values ``c`` (n,).
+        """Solve the quadratic program for constraint values ``c`` (n,) at d = 0.
 
-        ``price`` is the first weight of the violation; it is raised until c is met.
+        ``price`` is the first weight ρ of the violation of the constraints; it is raised until they
+        are met.
         """
         region, evaluation, size = self.program.region, self.iterate.evaluation, self.size
         count, rank, m = self.g.size, len(region.rows), c.size
@@ -276,7 +295,10 @@ class _LocalModel:
         return _Step(d, best.y[rank:], float(best.z[0]), predicted, price)
 
     def take(self, step: _Step) -> tuple[ConstraintValues | None, float]:
-        """Take a step; return the new point (None if it is unstable) and the fall of the merit."""
+        """Take a step; return the new point and the fall of the merit.
+
+        The point is None if no stable one is found.
+        """
         candidate, fall = self._after(step.d, step.price)
         if candidate is not None and fall < 0.75 * step.predicted and self.c.size:
             # second-order correction: use the value of c after the step, not of its tangent

@@ -19,16 +19,16 @@ _NO_GAIN = 1e-9  # a gain of reserve below this part of the scale of K_θ is not
 
 
 class StartPoints:
-    """Stable tensions in a bounded region, from which searches start.
+    """Tensions in a bounded region under which the arm is stable; searches start from them.
 
-    Corners of the region are searched in the directions of higher and of lower tension of each
-    cable, and in ``directions`` random directions. Raises SingularStiffness if no stable tensions
-    are found.
+    The search for corners of the region goes in the directions of higher and of lower tension of
+    each cable, and in ``directions`` random directions. Raises SingularStiffness if no stable
+    tensions are found.
 
     Attributes:
-        anchor: A stable point well inside.
-        points: The anchor, and stable points at the corners or near them. More random directions
-            add points and keep the others.
+        anchor: A stable point well inside the region.
+        points: The anchor, and stable points at the corners or near them. A larger ``directions``
+            adds points and keeps the others.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class StartPoints:
         self.points = [*self._known, *(point for point in drawn[known:] if point is not None)]
 
     def between(self, count: int) -> Iterator[Evaluation]:
-        """Yield up to ``count`` stable points, which are random means of :attr:`points`.
+        """Yield up to ``count`` stable points: means of :attr:`points` with random weights.
 
         Points found in random directions are not used for these means.
         """
@@ -79,9 +79,10 @@ class StartPoints:
 def _stabilize(model: StiffnessModel, region: Admissible, start: Evaluation) -> Evaluation:
     """Find tensions in ``region`` with about the largest reserve λ_min − floor, by cutting planes.
 
-    For every unit v, vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue. Each iterate adds
-    two such bounds, linearised, with v its two softest modes. The next iterate has the largest
-    reserve that the bounds allow within a trust region. ``start`` need not be stable.
+    For every unit vector v, vᵀ K_θ(F) v is an upper bound of the smallest eigenvalue λ_min. Each
+    iterate adds two such bounds, linearised in F: v are the eigenvectors of its two smallest
+    eigenvalues. The next iterate has the largest reserve that all bounds allow within a trust
+    region. ``start`` need not be stable. Raises SingularStiffness if no stable tensions are found.
     """
     iterate, radius, unit = start, 1.0, model.scale
     modes: list[Array] = []

@@ -1,4 +1,4 @@
-"""K_θ at one posture as a function of the tensions, and the tip stiffness that follows."""
+"""K_θ at one posture as a function of the tensions, and the tip stiffness that follows from it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ _NEAREST = 1e-9  # smallest distance of two eigenvalues in a derivative, as a pa
 
 
 def checked_margin(margin: float) -> float:
-    """Check and return ``margin``: at least 1e-9, which is above rounding, and below 1."""
+    """Check and return ``margin``: the least λ_min/λ_max of K_θ that counts as stable.
+
+    It is at least 1e-9, which is above rounding errors, and below 1.
+    """
     part = scalar("margin", margin)
     if not _LEAST_MARGIN <= part < 1.0:
         raise InvalidInput(
@@ -41,7 +44,8 @@ class StiffnessModel:
         pose: The posture.
         region: The admissible tensions.
         scale: Largest magnitude of an eigenvalue of K_θ under the least tensions [N m/rad].
-        floor: Smallest eigenvalue of K_θ that counts as stable [N m/rad].
+        floor: Limit of the smallest eigenvalue of K_θ; below it the arm counts as unstable
+            [N m/rad].
         evaluations: Number of evaluations of K_θ.
         iterations: Number of iterations of all searches.
     """
@@ -75,14 +79,14 @@ class StiffnessModel:
 
 
 class Evaluation:
-    """K_θ under given tensions.
+    """K_θ under given tensions: a point of a search.
 
     Attributes:
         model: The model that evaluates K_θ.
         F: Tensions (C,) [N].
         K: K_θ (nv, nv) [N m/rad].
-        eigenvalues: Eigenvalues of its symmetric part, ascending (nv,) [N m/rad].
-        eigenvectors: Eigenvectors, the columns of (nv, nv).
+        eigenvalues: Eigenvalues of the symmetric part of K_θ, ascending (nv,) [N m/rad].
+        eigenvectors: Their unit eigenvectors, the columns of (nv, nv).
     """
 
     def __init__(self, model: StiffnessModel, F: Array) -> None:
@@ -100,25 +104,26 @@ class Evaluation:
 
     @property
     def reserve(self) -> float:
-        """λ_min minus the floor [N m/rad]. The arm is stable if it is not negative."""
+        """λ_min of K_θ minus ``model.floor`` [N m/rad]; the arm is stable if it is not negative."""
         return float(self.eigenvalues[0] - self.model.floor)
 
     @cached_property
     def reserve_gradient(self) -> Array:
-        """Derivative of :attr:`reserve` (λ_min minus floor) by the tensions (C,) [m/rad²]."""
+        """Derivatives (C,) [m/rad²] of :attr:`reserve`, λ_min − floor, by the tensions."""
         return self.mode_gradient(self.eigenvectors[:, :1])
 
     def mode_gradient(self, v: Array) -> Array:
-        """Return ∂(vᵀ K_θ v)/∂F (C,) [m/rad²] for v (nv, 1)."""
+        """Return ∂(vᵀ K_θ v)/∂F (C,) [m/rad²] for a constant vector v (nv, 1)."""
         v = np.ascontiguousarray(v)
         return kernels.form_by_tension(*self.model.geometry, self.spring_slopes[0], v, v)[:, 0, 0]
 
     def reserve_hessian(self) -> Array:
-        """Return ∂²reserve/∂F² (C, C) [m/(N rad²)].
+        """Return the second derivatives (C, C) [m/(N rad²)] of :attr:`reserve` by the tensions.
 
-        Entry cd: 2 Σ_j (vᵀ ∂_c K_θ v_j)(v_jᵀ ∂_d K_θ v)/(λ − λ_j) + δ_cd vᵀ J_c k″_c J_cᵀ v. v is
-        the eigenvector of λ = λ_min, v_j are the others, ∂_c = ∂/∂F_c, and δ is the Kronecker
-        symbol.
+        Entry cd is 2 Σ_j (vᵀ ∂_c K_θ v_j)(v_jᵀ ∂_d K_θ v)/(λ − λ_j) + δ_cd k″_c (J_c·v)². v is the
+        eigenvector of the smallest eigenvalue λ, v_j are the other eigenvectors. ∂_c is ∂/∂F_c, J_c
+        the gradient of the length of cable c, k″_c the second derivative of its stiffness by F_c, δ
+        the Kronecker symbol.
         """
         J, v = self.model.pose.length_jacobian, np.ascontiguousarray(self.eigenvectors[:, :1])
         first, second = self.spring_slopes
@@ -130,7 +135,10 @@ class Evaluation:
         return result
 
     def backtracked(self, F: Array) -> Evaluation | None:
-        """Return the first stable point on the line from F (C,) [N] to ``self.F``, or None."""
+        """Return the first stable point on the line from F (C,) [N] to ``self.F``.
+
+        The result is None if no stable point is found.
+        """
         start = self.model.at(F)
         if start.reserve >= 0.0:
             return start
@@ -151,9 +159,10 @@ class Evaluation:
 
 
 class Constraint(NamedTuple):
-    """The n weighted sums Σ_ab E_j,ab X_ab [-] of a tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ (r, r) [N/m].
+    """Data of n constraints on one tip stiffness X = (R K_θ⁻¹ Rᵀ)⁻¹ (r, r) [N/m].
 
-    :class:`Constraints` requires a target value of each sum.
+    The value of constraint j is the weighted sum Σ_ab E_j,ab X_ab [-]. :class:`Constraints` has its
+    target.
     """
 
     rows: Array  # R (r, nv) [m/rad]
@@ -162,14 +171,14 @@ class Constraint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """c(F): values of all constraints minus their targets, to be zero."""
+    """Constraints c(F) = 0: each c is a weighted sum of stiffnesses [-] minus its target."""
 
     parts: tuple[Constraint, ...]  # whose values are joined in this order
     targets: Array  # (n,) [-]
     single: tuple[Array, float] | None = None  # u (3,) and target [N/m] of one direction
 
     def at(self, evaluation: Evaluation) -> ConstraintValues:
-        """Return the constraint values c at the tensions of ``evaluation``, which are stable."""
+        """Return the constraint values c at the tensions of ``evaluation``; it must be stable."""
         return ConstraintValues(self, evaluation)
 
 
@@ -184,7 +193,10 @@ class ConstraintValues:
         ∂_i ∂_j X = −Mᵀ (∂_i K_θ P ∂_j K_θ + ∂_j K_θ P ∂_i K_θ) M + δ_ij Mᵀ J_i k″_i J_iᵀ M.
 
     J_i is the gradient of the length of cable i, k″_i the second derivative of its stiffness by its
-    tension, δ the Kronecker symbol. ``values`` are the values c (n,) [-] of :class:`Constraints`.
+    tension, δ the Kronecker symbol. The formulas are those of a symmetric K_θ. If a moment acts on
+    the tip, Mᵀ is replaced by (K_θ⁻ᵀ Rᵀ Xᵀ)ᵀ.
+
+    ``values`` are the values c (n,) [-] of :class:`Constraints`.
     """
 
     def __init__(self, constraints: Constraints, evaluation: Evaluation) -> None:
@@ -209,7 +221,7 @@ class ConstraintValues:
         )
 
     def hessian(self, y: Array) -> Array:
-        """Return the Hessian (C, C) [1/N²] of the sum of the values with weights ``y`` (n,)."""
+        """Return the Hessian (C, C) [1/N²] of Σ_j y_j c_j, the values c with weights ``y`` (n,)."""
         slopes = *self.evaluation.model.geometry, *self.evaluation.spring_slopes
         total, first = np.zeros((self.evaluation.F.size,) * 2), 0
         each = zip(self._parts, self._tips, strict=True)

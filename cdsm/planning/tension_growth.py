@@ -53,10 +53,10 @@ def saturation(
     d along/db = ∂along/∂F · dF*/db. Tensions at the lower bound rise with b, and tensions between
     the bounds keep the balance. The result is the first b, beyond the b of largest slope, at which
     the slope has fallen to ``fraction`` of the largest. A strand starts soft, so its largest slope
-    is large (Section IV-C). Where the rigidity of the strand has levelled off, tension acts only
-    through the active part of K_θ (Eq. 16). Then more tension softens the arm if springs or leads
-    (straight cables between actuators and base disk) keep the wires from stiffening as they
-    stretch.
+    is large (Section IV-C). Where the rigidity of the strand has levelled off, more tension has two
+    small effects: the active part of K_θ (Eq. 16) usually softens the arm, and the wires stiffen
+    since their original lengths fall. Series springs and leads (straight cables between actuators
+    and base disk) weaken the second effect, so that the arm may soften.
 
     Args:
         pose: The posture, which stays fixed.
@@ -124,10 +124,10 @@ def saturation(
 
 
 def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
-    """Return the first interval of lower bounds [N], low and high, under which the arm is stable.
+    """Return the ends [N] of the first interval of lower bounds under which the arm is stable.
 
-    An end at which the arm buckles is moved inward by 1e-6 of the interval. Raises
-    SingularStiffness if the arm is stable at no lower bound.
+    The lower bounds are between ``low`` and ``high`` [N]. An end at which the arm buckles is moved
+    inward by 1e-6 of the interval. Raises SingularStiffness if the arm is stable at no lower bound.
     """
     places, margins, stable = stable_ranges(at, low, high)
     if not stable:
@@ -144,10 +144,11 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
 
 
 def _kinks(at: StiffnessAt, places: Array) -> Array:
-    """Find the lower bounds [N], ascending, within ``places`` at which the slope is discontinuous.
+    """Find the lower bounds b [N], ascending, at which the slope of the stiffness jumps.
 
-    There a cable reaches or leaves a bound, or passes a kink of its rigidity. Between these lower
-    bounds, the least tensions are linear in the bound.
+    At such a bound, a cable reaches or leaves a limit of its tension, or passes a kink of its
+    rigidity. Between two of them the least tensions are linear in b. ``places`` are lower bounds,
+    ascending; the search covers the range from the first to the last.
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))
@@ -173,7 +174,7 @@ def _least(K: Stiffness) -> Tension:
 
 
 def _active(K: Stiffness) -> Array:
-    """Return for each cable (C,): 1 at its lower bound, −1 at its upper bound, 0 between them."""
+    """Return for each cable (C,): 1 at its lower bound, −1 at its upper bound, 0 between both."""
     least, tight = _least(K), OPTIMALITY * float(K.tension.max())
     rises = (K.tension - least.minimum <= tight).astype(np.float64)
     return np.where(least.maximum - K.tension <= tight, -1.0, rises)
@@ -192,7 +193,11 @@ def _slope(K: Stiffness, u: Array) -> float:
 
 
 def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, float]:
-    """Return the lower bound [N] with the largest slope, and this slope [1/m]."""
+    """Return the lower bound [N] with the largest slope of the stiffness, and this slope [1/m].
+
+    ``curve`` has the rows of :attr:`Saturation.curve`; ``slope`` computes the slope at any lower
+    bound.
+    """
     best = int(curve[:, 2].argmax())
     around = curve[max(best - 1, 0) : best + 2, 0]
     place, value = float(curve[best, 0]), float(curve[best, 2])
@@ -207,7 +212,11 @@ def _steepest(curve: Array, slope: Callable[[float], float]) -> tuple[float, flo
 
 
 def _falls(curve: Array, slope: Callable[[float], float], start: float, level: float) -> float:
-    """Return the first lower bound [N] beyond ``start`` with a slope below ``level``, or inf."""
+    """Return the first lower bound [N] beyond ``start`` with a slope below ``level`` [1/m], or inf.
+
+    ``curve`` has the rows of :attr:`Saturation.curve`; ``slope`` computes the slope at any lower
+    bound.
+    """
     for place, _, value in curve[curve[:, 0] > start].tolist():
         if value < level:
             return sign_change(lambda x: slope(x) - level, start, place)
