@@ -90,7 +90,7 @@ class Observer:
         strain = self._mean_strain(pose, before.shares, F)
         spring = laws.series * (F - laws.rest)
         # an error of the tension stretches the cable; the encoder rounds by half a count at most
-        slack = self._tension_spread * (self._compliance(wire, F) * x)
+        slack = self._tension_spread * self._compliance(wire, F, x)
         spread = np.hypot(slack, self._encoder_spread)[locked]
         q, sure = pose.q, np.sqrt(before.variance)
         prior = np.append(np.zeros(q.size), 1.0) / sure
@@ -117,7 +117,7 @@ class Observer:
         """
         F = np.clip(reading.tension, *self._domains)
         stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
-        soft = self._compliance(reading.wire, F) * estimate.softness
+        soft = self._compliance(reading.wire, F, estimate.softness)
         return np.where(self.arm.cables.position_controlled, stretch / soft, 0.0)
 
     def _after_sliding(
@@ -172,14 +172,15 @@ class Observer:
         total = np.add.reduceat(strain * segments.lengths, chains.start[:-1])
         return np.asarray(total / pose.cable_lengths)
 
-    def _compliance(self, wire: Array, F: Array) -> Array:
-        """Compute how much cables lengthen with their tensions, dL/dF (C,) [m/N], by their laws.
+    def _compliance(self, wire: Array, F: Array, softness: float) -> Array:
+        """Compute how much cables lengthen with their tensions, dL/dF = l_0/(s EA) + 1/k_series.
 
-        The paid-out ``wire`` l_0 (C,) [m] is constant.
+        The paid-out ``wire`` l_0 (C,) [m] is constant, EA is that of the laws, and ``softness`` is
+        1/s. The result is (C,) [m/N].
         """
         soft = np.array(self.arm._model.laws.series)
         for law, of in self._problem.laws:
-            soft[of] += wire[of] / rigidity_of(law, F[of])
+            soft[of] += softness * wire[of] / rigidity_of(law, F[of])
         return soft
 
     @cached_property
