@@ -85,7 +85,7 @@ def _print_json(numbers: Json) -> None:
 
 def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
     """Return ``values``, one per cable (C,), by the name of the cable, for JSON."""
-    return dict(zip((cable.name for cable in arm.cables), values.tolist(), strict=True))
+    return dict(zip(arm.cables.names, values.tolist(), strict=True))
 
 
 def write(path: Path | None, fill: Callable[[Path], object]) -> None:
