@@ -227,7 +227,9 @@ class Tally(NamedTuple):
 
 def ask(family: str, seed: int, number: int) -> Tally:
     """Draw one arm and its questions, let every route answer, and judge."""
-    group = FAMILIES[family](np.random.default_rng([seed, number, list(FAMILIES).index(family)]))
+    random = np.random.default_rng([seed, number, list(FAMILIES).index(family)])
+    with warnings.catch_warnings(action="ignore", category=cdsm.CdsmWarning):  # odd arms are wanted
+        group = FAMILIES[family](random)
     motions = [group.exact.at(q) for q in group.q]
     tally = Tally(Counter(), {}, [])
     for route, verdicts in _verdicts(group, motions):
