@@ -25,7 +25,7 @@ _SHORTEST = 1e-3  # an arm shorter than this [m] was probably given in metres wh
 
 
 def farthest_holes(geometry: Description) -> list[float]:
-    """Return, for each disk, the distance [m] from the arm's axis to the farthest hole of it."""
+    """Return, for each disk, the distance [m] of its farthest hole from the arm's axis."""
     farthest = [R for R in geometry.hole_radii for _ in range(2)]
     for cable in geometry.cables:
         if cable.radius is not None:

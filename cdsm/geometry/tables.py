@@ -24,7 +24,7 @@ ARM_KEYS = (
 def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
     """Build a geometry from parsed TOML, in any form that :meth:`Geometry.read` describes.
 
-    Raises GeometryError if the keys belong to no such form.
+    Raises GeometryError, which lists every fault.
     """
     builders: dict[str, Callable[..., Geometry]] = {
         "universal": cls.universal,
