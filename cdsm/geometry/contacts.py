@@ -46,10 +46,10 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 
 
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
-    """Return the point of each of n solid cylinders that is nearest to its point (n, 3) [m].
+    """Return, for each of n ``points``, the nearest point of its solid cylinder (n, 3) [m].
 
-    Cylinder i belongs to row i of ``points`` (n, 3). It has a ``centre`` (n, 3) [m], a unit vector
-    ``axis`` (n, 3), half of its length ``half`` (n,) [m], and a ``radius`` (n,) [m].
+    Row i of all arguments belongs to cylinder i: its ``centre`` (n, 3) [m], unit vector ``axis``
+    (n, 3), half of its length ``half`` (n,) [m], ``radius`` (n,) [m].
     """
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)

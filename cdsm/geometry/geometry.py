@@ -236,7 +236,7 @@ class Geometry(Description):
 
     @classmethod
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
-        """Build a geometry from TOML text, as :meth:`read`; errors name its file, ``source``.
+        """Build a geometry from TOML text, see :meth:`read`; errors begin with ``source``.
 
         Raises GeometryError, which lists every fault, if the text is not TOML or not a geometry.
         """

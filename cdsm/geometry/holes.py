@@ -14,18 +14,18 @@ SAME_HOLE = 1e-6
 
 
 def evenly_spaced(joints: int, cables: int) -> list[list[float]]:
-    """Return a list for each joint k = 1…n of hole angles φ = 2π((k−1) + n j)/(n m) [rad].
+    """Return, for each joint k = 1…n, the hole angles φ = 2π((k−1) + n j)/(n m) [rad].
 
-    j = 0…m−1 is a cable of the joint; n is ``joints``, m is ``cables``, the number per joint.
+    j = 0…m−1 are its cables. n is ``joints``; m is ``cables``, the number per joint.
     """
     n, m = joints, cables
     return [[2.0 * math.pi * (k + n * j) / (n * m) for j in range(m)] for k in range(n)]
 
 
 def hinge_hole_angles(rolls: Sequence[float], cables: int) -> list[list[float]]:
-    """Return a list for each hinge of hole angles φ = ψ + 90° + 2πj/m [rad], j = 0…m−1.
+    """Return, for each hinge, the hole angles φ = ψ + 90° + 2πj/m [rad] of its cables j = 0…m−1.
 
-    ``rolls`` has the angle ψ [rad] of each hinge, whose axis is cos ψ y + sin ψ z. m is ``cables``,
+    ``rolls`` has the angle ψ [rad] of each hinge, whose axis is cos ψ y + sin ψ z; m is ``cables``,
     the number per hinge.
     """
     # evenly spaced, starting 90 degrees from the axis: two cables form the antagonistic pair

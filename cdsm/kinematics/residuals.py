@@ -105,9 +105,9 @@ class TipResidual(Residual):
 
 
 def usable_limits(arm: Manipulator) -> tuple[Array, Array]:
-    """Return lower and upper joint limits (nv,) between which no holes of a cable coincide.
+    """Return lower and upper joint limits (nv,), reduced where two holes of a cable coincide.
 
-    A limit at which two holes coincide is reduced by the factor 1 − 1e-5.
+    A limit at which they do is multiplied by 1 − 1e-5.
     """
     # a cable through coincident holes has no direction, so the arm cannot be evaluated there
     limits = arm.lower.copy(), arm.upper.copy()

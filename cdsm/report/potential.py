@@ -168,7 +168,7 @@ class Neighbourhood:
         return self.work(places, np.zeros(3))
 
     def work(self, places: Array, moment: Array | None = None) -> Array:
-        """Compute the active, gravity and load part of U (P, 3) [N m]; the load has a moment.
+        """Compute the active, gravity and load part of U (P, 3) [N m], with a moment in the load.
 
         The load part is minus the work of the force and of a ``moment`` (3,) [N m] at the tip;
         None: the moment of the wrench. The work of the moment is exact to first order in the

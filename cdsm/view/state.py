@@ -160,7 +160,7 @@ class Shown(ReadOnlyState):
     def principal(self) -> dict[str, Array] | None:
         """Softest and stiffest direction, and the stiffness along each [N/m]; None if not stable.
 
-        The keys are ``softest``, ``softest_direction``, ``stiffest``, ``stiffest_direction``.
+        The keys are those of :func:`~cdsm.kernels.principal.principal_stiffness`.
         """
         return None if self.compliance is None else principal_stiffness(self.compliance)
 
