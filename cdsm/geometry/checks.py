@@ -25,7 +25,7 @@ _SHORTEST = 1e-3  # an arm shorter than this [m] was probably given in metres wh
 
 
 def farthest_holes(geometry: Description) -> list[float]:
-    """Return the distance of the farthest hole of each disk from the axis [m]."""
+    """Return, for each disk, the distance [m] of its farthest hole from the arm's axis."""
     farthest = [R for R in geometry.hole_radii for _ in range(2)]
     for cable in geometry.cables:
         if cable.radius is not None:
@@ -35,7 +35,7 @@ def farthest_holes(geometry: Description) -> list[float]:
 
 
 def faults_of(geometry: Description) -> list[str]:
-    """Return the faults of a geometry that concern several of its parts, one text each."""
+    """Return the faults that concern several parts, such as too short links, one text each."""
     count = len(geometry.joints)
     faults = []
     if len(geometry.links) != count:
@@ -83,10 +83,10 @@ def _short_links(geometry: Description) -> list[str]:
 
 
 def doubts_about_units(length: float, sizes: Iterable[tuple[str, float, float]] = ()) -> list[str]:
-    """Return a doubt about the unit of lengths as a text in a list; the list may be empty.
+    """Return one warning text if lengths look as if they are not in metres, else an empty list.
 
-    ``length`` is the length of the arm [m]. Each of ``sizes`` is a description, a size and its
-    largest plausible value [m].
+    ``length`` is the length of the arm [m]. Each of ``sizes`` is a name for the text, a size [m]
+    and the largest plausible value of this size [m].
     """
     if 0.0 < length < _SHORTEST:
         return [
@@ -101,7 +101,7 @@ def doubts_about_units(length: float, sizes: Iterable[tuple[str, float, float]] 
 
 
 def doubts_about_angle(what: str, angle: float, most: float) -> list[str]:
-    """Return a doubt about the unit of an angle [rad] as a text in a list; the list may be empty.
+    """Return one warning text if ``angle`` [rad] looks as if it is in degrees, else an empty list.
 
     The text begins with ``what``, such as "a hole angle is"; ``most`` is the largest plausible
     magnitude [rad].
@@ -112,7 +112,7 @@ def doubts_about_angle(what: str, angle: float, most: float) -> list[str]:
 
 
 def doubts_about(geometry: Description) -> list[str]:
-    """Return doubts as texts, e.g. lengths that look like millimetres, or shared holes."""
+    """Return warning texts, e.g. if lengths look like millimetres, or if cables share holes."""
     sizes = [
         ("hole_radius", max(geometry.hole_radii), WIDEST),
         ("disk_offset", max(joint.disk_offset for joint in geometry.joints), WIDEST),

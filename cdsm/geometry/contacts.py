@@ -17,10 +17,10 @@ _TOUCHING = 1e-3  # a gap below this fraction of the radius counts as an overlap
 def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[str, str]]:
     """Return the pairs of links whose bodies overlap; neighbouring links are not checked.
 
-    The body of a link is the cylinder from its first disk to its last, with the larger of their
-    radii; ``poses`` has the pose (4, 4) of each link. A point is projected alternately onto the two
-    cylinders of a pair. Both are convex, so the distance between the last two projections converges
-    to the gap between the cylinders.
+    The body of a link is the cylinder from its first disk to its last, with the largest radius of
+    these disks; ``poses`` has the pose (4, 4) of each link, translation in m. A point is projected
+    alternately onto the two cylinders of a pair. Both are convex, so the distance between the last
+    two projections converges to the gap between the cylinders.
     """
     links = list(poses)
     apart = [(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1]
@@ -46,10 +46,10 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 
 
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
-    """Return the points (n, 3) of n solid cylinders that are nearest to ``points`` (n, 3) [m].
+    """Return, for each of n ``points``, the nearest point of its solid cylinder (n, 3) [m].
 
-    Each cylinder has a ``centre`` (3,) [m], a unit vector ``axis`` (3,), half of its length
-    ``half`` [m], and a ``radius`` [m].
+    Row i of all arguments belongs to cylinder i: its ``centre`` (n, 3) [m], unit vector ``axis``
+    (n, 3), half of its length ``half`` (n,) [m], ``radius`` (n,) [m].
     """
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)

@@ -1,4 +1,4 @@
-"""The fields of an arm's geometry, their checks, and properties computed from them."""
+"""Base class of Geometry: its fields, their checks, and properties computed from them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdsm.support.warning import warn
 
 @record
 class Description(Printed):
-    """Base class of :class:`~cdsm.Geometry`, which documents these fields."""
+    """Base class of :class:`~cdsm.Geometry`, whose docstring explains the fields."""
 
     joints: Annotated[
         tuple[Joint, ...], Field(strict=False, min_length=1, max_length=MAXIMUM_JOINTS)
@@ -52,7 +52,7 @@ class Description(Printed):
 
     @property
     def hole_radii(self) -> tuple[float, ...]:
-        """Hole radius R of the two disks of each joint [m]."""
+        """Hole radius R [m] for each joint; both disks of a joint have it."""
         return tuple(
             self.hole_radius if joint.hole_radius is None else joint.hole_radius
             for joint in self.joints
@@ -60,9 +60,9 @@ class Description(Printed):
 
     @property
     def joint_limits(self) -> tuple[float, ...]:
-        """Limit of each joint [rad]: the given limit, or 2 atan(h/R), at most 80°.
+        """Limit of each joint [rad]: the given limit, or else 2 atan(h/r), at most 80°.
 
-        R is the disk radius if it is given, else the hole radius.
+        h is the ``disk_offset``; r is the ``disk_radius`` if it is given, else the hole radius.
         """
         return tuple(
             min(2.0 * math.atan(joint.disk_offset / (joint.disk_radius or R)), math.radians(80.0))

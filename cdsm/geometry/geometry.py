@@ -39,13 +39,12 @@ class Geometry(Description):
     :meth:`hinged` build arms of equal or similar joints, :meth:`sections` joins several arms to
     one, and :meth:`replace` changes some attributes. Joint 1 is at x = ``base_length``, joint k+1
     at the end of link k, and the tip at the end of the last link. Every joint has two disks, at the
-    distance ``disk_offset`` before and after it, with their holes at its ``hole_radius``.
+    distance ``disk_offset`` before and after it; both have the ``hole_radius`` of the joint.
 
     Attributes:
         name: Name of the robot: letters, digits and underscores.
         base_length: L_0: distance from the base frame to joint 1 [m].
-        hole_radius: R: distance of the holes from the arm's axis [m]; for joints whose
-            ``hole_radius`` is None.
+        hole_radius: R: distance of the holes from the arm's axis [m]; a joint may have its own.
         joints: All joints, base to tip.
         links: One :class:`Link` per joint.
         cables: One :class:`CableRoute` per cable.
@@ -179,8 +178,9 @@ class Geometry(Description):
 
         Args:
             sections: The sections, base to tip.
-            spread: As for :meth:`universal`, for the cables of all sections. Alternatively, give
-                each section another ``phase``.
+            spread: Angle [rad] between the holes of cables whose angles φ are equal, as for
+                :meth:`universal`, but among the cables of all sections. Alternatively, give each
+                section another ``phase``.
             name: Name of the robot.
 
         Raises:
@@ -231,12 +231,12 @@ class Geometry(Description):
         return tables.text_of(self)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write :meth:`to_toml` to a file and return its path; FileError on failure."""
+        """Write the text of :meth:`to_toml` to a file; return its path. FileError on failure."""
         return write_text(path, self.to_toml())
 
     @classmethod
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
-        """Build a geometry from TOML text: see :meth:`read`; ``source`` names its file in errors.
+        """Build a geometry from TOML text, see :meth:`read`; errors begin with ``source``.
 
         Raises GeometryError, which lists every fault, if the text is not TOML or not a geometry.
         """
@@ -251,9 +251,9 @@ class Geometry(Description):
         """Read a geometry from a TOML file.
 
         The file has the full form that :meth:`write` writes, or one table ``[universal]`` or
-        ``[hinged]``. The keys of the table are the keywords of the constructor with this name. An
-        arm of sections has such a table in each ``[[sections]]`` (``[sections.universal]``), and
-        at the top ``name`` and ``spread``, keywords of :meth:`sections`. From an ARM.toml (see
+        ``[hinged]``, whose keys are the keywords of :meth:`universal` or :meth:`hinged`. An arm of
+        sections has such a table in each ``[[sections]]`` (``[sections.universal]``), and at the
+        top the keywords ``name`` and ``spread`` of :meth:`sections`. From an ARM.toml (see
         :meth:`cdsm.Manipulator.read`), only the geometry is read.
 
         Raises:

@@ -14,15 +14,19 @@ SAME_HOLE = 1e-6
 
 
 def evenly_spaced(joints: int, cables: int) -> list[list[float]]:
-    """Return the hole angles φ = 2π((k−1) + n j)/(n m) [rad] of cables j < m, per joint k ≤ n."""
+    """Return, for each joint k = 1…n, the hole angles φ = 2π((k−1) + n j)/(n m) [rad].
+
+    j = 0…m−1 are its cables. n is ``joints``; m is ``cables``, the number per joint.
+    """
     n, m = joints, cables
     return [[2.0 * math.pi * (k + n * j) / (n * m) for j in range(m)] for k in range(n)]
 
 
 def hinge_hole_angles(rolls: Sequence[float], cables: int) -> list[list[float]]:
-    """Return the hole angles φ = ψ + 90° + 2πj/m of cables j < m of each hinge [rad].
+    """Return, for each hinge, the hole angles φ = ψ + 90° + 2πj/m [rad] of its cables j = 0…m−1.
 
-    ``rolls`` has ψ of each hinge [rad]; its axis is cos ψ y + sin ψ z.
+    ``rolls`` has the angle ψ [rad] of each hinge, whose axis is cos ψ y + sin ψ z; m is ``cables``,
+    the number per hinge.
     """
     # evenly spaced, starting 90 degrees from the axis: two cables form the antagonistic pair
     turns = [2.0 * math.pi * j / cables for j in range(cables)]
@@ -30,7 +34,7 @@ def hinge_hole_angles(rolls: Sequence[float], cables: int) -> list[list[float]]:
 
 
 def spread_out(cables: Sequence[CableRoute], spread: float) -> tuple[CableRoute, ...]:
-    """Return the cables; those with the same hole angle are moved apart by ``spread`` [rad].
+    """Return the cables, with an angle ``spread`` [rad] between those that had equal hole angles.
 
     Of g cables at one angle, the hole of cable i = 0…g−1 is turned by (i − (g−1)/2)·spread.
     """

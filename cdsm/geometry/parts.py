@@ -104,7 +104,8 @@ class CableRoute:
     """Path of one cable: a hole at the same angle on every disk, from the base to its last disk.
 
     Attributes:
-        joint: Number of the joint it drives, from 1; it ends on the first disk after the joint.
+        joint: Number of the joint that the cable drives, from 1; the cable ends on the first disk
+            after this joint.
         angle: φ: angle of its holes about x, from y towards z [rad].
         lead: Straight cable between the actuator and the base disk [m].
         friction: μ [-]: Coulomb friction coefficient in every hole that the cable passes. Without

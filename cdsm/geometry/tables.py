@@ -22,7 +22,10 @@ ARM_KEYS = (
 
 
 def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
-    """Build a geometry from parsed TOML, or raise GeometryError; see :meth:`Geometry.read`."""
+    """Build a geometry from parsed TOML, in any form that :meth:`Geometry.read` describes.
+
+    Raises GeometryError, which lists every fault.
+    """
     builders: dict[str, Callable[..., Geometry]] = {
         "universal": cls.universal,
         "hinged": cls.hinged,
@@ -56,7 +59,7 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 
 
 def build_only(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
-    """Build the geometry in the parsed TOML of an arm as :func:`build` does; ignore other keys."""
+    """Build the geometry in the parsed TOML of an arm, and ignore the keys of other things."""
     described, rest = split_geometry(data)
     if "urdf" in rest and not described:
         raise GeometryError(

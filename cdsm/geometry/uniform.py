@@ -45,11 +45,12 @@ def uniform(
     usual_angles: Callable[[int], list[list[float]]],
     keywords: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return the attributes of a Geometry from keywords of its constructors.
+    """Return the attributes of a Geometry of universal joints or hinges, by name.
 
     ``axes`` has the axes of each joint. ``keywords`` are the arguments of
-    :meth:`Geometry.universal` by name. ``usual_angles`` returns the default hole angles of each
-    joint for a number of cables per joint. GeometryError if an argument is invalid.
+    :meth:`Geometry.universal` by name. ``usual_angles`` maps the number of cables per joint to the
+    default hole angles [rad], a list for each joint. Raises GeometryError if an argument is
+    invalid.
     """
     cables_per_joint, hole_angles = keywords["cables_per_joint"], keywords["hole_angles"]
     sizes = {key: keywords[key] for key in _SIZES}

@@ -133,7 +133,10 @@ def _read_cables(
 
 
 def _unique(name: str, used: dict[str, int]) -> str:
-    """Return a name that is not in ``used``, ``name`` or ``name #2`` and so on; add it to them."""
+    """Return ``name``, or the first of ``name #2``, ``name #3``, … that is not in ``used``.
+
+    Add the result to ``used``.
+    """
     label, count = name, used.get(name, 1)
     while label in used:
         count += 1

@@ -56,7 +56,7 @@ class SingleJoint(NamedTuple):
 
 @dataclass(frozen=True)
 class Body:
-    """Link of CASPR with the joint that carries it."""
+    """Link of a CASPR model, with the joint between it and its parent link."""
 
     number: int  # from 1; the base has 0
     name: str  # unique
@@ -71,7 +71,10 @@ class Body:
 
 
 def read_bodies(path: Path) -> tuple[Body, ...]:
-    """Read the links of a CASPR model in the order of their numbers from 1; FileError on faults."""
+    """Read the links of a CASPR model, in the order of their numbers 1, 2, ….
+
+    Raises FileError, which lists every fault.
+    """
     faults: list[str] = []
     root = read_root(path, "bodies_system", "bodies")
     elements = root.findall("links/*")
@@ -130,7 +133,10 @@ def _body(element: etree._Element, name: str) -> Body:
 
 
 def _single_joints(name: str, kind: str, joint: etree._Element) -> tuple[SingleJoint, ...]:
-    """Split a CASPR joint of the link ``name`` into single joints, in the order of coordinates."""
+    """Split the CASPR joint of type ``kind`` of the link ``name`` into joints of one coordinate.
+
+    They are in the order of CASPR's coordinates.
+    """
     if kind in _JOINTS:
         parts: list[tuple[str, str, tuple[float, ...]]] = [
             (axis, "revolute", AXES[axis])
@@ -180,7 +186,7 @@ def _text_of(element: etree._Element, name: str, path: str) -> str:
 
 
 def whole(where: str, text: str | None) -> int:
-    """Parse a whole number. ``where`` names the place in the error."""
+    """Parse ``text`` as a whole number; raise XmlFault, which names ``where``, if it is none."""
     (value,) = numbers(where, text, 1)
     if value != int(value):
         raise XmlFault(f"{where}: {value:g} given; a whole number is needed")
@@ -194,7 +200,11 @@ def refuse(path: Path, faults: Sequence[str]) -> None:
 
 
 def read_root(path: Path, tag: str, template: str) -> etree._Element:
-    """Read the root element ``tag`` of a file; its DOCTYPE may name CASPR's ``template``."""
+    """Parse an XML file and return its root element, which must be ``tag``; FileError if not.
+
+    The DOCTYPE of the file may name CASPR's ``template``, ``bodies`` or ``cables``; the DTD is not
+    read.
+    """
     try:
         return parse_xml(read_text(path), tag, _TEMPLATE.format(template))
     except XmlFault as error:

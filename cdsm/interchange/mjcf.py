@@ -1,9 +1,9 @@
 """Export the arm to MuJoCo (MJCF). Its cables become spatial tendons, pulled by motors or springs.
 
-MuJoCo has springs and servos of constant stiffness, so the model is exact near one posture. Each
-cable has its tangent stiffness k there. Its rest length gives the tension F:
+MuJoCo has springs and servos of constant stiffness, so the model is exact near one posture q. Each
+cable has its tangent stiffness k at q, and the rest length L_rest with which its tension at q is F:
 
-    F = k (L − L_rest),    L_rest = L(q) − F/k
+    tension at length L: k (L − L_rest),    L_rest = L(q) − F/k
 
 Below L_rest the cable is slack. With constant EA, the model is exact at every posture. Otherwise k
 of the real cable changes with its tension.
@@ -93,13 +93,14 @@ def to_mjcf(
       be negative.
 
     Time step: 1, 2 or 5 times a power of ten [s], at most 0.2/ω and at most MuJoCo's 2 ms. ω is the
-    highest natural frequency, K_θ φ = ω² M φ, with M of the exported bodies. Moving bodies without
-    mass get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs steps of microseconds.
+    highest natural frequency [rad/s], K_θ φ = ω² M φ, with the mass matrix M of the exported
+    bodies. Moving bodies without mass get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs
+    steps of microseconds.
 
-    Damping: the cables damp with c = β k [N s/m]. A mode has the ratio ζ = β (J_L φ)ᵀ k (J_L φ)/2ω,
-    about β ω/2. β gives the least damped mode, usually the lowest one, the ``damping_ratio``; all
-    others settle as fast or faster. Modes that get less than half of their ω² from the cables are
-    not considered for β; they are damped less.
+    Damping: each cable has the damping c = β k [N s/m]. A mode φ then has the damping ratio
+    ζ = β (J_L φ)ᵀ k (J_L φ)/2ω, about β ω/2. β is chosen so that the least damped mode, usually the
+    lowest, has the ``damping_ratio``. This choice ignores modes that get less than half of their ω²
+    from the cables; they may be damped less.
 
     A comment at the top states time step, damping with the range of ζ, and actuators. If K_θ is not
     positive definite, the model leaves the posture by itself: the comment says UNSTABLE, and a
@@ -210,7 +211,7 @@ def mujoco_model(
 
 
 def _checked(name: str, value: float | None) -> float | None:
-    """Return the damping ``name`` as a float; it must not be negative."""
+    """Return the argument ``name``, a damping, as a float; raise InvalidInput if it is negative."""
     if value is None:
         return None
     if (number := scalar(name, value)) < 0.0:
@@ -229,7 +230,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
 
 
 def _without_motors(K: Stiffness) -> Stiffness:
-    """Return the stiffness that K becomes if all motors control force: it has no passive part."""
+    """Return K with the passive part removed, as if all motors controlled force."""
     arm = K.posture.arm
     free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
     return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.wrench)

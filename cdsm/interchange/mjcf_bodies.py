@@ -30,10 +30,11 @@ _GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mas
 
 
 def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> list[Carried]:
-    """Add the tree of links to ``root``, with joints at ``start`` [rad, m]; return the masses.
+    """Add the tree of links to ``root``; return mass and inertia of each body that has a mass.
 
-    MuJoCo moves a joint by qpos − ref from its place in the file. Since ref is ``start``, a new
-    ``mjData`` begins with the joints at ``start``.
+    The file has the links at the joint coordinates ``start`` [rad or m], by joint name. MuJoCo
+    moves a joint by qpos − ref from its place in the file. Since ref is ``start``, a new ``mjData``
+    begins with the joints at ``start``.
     """
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
@@ -91,9 +92,10 @@ def _axis(joint: etree._Element) -> Array:
 
 
 def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Write the mass and inertia of a link to its body; a massless moving link gets tiny ones.
+    """Write the mass and inertia of a link to its body; return them in a list of one entry.
 
-    Returns what was written, in a list that is empty if a fixed link has no mass.
+    A massless link that ``moves`` gets 1e-6 kg and 1e-9 kg m²; its weight is compensated. For a
+    massless link that does not move, nothing is written, and the list is empty.
     """
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
@@ -112,9 +114,9 @@ def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[C
 
 
 def _inertia(inertia: etree._Element, R: Array) -> Array:
-    """Compute the inertia (3, 3), turned by R, with moments that MuJoCo accepts.
+    """Read an inertia (3, 3) [kg m²], rotate it by R, and change moments that MuJoCo refuses.
 
-    MuJoCo refuses zero moments, and a largest moment near the sum of the other two.
+    MuJoCo refuses zero moments, and a largest principal moment near the sum of the other two.
     """
     xx, yy, zz, xy, xz, yz = (
         float(inertia.get(key)) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -148,7 +150,10 @@ def _shape(body: etree._Element, visual: etree._Element) -> bool:
 def _sticks(
     body: etree._Element, ends: list[Array], sites: list[tuple[float, ...]], radius: float
 ) -> None:
-    """Draw a body as sticks: to the next joints, at ``ends``, and thinner ones to its sites."""
+    """Draw a body as capsules from its origin to ``ends``, the next joints [m], in its frame.
+
+    A thinner capsule joins each of its ``sites`` [m] to the nearest of these. ``radius`` is in m.
+    """
     lines = [np.array([np.zeros(3), end]) for end in ends if np.linalg.norm(end) > radius]
     bones = [(line, radius) for line in lines]
     for site in map(np.asarray, dict.fromkeys(sites)):
@@ -161,10 +166,10 @@ def _sticks(
 
 
 def _placed(element: etree._Element, kind: str | None = None, start: float = 0.0) -> dict[str, str]:
-    """Return ``pos`` and ``quat`` of the origin of an element.
+    """Return the ``<origin>`` of an element of a URDF as MJCF attributes ``pos`` and ``quat``.
 
-    If ``kind`` is ``hinge`` or ``slide``, the element is a joint; it is moved to the coordinate
-    ``start``.
+    If ``kind`` is ``hinge`` or ``slide``, the element is a joint of this kind; the pose is then
+    that of the joint at the coordinate ``start`` [rad or m].
     """
     place, turn = _origin(element)
     if kind is not None and start:
@@ -186,5 +191,5 @@ def _origin(element: etree._Element) -> tuple[Array, Rotation]:
 
 
 def row(values: ArrayLike) -> str:
-    """Write numbers as an attribute of MJCF, exact to the last bit."""
+    """Format numbers as the text of an MJCF attribute, exact to the last bit."""
     return " ".join(repr(float(x)) for x in np.ravel(values))

@@ -25,7 +25,7 @@ MuJoCo integrates the springs explicitly, which diverges from ω·dt = 2 on."""
 
 
 class Motion(NamedTuple):
-    """Time step and damping of a model."""
+    """Time step and damping of a MuJoCo model."""
 
     time_step: float  # [s]
     wires: Array  # damping of the cables (C,) [N s/m]
@@ -40,10 +40,11 @@ def choose_motion(
     ratio: float | None,
     damping: float | None,
 ) -> Motion:
-    """Choose the time step for the fastest mode of K and ``masses``, and the damping.
+    """Choose the damping, and the time step for the highest natural frequency of K and ``masses``.
 
-    If ``damping`` (of the joints) is None, the cables damp with c = β k, so that the least damped
-    mode has the ``ratio``. Joint dampers would slow down the slow motions of a long arm tenfold.
+    If ``damping``, that of every joint, is None, each cable gets the damping c = β k, with β such
+    that the least damped mode has the damping ratio ``ratio``. Joint dampers with this effect would
+    slow down the slow motions of a long arm tenfold. Without K, the time step is MuJoCo's own.
     """
     wires, joints = np.zeros(len(arm.cables)), damping or 0.0
     step, reason = _DEFAULT_STEP, "MuJoCo's own"
@@ -70,7 +71,10 @@ def choose_motion(
 
 
 def _time_step(omega: float) -> float:
-    """Choose the time step, 1, 2 or 5 times 10ⁿ s, for the highest natural frequency [rad/s]."""
+    """Choose a time step of 1, 2 or 5 times 10ⁿ s, at most 2 ms and at most 0.2/``omega``.
+
+    ``omega`` is the highest natural frequency [rad/s].
+    """
     if omega * _DEFAULT_STEP <= _PHASE:
         return _DEFAULT_STEP
     power = math.floor(math.log10(_PHASE / omega))

@@ -110,7 +110,8 @@ def inverse_kinematics(
 def _solve(residual: Residual, guess: Array, tolerance: float) -> dict[str, Any]:
     """Find the angles nearest to ``guess`` (nv,) with ‖r‖ ≤ ``tolerance``, or else least ‖r‖.
 
-    r is the ``residual``. Returns the fields that JointSolution and KinematicSolution share.
+    r is the ``residual``. Returns, by name, the fields that JointSolution and KinematicSolution
+    have in common: ``arm``, ``guess``, ``angles``, ``tolerance``, ``iterations``.
     """
     tolerance = scalar("tolerance", tolerance)
     if not _SMALLEST_TOLERANCE <= tolerance < 1.0:

@@ -1,4 +1,4 @@
-"""Inverse kinematics: find the joint angles nearest to a guess with the least residual.
+"""Inverse kinematics: find the joint angles with the least residual, nearest to a guess.
 
 The residual r(q) is dimensionless. If r = 0 is possible, the solution solves
 
@@ -51,9 +51,9 @@ _CONVERGED = 1e-11
 
 
 class _NewtonStep(NamedTuple):
-    """Step of Newton's method for the free joints, which are not at an active limit."""
+    """Step of Newton's method for the free joints: those that are not at an active limit."""
 
-    move: Array  # step (free,) [rad]
+    move: Array  # step (number of free joints,) [rad]
     # gradient of the objective (or Lagrangian) with respect to all joint angles (nv,)
     gradient: Array
     error: float  # violation of the optimality conditions
@@ -139,7 +139,8 @@ class _Search:
     def _nearest_step(self, q: Array, free: NDArray[np.bool_]) -> _NewtonStep:
         """Compute a Newton step of the joints ``free`` for min ½‖q − guess‖² subject to r = 0.
 
-        One part of the step leads to r = 0; the other, in the null space of ∂r/∂q, to the guess.
+        One part of the step reduces r. The other, in the null space of ∂r/∂q, reduces the distance
+        from the guess.
         """
         r, J = self.residual.evaluate(q)
         away = q - self.guess
@@ -165,11 +166,11 @@ class _Search:
     def _active_set(
         self, newton: _Newton, q: Array, at_limit: Limits
     ) -> tuple[Array | None, Limits]:
-        """Find the optimum within the joint limits from q (nv,) by an active-set method.
+        """Find the optimum within the joint limits by an active-set method that starts from q.
 
-        ``newton`` computes Newton steps, for which the joints at active limits are fixed. The first
-        set of active limits is ``at_limit``. Returns the joint angles, None if the search fails,
-        and the active limits.
+        ``newton`` computes a Newton step of the joints that are not at an active limit; the others
+        are fixed. ``at_limit`` is the active limits at the start. Returns the joint angles (nv,),
+        or None if the search fails, and the active limits at the end.
         """
         at_limit = at_limit.copy()
         for _ in range(2 * q.size + 5):
@@ -191,9 +192,10 @@ class _Search:
     def _iterate(
         self, newton: _Newton, q: Array, free: NDArray[np.bool_]
     ) -> tuple[Array, Array | None]:
-        """Iterate Newton's method for the ``free`` joints, from q; return q and the gradient.
+        """Iterate Newton's method for the ``free`` joints, from q; return the last q (nv,).
 
-        The gradient is None if the iteration does not converge.
+        Also return the gradient (nv,) of :class:`_NewtonStep` there, or None if the iteration does
+        not converge.
         """
         least = math.inf
         for _ in range(_ATTEMPTS):

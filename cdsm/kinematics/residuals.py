@@ -1,7 +1,8 @@
 """Residuals of the two inverse problems that :mod:`cdsm.kinematics.nearest` solves.
 
-The second derivatives equal terms of the stiffness: H_L·F, with weights on the cable lengths as F,
-and ∂(J_Xᵀ W)/∂θ, with weights on the tip as the wrench W.
+The Hessian of a weighted sum of residuals is computed as a term of the stiffness: as H_L·F, with
+the weights of the cable lengths as tensions F, or as ∂(J_Xᵀ W)/∂θ, with the weights of the tip
+errors as wrench W.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _NO_WRENCH = frozen(np.zeros(6))
 
 @dataclass(frozen=True, eq=False)
 class Residual(ABC):
-    """Dimensionless residual r (m,) of the joint angles q (nv,) of an arm; 0 at the target."""
+    """Dimensionless residual r (m,), a function of the joint angles q (nv,); 0 at the target."""
 
     arm: Manipulator
     target: Array
@@ -50,7 +51,7 @@ class Residual(ABC):
 
 @final
 class LengthResidual(Residual):
-    """Residual (L(q) − wanted lengths)/arm length (C,) of the cable lengths."""
+    """Residual of the cable lengths: r = (L(q) − target)/arm length (C,)."""
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """Compute the residual r (C,) and ∂r/∂q = J_L/arm length (C, nv) at q (nv,)."""
@@ -58,7 +59,7 @@ class LengthResidual(Residual):
         return (pose.cable_lengths - self.target) / length, pose.length_jacobian / length
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Compute the Hessian (nv, nv) of weight · r: H_L·F with F = weight/arm length."""
+        """Compute the Hessian (nv, nv) of weight · r as H_L·F, with F = weight/arm length (C,)."""
         tension = frozen(weight / self.arm.length)
         pose = self.arm.at(q, check_limits=False)
         none = frozen(np.zeros(weight.size))
@@ -68,9 +69,9 @@ class LengthResidual(Residual):
 
 @final
 class TipResidual(Residual):
-    """Residual of the tip: position error/arm length (3,).
+    """Residual of the tip: position error/arm length (3,), for a target position (3,) [m].
 
-    For a target pose it is (6,): the rotation vector of the orientation error [rad] follows.
+    For a target pose (4, 4), it is (6,): the rotation vector of the orientation error follows.
     """
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
@@ -104,7 +105,10 @@ class TipResidual(Residual):
 
 
 def usable_limits(arm: Manipulator) -> tuple[Array, Array]:
-    """Return lower and upper joint limits, slightly inside if holes coincide at a limit."""
+    """Return lower and upper joint limits (nv,), reduced where two holes of a cable coincide.
+
+    A limit at which they do is multiplied by 1 − 1e-5.
+    """
     # a cable through coincident holes has no direction, so the arm cannot be evaluated there
     limits = arm.lower.copy(), arm.upper.copy()
     for limit in limits:

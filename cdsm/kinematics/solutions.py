@@ -1,8 +1,7 @@
 """Solutions of inverse kinematics.
 
-All solutions are within the joint limits. If disks touch at a limit and their holes coincide, a
-cable has no direction. The limit is then reduced by the factor
-1 − 1e-5.
+All solutions are within the joint limits. If two holes of a cable coincide at a limit, because
+disks touch there, the cable has no direction. The limit is then reduced by the factor 1 − 1e-5.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ class _Solution(ReadOnlyState, ABC):
     @property
     @abstractmethod
     def _misfit(self) -> float:
-        """Distance [-] from the target, in arm lengths and rad; the tolerance is its limit."""
+        """Distance from the target [-]: lengths over the arm length, angles in rad."""
 
     @property
     def reachable(self) -> bool:
@@ -70,10 +69,10 @@ class _Solution(ReadOnlyState, ABC):
         return [*aligned([("joint", "angle", ""), *rows]), ""]
 
     def plot(self) -> Figure:
-        """Plot the arm in mm at the angles found.
+        """Plot the arm at ``angles``, in mm.
 
         Raises:
-            CableError: Two neighbouring sites of a cable coincide there.
+            CableError: Two neighbouring sites of a cable coincide at these angles.
         """
         return self.posture.plot()
 
@@ -104,7 +103,7 @@ class JointSolution(_Solution):
 
     @cached_property
     def residual(self) -> Array:
-        """Cable lengths found minus wanted (C,) [m]: ``lengths`` − ``cable_lengths``."""
+        """Misfit of each cable (C,) [m]: ``lengths`` − ``cable_lengths``."""
         return frozen(self.lengths - self.cable_lengths)
 
     @property
@@ -165,7 +164,8 @@ class KinematicSolution(_Solution):
         target: Wanted position (3,) [m] or pose (4, 4) of the tip, translation in m.
         guess: Joint angles that the solution should be near (nv,) [rad].
         angles: Joint angles of the solution (nv,) [rad], within the limits.
-        tip: Pose of ``tool0`` (4, 4) at ``angles``, translation in m: the target or the nearest.
+        tip: Pose of ``tool0`` (4, 4) at ``angles``, translation in m: the target, or the pose
+            nearest to it.
         tolerance: Largest misfit at which the target counts as reached, in arm lengths and rad [-].
         iterations: Number of evaluations of the tip.
     """

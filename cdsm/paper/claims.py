@@ -37,9 +37,9 @@ class Claim:
         paper: Numbers of the paper; None if the paper gives words only.
         computed: K_R with the pseudo-inverse and l_0 = L, as in the paper; for Section V the
             stiffness measured by weights; for Fig. 5 numbers of the strand.
-        original: As ``computed``, but with the original length l_0. Empty for Fig. 5, Section V.
+        original: As ``computed``, but with the original length l_0. Empty for Fig. 5 and Section V.
         along: Stiffness that a small weight measures, with the original length l_0. Empty for
-            Fig. 5, Section V.
+            Fig. 5 and Section V.
         assumption: Assumptions where the paper is silent.
         searched: Assumptions that were searched to meet the paper's number; empty if none.
         at_most: Whether the paper's number is an upper bound.
@@ -97,9 +97,10 @@ SUMMARY = ("number that deviates most", "compared", "deviation", "paper", "compu
 
 
 def to_summary(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
-    """Return a row per figure with the number that deviates most; :data:`SUMMARY` has the columns.
+    """Return a row per figure with its claim that deviates most from the paper.
 
-    A deviation is relative to the largest number of the paper in the same claim.
+    :data:`SUMMARY` names the columns. A deviation is relative to the largest number of the paper in
+    the same claim.
     """
     rows: list[tuple[str, ...]] = []
     for figure in figures:

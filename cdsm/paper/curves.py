@@ -110,10 +110,10 @@ class Pair(NamedTuple):
     def claim(
         self, measure: Callable[[Array, Array], Array], searched: str = FROM_FIG_6, **texts: Any
     ) -> Claim:
-        """Build a claim whose numbers ``measure`` computes from each of the three readings.
+        """Build a claim; ``measure`` computes its numbers from each of the three readings.
 
-        The arguments of ``measure`` are a stiffness (N, 3) and its active or passive part (N, 3),
-        both [N/m]. ``searched`` and ``texts`` are fields of the claim.
+        The arguments of ``measure`` are the stiffness (N, 3) and its active or passive part (N, 3)
+        in one reading, both [N/m]. ``searched`` and ``texts`` are fields of the claim.
         """
         paper, original = self.stretched, self.original
         return Claim(
@@ -128,11 +128,11 @@ class Pair(NamedTuple):
 def over_cases(
     label: str, q: Array, cases: Sequence[tuple[Elasticity, float]], swept: Array, part: Part
 ) -> Pair:
-    """Compute the stiffness at a posture q (nv,) [rad] for N cases.
+    """Compute the stiffness of the virtual prototype at a posture q (nv,) [rad] for N cases.
 
     A case is a law of the cables, and a lower bound of all tensions [N]. ``swept`` (N,) is the
-    abscissa of the curves [Pa or N]. ``part`` is the term of K_θ whose stiffness is computed in
-    addition to the total.
+    abscissa of the curves [Pa or N]. ``part`` is the term of K_θ whose part of the stiffness is
+    computed in addition to the total.
     """
 
     def curve(length: OriginalLength) -> Curve:
@@ -156,7 +156,7 @@ def over_cases(
 
 
 def over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> Pair:
-    """Compute stiffness and its active part at lower bounds of tension ``minima`` (N,) [N]."""
+    """Compute the stiffness and its active part for each lower bound in ``minima`` (N,) [N]."""
     return over_cases(label, q, [(law, minimum) for minimum in minima], minima, "active")
 
 
@@ -167,5 +167,8 @@ def at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
 
 
 def readings(K: Stiffness) -> Array:
-    """Return the diagonal of K_R (row 0) and stiffness for a small weight (row 1), (2, 3) [N/m]."""
+    """Return two tip stiffnesses in x, y, z (2, 3) [N/m].
+
+    Row 0 is the diagonal of K_R, row 1 the stiffness that a small weight measures.
+    """
     return np.array([np.diag(K.pseudoinverse()), [K.along(axis) for axis in np.eye(3)]])

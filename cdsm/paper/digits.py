@@ -81,10 +81,10 @@ def powers(tension: ArrayLike, slope: bool = False) -> Array:
 
 
 def _branches(rows: Array) -> tuple[Array, Array]:
-    """Return rows (..., 7) as rows (..., 14) of the lower branch and of the upper branch.
+    """Extend ``rows`` (..., 7) by zeros, to (..., 14): first for the lower, then the upper branch.
 
-    A row multiplies the coefficients of Eq. 19: columns 0 to 6 those of the lower branch, columns 7
-    to 13 those of the upper branch. In each result, the columns of the other branch are zero.
+    A result multiplies all coefficients of Eq. 19: columns 0 to 6 those of the lower branch,
+    columns 7 to 13 those of the upper branch. The columns of the other branch are zero.
     """
     none = np.zeros_like(rows)
     return np.hstack([rows, none]), np.hstack([none, rows])
@@ -93,10 +93,10 @@ def _branches(rows: Array) -> tuple[Array, Array]:
 def _least(
     cost: Array, positive: Array, bounds: Sequence[tuple[float | None, float | None]]
 ) -> Array:
-    """Minimise cost·c over the coefficients c (14,) of continuous laws with positive·c ≥ 0.
+    """Find the coefficients c (14,) with the least cost·c, among laws continuous at 31 N.
 
-    Returns c. ``cost`` has the shape (14,), ``positive`` (n, 14). ``bounds`` has the least and
-    largest value of each d; None for no bound.
+    They satisfy positive·c ≥ 0. ``cost`` has the shape (14,), ``positive`` (n, 14). ``bounds`` has
+    the least and largest value of each d_i (see the top of the module); None for no bound.
     """
     lower, upper = _branches(powers(JOIN)[0])
     join = lower - upper

@@ -160,7 +160,10 @@ def figure_13() -> ExperimentFigure:
 
 
 def _over_tension(fit: PrototypeFit) -> list[Trace]:
-    """Compute stiffness in x, y and z as a function of tension, and add the fitted Table II."""
+    """Compute stiffness in x, y and z against tension, with Table II as the paper's values.
+
+    It is the printed or the exchanged table, to which the prototype was fitted.
+    """
     prototype = fit.prototype
     tensions = np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS)
     curves = prototype.weigh(prototype.arm().at(prototype.configurations[0]), tensions)
@@ -199,7 +202,7 @@ def _configurations(
 
 
 def _table_claims(fit: PrototypeFit) -> list[Claim]:
-    """Build claims that compare Table II and its increments with the fitted prototype."""
+    """Build claims that compare Table II, and its increments, with numbers of the prototype."""
     table, computed = fit.step.table, fit.predicted.table
     assumption = f"{fit.step.label}; {fit.step.count}"
     claims = [

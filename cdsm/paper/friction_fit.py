@@ -76,11 +76,11 @@ class RoughPrototype:
 
     @property
     def spring(self) -> float:
-        """Stiffness k [N/m] of each of the two springs of a bearing; the bearing has 2 k R²."""
+        """Stiffness k [N/m] of each of the two springs of a bearing, whose stiffness is 2 k R²."""
         return self.bearing / (2.0 * self.prototype.hole_radius**2)
 
     def arm(self) -> Manipulator:
-        """Build the arm; the springs of the bearings are its last cables."""
+        """Build the arm; its last cables are the springs, unless ``bearing`` is 0."""
         strand = ScaledElasticity(presets.STRAND_1X19, self.rigidity)
         arm = arm_of(self.prototype, strand, self.prototype.drive_stiffness, self.friction)
         if self.bearing == 0.0:
@@ -119,7 +119,10 @@ class RoughPrototype:
         return np.array([path.beside(pose, F, np.zeros(6))[0] for path, F in pairs])
 
     def table(self, tips: ArrayLike) -> Array:
-        """Compute Table II (5, 3) [N/m] from the tips (15, 3) [m]: weight/displacement."""
+        """Compute Table II (5, 3) [N/m] from the tips (15, 3) [m] under the weights.
+
+        An entry is the weight divided by the displacement of the tip along it.
+        """
         weights = np.tile(self.prototype.weights, (5, 1))
         moved = np.asarray(tips) - self.arm().at(POSTURE).tip[:3, 3]
         work = np.einsum("ni,ni->n", weights, moved)
@@ -129,7 +132,10 @@ class RoughPrototype:
         return np.asarray(((weights**2).sum(axis=1) / work).reshape(5, 3))
 
     def _tensions(self, pose: Posture) -> Array:
-        """Return the tensions (5, C) [N] for the rows of Table II; bearings cause no torque."""
+        """Return the tensions (5, C) [N] for the rows of Table II.
+
+        The two springs of a bearing have tensions whose torques cancel.
+        """
         names = pose.arm.cables.names
         springs = [c for c, name in enumerate(names) if name.startswith("bearing")]
         fixed = dict[str, float]()
@@ -166,10 +172,10 @@ class RoughFit:
 def identify_rough_prototype(added: Sequence[str] = tuple(ADDED)) -> RoughFit:
     """Fit Table II as printed with friction, bearings and a factor on Eq. 19 as parameters.
 
-    The search varies the 11 parameters on which Table II depends (dimensions, weights, tension
-    offset), within :data:`~cdsm.paper.BOUNDS`, and the parameters of :data:`ADDED` that ``added``
-    names. With all three of these, 14 parameters are fitted to 15 numbers. The tensions of the rows
-    are evenly spaced.
+    The search varies 11 parameters on which Table II depends (dimensions, link mass, weights, drive
+    stiffness, tension offset), within :data:`~cdsm.paper.BOUNDS`, and the parameters of
+    :data:`ADDED` that ``added`` names. With all three of these, 14 parameters are fitted to 15
+    numbers. The tensions of the rows are evenly spaced.
 
     Raises:
         UnknownName: A name is not in :data:`ADDED`.

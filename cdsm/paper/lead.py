@@ -1,4 +1,4 @@
-"""Leads for which stiffness falls a little with tension, the paper's third finding.
+"""Find the leads for which stiffness falls with tension, which is the paper's third finding.
 
 The lead is the straight cable between its actuator and the base disk. With EA constant, tension
 has two effects. The active stiffness softens the arm. The original length l_0 of a locked wire is
@@ -30,7 +30,7 @@ MINIMA: Final = (100.0, 800.0)
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LeadFigure(Figure):
-    """Change of stiffness if the lower tension bound rises from 100 N to 800 N, for each lead.
+    """Change of stiffness if the lower bound of tension rises from 100 N to 800 N, for each lead.
 
     Attributes:
         leads: Leads of all cables (N,) [m].
@@ -54,7 +54,7 @@ class LeadFigure(Figure):
 
 
 def figure_lead() -> LeadFigure:
-    """Compute the change of stiffness from a lower bound of 100 N to 800 N, for each lead."""
+    """Compute, for each lead, the change of stiffness from a lower bound of 100 N to 800 N."""
     unstrained, stretched = (
         frozen(np.array([_changes(lead, length) for lead in LEADS.tolist()]))
         for length in ("unstrained", "stretched")
@@ -94,7 +94,11 @@ def _changes(lead: float, length: OriginalLength) -> Array:
 
 
 def _first_fall(changes: Array, length: OriginalLength, reading: int) -> tuple[float, ...]:
-    """Find the lead [mm] above which tension softens the arm in x, y and z; 0: with every lead."""
+    """Find the lead [mm] above which stiffness falls with tension, for x, y and z.
+
+    It is 0 if stiffness falls with every lead. ``changes`` (N, 3) [%] belong to :data:`LEADS`;
+    ``reading`` is the row of :func:`_changes` from which they come.
+    """
 
     def crossing(axis: int) -> float:
         if changes[0, axis] < 0.0:

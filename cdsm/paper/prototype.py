@@ -104,7 +104,9 @@ class Prototype:
         return arm_of(self, _RIGID, cable_stiffness)
 
     def measure(self, pose: Posture, tensions: ArrayLike) -> Array:
-        """Compute stiffness (N, 3) [N/m] along x, y, z at N reported tensions [N].
+        """Compute the stiffness for a small weight along x, y, z (N, 3) [N/m].
+
+        ``tensions`` are N reported tensions of the force-controlled cables [N].
 
         Raises:
             CdsmError: No tensions of the position-controlled cables balance the arm, a tension
@@ -113,17 +115,17 @@ class Prototype:
         return self._measured(pose, tensions, np.zeros((3, 3)))
 
     def weigh(self, pose: Posture, tensions: ArrayLike) -> Array:
-        """Compute weight/displacement in x, y, z (N, 3) [N/m] at N reported tensions [N].
+        """Compute weight/displacement along x, y, z (N, 3) [N/m] under the :attr:`weights`.
 
-        Errors are those of :meth:`measure`.
+        Argument and errors are those of :meth:`measure`.
         """
         return self._measured(pose, tensions, self.weights)
 
     def _measured(self, pose: Posture, tensions: ArrayLike, weights: Array) -> Array:
         """Compute stiffness (N, 3) [N/m] in x, y, z at N reported tensions [N].
 
-        ``weights`` (3, 3) [N] has the force of the test in each row. The stiffness is the secant
-        under this force; if it is zero, the tangent.
+        Row 0, 1, 2 of ``weights`` (3, 3) [N] is the force of the test in x, y, z. The stiffness is
+        force/displacement under this force; if the force is zero, the limit for small forces.
         """
         forced = [cable.name for cable in pose.arm.cables if cable.control == "force"]
         rows = []

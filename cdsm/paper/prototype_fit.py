@@ -157,7 +157,7 @@ _NEAR = 0.02  # a parameter is at a bound if it is this near, as a fraction of i
 
 
 def identify_prototype(step: Step) -> PrototypeFit:
-    """Find the free parameters of a step within :data:`BOUNDS` that minimise the squared residuals.
+    """Find the ``step.free`` parameters within :data:`BOUNDS` with the least squared residuals.
 
     Raises:
         InvalidInput: The start is out of bounds, or its arm has no stable equilibrium.
@@ -207,16 +207,16 @@ section_v_claim = partial(Claim, searched="all parameters of the prototype")
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PrototypeFigure(Figure):
-    """Residuals of all numbers of Section V for the identified prototypes.
+    """Residuals of the numbers of Section V for the identified prototypes.
 
     Attributes:
-        fits: Identified prototypes, one for each step of the identification.
+        fits: Identified prototypes, one for each interpretation of Section V (:data:`STEPS`).
     """
 
     fits: tuple[PrototypeFit, ...]
 
     def numbers(self) -> dict[str, object]:
-        """Return parameters and residuals of all steps, for JSON."""
+        """Return parameters and residuals of all fits, for JSON."""
         return {
             "bounds_SI": BOUNDS,
             "fits": [
@@ -250,7 +250,7 @@ class PrototypeFigure(Figure):
 
 
 def figure_prototype() -> PrototypeFigure:
-    """Compare all numbers of Section V with the prototype identified at each step."""
+    """Compare the numbers of Section V with the prototype identified for each interpretation."""
     fits = tuple(identified(step) for step in STEPS)
     checks = [
         section_v_claim(

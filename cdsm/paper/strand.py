@@ -62,7 +62,10 @@ class StrandFigure(Figure):
 
 
 def eq19_as_printed(tension: ArrayLike) -> Array:
-    """Compute EA [N] at each ``tension`` [N] by the misprinted Eq. 19: negative from 11 to 31 N."""
+    """Compute EA [N] at each ``tension`` [N] by Eq. 19 with its misprint.
+
+    The values from 11 to 31 N are negative.
+    """
     F = np.asarray(tension, dtype=np.float64)
     lower, upper = EQ19_PRINTED
     return np.where(F <= JOIN, polyval(F, (*lower[:-1], -1e-3)), polyval(F, upper))

@@ -151,7 +151,7 @@ def _along(attainable: StiffnessRange) -> str:
 
 
 def _plot_tensions(shown: Sequence[tuple[Tension, str, str]], title: str) -> Figure:
-    """Plot the tensions of the same cables in several cases (tensions, label, marker)."""
+    """Plot the tensions of the same cables in several cases, each (tensions, label, marker)."""
     names = shown[0][0].keys()
     figure, ((axes,),) = panels(_width(names), 2.8, 1)
     colors = {"v": GREEN, "o": BLUE, "^": VERMILLION}

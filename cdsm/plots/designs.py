@@ -35,8 +35,9 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
 
     Args:
         found: The result of :func:`cdsm.search_designs` or :func:`cdsm.refine_design`.
-        named: Indices into the front. The points of these designs get an id in an SVG,
-            ``design-NUMBER-OBJECTIVE``, so that a page can find them.
+        named: Indices of designs in ``found.front``. In an SVG, the points of these designs get the
+            id ``design-INDEX-OBJECTIVE``, so that a page can find them; OBJECTIVE is the index of
+            the objective on the vertical axis.
 
     Raises:
         InvalidInput: ``found`` is not such a result.

@@ -78,7 +78,10 @@ class Case(NamedTuple):
 
 
 def drawable(dataset: xarray.Dataset, poses: list[str]) -> list[str]:
-    """Return the names of the quantities with one number per posture and case."""
+    """Return the names of the quantities in a sweep that have one number per posture and case.
+
+    ``poses`` are the dimensions of the postures; the other dimensions make the cases.
+    """
     allowed = {*map(str, dataset["status"].dims), "direction"}
     return [
         str(name)
@@ -90,11 +93,11 @@ def drawable(dataset: xarray.Dataset, poses: list[str]) -> list[str]:
 def cases_of(
     dataset: xarray.Dataset, quantity: str, poses: list[str], words: Mapping[int, str]
 ) -> Iterator[Case]:
-    """Yield the values of ``quantity`` for each case.
+    """Yield the values of ``quantity`` at all postures, for each case of a sweep.
 
-    A case is one entry of the dimensions that are not ``poses``, the dimensions of the postures:
-    for example one lower bound of tension. ``words`` has the word of each status code. Values of
-    unstable entries become NaN, except those of the margin.
+    ``poses`` are the dimensions of the postures. A case is one combination of the coordinates of
+    all other dimensions, for example one lower bound of tension. ``words`` has the word of each
+    status code. Values of unstable entries become NaN, except those of the margin.
     """
     status = dataset["status"]
     dims = [str(dim) for dim in dataset[quantity].dims]
@@ -137,11 +140,11 @@ def _title(dataset: xarray.Dataset, dim: str, place: int) -> str:
 def slices_of(
     points: Array, section: tuple[str, float, float] | None, path: bool
 ) -> tuple[list[Slice], bool]:
-    """Return the slab of tips that each panel shows, and whether the slabs are slices of a cloud.
+    """Return the slab of tips for each panel, and True if they are three slices of a cloud of tips.
 
     ``points`` (N, 3) [mm] are the tips. ``section`` is an axis, a position [m] and a half thickness
-    [m], or None. If ``path`` is True, three panels show all tips, each along another axis, unless
-    the tips are in a plane.
+    [m] of a single slab, or None. Tips in a plane get a single panel. Otherwise, if ``path`` is
+    True, three panels show all tips, each seen along another axis.
     """
     if section is not None:
         return [_slab(section)], False

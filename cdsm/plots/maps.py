@@ -92,13 +92,13 @@ def plot_map(
 ) -> Figure:
     """Plot the tips of a sweep in mm, coloured by a quantity, with a panel for each case.
 
-    Tips in a plane and sections are dots, or cells if a statistic is given. A cloud of tips is
-    shown in three slices through its middle, as cells; a path is seen along each axis, as dots.
-    Many postures may put the tip into one cell; the statistic determines which value it shows.
-    Entries without the quantity are marked by their status. In a map of cells, no mark is drawn in
-    a cell that has a value. Unstable entries are marked instead of coloured, except in a map of the
-    margin. Outliers, far from the middle 90 % of the values, and infinite values have a colour of
-    their own, at the ends of the colour bar.
+    Tips in a plane and tips in a section are drawn as dots, or as cells if a statistic is given. A
+    cloud of tips is drawn in three slices through its middle, as cells; a path is drawn as dots, as
+    seen along each axis. Several postures may put the tip into one cell; the statistic determines
+    the value that the cell shows. An entry (a posture in a case) without the quantity is marked by
+    its status; in a map of cells, no mark is drawn in a cell that has a value. Unstable entries are
+    marked instead of coloured, except in a map of the margin. Outliers, far from the middle 90 % of
+    the values, and infinite values have a colour of their own, at the ends of the colour bar.
 
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
@@ -198,7 +198,7 @@ def plot_map(
 
 
 def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Return a colour scale for ``values`` without outliers, and the ends that have outliers.
+    """Return a colour scale for ``values`` without outliers, and the ends beyond which they are.
 
     The ends are ``"neither"``, ``"min"``, ``"max"`` or ``"both"``.
     """

@@ -88,7 +88,10 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Plot predicted and measured values, and residuals divided by σ with a label for each."""
+    """Plot predicted and measured values, and residuals divided by σ.
+
+    ``labels`` has a text for each residual.
+    """
     rows = fit._rows
     loops: list[tuple[int, Any]] = [
         (i, each) for i, each in enumerate(fit.measurements) if hasattr(each, "forces")
@@ -140,7 +143,11 @@ def _plot_stiffnesses(axes: Any, fit: Identification, rows: Sequence[int]) -> No
 def _plot_loop(
     axes: Any, fit: Identification, loop: WeightLoop, rows: Sequence[int], colour: Any
 ) -> None:
-    """Plot displacements of a loop, less its first reading; ``rows`` are its rows in ``fit``."""
+    """Plot measured and predicted displacements of a loop [mm] against the force [N].
+
+    All are along the force, less the first measured one. ``rows`` are the rows of the loop in
+    ``fit``.
+    """
     u = np.array(loop.direction) / np.linalg.norm(loop.direction)
     along = loop.axes @ u
     read, model = (
@@ -151,9 +158,10 @@ def _plot_loop(
 
 
 def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
-    """Plot the expected 95 % interval of each parameter, and the gain of repeating each candidate.
+    """Plot the expected 95 % interval of each parameter, and the gain by each candidate test.
 
-    The intervals are shown for the planned tests, and for an equal number of evenly spaced tests.
+    The intervals are those after the planned tests, and after an equal number of evenly spaced
+    tests. The gain is that of one more repetition of a candidate, divided by the largest gain.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
     place, width = np.arange(len(plan.names)), 0.38

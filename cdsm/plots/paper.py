@@ -1,7 +1,7 @@
 """Plot the recomputed figures of the paper: stiffness against Young's modulus, tension and lead.
 
-Columns are the directions x, y and z, or postures. Rows are the two readings of "the stiffness":
-the paper's K_R, and what a hung weight measures.
+Columns of panels are the directions x, y and z, or postures. Rows are two definitions of the tip
+stiffness, the "readings": the paper's K_R, and the stiffness that a hung weight measures.
 """
 
 from __future__ import annotations

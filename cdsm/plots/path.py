@@ -52,9 +52,8 @@ def plot_path(
     """Plot some postures of a path over each other, from pale to dark, with the path of the tip.
 
     Args:
-        path: Postures of one arm, in order; or a plan, of which the planned samples are drawn.
-        animate: A ``.gif`` to write too: the arm follows the path, its cables coloured by their
-            tensions.
+        path: Postures of one arm, in order; or a plan, of which the feasible samples are drawn.
+        animate: A ``.gif`` to write too: the arm follows the path, with cables coloured by tension.
         tensions: Tensions (P, C) [N] for the colours, a row for each of P postures. Default: those
             of the plan, if ``path`` is a plan.
 
@@ -83,10 +82,10 @@ def plot_path(
 
 
 def plot_modes(modes: Modes) -> Figure:
-    """Plot an arm deflected by its growing modes, if it is unstable, then by its lowest modes.
+    """Plot an arm and its deflections by up to three modes: growing modes, then the lowest.
 
-    Deflections are enlarged: the tip moves by at most 25 % of the length of the arm. Raises
-    InvalidInput if ``modes`` is not a result of :func:`~cdsm.modes`.
+    A stable arm has no growing modes. Deflections are enlarged: the tip moves by at most 25 % of
+    the length of the arm. Raises InvalidInput if ``modes`` is not a result of :func:`~cdsm.modes`.
     """
     expect("modes", modes, "Modes")
     pose = modes.stiffness.posture

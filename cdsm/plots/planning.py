@@ -176,7 +176,10 @@ def plot_path_plan(plan: PathPlan) -> Figure:
 
 
 def _stepped(values: Array) -> tuple[Array, Array]:
-    """Return x and y of a line through samples (S,); a large change becomes a vertical step."""
+    """Return x and y of a line through ``values`` (S,) at x = 0, 1, …, S − 1.
+
+    A change much larger than the changes beside it becomes a vertical step halfway.
+    """
     changes = np.diff(values)
     around = np.pad(changes, 1)
     # only neighbouring changes of equal sign make a ramp; up and back down is two steps

@@ -128,7 +128,7 @@ def panels(
 
 
 def styled(axes: Any) -> Any:
-    """Set grid lines and sizes of text of new axes; return the axes."""
+    """Give new axes grid lines and small text; return the axes."""
     axes.grid(alpha=0.3, linewidth=0.6)
     axes.tick_params(which="both", labelsize=SMALL, width=0.6)
     for axis in (axes.xaxis, axes.yaxis):
@@ -199,7 +199,10 @@ def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line
 
 
 def number_colors(axes: Any, count: int, name: str) -> Array:
-    """Return a colour for each number from 1 to ``count`` (count, 4), and draw their colour bar."""
+    """Return an RGBA colour for each number from 1 to ``count`` (count, 4); draw a colour bar.
+
+    ``name`` says on the bar what the numbers count, such as ``cable``.
+    """
     colors = ScalarMappable(Normalize(1, count), COLOR_MAP)
     bar = axes.figure.colorbar(colors, ax=axes, aspect=30.0)
     bar.set_label(f"number of the {name}", fontsize=TEXT)

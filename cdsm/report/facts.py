@@ -41,7 +41,7 @@ class Rank(ReadOnlyState):
 
     @classmethod
     def of(cls, matrix: Array) -> Rank:
-        """Compute the rank of a matrix whose entries have one unit."""
+        """Compute the rank of a matrix whose entries all have the same unit."""
         values = np.linalg.svd(matrix, compute_uv=False)
         rank = int(np.count_nonzero(values > RANK * values[0]))
         return cls(rank=rank, full=values.size, values=frozen(values.astype(np.float64)))
@@ -65,7 +65,7 @@ class CableState:
         tension: F [N].
         stiffness: k as used in K_θ [N/m].
         tangent: EA(F) [N]; None if F is outside the domain (possible under force control).
-        secant: ΔF/(Δl/l_0) of Eq. 18 [N], or None.
+        secant: ΔF/(Δl/l_0) of Eq. 18 [N]; None if F is outside the domain.
         low: Lowest tension in the domain of the law [N].
         high: Highest tension in the domain of the law [N], or inf.
     """
@@ -112,7 +112,10 @@ class Readings(ReadOnlyState):
 
     @property
     def spread(self) -> Array:
-        """Return largest/smallest finite stiffness per axis (3,) [-]; inf if signs differ."""
+        """Return, per axis, the ratio of the largest to the smallest of the three (3,) [-].
+
+        Infinite and missing stiffnesses are ignored. The ratio is inf if the signs differ.
+        """
         spread = np.ones(3)
         rows = np.array([self.along, self.cartesian, self.pseudoinverse])
         for i, column in enumerate(rows.T):
@@ -132,9 +135,10 @@ def ranks(K: Stiffness) -> tuple[Rank, Rank, Rank]:
 
 
 def balance_error(K: Stiffness) -> tuple[float, str, float]:
-    """Return the largest residual of Eq. 13 [N m], its joint, and its ratio to :func:`torque_size`.
+    """Return the largest residual of Eq. 13 [N m], the name of its joint, and a relative residual.
 
-    The force at a prismatic joint is multiplied by the arm's length.
+    The latter is divided by :func:`torque_size` [-]. The force at a prismatic joint is multiplied
+    by the arm's length.
     """
     arm, whole = K.posture.arm, torque_size(K)
     left = abs(K.residual * joint_unit(arm))
@@ -143,7 +147,7 @@ def balance_error(K: Stiffness) -> tuple[float, str, float]:
 
 
 def torque_size(K: Stiffness) -> float:
-    """Return the torque size, the largest entry of |J_L|ᵀ F + |J_X|ᵀ |W| + |g| [N m]."""
+    """Return the largest entry of |J_L|ᵀ F + |J_X|ᵀ |W| + |g| [N m], the scale of residuals."""
     pose = K.posture
     parts = K.tension @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
     return float(((parts + abs(pose.gravity_torque)) * joint_unit(pose.arm)).max())
@@ -170,7 +174,7 @@ def cable_states(K: Stiffness) -> tuple[CableState, ...]:
 
 
 def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
-    """Return ``answer()``, a number by the law of ``cable``; None if it raises a CdsmError."""
+    """Return the number that ``answer()`` computes from the law of ``cable``; None if it fails."""
     try:
         return float(evaluate_law(cable, answer))
     except CdsmError:
@@ -193,10 +197,10 @@ class Sticking(ReadOnlyState):
 
 
 def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
-    """Compute the tip stiffnesses while all cables stick; None if there are none.
+    """Compute the tip stiffnesses while all cables stick in their holes.
 
-    ``readings`` are the frictionless tip stiffnesses. None if they are None, no cable can stick, or
-    a tension is outside the domain of its law.
+    ``readings`` are the tip stiffnesses without friction. Returns None if ``readings`` is None, if
+    no cable can stick, or if a tension is outside the domain of its law.
     """
     pose, sticks = K.posture, holding(K.posture)
     T, J = K.tension[pose.segments.chains.cable], pose.jacobian[:3]

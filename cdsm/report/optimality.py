@@ -1,4 +1,4 @@
-"""Check the optimality of the tensions in a report, by conditions derived a second time."""
+"""Check for a report whether tensions are the least, with multipliers that no solver computed."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ class Optimality:
 
 
 def optimality(K: Stiffness, tension: Tension) -> Optimality:
-    """Evaluate the optimality conditions of the distributed tensions ``tension`` of ``K``."""
+    """Evaluate the optimality conditions at the tensions of ``K``.
+
+    ``tension`` is the distribution from which they come; it has their bounds and solver.
+    """
     pose = K.posture
     torque = pose.jacobian.T @ K.wrench - pose.gravity_torque
     problem = tension_kernels.Scaled(

@@ -6,7 +6,8 @@
 L_c is the length of cable c, F_c its tension and E_c its stored energy. L_c0 and F_c without
 argument are the values at the posture. V is the potential of gravity, f the force at the tip x. U
 uses only cable lengths, poses of links and energies of cables. It uses no moment arms, no Hessian
-and no rigidity. A moment has no potential; it does the work m·ω.
+and no rigidity. A moment m at the tip has no potential; for a small rotation vector ω of the tip,
+it does the work m·ω.
 """
 
 from __future__ import annotations
@@ -49,7 +50,10 @@ class LockedCable(NamedTuple):
     free_length: float  # original length l_0, which the motor keeps [m]
 
     def tensions(self, longer: Array) -> Array:
-        """Compute the tension (P,) [N] of this cable if the cables are longer by (P, C) [m]."""
+        """Compute the tension (P,) [N] of this cable at P places near the posture.
+
+        There, the cables of the arm are longer than at the posture by ``longer`` (P, C) [m].
+        """
         cable, start = self.cable, self.free_length
         more = longer[:, self.number]
         return evaluate_law(
@@ -57,7 +61,11 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute gain of energy minus F ΔL (P,) [J] if the cables are longer by ΔL (P, C) [m]."""
+        """Compute the gain of stored energy less F ΔL (P,) [J] of this cable.
+
+        ΔL is its elongation since the posture; the argument ``longer`` (P, C) [m] has that of all
+        cables.
+        """
         cable, F, start = self.cable, self.tension, self.free_length
         tensions = self.tensions(longer)
         more = evaluate_law(cable, lambda: cable.energy(tensions, start) - cable.energy(F, start))
@@ -78,7 +86,10 @@ class LockedCable(NamedTuple):
         return min(abs(F - edge) for edge in edges)
 
     def one_sided(self) -> list[str]:
-        """Return a message for each bound or kink of the law at the tension; usually none."""
+        """Return a message for each bound or kink of the law that is at the tension; usually none.
+
+        K_θ has another value on either side of it.
+        """
         F, name = self.tension, self.cable.name
         if F == 0.0:
             return [f"{name} is slack (0 N), and K_θ counts it as if it were taut"]
@@ -97,7 +108,11 @@ class LockedCable(NamedTuple):
 
 
 def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
-    """Return what ``answer`` computes by the law of ``cable``; InvalidInput if the law fails."""
+    """Return ``answer()``, which evaluates the law of ``cable``.
+
+    Raises InvalidInput if a law of a user raises another error than a CdsmError, or if a number is
+    not finite.
+    """
     try:
         values = np.asarray(answer(), dtype=np.float64)
     except CdsmError:
@@ -149,14 +164,15 @@ class Neighbourhood:
     # --- potentials ---------------------------------------------------------------------------
 
     def kinematic(self, places: Array) -> Array:
-        """Compute the active, gravity and load part of U (P, 3) [N m], for the force f alone."""
+        """Compute the active, gravity and load part of U (P, 3) [N m], without any moment."""
         return self.work(places, np.zeros(3))
 
     def work(self, places: Array, moment: Array | None = None) -> Array:
-        """Compute the active, gravity and load part of U (P, 3) [N m], with the work of a moment.
+        """Compute the active, gravity and load part of U (P, 3) [N m], with a moment in the load.
 
-        ``moment`` (3,) [N m] acts at the tip; None: the moment of the wrench. Its work is exact to
-        first order in the displacement.
+        The load part is minus the work of the force and of a ``moment`` (3,) [N m] at the tip;
+        None: the moment of the wrench. The work of the moment is exact to first order in the
+        displacement.
         """
         moment = self._wrench[3:] if moment is None else moment
         pose, arm = self._pose, self._pose.arm
@@ -208,7 +224,7 @@ class Neighbourhood:
         return np.array(torques)[:, None] * self.unit
 
     def measured_lengths(self) -> Array:
-        """Compute the cable lengths L (C,) [m] from the link poses that Pinocchio computes."""
+        """Compute the cable lengths at the posture (C,) [m] from Pinocchio's poses of the links."""
         pose = self._pose
         links = {site.link for cable in pose.arm.cables for site in cable.sites}
         frames = {link: pose.link_pose(link) for link in links}
@@ -242,7 +258,10 @@ class Neighbourhood:
 
     @cached_property
     def _closing_motion(self) -> float:
-        """Return the least joint displacement, in :attr:`unit`, at which two sites may coincide."""
+        """Return a joint displacement, in :attr:`unit`, below which no two sites coincide.
+
+        Only neighbouring sites of one cable count.
+        """
         pose = self._pose
         routing = pose.arm._model.routing
         segment, joint = routing.segment, routing.joint

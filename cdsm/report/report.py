@@ -35,7 +35,7 @@ class Report(ReadOnlyState):
         residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a prismatic
             joint is multiplied by the arm's length.
         residual_joint: Name of the joint with the largest residual.
-        imbalance: ``residual`` divided by the size of the torques that it sums [-].
+        imbalance: ``residual`` divided by the largest entry of |J_L|ᵀ F + |J_X|ᵀ |W| + |g| [-].
         optimality: Optimality conditions of Eq. 17; None if the tensions were not distributed.
         cables: Tension, stiffness and domain of each cable.
         jacobian_rank: Rank and condition number of J_X.
@@ -45,7 +45,7 @@ class Report(ReadOnlyState):
             the arm cannot be pretensioned with all cables, NaN if HiGHS fails.
         readings: The three tip stiffnesses along the base axes; None if K_θ is singular.
         sticking: Tip stiffnesses under loads too small to make a cable slide; None if no cable
-            sticks, or if K_θ is singular.
+            sticks, K_θ is singular, or a tension is outside the domain of its law.
     """
 
     stiffness: Stiffness
@@ -69,7 +69,7 @@ class Report(ReadOnlyState):
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Return notes, one text each: slack cables, ends of laws, different tip stiffnesses."""
+        """Return notes on how to read the stiffness, one text each, e.g. that a cable is slack."""
         return tuple(remarks.notes(self))
 
     @property

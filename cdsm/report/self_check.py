@@ -2,8 +2,9 @@
 
 First, K_θ is the Hessian of the potential, computed from lengths, poses and energies alone. This
 check shares with Eq. 16 only the positions of cables and links. Second, K_θ is the derivative of
-the residual torque. This check uses the gradients, which are checked separately, and is more
-precise. A moment at the tip has no potential: then only the torque checks the load term.
+the residual torque J_Lᵀ F + g − J_Xᵀ W. This check is more precise, but uses J_L, g and J_X; these
+are checked by first differences of the potential. A moment at the tip has no potential: then only
+the torque checks the load term.
 """
 
 from __future__ import annotations
@@ -47,7 +48,10 @@ _SUM = 16.0 * float(np.finfo(np.float64).eps)
 
 
 class _Recomputed(NamedTuple):
-    """Value by finite differences with its error bound, or the reason why there is none."""
+    """Second value of a term, mostly by finite differences, with its error bound.
+
+    If the value is None, ``reason`` says why.
+    """
 
     value: Array | None
     reason: str = ""
@@ -60,11 +64,12 @@ _NONE = _Recomputed(None)
 @final
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """Difference between a matrix and its value by central differences, in the matrix's unit.
+    """Difference between a matrix or vector and its second value, in the unit of its entries.
 
     Attributes:
         found: Largest magnitude of an entry of the difference.
-        expected: Bound of the difference by truncation and rounding of the central differences.
+        expected: Bound of ``found`` if both values are right: truncation of the central
+            differences, and rounding.
     """
 
     found: float
@@ -84,10 +89,13 @@ class Agreement:
         unit: ``"N m/rad"``; for the torque ``"N m"``, for the lengths ``"m"``.
         largest: Largest magnitude of an entry of the term; for the torque, of the torques that it
             sums; for the lengths, the longest one.
-        potential: Comparison with finite differences of the potential; None if there is none.
-        torque: Comparison with finite differences of the torque, or None.
-        verdict: ``"DIFFERS"``: a difference is larger than expected. ``"agrees"``: none is larger,
-            and the expected error of a comparison is at most :data:`RESOLVED` of the largest entry.
+        potential: Comparison with finite differences of the potential; for the lengths, with
+            distances between sites placed by Pinocchio. None if it is not possible.
+        torque: Comparison with finite differences of the torque; None if it is not possible, and
+            for the torque and the lengths.
+        verdict: ``"DIFFERS"``: a difference is larger than expected, or a term is not the sum of
+            its parts. ``"agrees"``: none is larger, and the expected error of a comparison is at
+            most 1e-6 (:data:`RESOLVED`) of the largest entry, or 1e-8 of that of K_θ.
             ``"not possible"``: the expected errors of all comparisons are larger.
         reason: Why the check is not possible, or what differs; usually empty.
     """
@@ -174,7 +182,10 @@ def self_check(K: Stiffness) -> SelfCheck:
 
 
 def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Recomputed]]:
-    """Return the terms as second differences of the potential, and as first ones of the torque."""
+    """Compute the terms as second differences of the potential and as first ones of the torque.
+
+    Both lists have the order active, passive, gravity, load.
+    """
     step = near.first_step
     moved = _differentiated(hessians, near, near.kinematic, near.kinematic_noise, step)
     turned = _differentiated(
@@ -199,9 +210,10 @@ def _differentiated(
     noise: Noise,
     step: float,
 ) -> list[_Recomputed]:
-    """Differentiate each part of a potential or torque that ``f``, a method of ``near``, computes.
+    """Differentiate each part of the potential, or of the torque, by ``derive``.
 
-    If this fails, each result has the text of the error as its reason.
+    ``f``, a method of ``near``, computes the parts, ``noise`` their rounding errors; ``step`` is
+    the largest step. If this fails, each result has the text of the error as its reason.
     """
     try:
         values, errors = derive(f, near.unit.size, step, noise)
@@ -231,9 +243,10 @@ def _compare(
     torque: _Recomputed = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
-    """Compare the term ``given`` with its values by differences of the potential and of the torque.
+    """Compare the term ``given`` with its second values, from the potential and from the torque.
 
-    ``largest`` is its largest entry, as in :class:`Agreement`; ``whole`` is that of K_θ.
+    ``largest`` is the scale of the term, as in :class:`Agreement`; ``whole`` is the largest entry
+    of K_θ.
     """
     unit = _UNITS.get(name, "N m/rad")
     enough = max(RESOLVED * largest, _NEGLIGIBLE * whole)

@@ -19,7 +19,10 @@ _NEAR: Final = 0.012
 
 
 def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> int | None:
-    """Return the index of the cable nearest to a ray from a camera; None if none is near."""
+    """Return the index of the cable nearest to a ray from a camera; None if none is near.
+
+    ``paths`` has the points (n, 3) [m] of each cable. The ray begins at ``origin`` (3,) [m].
+    """
     u = direction / np.linalg.norm(direction)
     angles = [
         min(_angle(start - origin, end - start, u) for start, end in pairwise(path))
@@ -30,9 +33,9 @@ def clicked_cable(paths: Sequence[Array], origin: Array, direction: Array) -> in
 
 
 def _angle(start: Array, span: Array, u: Array) -> float:
-    """Return the least angle [rad] between a ray along u and a segment, ``start`` + t·``span``.
+    """Return the least angle [rad], seen from the origin, between u and a segment of a cable.
 
-    The ray begins at the origin; t is 0 to 1.
+    u is a unit vector; the segment is ``start`` + t·``span``, t = 0 to 1.
     """
     across, off = span - (span @ u) * u, start - (start @ u) * u
     part = float(np.clip(-(off @ across) / max(float(across @ across), 1e-300), 0.0, 1.0))
@@ -50,7 +53,10 @@ class CableNames:
         self.chosen: int | None = None
 
     def choose(self, shown: Shown, origin: Array, direction: Array) -> None:
-        """Choose the cable of ``shown`` that the ray of a click hits, or else no cable."""
+        """Choose the cable of ``shown`` that a clicked ray hits; if it hits none, choose none.
+
+        The ray begins at ``origin`` (3,) [m].
+        """
         if shown.posture is not None:
             self.chosen = clicked_cable(shown.posture.cable_paths, origin, direction)
 

@@ -58,8 +58,8 @@ def placed(ball: Ball, direction: Array, aspect: float, free: float) -> tuple[Ar
     """Compute position and look-at point [m] of a camera that shows a ball.
 
     ``direction`` points from the ball to the camera. ``aspect`` is the width of the picture divided
-    by its height. Only the fraction ``free`` of its height, at the top, is not covered by the
-    panel; the ball is shown there.
+    by its height. The panel leaves only the top fraction ``free`` of the picture's height
+    uncovered; the ball is shown there.
     """
     high = math.tan(_FOV / 2.0)
     distance = _MARGIN * ball.radius / min(high * free, high * aspect)
@@ -74,7 +74,10 @@ def placed(ball: Ball, direction: Array, aspect: float, free: float) -> tuple[Ar
 
 @dataclass
 class _Browser:
-    """Picture of a browser: uncovered part of its height, size [pixels], last camera position."""
+    """Picture of a browser: uncovered fraction of its height, size [pixels].
+
+    ``position`` is the camera position [m] to which :class:`Cameras` last moved the camera.
+    """
 
     free: float
     size: tuple[int, int]
@@ -82,7 +85,10 @@ class _Browser:
 
 
 class Cameras:
-    """Cameras of all browsers; one that its user has not moved is fitted to a resized picture."""
+    """Cameras of all browsers, each fitted to show a ball around the arm.
+
+    If a picture is resized, its camera is fitted again, unless the user has moved the camera.
+    """
 
     def __init__(self, server: viser.ViserServer, ball: Ball) -> None:
         self._server, self._ball = server, ball
@@ -94,7 +100,7 @@ class Cameras:
         server.on_client_disconnect(self._on_disconnect)
 
     def follow(self, ball: Ball) -> None:
-        """Fit all cameras to ``ball`` if it would be partly outside the pictures, or too small."""
+        """Fit all cameras to ``ball``, if it is partly outside the present view, or small in it."""
         if not self._ball.fits(ball):
             self._ball = ball
             self._set_first()

@@ -37,7 +37,10 @@ _CODE: Final = "display:block;white-space:pre-wrap;overflow-wrap:anywhere;margin
 
 
 def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str]) -> str:
-    """Write the command for the numbers of a setting: ``cdsm stiffness`` or ``cdsm weigh``."""
+    """Write the command that computes the numbers: ``cdsm stiffness`` or ``cdsm weigh``.
+
+    ``arm_arguments`` are the arguments of this command that describe the arm.
+    """
     weighs, units = setting.sag and bool(setting.force.any()), JointUnits(arm.slides).shown
     options = {
         "angles": _joined(x / unit for x, (_, unit) in zip(setting.q.tolist(), units, strict=True)),
@@ -52,7 +55,7 @@ def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str
 
 
 def python_lines(arm: Manipulator, setting: Setting) -> str:
-    """Write the lines of Python that compute the numbers of a setting of an arm ``arm``."""
+    """Write the lines of Python that compute the numbers, if the arm has the name ``arm``."""
     wrench = f"[{_joined(_wrench(setting), ', ')}]"
     bounds = [f"{setting.minimum:.12g}"]
     bounds += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []

@@ -36,13 +36,13 @@ _SAG: Final = (
 
 
 class Controls:
-    """Controls and text of an arm in the empty panel of a viser server.
+    """Panel of the page: controls that set the arm, and text about the arm.
 
-    ``arm_arguments`` describe the arm in a shell. ``limits`` [N] are the ends of the sliders of the
-    lower bound of all tensions, and of each force component (±). ``force_scale`` [m/N] is the
-    length of the force arrow per newton. ``changed`` is called, in any thread, when a control has
-    changed. ``fit`` fits the camera of a browser. ``admit`` is called with every control that
-    browsers may use.
+    ``arm_arguments`` are the arguments of the command ``cdsm`` that describe the arm. ``limits``
+    [N] are the right ends of two sliders: of the lower bound of all tensions, and of each force
+    component, whose left end is the negative. ``force_scale`` [m/N] is the length of the force
+    arrow per newton. ``changed`` is called, in any thread, when a control has changed. ``fit`` fits
+    the camera of a browser. ``admit`` is called with every control that browsers may use.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Controls:
         )
 
     def update(self, shown: Shown, remark: str) -> None:
-        """Write the text about the results ``shown``, and a remark."""
+        """Write the text about the results ``shown``, and above it ``remark``, unless empty."""
         self._text.content = page_text(shown, self._force_scale, remark)
         self._tensions.content = tensions_text(shown)
         self._command.content = command_text(self._arm, shown.setting, self._arm_arguments)

@@ -66,7 +66,10 @@ Control = (
 
 
 class _Address(str):
-    """Address of one guard. Two of them are never equal, so two views may have equal addresses."""
+    """Address of one guard. The guard knows its server by the identity of this object.
+
+    Therefore two views in one process may have addresses of equal text.
+    """
 
     __slots__ = ()
 
@@ -189,7 +192,10 @@ class Guard:
         return None
 
     def _allowed(self, uuid: str, value: object) -> bool | float | str | None:
-        """Return a value for the control ``uuid``; None if this control or value is not allowed."""
+        """Return ``value``, clipped to the range of a slider, for the control ``uuid``.
+
+        None if clients may not use this control, or not set this value.
+        """
         control = self._controls.get(uuid)
         if isinstance(control, viser.GuiButtonHandle):
             return True if value is True else None
@@ -216,7 +222,7 @@ class Guard:
 
 
 class _Connection(ServerConnection):
-    """A connection that receives only messages that its guard allows."""
+    """Websocket connection that drops all messages which its guard refuses."""
 
     def __init__(self, guard: Guard, *parts: Any, **limits: Any) -> None:
         super().__init__(*parts, **limits)

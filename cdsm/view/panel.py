@@ -1,4 +1,4 @@
-"""Write the panel of the page as HTML, in mm and N/mm, with a name on every number."""
+"""Write the text of the panel as HTML, in mm and N/mm; every number is in a named element."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _GRADIENT: Final = ",".join(
 
 
 class _Row(NamedTuple):
-    """A row of the page's table: its text, its numbers by name, and their unit."""
+    """Row of the table on the page: its text, its numbers by name, and their unit."""
 
     what: str
     values: dict[str, str]
@@ -104,7 +104,10 @@ def tensions_text(shown: Shown) -> str:
 
 
 def _remarks(shown: Shown, remark: str) -> Iterator[tuple[str, str]]:
-    """Yield names and texts of the remarks above the numbers: on ``shown``, and ``remark``."""
+    """Yield name and text of each remark above the numbers.
+
+    They are ``remark``, unless it is empty, and the remarks about the results ``shown``.
+    """
     if remark:
         yield "remark", remark
     if shown.problem:

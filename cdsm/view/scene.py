@@ -121,7 +121,7 @@ class Scene:
             self.cameras.follow(self._ball(pose))
 
     def draw_path(self, tips: Array) -> None:
-        """Draw a path of the tip (S, 3) [m], and fit the cameras to it and the arm."""
+        """Draw a path of the tip (S, 3) [m]; from now on, cameras are fitted to it and the arm."""
         self._path = tips
         lines = np.stack([tips[:-1], tips[1:]], axis=1).astype(np.float32)
         self._server.scene.add_line_segments(
@@ -129,7 +129,7 @@ class Scene:
         )
 
     def _draw_lines(self, shown: Shown) -> None:
-        """Draw sticks for links without shapes, the posture before an arm sags, and holes."""
+        """Draw links without shapes as sticks, the reference of an arm that sags, and holes."""
         pose, reference = shown.posture, shown.reference
         shaped = frozenset() if self._shapes is None else self._shapes.rows
         bones, brackets = ([], []) if pose is None else pose._stick_figure(shaped)

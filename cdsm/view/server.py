@@ -116,7 +116,10 @@ def _tips(arm: Manipulator, path: Array, of_tips: bool) -> Array:
 
 
 def _server(host: object, port: object, name: str) -> tuple[Guard, viser.ViserServer]:
-    """Start a guarded viser server at exactly ``host`` and ``port``; ``name`` titles its page."""
+    """Start a viser server and its guard; InvalidInput if ``host`` or ``port`` is not available.
+
+    ``name`` is that of the arm, for the title of the page.
+    """
     from viser._messages import RunJavascriptMessage
 
     from cdsm.view.guard import Guard
@@ -139,7 +142,10 @@ def _server(host: object, port: object, name: str) -> tuple[Guard, viser.ViserSe
 
 
 def _check_free(host: str, port: int) -> None:
-    """Check that ``port`` of ``host`` is free; viser would use the next port, or wait for ever."""
+    """Raise InvalidInput unless ``port`` of ``host`` is free.
+
+    Otherwise, viser would use the next port, or wait for ever.
+    """
     try:
         for family, *_, address in socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

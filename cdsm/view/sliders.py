@@ -31,7 +31,10 @@ _ROUND = 1e-9  # largest difference of an end from a round number, as a fraction
 @final
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Ends, step, first position and digits of a slider, in a unit whose size in SI is ``unit``."""
+    """Ends, step and first position of a slider, in a unit whose size in SI is ``unit``.
+
+    ``digits`` is the number of decimals that the page shows.
+    """
 
     label: str
     low: float

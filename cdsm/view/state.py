@@ -142,7 +142,7 @@ class Shown(ReadOnlyState):
 
     @cached_property
     def compliance(self) -> Array | None:
-        """Compliance (3, 3) [m/N] of the tip; None if the arm is not stable."""
+        """Compliance C_vv (3, 3) [m/N] of the tip; None if the arm is not stable as shown."""
         if self.condition not in (Condition.STABLE, Condition.LEFT_REFERENCE):
             return None
         source = self.rest or self.stiffness
@@ -158,7 +158,10 @@ class Shown(ReadOnlyState):
 
     @cached_property
     def principal(self) -> dict[str, Array] | None:
-        """Softest and stiffest direction and their stiffness [N/m]; None if not stable."""
+        """Softest and stiffest direction, and the stiffness along each [N/m]; None if not stable.
+
+        The keys are those of :func:`~cdsm.kernels.principal.principal_stiffness`.
+        """
         return None if self.compliance is None else principal_stiffness(self.compliance)
 
     @cached_property
@@ -173,9 +176,9 @@ class Shown(ReadOnlyState):
 
     @cached_property
     def holes(self) -> tuple[Array, Array]:
-        """Marks of holes, as lines (n, 2, 3) [m]: where cables stick, and where they slide.
+        """Short lines (n, 2, 3) [m] at the holes where cables stick, and at those where they slide.
 
-        Holes without friction, and holes that a cable passes straight, have no mark. Cables
+        Holes without friction, and holes that a cable passes straight, have no line. Cables
         slide only if the force moves the arm (``sag``); else the second array is empty.
         """
         pose = self.posture
@@ -207,7 +210,10 @@ def remedies_of(shown: Shown) -> tuple[str, ...]:
 
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
-    """Compute the results for an arm at a setting; every error becomes a condition."""
+    """Compute the results for an arm at a setting.
+
+    A CdsmError is not raised: it determines the ``condition``, and its text is the ``problem``.
+    """
     pose = tension = K = rest = history = None
     condition, problem = Condition.STABLE, ""
     try:
@@ -251,7 +257,7 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
 
 
 def _rest(history: LoadHistory) -> Equilibrium:
-    """Return the last state of ``history`` as an equilibrium, with its tangent K_θ."""
+    """Return the last state of ``history`` as an equilibrium, with the tangent K_θ there."""
     K, reaction = history.stiffness(-1), history.reaction[-1].copy()
     return Equilibrium(
         reference=history.reference,

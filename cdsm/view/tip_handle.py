@@ -51,9 +51,10 @@ class TipHandle:
         self._changed()
 
     def solve(self, q: Array) -> Array | None:
-        """Return joint angles (nv,) near ``q`` for a new target of the tip.
+        """Return joint angles (nv,) near ``q`` with the tip at, or nearest to, a new target.
 
-        None if there is no new target, or if the inverse kinematics fails.
+        None if there has been no new target since the last call, or if the inverse kinematics
+        raises an error.
         """
         target, self._target = self._target, None
         if target is None:
@@ -73,11 +74,14 @@ class TipHandle:
         return found.angles
 
     def moved_to(self, q: Array) -> None:
-        """Store the angles (nv,) of the sliders after they were moved to the result of a search."""
+        """Store the angles (nv,) of the sliders, after the result of :meth:`solve` moved them."""
         self._q = q
 
     def remark(self, q: Array) -> str:
-        """Return why the tip did not reach the handle; empty if ``q`` is not the stored angles."""
+        """Return why the tip did not reach the handle.
+
+        Empty if it did, or if the arm has been moved since: ``q`` (nv,) is not the stored angles.
+        """
         return self._remark if np.array_equal(q, self._q) else ""
 
     def update(self, shown: Shown) -> None:
