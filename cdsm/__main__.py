@@ -1,4 +1,4 @@
-"""Run the command line: ``cdsm`` and ``python -m cdsm``."""
+"""Entry point of the commands ``cdsm`` and ``python -m cdsm``."""
 
 import sys
 
@@ -6,7 +6,7 @@ import cdsm
 
 
 def main() -> None:
-    """Print the version, or run a command."""
+    """Print the version for ``--version``; otherwise run the command that the user gave."""
     if sys.argv[1:] == ["--version"]:  # typer would take longer to import than all the rest
         print(f"cdsm {cdsm.__version__}")
         return

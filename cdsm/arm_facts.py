@@ -1,4 +1,4 @@
-"""Properties of an arm: names, cables, limits, gravity; copies of an arm with other cables."""
+"""Properties of an arm (names, cables, limits, gravity), and copies with some of them changed."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class ArmFacts(Printed):
 
     @cached_property
     def has_friction(self) -> bool:
-        """Whether a cable has friction in a hole. Results that neglect friction say so."""
+        """Whether any cable has friction in a hole. Results that neglect this friction say so."""
         return any(any(cable.friction) for cable in self.cables)
 
     @property
@@ -176,9 +176,8 @@ class ArmFacts(Printed):
     ) -> None:
         """Check the arguments of :class:`Manipulator`, and set all attributes from them.
 
-        ``urdf`` is a text that has been checked. ``tip`` is the link whose frame is the tip. Doubts
-        are issued as warnings, except those in ``told``, of which the user was already
-        warned.
+        ``urdf`` is a text that has been checked. ``tip`` is the link whose frame is the tip.
+        :attr:`_doubts` are issued as warnings, except those in ``told``, which the user has seen.
         """
         self._cables = cables = _checked_cables(cables)
         self._gravity = gravity_vector("gravity", gravity)
@@ -195,7 +194,7 @@ class ArmFacts(Printed):
 
     @cached_property
     def _doubts(self) -> list[str]:
-        """Doubts about the unit of lengths of the robot and of its cables, and about its tip."""
+        """Texts of warnings: lengths look as if not in metres, or no joint moves the tip."""
         length = self._model.body.length
         # without lengths between the joints, the frame of the robot may be as long as any arm
         most = max(_FARTHEST, 10.0 * length) if length > 0.0 else LONGEST
@@ -261,7 +260,7 @@ class ArmFacts(Printed):
         return self._replace(gravity=gravity)
 
     def _with_laws(self, laws: Sequence[Elasticity]) -> Self:
-        """Return the same arm with other laws, one per cable, without building its robot again."""
+        """Return the same arm with other laws, one per cable; faster, since its robot is kept."""
         pairs = zip(self.cables, laws, strict=True)
         cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
         arm = type(self).__new__(type(self))

@@ -57,11 +57,11 @@ class ArmModel:
         tree: Kinematic tree of the joints.
         routing: Cable sites and segments.
         masses: Masses of the links, gravity, and the pose of the tip on its link.
-        blocks: Joints and cables in groups that are solved one after the other for a first guess
-            of the tensions.
+        blocks: Blocks of joints and cables from base to tip. To guess the tensions, the balance of
+            one block after the other is solved.
         laws: Elasticities of the cables.
-        arrays: Fields of tree, routing and masses, one after the other: arguments of the kernel
-            ``single_pose``.
+        arrays: All fields of tree, routing and masses in one tuple, as the kernel ``single_pose``
+            takes them.
         lowest: Lower joint limits (nv,) [rad], minus the rounding tolerance.
         highest: Upper joint limits (nv,) [rad], plus the rounding tolerance.
     """
@@ -112,11 +112,11 @@ class ArmModel:
 
     @cached_property
     def moving(self) -> tuple[Indices, Indices, Indices, Indices]:
-        """The n segments whose length depends on joints, as (a, b, segment, joint).
+        """Segments whose length depends on joints, as four arrays (a, b, segment, joint).
 
-        Segment i lies between the sites ``a[i]`` and ``b[i]``. Each of the m entries of ``segment``
-        and ``joint`` is a pair: the length of segment number ``segment[j]`` depends on the joint in
-        row ``joint[j]`` of :attr:`tree`.
+        Segment i lies between the sites ``a[i]`` and ``b[i]``. Entry j of ``segment`` and ``joint``
+        says that the length of segment number ``segment[j]`` depends on the joint in row
+        ``joint[j]`` of :attr:`tree`.
         """
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
@@ -124,9 +124,10 @@ class ArmModel:
 
     @cached_property
     def wire_laws(self) -> CableLaws:
-        """Elasticities of the cables; cables with friction are taken as position-controlled.
+        """Elasticities of the cables, where cables with friction count as position-controlled.
 
-        A motor that controls force cannot keep the tension behind a hole in which its cable sticks.
+        A motor that controls force does not control the tension beyond a hole in which its cable
+        sticks.
         """
         forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
         if not any(any(self._cables[c].friction) for c in forced):
@@ -139,7 +140,7 @@ class ArmModel:
 
     @cached_property
     def holes(self) -> Holes:
-        """Holes of the cables, in the form that the kernels of batches need."""
+        """Holes and leads of the cables as arrays, for the kernels of batches with friction."""
         cables = self._cables
         first = np.cumsum([0, *(len(cable.sites) for cable in cables)])
         sites = [site for cable in cables for site in cable.sites]
@@ -156,12 +157,15 @@ class ArmModel:
         )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
-        """Return whether each joint angle of q (nv,) [rad] is beyond its limits (nv,)."""
+        """Return for each joint angle of q (nv,) [rad] whether it is beyond its limits (nv,)."""
         return np.asarray((q < self.lowest) | (q > self.highest))
 
 
 def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
-    """Return the routing of cables: sites in the frames of their joints, and cable segments."""
+    """Return the routing of cables: their sites in joint frames, and their segments.
+
+    Raises CableError for an unknown link, or if two neighbouring sites of a link coincide.
+    """
     row, point, fixed = [], [], np.array([cable.lead for cable in cables])
     parts: list[tuple[int, int, int, int, int]] = []
     joints: list[int] = []
@@ -198,7 +202,7 @@ def route(body: RigidBody, tree: Tree, cables: Sequence[Cable]) -> Routing:
 
 
 def joints_to(tree: Tree, row: int) -> list[int]:
-    """Return the rows in ``tree`` of the joints from the base to joint ``row``, ``row`` last."""
+    """Return the rows in ``tree`` of the joints from the base to the joint in ``row``, included."""
     rows: list[int] = []
     while row:
         rows.insert(0, row)

@@ -1,4 +1,4 @@
-"""Cables as straight segments between sites on links: length, stiffness and energy."""
+"""Cables that run straight from site to site of the links; their stiffness and energy."""
 
 from __future__ import annotations
 
@@ -228,7 +228,7 @@ class Cables(tuple[Cable, ...]):
 
     @property
     def position_controlled(self) -> NDArray[np.bool_]:
-        """Whether the motor of each cable controls its length, not its tension (C,)."""
+        """Whether each cable's motor controls its length (True) or its tension (False) (C,)."""
         return np.array([cable.control == "position" for cable in self])
 
     def __repr__(self) -> str:
@@ -252,7 +252,11 @@ def _length(value: float) -> float:
 
 
 def in_series(*stiffness: float) -> float:
-    """Compute 1/Σ(1/k) [N/m] of springs in series, k [N/m] or inf; InvalidInput if not positive."""
+    """Compute the stiffness 1/Σ(1/k) [N/m] of springs in series; each k [N/m] > 0 may be inf.
+
+    Raises:
+        InvalidInput: A stiffness is not a positive number.
+    """
     if not stiffness:
         raise InvalidInput("stiffness", "none given; give one or more in N/m.")
     springs = [quantity("stiffness", k, "stiffness", infinite=True) for k in stiffness]

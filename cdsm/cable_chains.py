@@ -1,4 +1,4 @@
-"""Cables, divided into the segments between their holes, for cables that stick in holes.
+"""Divide cables into the segments between their holes, for cables that stick in holes.
 
 The segments of a cable are its lead, then one segment between each two neighbouring sites. Between
 two segments is a hole. Where the cable sticks in a hole, the segments on both sides are separate
@@ -26,7 +26,7 @@ from cdsm.support.values import Array, ReadOnlyState, frozen
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Chains:
-    """Segments and holes of all cables of an arm; S segments, P holes, actuator side first.
+    """S segments and P holes of all C cables of an arm, in each cable from the actuator on.
 
     Attributes:
         segments: Each segment as a cable between two sites. The series spring is in the first
@@ -34,7 +34,7 @@ class Chains:
             motor control; the others are position-controlled. The lead is a segment along x of the
             link of the first site.
         cable: Index of the cable of each segment (S,).
-        start: Index of the first segment of each cable, then S (C+1,).
+        start: Index of the first segment of each cable, and S at the end (C+1,).
         hole: Index of the segment before each hole (P,); the segment after it has the next index.
         site: Index of each hole among the sites of its cable (P,).
         friction: μ of each hole (P,) [-].
@@ -91,13 +91,14 @@ class Chains:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Segments(ReadOnlyState):
-    """Segments of all cables between their holes at a posture; S segments, P holes.
+    """Lengths of the S segments of all cables, and wrap angles at their P holes, at a posture.
 
     Attributes:
         chains: The segments and holes, with the cable of each.
-        lengths: l (S,) [m].
+        lengths: Length l of each segment (S,) [m].
         length_jacobian: ∂l/∂θ (S, nv) [m/rad]; zero for leads and segments within one link.
-        wrap: φ (P,) [rad]: angle by which the cable turns in the hole, plus the wrap of the site.
+        wrap: Wrap angle φ at each hole (P,) [rad]: the angle by which the cable turns there, plus
+            :attr:`Site.wrap`.
         wrap_jacobian: ∂φ/∂θ (P, nv) [rad/rad]; 0 where the cable goes straight through.
     """
 
@@ -131,7 +132,10 @@ class Segments(ReadOnlyState):
         return found
 
     def tension_stiffness(self, tension: Array) -> Array:
-        """Compute Σ T_j ∂²l_j/∂θ² over the segments j of each cable, (C, nv, nv); T (S,) [N]."""
+        """Compute Σ T_j ∂²l_j/∂θ² [N m/rad] over the segments j of each cable, (C, nv, nv).
+
+        It is the cable's part of the active term of K_θ. ``tension`` is T (S,) [N].
+        """
         cable, (_, _, segment, joint, _) = self.chains.cable, self._routing
         return frozen(
             single_length_hessian(segment, joint, *self._frames, tension, cable, int(cable[-1]) + 1)

@@ -1,4 +1,4 @@
-"""Elasticities of all cables of an arm: stiffness, tension bounds and original lengths."""
+"""Stiffness, tension bounds and original lengths of all cables of an arm, from their laws EA(F)."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ class CableLaws:
 
     Args:
         cables: Cables of the arm.
-        original_length: ``"unstrained"``: the original length of a wire is ℓ/(1 + ε).
-            ``"stretched"``: it is ℓ, as in the paper.
+        original_length: Original length of a wire of length ℓ and strain ε. ``"unstrained"``:
+            ℓ/(1 + ε); ``"stretched"``: ℓ, as in the paper.
 
     Attributes:
         held: Each distinct law of the position-controlled cables, with the indices of its cables.
         series: 1/k_series of all cables (C,) [m/N].
         rest: Tension (C,) [N] at which wire strain and spring elongation are zero.
         constant: EA (C,) [N] of position-controlled cables with a linear law; 0 for all others.
-        linear: Factor b (C,) [-] in EA (1 + ε) = EA + b F of these cables: 1 if l_0 is unstrained;
-            0 if it is stretched, and for all other cables.
+        linear: Factor b (C,) [-] in EA (1 + ε) = EA + b F of these cables: 1 if ``original_length``
+            is unstrained, 0 if it is stretched. It is 0 for all other cables.
         nonlinear: The entries of ``held`` whose law is not linear; their EA is computed at each
             tension.
         without_kernel: The laws of ``nonlinear`` that no compiled kernel can evaluate.
@@ -92,7 +92,7 @@ class CableLaws:
 
     @cached_property
     def wires(self) -> Wires:
-        """The laws of the cables in the form that kernels evaluate."""
+        """The laws of the cables as arrays, which compiled kernels evaluate."""
         count = len(self._cables)
         of_cable, ends = np.tile([0, -1, 0], (count, 1)), np.zeros((count, 6))
         edges, coefficients = [np.zeros((3, 0))], [np.zeros((0, 0))]
@@ -139,7 +139,7 @@ class CableLaws:
         return frozen(k)
 
     def _rigidity(self, tension: Array) -> Array:
-        """Compute EA (1 + ε) (C,) [N] at F (C,); for linear laws only its constant part, EA."""
+        """Compute EA (1 + ε) (C,) [N] at F (C,) [N]; for linear laws only its constant part, EA."""
         if not self.without_kernel:
             arguments: tuple[Any, ...] = (self.constant, *self.wires[2:], tension)
             rigidity = single_rigidity(*arguments)
@@ -220,7 +220,7 @@ class CableLaws:
     ) -> ElasticityRangeError:
         """Return a copy of a law's error that also names the cables whose tension caused it.
 
-        ``held`` selects the cables that have this law from all cables.
+        ``held`` are the indices, among all cables, of the cables to which the law was applied.
         """
         outside = np.arange(len(self._cables))[held][list(error.indices)].tolist()
         names = [self._cables[c].name for c in outside]
@@ -230,9 +230,9 @@ class CableLaws:
 def kinks(law: Elasticity) -> tuple[float, ...]:
     """Return the tensions [N], in ascending order, at which dEA/dF of a law jumps: its kinks.
 
-    They are the joins of the polynomials of a strand, and the end of a slack branch. At a kink,
-    ``rigidity_slope`` returns the slope below it. dEA/dF also jumps at the points of a tabulated
-    law, but these points are not returned.
+    They are the tensions where two polynomials of a strand's law meet, and the tension below which
+    a cable is slack. At a kink, ``rigidity_slope`` returns the slope below it. dEA/dF also jumps at
+    the points of a tabulated law, but these points are not returned.
     """
     if isinstance(law, SlackBelow):
         return law.rest, *kinks(law.law)
@@ -240,9 +240,9 @@ def kinks(law: Elasticity) -> tuple[float, ...]:
 
 
 def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | None:
-    """Return a law without its slack branch, and its pieces in the form that kernels evaluate.
+    """Return a law without its slack branch, its kind of pieces, and arrays of the pieces.
 
-    The pieces are a kind, POLYNOMIAL or CURVE, and two arrays, their edges and coefficients. Return
+    The kind is POLYNOMIAL or CURVE. The arrays are edges and coefficients, for the kernels. Return
     None if no kernel can evaluate the law, or if its polynomials are not positive on its domain.
     """
     inside = law.law if isinstance(law, SlackBelow) else law
@@ -254,13 +254,13 @@ def _pieces(law: Elasticity) -> tuple[Elasticity, int, tuple[Array, Array]] | No
 
 
 def _joined(tables: list[Array]) -> Array:
-    """Join tables of coefficients side by side, each padded by zeros to k·AT_ONCE rows."""
+    """Join tables of coefficients side by side; zeros fill each to a multiple of AT_ONCE rows."""
     rows = AT_ONCE * -(-max(map(len, tables)) // AT_ONCE)
     return np.hstack([np.pad(each, ((0, rows - len(each)), (0, 0))) for each in tables])
 
 
 def key(law: Elasticity) -> object:
-    """Return a hashable key of a law: the law, or its identity if a user's law is not hashable."""
+    """Return a hashable key of a law: the law, or its ``id`` if a user's law is not hashable."""
     try:
         hash(law)
     except TypeError:

@@ -215,8 +215,8 @@ class Manipulator(ArmFacts):
     def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
         """Compute only L(q) (C,) [m], lead included (Eq. 8); equal to ``at(q).cable_lengths``.
 
-        The lead is the straight cable between its actuator and the base disk. Arguments and errors
-        are those of :meth:`at`.
+        The lead is the straight cable between actuator and base disk. Arguments and errors are
+        those of :meth:`at`.
         """
         return frozen(self._pose(self._angles(q, check_limits))[2])
 
@@ -240,7 +240,10 @@ class Manipulator(ArmFacts):
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
     def _pose(self, q: Array) -> tuple[Array, ...]:
-        """Return what the kernel ``single_pose`` computes at checked joint angles q (nv,) [rad]."""
+        """Compute the fields of :class:`Posture` after ``q``, by the kernel ``single_pose``.
+
+        q (nv,) [rad] must be checked. Raises CableError if two neighbouring sites coincide.
+        """
         *pose, shortest = single_pose(self._model.arrays, q)
         if shortest < SHORTEST_SEGMENT:
             site = pose[-1]

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 class Posture(ReadOnlyState):
     """Kinematics, cable lengths and gravity of an arm at q; made by :meth:`Manipulator.at`.
 
-    All arrays are read-only and in base axes. Cable lengths include the lead (the straight cable
-    between its actuator and the base disk).
+    All arrays are read-only and in base axes. Cable lengths include the lead, the straight cable
+    between actuator and base disk.
 
     Attributes:
         arm: The arm.
@@ -65,14 +65,14 @@ class Posture(ReadOnlyState):
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
 
     def plot(self, tension: Tension | None = None, stiffness: Stiffness | None = None) -> Figure:
-        """Plot the arm in mm, with ``tension`` as colours and the tip compliance of ``stiffness``.
+        """Plot the arm in mm; ``tension`` colours its cables, ``stiffness`` adds tip compliance.
 
         Arguments and errors are those of :func:`cdsm.plots.plot_arm`.
         """
         return cdsm.plots.plot_arm(self, tension, stiffness)
 
     def to_dict(self) -> dict[str, object]:
-        """Return angles, tip, cable lengths and moment arms in SI for JSON, units in the keys."""
+        """Return angles, tip, cable lengths and moment arms for JSON; keys name the SI units."""
         lengths = dict(zip(self.arm.cables.names, self.cable_lengths, strict=True))
         numbers = {
             **self._coordinates,
@@ -89,7 +89,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def moment_arms(self) -> MomentArms:
-        """Moment arm of each cable about each joint, with names."""
+        """Moment arm of each cable about each joint, found by their names."""
         arm, values = self.arm, frozen(0.0 - self.length_jacobian)  # no zero is negative
         return MomentArms(
             values=values, cables=arm.cables.names, joints=arm.joint_names, slides=arm.slides
@@ -131,9 +131,9 @@ class Posture(ReadOnlyState):
         return tuple(lines)
 
     def _stick_figure(self, without: Collection[int]) -> tuple[list[Array], list[Array]]:
-        """Return :attr:`bones` and :attr:`brackets`, but not the lines of the links ``without``.
+        """Return :attr:`bones` and :attr:`brackets`, except those of the links in ``without``.
 
-        A link has the number of the joint that carries it, from 1; the base has 0.
+        A link is given by the number of the joint that carries it, from 1; 0 is the base.
         """
         rows = self.arm._model.routing.row.tolist()
         brackets = zip(rows, self.brackets, strict=True)
@@ -144,7 +144,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def _bones(self) -> tuple[tuple[Array, ...], ...]:
-        """Bones of the base and of each joint: lines (2, 3) [m] to the next joints or the tip."""
+        """Lines (2, 3) [m] from the base, and from each joint, to the next joints or the tip."""
         origin, parent = self._frames.origin, self.arm._model.tree.parent
         ends = [*zip(parent[1:], origin[1:], strict=True)]
         bones: list[list[Array]] = [[] for _ in origin]
@@ -171,7 +171,7 @@ class Posture(ReadOnlyState):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """A sentence if the arm passes through itself; else empty."""
+        """One text, which names overlapping links, if the arm passes through itself; else none."""
         pairs = [" and ".join(pair) for pair in self.self_contacts]
         if not pairs:
             return ()
@@ -179,7 +179,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def segments(self) -> Segments:
-        """Segments of the cables between their holes, and wrap angles, computed on first use."""
+        """Lengths of cable segments between holes, and wrap angles; computed on first use."""
         model = self.arm._model
         found = chain_kernels.single_chains(model.arrays[:6], model.chain_arrays, self.q)
         lengths, jacobian, wrap, gradient, *frames = found
@@ -199,8 +199,8 @@ class Posture(ReadOnlyState):
     def _joint_stiffness(self, tension: Array, cable_stiffness: Array, wrench: Array) -> Array:
         """Compute five matrices (5, nv, nv) [N m/rad]: active, passive and load term, P, and K_θ.
 
-        Each entry of P is the sum of the magnitudes of this entry in the four terms of K_θ.
-        ``tension`` (C,) [N], ``cable_stiffness`` (C,) [N/m] and ``wrench`` (6,) must be checked.
+        P is the entrywise sum of the magnitudes of the four terms of K_θ. ``tension`` (C,) [N],
+        ``cable_stiffness`` (C,) [N/m] and ``wrench`` (6,) must be checked.
         """
         model = self.arm._model
         terms = stiffness_kernels.single_stiffness(
@@ -254,7 +254,7 @@ class MomentArms(ReadOnlyState):
         return float(self.values[row, self.joints.index(one_of("joint", joint, self.joints))])
 
     def to_dict(self) -> dict[str, object]:
-        """Return the moment arms by cable and joint for JSON, with the units in the keys."""
+        """Return the moment arms by cable and joint for JSON; the keys name the SI units."""
         found: dict[str, object] = {}
         for name, chosen in (("moment_arm_m", ~self.slides), ("force_per_tension", self.slides)):
             columns = np.flatnonzero(chosen).tolist()
@@ -266,7 +266,10 @@ class MomentArms(ReadOnlyState):
         return found
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table in SI, a row for each cable; needs pandas (MissingExtra)."""
+        """Return a pandas table in SI: a row for each cable, a column for each joint.
+
+        Raises MissingExtra if pandas is not installed.
+        """
         units = np.where(self.slides, "-", "m").tolist()
         names = [f"{joint} [{unit}]" for joint, unit in zip(self.joints, units, strict=True)]
         return data_frame(dict(zip(names, self.values.T, strict=True)), "cable", self.cables)

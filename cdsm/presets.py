@@ -112,10 +112,10 @@ def experimental_prototype_geometry(
     lead: float = 0.3,
     friction: float = 0.0,
 ) -> Geometry:
-    """Build the geometry of Section V: three hinges of ±30°, twisted by 30°, each with two cables.
+    """Build the geometry of Section V: three hinges of ±30°, each with two antagonistic cables.
 
-    The paper gives the joints, their limits, the twist and the antagonistic pairs of cables. It
-    gives no dimensions: all are assumed.
+    Each hinge is turned about the arm's axis by 30° from the one before. The paper gives joints,
+    limits, this twist and the pairs of cables. It gives no dimensions: all are assumed.
 
     Args:
         link_length: Length of every link [m]; assumed.

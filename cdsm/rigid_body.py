@@ -31,7 +31,7 @@ class BodyState(NamedTuple):
 
 
 class Shapes(NamedTuple):
-    """Drawn shapes of a URDF in a viser server: a function that moves them, and their joints."""
+    """Shapes of a URDF that a viser server draws: a function that moves them, and their joints."""
 
     place: Callable[[Array], None]  # moves the shapes to joint angles (nv,) [rad]
     rows: frozenset[int]  # rows in Tree of the joints whose links have shapes
@@ -84,10 +84,10 @@ class RigidBody:
         return tuple(self._frames)
 
     def locate(self, link: str) -> tuple[int, Array, Array]:
-        """Return the row of a link's joint, and the link's frame in the frame of that joint.
+        """Return the row in :class:`Tree` of the joint that carries a link, and the link's frame.
 
-        The frame is a rotation (3, 3) and a translation (3,) [m]. Raises UnknownName if the arm has
-        no such link.
+        The frame is a rotation (3, 3) and a translation (3,) [m] in the frame of this joint. Raises
+        UnknownName if the arm has no such link.
         """
         frame = self._model.frames[self._frame(link)]
         return (
@@ -119,7 +119,7 @@ class RigidBody:
         return length
 
     def _local_twists(self) -> Array:
-        """Compute the unit twist of each joint in its own frame (nv, 6), linear part first."""
+        """Compute the unit twist of each joint in the joint's frame (nv, 6), linear part first."""
         model, data = self._model, self._data()
         pin.computeJointJacobians(model, data, pin.neutral(model))
         return np.array(
@@ -130,7 +130,7 @@ class RigidBody:
         )
 
     def masses(self) -> Masses:
-        """Build :class:`Masses`: masses of the links on the tree, gravity, position of the tip."""
+        """Return masses of the bodies that the joints carry, gravity, and the tip's frame."""
         model, tip = self._model, self._model.frames[self._tip]
         inertias = [model.inertias[i] for i in (0, *self._ids)]
         return Masses(
@@ -181,9 +181,10 @@ class RigidBody:
         return whole
 
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
-        """Draw the URDF's shapes below a node of a viser server; None if the URDF has no shapes.
+        """Draw the visual shapes of a URDF below a node of a viser server, and return them.
 
-        Raises UrdfError, and draws nothing, if a shape cannot be read.
+        Returns None if the URDF has no shapes. Raises UrdfError, and draws nothing, if a shape
+        cannot be read.
         """
         from pinocchio.visualize import ViserVisualizer
 
@@ -205,11 +206,11 @@ class RigidBody:
         return Shapes(lambda q: drawn.display(q[self._ours]), rows)
 
     def _path(self, joint: int) -> list[int]:
-        """Return the indices in Pinocchio of the joints from the base to ``joint``, it included."""
+        """Return Pinocchio's indices of the joints from the base to ``joint``, included."""
         return list(self._model.supports[joint])[1:]
 
     def _row(self, joint: int) -> int:
-        """Return the row in :class:`Tree` of a joint with an index of Pinocchio; 0 is the base."""
+        """Convert Pinocchio's index of a joint to its row in :class:`Tree`; the base is 0."""
         return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:
@@ -224,7 +225,7 @@ class RigidBody:
 
 
 def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:
-    """Check and return the wanted order of joints; InvalidInput unless it has each joint once."""
+    """Return ``wanted``, the order of joints; InvalidInput unless it has each of ``names`` once."""
     wanted = sequence_of("joint_names", wanted, str)
     if sorted(wanted) != sorted(names):
         missing = [name for name in names if name not in wanted]

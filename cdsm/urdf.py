@@ -2,8 +2,8 @@
 
 The links are ``base_link`` (empty, no inertia), ``base_disk``, ``cross{k}`` (universal joints
 only), ``link{k}`` and ``tool0``. ``base_disk`` is fixed to ``base_link``, and ``tool0`` is at the
-end of the last link. The joints are ``joint{k}_1`` and ``joint{k}_2``, or ``joint{k}`` for a hinge
-(Table I with T(R_0→R_g) of Eq. 2).
+end of the last link. The joints are ``joint{k}_1`` and ``joint{k}_2``, or ``joint{k}`` for a hinge.
+Universal joints follow Table I of the paper, transformed by T(R_0→R_g) of Eq. 2.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def to_urdf(geometry: Geometry) -> str:
 
 
 def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
-    """Return the indented URDF text of a robot, below a comment; ``parts`` are links and joints."""
+    """Return the indented URDF of a robot with a comment; ``parts``: links, joints, materials."""
     robot = E.robot(etree.Comment(comment), *parts, name=name)
     etree.indent(robot, space="  ")
     text: str = etree.tostring(robot, xml_declaration=True, encoding="UTF-8").decode() + "\n"
@@ -86,17 +86,17 @@ def urdf_text(name: str, parts: Iterable[etree._Element], comment: str) -> str:
 
 
 def joint(kind: str, name: str, parent: str, child: str, *parts: etree._Element) -> etree._Element:
-    """Build a joint of type ``kind`` between two links; ``parts``: its origin, axis and limit."""
+    """Build a joint element of type ``kind``; ``parts``: its origin, axis and limit elements."""
     return E.joint(E.parent(link=parent), E.child(link=child), *parts, name=name, type=kind)
 
 
 def origin(xyz: Iterable[float], rpy: str = "0.0 -0.0 0.0") -> etree._Element:
-    """Build the origin of a joint, body or shape: position [m]; roll, pitch, yaw [rad] as text."""
+    """Build an origin element: position (3,) [m]; roll, pitch and yaw [rad] as text."""
     return E.origin(xyz=tuple(map(float, xyz)), rpy=rpy)
 
 
 def inertial(mass: float, inertia: Array, *place: etree._Element) -> etree._Element:
-    """Build the inertial element: mass [kg], inertia (3, 3) [kg m²]; ``place`` is its origin."""
+    """Build an inertial element: mass [kg], inertia (3, 3) [kg m²]; ``place``: its origin."""
     moments = {
         f"i{'xyz'[i]}{'xyz'[j]}": float(inertia[i, j]) for i in range(3) for j in range(i, 3)
     }
@@ -104,10 +104,10 @@ def inertial(mass: float, inertia: Array, *place: etree._Element) -> etree._Elem
 
 
 def write_urdf(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
-    """Write the URDF of an arm, read it back with two parsers, and return its path.
+    """Write the URDF of an arm, check it with two parsers, and return its path.
 
-    Pinocchio and yourdfpy read a temporary file before it replaces ``path``. Their tip poses are
-    compared at the zero posture, at both limits and at random postures.
+    Pinocchio and yourdfpy read a temporary file before it replaces ``path``. They must agree on the
+    pose of the tip at the zero posture, at both limits and at random postures.
 
     Raises:
         InvalidInput: ``geometry`` is not a Geometry.
@@ -147,7 +147,7 @@ def _read_back(path: Path, length: float) -> None:
 
 
 def _link(geometry: Geometry, index: int, disks: tuple[Disk, ...]) -> etree._Element:
-    """Build body ``index`` of the arm with its disks: 0 is the base, k is link k."""
+    """Build the link element of the base (``index`` 0) or of link k (``index`` k) with disks."""
     radius = disks[0].hole_radius
     thickness = 0.2 * geometry.joints[max(index - 1, 0)].disk_offset
     length = geometry.links[index - 1].length if index else geometry.base_length
@@ -172,7 +172,7 @@ def _cross(name: str, radius: float) -> etree._Element:
 
 
 def _cylinder(material: str, x: float, radius: float, length: float) -> etree._Element:
-    """Build a drawn cylinder along x, centred at x [m]; ``material`` is the name of its colour."""
+    """Build the visual element of a cylinder along x with its centre at x [m]."""
     shape = E.geometry(E.cylinder(radius=radius, length=length))
     place = origin((x, 0.0, 0.0), f"-0.0 {math.pi / 2.0} 0.0")
     return E.visual(shape, place, E.material(name=material))
@@ -189,5 +189,5 @@ def _revolute(
 
 
 def _at(x: float) -> tuple[etree._Element, ...]:
-    """Return the origin at x on the link; empty for x = 0."""
+    """Return a tuple with the origin element of position (x, 0, 0) [m]; an empty one for x = 0."""
     return (origin((x, 0.0, 0.0)),) if x else ()

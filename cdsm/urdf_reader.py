@@ -67,7 +67,7 @@ _LOOSE = 1e-2
 
 
 def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> str:
-    """Read the text of a URDF from a path, or from the text itself, which begins with ``<``.
+    """Check a URDF and return its text. ``source`` is a path, or the text if it begins with ``<``.
 
     Arguments and errors are those of :meth:`cdsm.Manipulator.from_urdf`.
     """
@@ -111,9 +111,9 @@ def _faults(robot: etree._Element, check_inertia: bool) -> list[str]:
 
 
 def _check_elements(faults: list[str], where: str, element: etree._Element) -> None:
-    """Find elements that are repeated, misspelt or for xacro, in ``element`` and what it holds.
+    """Append faults of ``element`` and of the elements in it: repeated, misspelt or xacro elements.
 
-    Elements and attributes of other programs are no faults.
+    ``where`` names the place in the texts. Elements and attributes of other programs are no faults.
     """
     once = _ONCE.get(element.tag, ())
     known = (*once, *_OTHERS.get(element.tag, ()))
@@ -218,7 +218,7 @@ def _check_origin(faults: list[str], where: str, element: etree._Element) -> Non
 
 
 def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[float, ...] | None:
-    """Return the ``count`` numbers in ``text``; on failure append to ``faults`` and return None."""
+    """Return the ``count`` numbers in ``text``; else append a fault at ``where``, return None."""
     try:
         return numbers(where, text, count)
     except XmlFault as error:
@@ -227,7 +227,7 @@ def _read(faults: list[str], where: str, text: str | None, count: int) -> tuple[
 
 
 def _tree_faults(links: list[str], joints: list[etree._Element]) -> list[str]:
-    """Return the faults of the tree: unknown links, links with two parents, two roots, cycles."""
+    """Return the faults of the tree: unknown links, two parents or roots, cycles, long chains."""
     faults: list[str] = []
     known = set(links)
     parents: dict[str, tuple[str, str]] = {}

@@ -66,7 +66,7 @@ class _Urdf:
 
 @record
 class _Keys(CableKeys):
-    """Top-level keys of an ARM.toml. Fields of type Any are checked by their own readers."""
+    """Top-level keys of an ARM.toml. The functions that read fields of type Any check them."""
 
     gravity: Annotated[tuple[_G, _G, _G], Field(strict=False)] = GRAVITY
     original_length: OriginalLength = "unstrained"
@@ -126,7 +126,7 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
 
 
 def _tolerances(given: object) -> Tolerances:
-    """Build tolerances from the parsed table [tolerances]; raise GeometryError with every fault."""
+    """Build the tolerances of a parsed table [tolerances]; GeometryError lists every fault."""
     if not isinstance(given, dict):
         raise GeometryError([f"tolerances: is {given!r}; give a table [tolerances]"])
     try:
@@ -136,7 +136,11 @@ def _tolerances(given: object) -> Tolerances:
 
 
 def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
-    """Return the cables in [[cables]], or those of the geometry with settings in [cables.NAME]."""
+    """Read the cables of an arm from the value of the key ``cables``; GeometryError lists faults.
+
+    Tables ``[[cables]]`` describe all cables. Otherwise the cables are those of the geometry, and
+    each table ``[cables.NAME]`` has settings of one of them.
+    """
     if geometry is None or isinstance(cables, list):
         return read_routed(cables)
     tables = {} if cables is None else cables
@@ -195,7 +199,7 @@ def _geometry_lines(geometry: Geometry) -> list[str]:
 
 
 def _urdf_lines(parts: ArmParts) -> list[str]:
-    """Return the TOML lines of a table [urdf]; the URDF is a literal string if TOML allows it."""
+    """Return the TOML lines of the table [urdf], with the URDF unescaped ('''…''') if possible."""
     urdf, lines = parts.urdf, ["[urdf]", f"tip = {toml_value(parts.tip)}"]
     lines.append(f"joint_names = {toml_value(parts.joint_names)}")
     try:

@@ -118,7 +118,7 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
 
 
 def with_current_keys(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the data of a file with older keys replaced by the current ones."""
+    """Rename the keys ``elasticities`` and ``elasticity`` of older files to ``wires``, ``wire``."""
     if "elasticities" in data:
         data["wires"] = data.pop("elasticities")
     cables = data.get("cables")
@@ -133,7 +133,7 @@ _ANY = LinearElasticity(1.0)
 
 
 class Routed(NamedTuple):
-    """A cable in a file, whose wire is not read yet."""
+    """A cable as a file describes it: its sites are built, its wire is not read yet."""
 
     where: str  # key in the file, which errors name
     name: str
@@ -163,7 +163,7 @@ def read_routed(cables: object) -> list[Routed]:
 
 
 def _sites(entry: _Entry) -> tuple[Site, ...]:
-    """Build the sites of the cable ``entry``; all holes that give no friction have the cable's."""
+    """Build the sites of a cable. A hole without ``friction`` has the friction of the cable."""
     passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
     sites = []
     for i, site in enumerate(entry.sites):
@@ -176,10 +176,10 @@ def _sites(entry: _Entry) -> tuple[Site, ...]:
 def build_cables(
     routed: Iterable[Routed], settings: CableSettings, wires: Wires, path: str | os.PathLike[str]
 ) -> tuple[Cable, ...]:
-    """Build cables with ``wires``; ``settings`` apply to all cables without such a setting.
+    """Build cables with the laws of ``wires``.
 
-    Raises GeometryError, which lists every fault, or MissingWire if wires are missing and nothing
-    else is wrong.
+    ``settings`` has the values for all cables without a setting of their own. Raises GeometryError,
+    which lists every fault, or MissingWire if wires are missing and nothing else is wrong.
     """
     cables: list[Cable] = []
     faults: list[str] = []
@@ -208,7 +208,7 @@ def build_cables(
 
 
 def setting_lines(cable: Cable) -> list[str]:
-    """Return one TOML line for each setting of a cable that is not the default."""
+    """Return a TOML line for each of :data:`SETTINGS` in which a cable differs from the default."""
     defaults = {field.name: field.default for field in fields(Cable)}
     given = {key: getattr(cable, key) for key in SETTINGS if getattr(cable, key) != defaults[key]}
     return [f"{key} = {toml_value(value)}" for key, value in given.items()]
@@ -217,7 +217,11 @@ def setting_lines(cable: Cable) -> list[str]:
 def cable_lines(
     cables: Sequence[Cable], wires: Sequence[str], settings: Sequence[Sequence[str]]
 ) -> list[str]:
-    """Return the TOML of cables, with the wire of each (``""``: none) and lines of its settings."""
+    """Return the TOML lines of tables ``[[cables]]``, one table for each cable.
+
+    ``wires`` are values of the key ``wire`` (``""``: leave out the key), ``settings`` are lines of
+    :func:`setting_lines`, both for each cable.
+    """
     lines = []
     for cable, wire, given in zip(cables, wires, settings, strict=True):
         lines += ["[[cables]]", f"name = {toml_value(cable.name)}"]

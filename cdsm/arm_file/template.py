@@ -84,8 +84,9 @@ def template(
 ) -> str:
     """Return the text of an ARM.toml called ``name``.
 
-    ``wire`` is a name or EA [N], ``gravity`` is in base axes [m/s²]. Each of ``sections`` is the
-    name of a constructor of :class:`Geometry`, ``"universal"`` or ``"hinged"``, and its keywords.
+    ``wire`` is a name or EA [N], ``gravity`` is in base axes [m/s²]. Each of ``sections``, base to
+    tip, is a constructor of :class:`Geometry` by name (``"universal"``, ``"hinged"``) and its
+    keywords.
     """
     lines = [
         _HEAD.format(
@@ -111,7 +112,7 @@ def template(
 
 
 def _line(key: str, value: object, comment: str) -> str:
-    """Return a TOML line: a key with its value, and with unit and meaning as a comment."""
+    """Return the TOML line of a key with its value; unit and ``comment`` follow after #."""
     words = [f"[{_UNITS[key]}]"] if key in _UNITS else []
     if _UNITS.get(key) == "rad" and isinstance(value, float):
         words.append(f"{math.degrees(value):.4g} degrees;")

@@ -1,4 +1,4 @@
-"""Read and write wires in TOML: names, rigidities, tables of laws, settings that cables share."""
+"""Read and write wires of cables in TOML (by name, by EA, as tables) and settings of cables."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cdsm.wires.files import from_table, table_of
 
 @record
 class CableSettings:
-    """Settings in a file, of all cables or of one cable; a setting that is not given is None."""
+    """Settings that a file gives for one cable or for all cables; None if not given."""
 
     wire: Any = None
     series_stiffness: SpringStiffness | None = None
@@ -36,7 +36,7 @@ class CableSettings:
 
 @record
 class CableKeys(CableSettings):
-    """Top-level keys of a file with cables. Fields of type Any are checked by their own readers."""
+    """Top-level keys of a file of cables. The functions that read fields of type Any check them."""
 
     wires: Any = Field(default_factory=dict)
     cables: Any = None
@@ -47,20 +47,20 @@ SETTINGS = ("series_stiffness", "control", "minimum", "maximum")
 
 
 class Wires(NamedTuple):
-    """The laws of the wires in a file."""
+    """The laws EA(F) that a file gives for wires."""
 
     named: dict[str, Elasticity]  # of the tables [wires.NAME]
     usual: Elasticity | None  # of cables without a wire of their own
     forced: Elasticity | None  # replaces the laws of all cables
 
     def of(self, given: object) -> Elasticity | None:
-        """Return the law of a cable whose key ``wire`` is ``given``; None if it has no wire."""
+        """Return the law of a cable whose key ``wire`` has the value ``given``; None if missing."""
         own = None if given is None else read_wire(given, self.named)
         return self.forced or own or self.usual
 
 
 def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
-    """Read the wires of a file, or raise GeometryError; a law ``forced`` replaces all of them."""
+    """Read the wires of a file. The law ``forced`` replaces all. GeometryError lists the faults."""
     if not isinstance(keys.wires, dict):
         raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
     named, usual, faults = {}, None, []
@@ -81,7 +81,10 @@ def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
 
 
 def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire") -> Elasticity:
-    """Return the law that a name, EA [N] or a table gives; errors (GeometryError) name ``key``."""
+    """Return the law of the wire ``given``: a name, EA [N], or a parsed table.
+
+    ``named`` has the laws of the file's own wires by name. A GeometryError lists faults of ``key``.
+    """
     try:
         if isinstance(given, dict):
             return from_table(given)
@@ -101,7 +104,7 @@ def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire")
 
 
 def wire_entries(cables: Sequence[Cable]) -> tuple[list[str], list[str]]:
-    """Return the value of the key ``wire`` for each cable, and the lines of the wires' tables."""
+    """Return the TOML value of the key ``wire`` of each cable, and lines of tables [wires.NAME]."""
     values: dict[str, str] = {}
     lines: list[str] = []
     keys = []

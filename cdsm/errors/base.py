@@ -1,4 +1,4 @@
-"""Base classes of errors and warnings, and texts that list many faults."""
+"""Base classes of errors and warnings, and functions that list many faults in a message."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from collections.abc import Sequence
 
 
 def listed(faults: Sequence[str], most: int | None = None) -> str:
-    """Return one line for each of at most ``most`` faults, and the number of the others."""
+    """Return a text with a line for each of the first ``most`` faults and the number of others."""
     more = "" if most is None or len(faults) <= most else f"\n  and {len(faults) - most} more"
     return "".join(f"\n  - {fault}" for fault in faults[:most]) + more
 
 
 def counted(faults: Sequence[str], most: int | None = None) -> str:
-    """Return the number of faults, and below it one line for each of at most ``most`` faults."""
+    """Return a text with the number of faults, then the lines of :func:`listed`."""
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     return f"{count}:{listed(faults, most)}"
 
 
 def first_of(said: Sequence[str], most: int, what: str) -> str:
-    """Return the first ``most`` texts and the number of the others: ``…; and 3 joints more``.
+    """Join the first ``most`` texts, and add the number of the others: ``…; and 3 joints more``.
 
-    ``what`` is the noun, such as ``joints``.
+    ``what`` is the noun after this number, such as ``joints``.
     """
     more = len(said) - most
     return "; ".join(said[:most]) + (f"; and {more} {what} more" if more > 0 else "")
@@ -31,7 +31,7 @@ NAMED = 4
 
 
 def named(words: Sequence[str]) -> str:
-    """Return the first :data:`NAMED` words with commas, and ``…`` if there are more."""
+    """Join the first :data:`NAMED` words by commas; ``…`` at the end stands for the others."""
     return ", ".join(words[:NAMED]) + (", …" if len(words) > NAMED else "")
 
 

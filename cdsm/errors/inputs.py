@@ -57,10 +57,11 @@ class FileError(CdsmError, OSError):
 
 
 class StoreError(FileError):
-    """A sweep store that contains another sweep, or that another run is writing to.
+    """A store that contains another sweep or design search, or that another run is writing to.
 
     Attributes:
-        differences: Differences between the stored and the requested sweep, one text each.
+        differences: Differences between the stored and the requested sweep, one text each; may be
+            empty.
     """
 
     def __init__(self, path: object, problem: str, differences: Sequence[str] = ()) -> None:
@@ -86,7 +87,7 @@ class MissingExtra(CdsmError, ImportError):
 
 
 class ClusterError(CdsmError):
-    """A dask cluster that does not work."""
+    """A dask cluster that cannot compute, e.g. because its client is closed or a worker failed."""
 
 
 class MissingWire(CdsmError, LookupError):
@@ -113,7 +114,7 @@ class GeometryError(CdsmError, ValueError):
 
     Attributes:
         faults: All faults, one sentence each.
-        source: The file of the geometry, or None.
+        source: Path of the file with the geometry, or None.
     """
 
     def __init__(self, faults: Sequence[str], source: str | None = None) -> None:
@@ -128,7 +129,7 @@ class UrdfError(CdsmError, ValueError):
 
 
 class CableError(CdsmError, ValueError):
-    """A cable that cannot be routed as described.
+    """A cable with an invalid attribute, a name used twice, or sites where it cannot run.
 
     Attributes:
         cable: Name of the cable.

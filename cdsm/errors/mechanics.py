@@ -18,8 +18,9 @@ class ElasticityRangeError(CdsmError, ValueError):
 
     Attributes:
         problem: The fault, as text.
-        tension: The invalid tensions [N]; empty if a strain or an elongation has no tension.
-        indices: Indices of these tensions, or strains, in the input array.
+        tension: The invalid tensions [N]; empty if the error is about a strain or an elongation
+            that no tension gives.
+        indices: Indices of these tensions, strains or elongations in the input array.
         cables: Names of the cables with these tensions; empty if no cable is known.
     """
 
@@ -44,13 +45,12 @@ class InfeasibleTension(CdsmError):
     """No cable tension within the bounds balances the arm at this posture.
 
     Attributes:
-        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] for prismatic joints). It
-            belongs to those tensions within the bounds that minimise the sum of its magnitudes.
+        missing: Torque that the cables cannot balance, (nv,) [N m] ([N] for prismatic joints), at
+            the tensions within the bounds that minimise Σ|missing|.
         joint: Name of the joint with the largest missing torque.
         relaxation: Least amount by which the bounds of all cables without a fixed tension must be
             widened to make the problem feasible [N]; inf if this is not possible.
-        binding: Names of the cables without a fixed tension that are at a bound under the tensions
-            to which ``missing`` belongs.
+        binding: Names of the cables without a fixed tension that are at a bound at these tensions.
         fixed: Names of the cables with fixed tensions, if these make the problem infeasible; else
             empty.
     """
@@ -110,7 +110,8 @@ class SingularStiffness(CdsmError, ArithmeticError):
     """A stiffness or compliance matrix that does not exist at this posture.
 
     Attributes:
-        direction: The critical direction: joint space (nv,) or Cartesian (3,), unit length.
+        direction: Unit vector: the joint motion (nv,) with the least stiffness, or the direction
+            (3,) in base axes in which the tip cannot move.
     """
 
     def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:

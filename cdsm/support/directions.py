@@ -1,4 +1,4 @@
-"""Check directions in base axes, which are given as names of axes or as vectors."""
+"""Check directions in base axes, given as an axis such as ``"-y"`` or as a vector."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def axis_vector(name: str, axis: str) -> tuple[float, float, float]:
 
 
 def gravity_vector(name: str, value: Direction) -> Array:
-    """Return gravity (3,) [m/s²], read-only: a vector, or 9.81 m/s² along an axis."""
+    """Return gravity (3,) [m/s²], read-only, from a vector or an axis (9.81 m/s² along it)."""
     if isinstance(value, str):
         return frozen(9.81 * np.array(axis_vector(name, value)))
     return vector(name, value, 3, "gravity in base axes [m/s²]", "gravity")

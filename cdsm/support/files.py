@@ -66,10 +66,10 @@ def write_text(path: str | os.PathLike[str], text: str) -> Path:
 
 
 def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> Path:
-    """Call ``fill`` with a temporary file, then rename this file to the wanted path.
+    """Call ``fill`` with the path of a temporary file, then rename this file to ``path``.
 
-    A link is followed; an existing file keeps its mode. On failure the wanted path stays unchanged,
-    and a FileError says why.
+    If ``path`` is a link, its target is replaced. An existing file keeps its mode. On failure the
+    file at ``path`` stays unchanged, and a FileError says why.
     """
     path = as_path(path)
     aside: Path | None = None
@@ -93,9 +93,9 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
 
 
 def require_writable(path: Path) -> None:
-    """Raise a FileError if the folder of a file to write is missing.
+    """Raise a FileError if a file cannot be written at ``path``.
 
-    Also raise it if there is a folder or a device at the path itself.
+    The reason is that its folder is missing, or that ``path`` is a folder or a device.
     """
     if path.exists() and not path.is_file():
         raise FileError(path, "is not a regular file; give the path of a file.")
@@ -103,7 +103,7 @@ def require_writable(path: Path) -> None:
 
 
 def require_folder(path: Path) -> None:
-    """Raise a FileError if the folder of a path to write does not exist."""
+    """Raise a FileError if the parent folder of ``path`` does not exist."""
     if not path.resolve().parent.is_dir():
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
 

@@ -21,7 +21,7 @@ def coordinates(values: Iterable[float], form: str = ".4g") -> str:
 
 
 def rounded(value: float, *, up: bool) -> str:
-    """Return a bound as text with four digits, rounded ``up`` or down so that it stays valid."""
+    """Return a bound ≥ 0 as text with four digits, rounded up, or down if ``up`` is False."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3) if value > 0.0 else 1.0
     return f"{(math.ceil if up else math.floor)(value / step) * step:.4g}"
 
@@ -45,13 +45,13 @@ _ROUNDING = 1e-9  # a number of a table below this fraction of the largest is pr
 
 
 def without_rounding(values: Array) -> Array:
-    """Return the numbers of a table; those below the rounding error of the largest become 0."""
+    """Return ``values`` with all magnitudes below 1e-9 of the largest, mere rounding, set to 0."""
     size = abs(values)
     return np.where(size > _ROUNDING * size.max(initial=0.0), values, 0.0)
 
 
 def plain(numbers: Mapping[str, Any]) -> dict[str, object]:
-    """Turn arrays and tuples into lists, infinite numbers and NaN into None, as JSON needs them."""
+    """Prepare values for JSON: arrays and tuples become lists, infinite numbers and NaN None."""
     return {name: _plain(each) for name, each in numbers.items()}
 
 
@@ -76,7 +76,7 @@ def place(value: float, unit: str) -> str:
 
 
 def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
-    """Return a sentence that ``value`` of a joint [rad or m] is outside ``low`` to ``high``."""
+    """Return the text of an error: the ``value`` of a joint [rad or m] is not in [low, high]."""
     said = f"{joint} = {place(value, unit)} is outside {place(low, unit)} to {place(high, unit)}"
     return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
 
@@ -108,7 +108,7 @@ class JointUnits(NamedTuple):
 
     @property
     def shown(self) -> tuple[tuple[str, float], ...]:
-        """Return the printed unit of each joint coordinate, deg or mm, and its size in SI."""
+        """Return the printed unit of each joint, deg or mm, and its value in rad or m."""
         return tuple(("mm", 1e-3) if slides else ("deg", math.pi / 180.0) for slides in self.slides)
 
     def torque(self, joint: int | None = None) -> str:
@@ -120,7 +120,7 @@ class JointUnits(NamedTuple):
         return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
-        """Return a unit for each joint (nv,): 1 rad, or ``length`` [m] for a prismatic joint."""
+        """Return a scale of each joint coordinate (nv,): 1 rad, or ``length`` [m] if prismatic."""
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
@@ -135,7 +135,8 @@ class JointUnits(NamedTuple):
     def joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
         """Return the text for a joint: ``sliding`` if it is prismatic, else ``turning``.
 
-        If ``joint`` is None, the text is for all joints; "or" joins both texts if they differ.
+        If ``joint`` is None, the text is for all joints: both texts, joined by "or", if
+        the arm has both types.
         """
         slides = self.slides if joint is None else self.slides[joint : joint + 1]
         if slides.all():

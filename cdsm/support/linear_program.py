@@ -1,4 +1,4 @@
-"""Solve linear programs by HiGHS (Huangfu and Hall, Math. Prog. Comp. 10, 2018) of scipy."""
+"""Solve linear programs by scipy with HiGHS (Huangfu and Hall, Math. Prog. Comp. 10, 2018)."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ _TIGHT: Final = 1e-10
 
 
 def least(cost: Array, **constraints: Any) -> OptimizeResult:
-    """Minimise cost · x under the constraints of scipy's ``linprog``; return its result.
+    """Minimise cost · x by scipy's ``linprog``, and return its result.
 
-    If the simplex method ends undecided (as in scipy 1.14), the interior-point method follows.
+    ``constraints`` are keywords of ``linprog``. If the simplex method ends undecided (as in scipy
+    1.14), the interior-point method follows.
     """
     from scipy.optimize import linprog  # slow to import
 
@@ -40,8 +41,9 @@ def proved_largest(
     """Maximise cost · x with G x ≤ h, A x = b and low ≤ x ≤ high, and prove an upper bound.
 
     By weak duality the maximum is at most y·b + z·h + Σ max(r low, r high), r = cost − Aᵀ y − Gᵀ z,
-    for all y and all z ≥ 0. So the bound holds even if the solver's y and z are inexact. Entries of
-    r below ``rounding`` are taken as 0. The bound is NaN if the solver finds no optimum.
+    for all multipliers y of the equations and z ≥ 0 of the inequalities. So the bound holds even if
+    the solver's y and z are inexact. Magnitudes of r below ``rounding`` are taken as 0. Returns
+    scipy's result and the bound, which is NaN if the solver finds no optimum.
     """
     from scipy.optimize import linprog  # slow to import
 

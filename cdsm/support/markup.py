@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 
 class Markup(str):
-    """HTML text made by :func:`element`; it is not escaped again."""
+    """HTML made by :func:`element`, which does not escape it again inside another element."""
 
     __slots__ = ()
 

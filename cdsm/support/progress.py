@@ -27,7 +27,7 @@ _outermost: ContextVar[bool] = ContextVar("_outermost", default=True)
 
 
 class _Items(Sized, Iterable[_Item], Protocol[_Item]):
-    """Items of :func:`track`: an iterable with a length."""
+    """Type of the items of :func:`track`: an iterable with a length."""
 
 
 def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:
@@ -126,7 +126,7 @@ class _Bar:
 
 
 def _rate() -> ProgressColumn:
-    """Return a column with the work per second over the last half minute."""
+    """Return a column of a bar with the items per second in the last half minute."""
     from rich.progress import ProgressColumn
     from rich.text import Text
 

@@ -1,4 +1,4 @@
-"""Strict frozen records that report all faults of a description at once, and their TOML form."""
+"""Frozen records of strictly checked fields, one error for all faults, and TOML of records."""
 
 from __future__ import annotations
 
@@ -112,7 +112,10 @@ class CrossFaults(ValueError):
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def record(cls: type[_Record]) -> type[_Record]:
-    """Build a frozen, strict pydantic dataclass; all faults raise one :class:`GeometryError`."""
+    """Decorate a class as a frozen, strict pydantic dataclass.
+
+    One :class:`GeometryError` lists all faults of the values of its fields.
+    """
     made: Any = dataclass(frozen=True, kw_only=True, config=_STRICT)(cls)
     made.__init__ = _reporting(made.__init__, made)
     return made  # type: ignore[no-any-return]
@@ -127,7 +130,7 @@ def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
     """Wrap ``validated`` so that all faults that pydantic finds raise one GeometryError.
 
     pydantic checks the values given to ``validated`` before it builds a record or runs a function.
-    ``kind`` is this record or function; messages use the names of its keywords.
+    ``kind`` is this record or function; messages name its keywords.
     """
 
     @wraps(validated)
@@ -166,14 +169,14 @@ def parse(kind: type[_Record], data: object) -> _Record:
 
 
 def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
-    """Return one TOML line for each field of a record, or of ``keys``, whose value is not None."""
+    """Return a TOML line for each field of a record, or each of ``keys``, that is not None."""
     names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
     values = ((name, getattr(record, name)) for name in names)
     return [f"{name} = {toml_value(value)}" for name, value in values if value is not None]
 
 
 def toml_value(value: object) -> str:
-    """Return a text, a number, or a tuple or array of these, as a TOML value."""
+    """Write a text, a number, or a tuple or array of these as a TOML value."""
     value = _plain(value)
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(toml_value, value))}]"
@@ -200,18 +203,19 @@ def _keys(kind: Callable[..., Any]) -> list[str]:
 
 
 def did_you_mean(key: str, known: Iterable[str], least: float = 0.6) -> str:
-    """Return ``; did you mean …?`` with the known key most like this one, or an empty text.
+    """Return ``; did you mean …?`` with the known key that is most similar to ``key``.
 
-    ``least`` is the least similarity, from 0 to 1.
+    The text is empty if no similarity, from 0 to 1, reaches ``least``.
     """
     near = difflib.get_close_matches(key[:100], list(known), n=1, cutoff=least)
     return f"; did you mean {near[0]}?" if near and near[0] != key else ""
 
 
 def misspelt(name: str, known: Iterable[str], least: float = 0.6) -> str:
-    """Return :func:`did_you_mean` of a name that is not known; known ones are as long, but for one.
+    """Return :func:`did_you_mean` for an unknown name; an empty text for a known one.
 
-    Unlike keys of cdsm's own files, longer or shorter names may be those of other programs.
+    Only known names whose length differs by at most one letter are suggested: a name of another
+    length may belong to another program that uses the file.
     """
     known = tuple(known)
     as_long = [each for each in known if abs(len(each) - len(name)) < 2]

@@ -1,4 +1,4 @@
-"""Status of each posture of a batch; a single posture would raise an error."""
+"""Status of each posture of a batch, instead of the error that a single posture raises."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Status(IntEnum):
 
     @classmethod
     def of(cls, error: CdsmError) -> Status | None:
-        """Return the status that stands for an error; None if there is none."""
+        """Return the status that stands for ``error``; None if no status does."""
         return next((status for kind, status in _ERRORS.items() if isinstance(error, kind)), None)
 
 
@@ -67,7 +67,7 @@ _ERRORS: dict[type[CdsmError], Status] = {
 
 
 def summary(status: NDArray[np.uint8]) -> str:
-    """Return a text that counts the postures with each status."""
+    """Count the postures with each status in a text: ``9 postures: 8 OK, 1 SINGULAR``."""
     counts = np.bincount(status, minlength=len(Status))
     listed = [f"{counts[each]} {each.name}" for each in Status if counts[each] or each == Status.OK]
     return f"{plural(len(status), 'posture')}: {', '.join(listed)}"

@@ -1,4 +1,4 @@
-"""Read and write tables of numbers in text: comment lines that begin with #, a header, rows."""
+"""Read and write text files of numbers: comment lines that begin with #, a header, rows."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _TRIED = 500  # lines that tell the delimiter; titles are fewer
 
 
 def _numbers(decimal: str, thousands: str) -> tuple[re.Pattern[str], re.Pattern[str]]:
-    """Return the patterns of numbers without and with separators of thousands."""
+    """Return two patterns of numbers with the mark ``decimal``: without and with ``thousands``."""
     whole = rf"(?:0|[1-9]\d{{0,2}}(?:{re.escape(thousands)}\d{{3}})*)"
     point, power = re.escape(decimal), r"(?:[eE][-+]?\d+)?"
     plain = rf"[-+]?(?:\d+(?:{point}\d*)?|{point}\d+){power}"
@@ -48,7 +48,7 @@ def csv_text(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
 
 
 class Table(NamedTuple):
-    """Cells of a table, without white space around them."""
+    """A table that was read from a text file. Its cells have no white space around them."""
 
     rows: list[tuple[int, list[str]]]  # line number and cells; the first row is the header
     comments: list[str]  # lines that begin with #
@@ -61,7 +61,7 @@ class Table(NamedTuple):
         return self.rows[0][1]
 
     def column(self, at: int, refuse: Callable[[str], NoReturn], first: int = 1) -> Array:
-        """Return the numbers of column ``at`` from row ``first`` on.
+        """Return the numbers of the column with index ``at``, from the row ``first`` on.
 
         If a cell is not a finite number, ``refuse`` is called, which raises an error.
         """
@@ -84,11 +84,12 @@ class Table(NamedTuple):
             return math.nan
 
     def with_decimal_mark(self, refuse: Callable[[str], NoReturn], first: int = 1) -> Table:
-        """Return this table with the decimal mark of its numbers from row ``first`` on.
+        """Find the decimal mark, comma or point, and return this table with it.
 
-        All columns of numbers decide. Where both marks occur, one must separate thousands. A mark
-        that occurs alone marks decimals, but for columns such as 998, 1.004. If the marks remain
-        unclear, ``refuse`` is called.
+        The mark must fit all columns of numbers from row ``first`` on. If both marks occur, the
+        other one separates thousands. If only one occurs, it marks decimals. ``refuse`` is called,
+        which raises an error, if no mark fits, or if both fit and it is unclear which one is meant,
+        e.g. in a column of 998 and 1.004.
         """
         if self.delimiter == ",":
             return self._replace(marks=".")
@@ -119,7 +120,7 @@ class Table(NamedTuple):
 
 
 def readings(cell: str, marks: str) -> list[float]:
-    """Return the numbers that a cell may be if one of ``marks`` marks decimals."""
+    """Return the value of a cell for each decimal mark of ``marks`` with which it is a number."""
     return [
         float(cell.replace(thousands, "").replace(mark, "."))
         for mark, thousands in (",.", ".,")
@@ -128,7 +129,10 @@ def readings(cell: str, marks: str) -> list[float]:
 
 
 def _is_read(cells: list[str], mark: str) -> bool:
-    """Return whether all cells are numbers, and either all or none separate their thousands."""
+    """Return whether all cells are numbers with the decimal mark ``mark``.
+
+    Either all must have separators of thousands, or none; 998 counts as both.
+    """
     return any(all(map(pattern.fullmatch, cells)) for pattern in _NUMBERS[mark])
 
 
@@ -139,11 +143,11 @@ def read_table(
     skip: int = 0,
     any_encoding: bool = False,
 ) -> Table:
-    """Read a table. Its delimiter is the one with which most lines have two or more numbers.
+    """Read a table from a text file; the first ``skip`` lines are left out.
 
-    If several ``delimiters`` give equally many such lines, the first of them that occurs in the
-    header is taken. The first ``skip`` lines are not read. ``any_encoding`` is an argument of
-    :func:`read_text`. Raises FileError, which names the line that cannot be split into cells.
+    The delimiter of the cells is the one of ``delimiters`` that splits most lines into two or more
+    numbers. Of several equal ones, the first that occurs in the header is taken. ``any_encoding``
+    is an argument of :func:`read_text`. FileError names a line that cannot be split into cells.
     """
     text = read_text(path, any_encoding=any_encoding)
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and k > skip]
@@ -173,12 +177,12 @@ def name_and_unit(cell: str) -> tuple[str, str]:
 def named_columns(
     table: Table, known: Sequence[str], refuse: Callable[[str], NoReturn]
 ) -> dict[str, tuple[int, str]]:
-    """Return index and unit of each column of a table, by name.
+    """Return index and unit of each column of a table, by the name of the column.
 
-    A table may have other columns than the ``known`` ones. ``refuse`` raises an error if a name is
-    given twice, looks like a misspelt known name or begins like one up to its number (a joint that
-    the arm does not have), if semicolons separate the columns, or if a row has more cells than the
-    header.
+    Columns with other names than the ``known`` ones are allowed. ``refuse`` is called, which raises
+    an error, if a name is given twice, looks like a misspelt known name, or has the letters of a
+    known name before its number (a joint that the arm does not have). It is also called if
+    semicolons separate the columns, or a row has more cells than the header.
     """
     if len(table.header) == 1 and ";" in table.header[0]:
         refuse("has its columns separated by semicolons; separate them by commas")
@@ -210,10 +214,10 @@ def column_in(
     found: dict[str, tuple[int, str]],
     refuse: Callable[[str], NoReturn],
 ) -> tuple[int, float]:
-    """Return the index of the column ``name`` of ``found``, and the factor to SI of its unit.
+    """Return the index of the column ``name``, and the factor that converts its unit to SI.
 
-    ``known`` has the factor of each allowed unit. If the column is missing or has another unit,
-    ``refuse`` is called, which raises an error.
+    ``known`` has this factor for each allowed unit. ``found`` is a result of :func:`named_columns`.
+    If the column is missing or has another unit, ``refuse`` is called, which raises an error.
     """
     at, unit = found.get(name, (-1, ""))
     if unit not in known:

@@ -26,7 +26,7 @@ def data_frame(
     index: str,
     labels: NDArray[Any] | Sequence[object],
 ) -> pandas.DataFrame:
-    """Build a pandas table from columns by name; ``index`` is the name of the row ``labels``."""
+    """Build a pandas table from columns by name; ``labels`` are its index, called ``index``."""
     need("sweep", "pandas")
     import pandas
 
@@ -38,7 +38,10 @@ def dataset(
     labels: Mapping[str, Sequence[object] | NDArray[Any]],
     **attributes: str,
 ) -> xarray.Dataset:
-    """Build a Dataset; a variable has dimensions, values, SI unit, a dimension has ``labels``."""
+    """Build a Dataset from variables, given as (dimensions, values, SI unit) by name.
+
+    ``labels`` are the coordinates of the dimensions; those that no variable has are left out.
+    """
     need("sweep", "xarray")
     import xarray
 
@@ -58,7 +61,7 @@ def write_labelled(
     table: Callable[[], pandas.DataFrame],
     labelled: Callable[[], xarray.Dataset],
 ) -> Path:
-    """Write ``table()`` to a ``.csv``, or ``labelled()`` to a ``.nc``; only this one is built."""
+    """Write ``table()`` to a ``.csv`` or ``labelled()`` to a ``.nc``; only this one is called."""
     suffix = checked_suffix(path)
     if suffix == ".csv":
         return write_file(path, table().to_csv)
@@ -67,7 +70,7 @@ def write_labelled(
 
 
 def write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
-    """Write a Dataset to a NetCDF file; OSError says how much room is left."""
+    """Write a Dataset to a NetCDF file; on failure, OSError also gives the free disk space."""
     try:
         dataset.to_netcdf(path, engine="netcdf4")
     except (RuntimeError, PermissionError) as error:  # HDF5 does not report a full disk
@@ -76,7 +79,7 @@ def write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
 
 
 def checked_suffix(path: str | os.PathLike[str]) -> str:
-    """Return ``.csv`` or ``.nc``, in lower case; raise InvalidInput for other paths."""
+    """Return the suffix of a path, ``.csv`` or ``.nc``; raise InvalidInput for any other."""
     suffix = as_path(path).suffix.lower()
     if suffix not in (".nc", ".csv"):
         raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
@@ -97,7 +100,10 @@ def check_sweep(dataset: object) -> None:
 
 
 def status_names(dataset: xarray.Dataset) -> dict[int, str]:
-    """Return the word of each value of a sweep's ``status``; InvalidInput if they do not fit."""
+    """Return the name of each status of a sweep by its number, read from the attributes.
+
+    Raises InvalidInput if names or numbers are missing.
+    """
     flags = dataset["status"].attrs
     try:
         values = np.atleast_1d(flags["flag_values"]).tolist()
@@ -109,7 +115,10 @@ def status_names(dataset: xarray.Dataset) -> dict[int, str]:
 
 
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
-    """Build a table of a sweep: a row for each entry, a column with unit for each component."""
+    """Turn the Dataset of a sweep into a pandas table with a row for each entry of ``status``.
+
+    The columns are the components of all variables; their names contain the unit.
+    """
     import pandas
 
     if not dataset["status"].ndim:
@@ -138,9 +147,9 @@ def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
 def _components(
     variable: xarray.DataArray, status: xarray.DataArray
 ) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the columns of a variable, one for each component, with the suffix of its name.
+    """Yield each component of a variable: the suffix of its name, such as ``_x``, and its values.
 
-    A column has an entry for each entry of ``status``.
+    There is a value for each entry of ``status``.
     """
     inner = [dim for dim in variable.dims if dim not in status.dims]
     names = [map(str, variable[dim].values.tolist()) for dim in inner]

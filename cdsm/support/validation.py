@@ -1,7 +1,7 @@
 """Check all inputs: native float64, right shape, finite, of a plausible size.
 
-A quantity outside its range in :data:`RANGES` raises a named error here, so other code need not
-guard against overflow or denormal numbers.
+A quantity outside its range in :data:`RANGES` raises an error here, so other code need not guard
+against overflow or denormal numbers.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ _ZERO: Final = frozen(np.zeros(6))
 
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
-    """Return why ``value`` is outside ``RANGES[quantity]``, in words; empty if it is inside.
+    """Return a message if ``value`` is outside ``RANGES[quantity]``, else an empty text.
 
     ``zero`` and ``infinite`` also allow 0 and inf.
     """
@@ -116,7 +116,7 @@ def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
 
 
 def _first_of(array: Array, chosen: NDArray[np.bool_]) -> str:
-    """Return a text about the first entry where ``chosen`` is True: ``entry [0, 2] is 5``."""
+    """Return index and value of the first entry where ``chosen`` is True: ``entry [0, 2] is 5``."""
     at = np.argwhere(chosen)[0]
     where = f"entry [{', '.join(map(str, at))}] is " if array.ndim else ""
     return f"{where}{array[tuple(at)]:g}"
@@ -141,9 +141,10 @@ def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_
 
 
 def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | None = None) -> Array:
-    """Return a new, read-only, finite vector (size,), or raise InvalidInput with its ``meaning``.
+    """Return a new, read-only, finite vector (size,), or raise :class:`InvalidInput`.
 
-    ``kind`` is the key of :data:`RANGES` that gives the range of the entries.
+    ``meaning`` says in the message what the vector is. ``kind`` is the key of :data:`RANGES` that
+    gives the range of the entries.
     """
     array = number_array(name, value, kind)
     if array.shape != (size,):
@@ -178,7 +179,7 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
 
 
 def wrench_vector(name: str, value: ArrayLike) -> Array:
-    """Check a wrench, force [N] and moment [N m]; return it as a read-only vector (6,)."""
+    """Check a wrench: force [N], then moment [N m]. Return it as a read-only vector (6,)."""
     return _ZERO if value is NO_WRENCH else vector(name, value, 6, WRENCH, "wrench")
 
 
@@ -215,7 +216,7 @@ _NO_LETTER = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\ufff
 
 
 def text(name: str, value: object) -> str:
-    """Return a text that files can hold and people can read, or raise :class:`InvalidInput`."""
+    """Return ``value`` if it is a printable, not blank text; else raise :class:`InvalidInput`."""
     if not isinstance(value, str) or not value.strip():
         raise InvalidInput(name, f"{value!r} given; a name is needed, a text that is not blank.")
     wrong = _NO_LETTER.search(value)
@@ -226,7 +227,7 @@ def text(name: str, value: object) -> str:
 
 
 def one_of(kind: str, name: object, known: Iterable[str], remedy: str = "") -> str:
-    """Return ``name`` if it is among ``known``, the names of a ``kind``; else raise UnknownName."""
+    """Return ``name`` if it is a known name of a ``kind``, e.g. a link; else raise UnknownName."""
     known = tuple(known)
     if not isinstance(name, str) or name not in known:
         raise UnknownName(kind, name, known, remedy)
@@ -234,7 +235,7 @@ def one_of(kind: str, name: object, known: Iterable[str], remedy: str = "") -> s
 
 
 def _native(name: str, value: ArrayLike) -> Array:
-    """Return a copy as native float64; the caller may change the original array later."""
+    """Copy ``value`` to a new array of native float64, or raise :class:`InvalidInput`."""
     if type(value) is np.ndarray and value.dtype == np.float64:  # usual case, must be fast
         copy: Array = value.copy()
         return copy

@@ -11,7 +11,7 @@ _OURS = {"cdsm", "pydantic", "dataclasses", "contextlib"}
 
 
 def warn(message: str) -> None:
-    """Issue a :class:`CdsmWarning` with ``message``, at the first caller outside cdsm."""
+    """Issue a :class:`CdsmWarning` that names the line of the first caller outside cdsm."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None:
         if str(frame.f_globals.get("__name__")).partition(".")[0] not in _OURS:

@@ -25,14 +25,14 @@ _SHOWN = 160  # maximum number of characters of a text that a fault shows
 
 
 class XmlFault(ValueError):
-    """Fault of an XML document; the caller turns it into an error of its file format."""
+    """Fault of an XML document; callers raise the error of their file format instead."""
 
 
 def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Element:
     """Parse an XML text and return its root element, which must have the name ``root``.
 
-    A DOCTYPE is allowed only if it does nothing but name a DTD that matches the pattern
-    ``doctype``; the DTD is not read. Other DOCTYPEs could define entities or name files to read.
+    A DOCTYPE is allowed only if it just names a DTD that matches the pattern ``doctype``; the DTD
+    is not read. Other DOCTYPEs could define entities or name files to read.
     Raises XmlFault if the text is not well-formed, too large or too deep, or has another root.
     """
     if len(text) > MAXIMUM_BYTES:
@@ -79,7 +79,7 @@ def parse_xml(text: str, root: str, doctype: str | None = None) -> etree._Elemen
 
 
 def _names_dtd(text: str, system: str) -> bool:
-    """Return whether the text has one DOCTYPE that only names a DTD matching ``system``."""
+    """Return whether the only DOCTYPE of a text just names a DTD of the pattern ``system``."""
     literal = rf"""(?:"{system}"|'{system}')"""
     alone = rf"""<!DOCTYPE\s+[^\s"'<>\[]+\s+(?:SYSTEM|PUBLIC\s+(?:""|''))\s+{literal}\s*>"""
     return text.count("<!DOCTYPE") == 1 and re.search(alone, text) is not None
