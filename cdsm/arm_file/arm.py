@@ -11,7 +11,7 @@ from typing import Annotated, Any, Self, TypeVar
 from pydantic import Field, model_validator
 
 from cdsm.arm_file.cables import (
-    Routed,
+    UnwiredCable,
     build_cables,
     cable_lines,
     read_routed,
@@ -135,7 +135,7 @@ def _tolerances(given: object) -> Tolerances:
         raise GeometryError([f"tolerances.{fault}" for fault in error.faults]) from None
 
 
-def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
+def _routed(cables: object, geometry: Geometry | None) -> list[UnwiredCable]:
     """Read the cables of an arm from the value of the key ``cables``; GeometryError lists faults.
 
     Tables ``[[cables]]`` describe all cables. Otherwise the cables are those of the geometry, and
@@ -159,7 +159,7 @@ def _routed(cables: object, geometry: Geometry | None) -> list[Routed]:
     if faults:
         raise GeometryError(faults)
     return [
-        Routed(f"cables.{c.name}", c.name, c.sites, c.lead, own.get(c.name, CableSettings()))
+        UnwiredCable(f"cables.{c.name}", c.name, c.sites, c.lead, own.get(c.name, CableSettings()))
         for c in routed
     ]
 

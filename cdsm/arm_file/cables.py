@@ -10,7 +10,14 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from cdsm.arm_file.wires import SETTINGS, CableKeys, CableSettings, Wires, read_wires, wire_entries
+from cdsm.arm_file.wires import (
+    SETTINGS,
+    CableKeys,
+    CableSettings,
+    FileWires,
+    read_wires,
+    wire_entries,
+)
 from cdsm.cable import Cable, Site
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, MissingWire, counted
@@ -132,7 +139,7 @@ _ANY = LinearElasticity(1.0)
 """Placeholder for a missing wire, so that all other faults of the file are found first."""
 
 
-class Routed(NamedTuple):
+class UnwiredCable(NamedTuple):
     """A cable as a file describes it: its sites are built, its wire is not read yet."""
 
     where: str  # key in the file, which errors name
@@ -142,7 +149,7 @@ class Routed(NamedTuple):
     own: CableSettings  # settings of this cable alone
 
 
-def read_routed(cables: object) -> list[Routed]:
+def read_routed(cables: object) -> list[UnwiredCable]:
     """Read the cables of the parsed tables ``[[cables]]``; GeometryError lists every fault."""
     entries = parse(_Entries, {"cables": cables} if cables is not None else {}).cables
     names = [entry.name for entry in entries]
@@ -154,7 +161,9 @@ def read_routed(cables: object) -> list[Routed]:
     routed = []
     for i, entry in enumerate(entries, start=1):
         try:
-            routed.append(Routed(f"cables[{i}]", entry.name, _sites(entry), entry.lead, entry))
+            routed.append(
+                UnwiredCable(f"cables[{i}]", entry.name, _sites(entry), entry.lead, entry)
+            )
         except InvalidInput as error:
             faults.append(f"cables[{i}]: {error}")
     if faults:
@@ -174,7 +183,10 @@ def _sites(entry: _Entry) -> tuple[Site, ...]:
 
 
 def build_cables(
-    routed: Iterable[Routed], settings: CableSettings, wires: Wires, path: str | os.PathLike[str]
+    routed: Iterable[UnwiredCable],
+    settings: CableSettings,
+    wires: FileWires,
+    path: str | os.PathLike[str],
 ) -> tuple[Cable, ...]:
     """Build cables with the laws of ``wires``.
 

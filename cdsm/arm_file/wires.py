@@ -46,7 +46,7 @@ SETTINGS = ("series_stiffness", "control", "minimum", "maximum")
 """Settings that are attributes of a :class:`Cable` with the same name."""
 
 
-class Wires(NamedTuple):
+class FileWires(NamedTuple):
     """The laws EA(F) that a file gives for wires."""
 
     named: dict[str, Elasticity]  # of the tables [wires.NAME]
@@ -59,7 +59,7 @@ class Wires(NamedTuple):
         return self.forced or own or self.usual
 
 
-def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
+def read_wires(keys: CableKeys, forced: Elasticity | None) -> FileWires:
     """Read the wires of a file. The law ``forced`` replaces all. GeometryError lists the faults."""
     if not isinstance(keys.wires, dict):
         raise GeometryError([f"wires: is {keys.wires!r}; give tables [wires.NAME]"])
@@ -77,7 +77,7 @@ def read_wires(keys: CableKeys, forced: Elasticity | None) -> Wires:
         faults += error.faults
     if faults:
         raise GeometryError(faults)
-    return Wires(named, usual, forced)
+    return FileWires(named, usual, forced)
 
 
 def read_wire(given: object, named: Mapping[str, Elasticity], key: str = "wire") -> Elasticity:

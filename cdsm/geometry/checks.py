@@ -10,7 +10,7 @@ from cdsm.errors import first_of
 from cdsm.geometry.holes import sharing
 
 if TYPE_CHECKING:
-    from cdsm.geometry.description import Description
+    from cdsm.geometry.description import GeometryFields
 
 LONGEST = 30.0
 """If an arm is longer than this [m], its lengths are probably in millimetres."""
@@ -24,7 +24,7 @@ _WIDEST_ANGLE = 8.0 * math.pi
 _SHORTEST = 1e-3  # an arm shorter than this [m] was probably given in metres where mm are taken
 
 
-def farthest_holes(geometry: Description) -> list[float]:
+def farthest_holes(geometry: GeometryFields) -> list[float]:
     """Return, for each disk, the distance [m] of its farthest hole from the arm's axis."""
     farthest = [R for R in geometry.hole_radii for _ in range(2)]
     for cable in geometry.cables:
@@ -34,7 +34,7 @@ def farthest_holes(geometry: Description) -> list[float]:
     return farthest
 
 
-def faults_of(geometry: Description) -> list[str]:
+def faults_of(geometry: GeometryFields) -> list[str]:
     """Return the faults that concern several parts, such as too short links, one text each."""
     count = len(geometry.joints)
     faults = []
@@ -65,7 +65,7 @@ def faults_of(geometry: Description) -> list[str]:
     return faults
 
 
-def _short_links(geometry: Description) -> list[str]:
+def _short_links(geometry: GeometryFields) -> list[str]:
     """Return one fault for all links that are too short for their disks."""
     offsets = [joint.disk_offset for joint in geometry.joints]
     short = [
@@ -111,7 +111,7 @@ def doubts_about_angle(what: str, angle: float, most: float) -> list[str]:
     return [f"{what} {angle:g} rad: it looks as if it is in degrees; give rad."]
 
 
-def doubts_about(geometry: Description) -> list[str]:
+def doubts_about(geometry: GeometryFields) -> list[str]:
     """Return warning texts, e.g. if lengths look like millimetres, or if cables share holes."""
     sizes = [
         ("hole_radius", max(geometry.hole_radii), WIDEST),

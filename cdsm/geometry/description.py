@@ -16,7 +16,7 @@ from cdsm.support.warning import warn
 
 
 @record
-class Description(Printed):
+class GeometryFields(Printed):
     """Base class of :class:`~cdsm.Geometry`, whose docstring explains the fields."""
 
     joints: Annotated[

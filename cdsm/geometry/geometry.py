@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from cdsm.errors import GeometryError
 from cdsm.geometry import tables
-from cdsm.geometry.description import Description
+from cdsm.geometry.description import GeometryFields
 from cdsm.geometry.holes import evenly_spaced, hinge_hole_angles, spread_out
 from cdsm.geometry.parts import UNIVERSAL_AXES, CableRoute, Joint, Limit, Link, Turn
 from cdsm.geometry.uniform import CablesPerJoint, HoleAngles, JointCount, uniform
@@ -32,7 +32,7 @@ from cdsm.support.validation import instance, scalar, sequence_of
 
 
 @record
-class Geometry(Description):
+class Geometry(GeometryFields):
     """A serpentine arm, joint by joint; frozen, checked, all in SI units.
 
     This general constructor allows different joints, links and cables. :meth:`universal` and

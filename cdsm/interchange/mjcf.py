@@ -194,7 +194,7 @@ def mujoco_model(
         if tensions:
             frame.set("ctrl", row(tensions))
 
-    loaded = K if K is None or actuators != "tension" else _without_motors(K)
+    loaded = K if K is None or actuators != "tension" else _as_force_controlled(K)
     unstable = None if loaded is None or loaded.is_stable else verdict(loaded)
     remarks = (
         *motion.said,
@@ -229,7 +229,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
         yield f"balance    {left:.4g} N m are missing, most at {joint}: the arm leaves the posture"
 
 
-def _without_motors(K: Stiffness) -> Stiffness:
+def _as_force_controlled(K: Stiffness) -> Stiffness:
     """Return K with the passive part removed, as if all motors controlled force."""
     arm = K.posture.arm
     free = arm.with_cables([replace(cable, control="force") for cable in arm.cables])

@@ -47,7 +47,7 @@ _SUM = 16.0 * float(np.finfo(np.float64).eps)
 """Rounding error of a sum, relative to the sum of the magnitudes of its terms."""
 
 
-class _Recomputed(NamedTuple):
+class _SecondValue(NamedTuple):
     """Second value of a term, mostly by finite differences, with its error bound.
 
     If the value is None, ``reason`` says why.
@@ -58,7 +58,7 @@ class _Recomputed(NamedTuple):
     error: float = 0.0
 
 
-_NONE = _Recomputed(None)
+_NONE = _SecondValue(None)
 
 
 @final
@@ -155,7 +155,7 @@ def self_check(K: Stiffness) -> SelfCheck:
     near = Neighbourhood(K)
     energies, torques = _recomputed_terms(near)
     if K.wrench[3:].any():
-        energies[3] = _Recomputed(None, "a moment has no potential")
+        energies[3] = _SecondValue(None, "a moment has no potential")
 
     scaled = near.unit[:, None] * near.unit
     given = np.array([getattr(K, name) for name in _TERMS]) * scaled
@@ -175,13 +175,13 @@ def self_check(K: Stiffness) -> SelfCheck:
     statics = _compare("torque", K.residual * near.unit, torque_size(K), _summed(work))
 
     # two programs compute places along the links, so the results differ by some more rounding
-    measured = _Recomputed(near.measured_lengths(), error=16.0 * float(near.length_noise.max()))
+    measured = _SecondValue(near.measured_lengths(), error=16.0 * float(near.length_noise.max()))
     lengths = K.posture.cable_lengths
     same = _compare("lengths", lengths, float(lengths.max()), measured)
     return SelfCheck(terms=tuple(terms), statics=statics, lengths=same)
 
 
-def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Recomputed]]:
+def _recomputed_terms(near: Neighbourhood) -> tuple[list[_SecondValue], list[_SecondValue]]:
     """Compute the terms as second differences of the potential and as first ones of the torque.
 
     Both lists have the order active, passive, gravity, load.
@@ -193,7 +193,7 @@ def _recomputed_terms(near: Neighbourhood) -> tuple[list[_Recomputed], list[_Rec
     )
     if one_sided := [reason for cable in near.locked for reason in cable.one_sided()]:
         named = first_of(one_sided, _NAMED, "cables")
-        stored = stretched = [_Recomputed(None, f"K_θ has another value on either side: {named}.")]
+        stored = stretched = [_SecondValue(None, f"K_θ has another value on either side: {named}.")]
     else:
         step = near.first_elastic_step
         stored = _differentiated(hessians, near, near.elastic, near.elastic_noise, step)
@@ -209,7 +209,7 @@ def _differentiated(
     f: Sampled,
     noise: Noise,
     step: float,
-) -> list[_Recomputed]:
+) -> list[_SecondValue]:
     """Differentiate each part of the potential, or of the torque, by ``derive``.
 
     ``f``, a method of ``near``, computes the parts, ``noise`` their rounding errors; ``step`` is
@@ -218,29 +218,29 @@ def _differentiated(
     try:
         values, errors = derive(f, near.unit.size, step, noise)
     except CdsmError as error:
-        return [_Recomputed(None, str(error))] * 3
+        return [_SecondValue(None, str(error))] * 3
     return [
-        _Recomputed(value, error=float(error))
+        _SecondValue(value, error=float(error))
         if np.isfinite(error)
-        else _Recomputed(None, _UNSETTLED)
+        else _SecondValue(None, _UNSETTLED)
         for value, error in zip(values, errors, strict=True)
     ]
 
 
-def _summed(parts: list[_Recomputed]) -> _Recomputed:
+def _summed(parts: list[_SecondValue]) -> _SecondValue:
     """Add values and error bounds of ``parts``; if a value is missing, return the reason."""
     values = [each.value for each in parts if each.value is not None]
     if len(values) < len(parts):
-        return _Recomputed(None, next(each.reason for each in parts if each.value is None))
-    return _Recomputed(np.sum(values, axis=0), error=sum(each.error for each in parts))
+        return _SecondValue(None, next(each.reason for each in parts if each.value is None))
+    return _SecondValue(np.sum(values, axis=0), error=sum(each.error for each in parts))
 
 
 def _compare(
     name: str,
     given: Array,
     largest: float,
-    potential: _Recomputed,
-    torque: _Recomputed = _NONE,
+    potential: _SecondValue,
+    torque: _SecondValue = _NONE,
     whole: float = 0.0,
 ) -> Agreement:
     """Compare the term ``given`` with its second values, from the potential and from the torque.
