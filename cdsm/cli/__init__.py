@@ -1,6 +1,6 @@
 """Command line of cdsm. Options take mm, degrees and N/mm.
 
-Each command imports its modules when it runs, so that help pages appear at once.
+A command imports slow modules only when it runs, so that help pages appear at once.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def stiffness(
     tolerances: _Given = None,
     as_json: AsJson = False,
 ) -> None:
-    """Distribute the tensions at a posture, and print them and the stiffness.
+    """Compute the least tensions that balance the arm at a posture, and the stiffness under them.
 
     Exit code 0; 3 if the arm is unstable.
     """
@@ -95,11 +95,11 @@ def stiffness(
 
 
 def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[str, cdsm.Breakaway]:
-    """Compute the breakaway load in each direction of ``along``, by name of the direction.
+    """Compute the load in each direction of ``along`` at which a cable begins to slide in a hole.
 
-    A direction has no entry if the arm buckles, or a tension leaves the domain of its law, before a
-    cable slides; nor if a cable slides without a load, or none slides at any load. The result is
-    empty if the arm has no friction.
+    The result is by name of the direction, and empty if the arm has no friction. A direction has
+    no entry in these cases: a cable slides already without a load; none slides at any load; the arm
+    buckles before; or a tension leaves the domain of its law before.
     """
     found = {}
     if tension.posture.arm.has_friction:
@@ -114,9 +114,10 @@ def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[s
 def _sticking(
     breakaways: dict[str, cdsm.Breakaway], along: Mapping[str, Direction]
 ) -> tuple[list[str], Json]:
-    """Return stuck stiffness and breakaway load in each direction, as lines of text and for JSON.
+    """Return the stiffness under small loads, while all cables stick, and the breakaway loads.
 
-    ``breakaways`` is the result of :func:`_breakaways`. If it is empty, so are text and JSON.
+    The result is a text, in a list, and the JSON, with both numbers for each direction.
+    ``breakaways`` is the result of :func:`_breakaways`; if it is empty, so are text and JSON.
     """
     from cdsm.stiffness_matrix.prints import model_of
 
@@ -139,10 +140,11 @@ def _sticking(
 def _uncertainty(
     tension: cdsm.Tension, tolerances: Path | None, along: Mapping[str, Direction] = _ALONG
 ) -> tuple[list[str], Json]:
-    """Compute the uncertainty budget in each direction of ``along``, as a table and for JSON.
+    """Compute the uncertainty of the stiffness in each direction of ``along``.
 
-    Both are empty if neither a file of ``tolerances`` is given nor the arm has tolerances. A
-    direction in which the tip cannot move has no budget.
+    Return a table, as a list of one text, and the JSON. The tolerances are those in the file
+    ``tolerances``, or else those of the arm; without any, table and JSON are empty. A direction in
+    which the tip cannot move is left out.
     """
     pose, found = tension.posture, {}
     given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
@@ -155,7 +157,10 @@ def _uncertainty(
 
 
 def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
-    """Write a table of ``budgets``, a column per axis: stiffness ± uncertainty, and sources [%]."""
+    """Format budgets as a table with a column for each direction.
+
+    The rows are the stiffness ± its uncertainty, then the share of each source in it [%].
+    """
     from cdsm.support.format import aligned
 
     def percent(source: str) -> list[float]:

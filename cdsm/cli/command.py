@@ -17,7 +17,10 @@ from cdsm.cli.words import newer
 
 
 class Command(typer.core.TyperCommand):
-    """Command of typer that accepts older option names; with --json, errors of usage are JSON."""
+    """A typer command that also accepts older names of options.
+
+    With --json, it prints errors of usage as JSON.
+    """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Replace older names of options in ``args``, then parse and check them."""
@@ -28,7 +31,10 @@ class Command(typer.core.TyperCommand):
             return rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help page of ``ctx``: join lines of a paragraph; take no unit for markup."""
+        """Write the help page: join the lines of a paragraph, and print units such as [mm].
+
+        Without this, typer would take a unit in brackets for markup and leave it out.
+        """
         self.help = re.sub(r"(?<!\n)\n(?!\n)", " ", self.help or "")
         for option in self.params:
             text = getattr(option, "help", None)
@@ -38,10 +44,11 @@ class Command(typer.core.TyperCommand):
 
 
 def as_command(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a function as typer needs it: one parameter per option, and errors as messages.
+    """Wrap a function for typer: one parameter per option, and errors printed as messages.
 
-    typer reads options only from the signature. A parameter whose type is a dataclass holds options
-    that several commands share. In the signature, the fields of the dataclass replace it.
+    typer reads the options from the signature of a function. In ours, a dataclass such as
+    :class:`~cdsm.cli.options.ArmOptions` stands for options that several commands share; the
+    wrapper has a parameter for each of its fields instead.
     """
     groups: dict[str, Any] = {}
     options: list[inspect.Parameter] = []

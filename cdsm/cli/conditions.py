@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conditions:
-    """First lines of an answer: the assumptions of its results, the arm, the posture if given."""
+    """First lines of a printed answer: the assumptions, the arm, and the posture if given."""
 
     of: cdsm.Manipulator | cdsm.Posture  # the arm, or the only posture of the results
     minimum: tuple[float, ...] = ()  # given lower bounds of all tensions [N], one per case
@@ -22,7 +22,7 @@ class Conditions:
 
     @property
     def arm(self) -> cdsm.Manipulator:
-        """The arm."""
+        """The arm of the results."""
         return self.of.arm if isinstance(self.of, cdsm.Posture) else self.of
 
     def __str__(self) -> str:

@@ -55,8 +55,8 @@ def design(
 ) -> None:
     """Find the best designs of an arm; write the Pareto front, figures and the chosen arm.
 
-    The deflection is what the load adds after the motors are locked, to first order: with the
-    stiffness of the least tensions without the load.
+    The deflection is how far the load moves the tip when the motors are locked before it acts. It
+    is computed to first order, with the stiffness under the least tensions without the load.
     A stopped search resumes from the files in --out.
     """
     from cdsm.batch.inputs import checked_threads
@@ -108,7 +108,10 @@ def design(
 
 
 def _tell(first: cdsm.Objective, step: cdsm.DesignProgress) -> None:
-    """Print the state of a search on a terminal; ``first`` is its first objective."""
+    """Print a line about a generation of the search, if standard error is a terminal.
+
+    ``first`` is the first objective; the line has its best value so far.
+    """
     if not console().is_terminal:
         return
     best = (

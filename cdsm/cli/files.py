@@ -1,4 +1,4 @@
-"""Declare files to write, which are checked before a command computes."""
+"""Declare options for files to write; their paths are checked before a command computes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def file_option(
 ) -> Any:
     """Declare an option for a file to write; its path is checked before the command computes.
 
-    The path must end in one of ``endings``. ``shown`` are help and metavar.
+    The path must end in one of ``endings``. ``declare`` is typer's Option or Argument. ``shown``
+    are its keywords, such as help and metavar.
     """
 
     def checked(
@@ -53,7 +54,7 @@ def file_option(
 
 
 def require_apart(context: typer.Context) -> None:
-    """Refuse a file to write that the command also reads, or also writes by another option."""
+    """Raise BadParameter if the path of a file to write is also given for another option."""
     names = {
         each.name: each.opts[0] if each.opts[0].startswith("-") else str(each.metavar)
         for each in context.command.params

@@ -62,8 +62,9 @@ def identify(
 ) -> None:
     """Find friction, rigidity, springs and dimensions from loops of weight tests.
 
-    A force is applied and removed along a direction, motors locked; friction widens the loop. Each
-    parameter has its 95 % interval; warnings say what the tests do not determine.
+    A test applies a force along a direction and removes it, with locked motors. Friction widens the
+    loop of force and displacement. The answer gives each parameter with a 95 % interval, and warns
+    of parameters that the tests do not determine.
     """
     from cdsm.identification.arm_parameters import ArmParameters
     from cdsm.identification.experiment import plan_tests
@@ -95,7 +96,10 @@ def identify(
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:
-    """Return the bounds of each parameter in ``--free``, in its unit there; None if not given."""
+    """Return the bounds of each parameter in ``--free``, by name, in the units of the option.
+
+    A parameter without bounds has None.
+    """
     ranges: dict[str, Range | None] = {}
     for each in free:
         name, _, given = each.partition("=")
@@ -114,7 +118,7 @@ def _ranges(free: list[str]) -> dict[str, Range | None]:
 
 
 class _Shown:
-    """Parameters of an arm in units of the command line, by labels such as ``lead [mm]``."""
+    """Parameters of an arm in printed units (mm, N/mm, g), by labels such as ``lead [mm]``."""
 
     def __init__(self, parameters: ArmParameters) -> None:
         self._parameters = parameters
@@ -140,7 +144,10 @@ class _Shown:
         }
 
     def bounds(self, name: str, given: Range | None) -> Range:
-        """Return ``given``; if None, 0 to 1 for friction, else half to twice the arm's value."""
+        """Return the bounds ``given``, or defaults if they are None.
+
+        Defaults are 0 to 1 for friction, else half to twice the value of the arm.
+        """
         if given is not None:
             return given
         if name.partition("@")[0] == "friction":

@@ -36,9 +36,9 @@ def weigh(
 ) -> None:
     """Hang a weight at the tip with the motors locked; print the displacement (Eq. 20).
 
-    --force or --mass is the weight; --wrench is a load before it. Exit code 0; 3 if the arm does
-    not stay at its posture without the weight, or buckles under it. With --friction, it also says
-    which weights measure which stiffness.
+    --force or --mass is the weight; --wrench is a load that the arm carries already. With friction
+    in the holes, the answer also says which stiffness small and large weights measure. Exit code 0;
+    3 if the arm does not stay at its posture without the weight, or buckles under it.
     """
     if not weight.given:
         raise misuse("--force", "give it or --mass: the weight.")
@@ -130,7 +130,7 @@ def cycle(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Load the tip slowly up and down, and print the hysteresis due to friction in the holes.
+    """Load and unload the tip slowly, and print the hysteresis due to friction in the holes.
 
     --force plus the weight of --mass is the largest load; --wrench is a constant load in addition.
     Exit code 0; 3 if the arm snaps through.

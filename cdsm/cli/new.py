@@ -139,7 +139,7 @@ def new(
 
 
 def _in_options(error: cdsm.GeometryError) -> str:
-    """Return the faults of a geometry, with options in place of its keys."""
+    """Return the faults of a geometry as a text, with options such as --link-length for keys."""
     return "; ".join(
         re.sub(_KEY, lambda key: f"--{key[0].replace('_', '-')}", fault) for fault in error.faults
     )

@@ -126,7 +126,7 @@ class ArmOptions:
     ] = None
 
     def read(self) -> cdsm.Manipulator:
-        """Build the arm from its files and options."""
+        """Build the arm from its files and all other options that describe it."""
         from cdsm.support.validation import quantity
 
         try:
@@ -145,7 +145,7 @@ class ArmOptions:
         return arm
 
     def _arm(self) -> cdsm.Manipulator:
-        """Read the arm, its wire included, from its files."""
+        """Read the arm from its files, with the wire of the options if one is given."""
         if self.arm.suffix.lower() in (".nc", ".csv", ".zarr"):
             raise misuse(
                 "ARM", f"{self.arm} is no arm; cdsm map reads sweeps, cdsm fit tensile tests."
@@ -187,7 +187,7 @@ class ArmOptions:
                 raise misuse(f"--{field.name}", f"{why}; leave it out.")
 
     def _wire(self) -> cdsm.Elasticity | None:
-        """Return the wire of --wire, or of --rigidity, if one is given."""
+        """Return the law that --wire or --rigidity gives; None if neither is given."""
         from cdsm.support.validation import quantity
         from cdsm.wires.catalogue import as_wire
 
@@ -247,7 +247,7 @@ class WeightOptions:
 
     @property
     def option(self) -> str:
-        """Name of the option to which a message about the load belongs."""
+        """The option that a message about the load names: --mass if given, else --force."""
         return "--force" if self.mass is None else "--mass"
 
     def vector(self, arm: cdsm.Manipulator) -> Array:

@@ -58,7 +58,8 @@ def answer(
 ) -> None:
     """Print an answer, its warnings first: ``parts`` as text, or ``as_dict()`` as strict JSON.
 
-    If there are warnings, the command ends here with exit code 3, so write its files before.
+    If there are warnings, the command ends here with exit code 3. So a command must write its files
+    before it calls this function.
     """
     if as_json:
         numbers: Json = {"warnings": warnings}
@@ -103,7 +104,7 @@ def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
 def _show(
     usual: Callable[..., None], message: Warning, category: type[Warning], *where: Any
 ) -> None:
-    """Print a warning of cdsm in one line; show others by ``usual``, as Python does."""
+    """Print a warning of cdsm in one line, and other warnings by ``usual``, Python's function."""
     if not issubclass(category, cdsm.CdsmWarning):
         return usual(message, category, *where)
     text = f"warning: {message}"

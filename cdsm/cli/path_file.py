@@ -45,8 +45,8 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
     def columns(wanted: dict[str, dict[str, float]], *, some: bool = False) -> Array | None:
         """Return the n columns that ``wanted`` names, (S, n) in SI; None if all are missing.
 
-        For each column, ``wanted`` has its allowed units with their sizes in SI. If only some
-        columns are missing, they are zero if ``some`` is True, otherwise FileError is raised.
+        ``wanted`` has the allowed units of each column, with the SI value of each unit. If some of
+        the columns are missing, they are zero where ``some`` is True; else FileError is raised.
         """
         if not wanted.keys() & found.keys():
             return None
@@ -72,9 +72,9 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
 
 
 def one_target(given: float | None, of_file: Array | None, option: str) -> float | Array:
-    """Return the target [N/m], ``given`` or ``of_file``.
+    """Return the wanted stiffness [N/m]: ``given`` by an option, or ``of_file`` (S,) of the path.
 
-    Raises BadParameter, which names ``option``, unless exactly one of them is not None.
+    Raises BadParameter, which names ``option``, if both or neither are given.
     """
     if given is not None and of_file is None:
         return given

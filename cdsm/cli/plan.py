@@ -68,8 +68,8 @@ def plan(
 ) -> None:
     """Find the least tensions with a wanted stiffness, at a posture or along a path.
 
-    Exit code 0; 3 if no tensions reach the target, at a posture or at some samples of the path. The
-    other samples are written all the same.
+    Exit code 0; 3 if no tensions reach the target at the posture, or at some samples of the path.
+    The plan of the other samples is still written.
     """
     u = direction_of(direction)
     if path is not None and angles is not None:

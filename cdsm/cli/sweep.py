@@ -38,7 +38,7 @@ def _quantities() -> list[str]:
 
 @dataclass(frozen=True)
 class PoseOptions:
-    """Options that describe the postures of a sweep."""
+    """Options for the postures of a sweep: a grid, a path or random postures."""
 
     grid: Annotated[
         str | None,
@@ -65,7 +65,7 @@ class PoseOptions:
     seed: Annotated[int | None, typer.Option(help="Seed of --random; default 0.")] = None
 
     def read(self, arm: cdsm.Manipulator) -> cdsm.PoseSet:
-        """Build the set of postures from its options."""
+        """Build the set of postures; BadParameter unless one of the three kinds is given."""
         if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
             raise misuse(_POSES, "give one of --grid, --path and --random.")
         for option, value, needed, of in (
@@ -138,9 +138,10 @@ def sweep(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compute the stiffness over a grid, a path or random postures, under one or more bounds.
+    """Compute the stiffness over a grid, a path or random postures.
 
-    Exit code 0; 3 if no entry is ok: each posture, under each bound, has a status in the file.
+    The file has an entry with a status for each posture and each lower bound of the tensions. Exit
+    code 0; 3 if no entry has the status ok.
     """
     robot = arm.read()
     wanted = poses.read(robot)
@@ -193,7 +194,8 @@ def map_sweep(
 ) -> None:
     """Plot the reachable workspace, coloured by a quantity of a sweep.
 
-    Exit code 0; 3 if the quantity exists at no entry. The map marks the statuses of the others.
+    The map marks the postures at which the quantity does not exist, by status. Exit code 0; 3 if it
+    exists at no posture.
     """
     dataset = cdsm.read_sweep(sweep)
     slab = None
@@ -207,7 +209,7 @@ def map_sweep(
 
 
 def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
-    """Read a grid such as ``joint1=-20:20:9,joint2=5``, in degrees (prismatic joints: mm)."""
+    """Read --grid, such as ``joint1=-20:20:9,joint2=5``, in degrees (prismatic joints: mm)."""
     import numpy as np
 
     units = dict(zip(arm.joint_names, joint_scales(arm), strict=True))
@@ -238,10 +240,11 @@ def _answer(
     conditions: Conditions | None = None,
     mapped: str | None = None,
 ) -> None:
-    """Print which file was written, and warn if the quantity ``mapped`` exists at no entry.
+    """Print which file was written, with warnings about the sweep ``dataset``.
 
-    For a new sweep, ``conditions`` are given. They and the number of entries with each status are
-    then printed too, and a warning if no entry is ok.
+    ``conditions`` are given for a new sweep: they are printed, with the number of entries of each
+    status, and a warning if none is ok. ``mapped`` is given for a map: the quantity, with a warning
+    if it exists at no entry.
     """
     from cdsm.support.tidy import status_names
 

@@ -50,7 +50,7 @@ class TrueArmOptions:
     ] = None
 
     def check(self) -> None:
-        """Raise an error if an option is out of range."""
+        """Raise InvalidInput or BadParameter if an option is out of range."""
         from cdsm.support.validation import quantity
 
         quantity("--true-friction", self.true_friction or 0.0, "friction", zero=True)
@@ -60,7 +60,10 @@ class TrueArmOptions:
             )
 
     def made(self, model: cdsm.Manipulator, period: float) -> cdsm.SlowPlant | cdsm.MuJoCoPlant:
-        """Build the plant; ``model`` is the controller's arm, ``period`` the time of a step [s]."""
+        """Build the plant, which simulates the true arm.
+
+        ``model`` is the arm that the controller knows, ``period`` the time of a control step [s].
+        """
         from cdsm.control import with_rigidity
 
         arm = with_rigidity(model, self.true_rigidity) if self.true_rigidity != 1.0 else model
@@ -150,7 +153,7 @@ def track(
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate a closed loop along a path at a wanted stiffness, with model errors.
+    """Simulate an arm that follows a path in closed loop at a wanted stiffness.
 
     The arm of the file is the controller's model; --true-rigidity, --true-friction and --payload
     say how the true arm differs. Exit code 0; 3 if the loop is unstable, the arm buckles,

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 def misuse(option: str, problem: str) -> typer.BadParameter:
-    """Return the error of a wrong value of ``option``."""
+    """Return the error to raise for a wrong value of ``option``."""
     return typer.BadParameter(problem, param_hint=option)
 
 
 def joint_scales(arm: cdsm.Manipulator) -> Array:
-    """Return the size in SI (nv,) of each joint's unit on the command line, 1° or 1 mm."""
+    """Return the SI value (nv,) of the unit of each joint on the command line: 1° or 1 mm."""
     import numpy as np
 
     from cdsm.support.format import JointUnits
@@ -50,11 +50,11 @@ def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
 
 
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:
-    """Return the text after each ``JOINT=`` in an option, by joint.
+    """Split the text of an option into entries ``JOINT=VALUE``; return the values by joint.
 
-    Commas or spaces separate the entries, but joint names may contain them and ``=``. Raises
-    BadParameter, which says that ``form`` is needed, if the text does not begin with a joint or
-    names one twice; UnknownName if the arm has no such joint.
+    Commas or spaces separate the entries, but joint names may also contain commas, spaces and
+    ``=``. Raises BadParameter if the text does not begin with a joint (the message then shows
+    ``form``) or names a joint twice; UnknownName if the arm has no such joint.
     """
     from cdsm.support.validation import one_of
 
@@ -96,9 +96,9 @@ def gravity_of(text: str) -> list[float] | str:
 
 
 def numbers(option: str, text: str, count: int | None = None, form: str = "N,N,...") -> list[float]:
-    """Return the ``count`` numbers in the text of an option; None: any count.
+    """Return the numbers in the text of an option: ``count`` of them, or any number if None.
 
-    Raises BadParameter for another text or count; its message has ``form``, such as ``FX,FY,FZ``.
+    Raises BadParameter for another text or count; the message shows ``form``: ``FX,FY,FZ``.
     """
     from cdsm.support.format import plural
 

@@ -61,8 +61,8 @@ def fit(
 ) -> None:
     """Fit the rigidity of a wire to its tensile test; print a report, write its law and a figure.
 
-    It reads the text files of testing machines: titles before the header, other languages, decimal
-    commas, units in a line of their own.
+    TEST.csv may be the text file of a testing machine: with lines of titles, names of columns in
+    other languages, decimal commas, or a line of units.
     """
     from cdsm.support.progress import progress_bar
 
@@ -86,7 +86,10 @@ def fit(
 
 
 def _pair(option: str, text: str | None) -> list[str] | None:
-    """Return the two entries of an option's text; an entry with a comma needs quotes."""
+    """Split the text of an option at its comma into two entries; an entry with a comma has quotes.
+
+    Return None if ``text`` is None.
+    """
     if text is None:
         return None
     entries = [entry.strip() for entry in next(csv.reader([text], skipinitialspace=True), [])]

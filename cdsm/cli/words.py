@@ -1,4 +1,4 @@
-"""Put names of options into messages of the library; replace older names of options."""
+"""Replace names: arguments in messages of the library by options, older options by newer ones."""
 
 from __future__ import annotations
 
@@ -60,6 +60,6 @@ def in_options(message: str) -> str:
 
 
 def newer(command: str, word: str) -> str:
-    """Return ``word``, typed after a command; an older name of an option is replaced in it."""
+    """Return a word typed after ``command``; replace an older option name by the current one."""
     name, equals, value = word.partition("=")
     return OLDER.get(command, {}).get(name, name) + equals + value

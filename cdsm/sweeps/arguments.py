@@ -1,4 +1,4 @@
-"""Check the arguments of a sweep: each is one value, several values, or several by name."""
+"""Check the arguments of a sweep that may be one value, several values, or several by name."""
 
 from __future__ import annotations
 
@@ -24,14 +24,17 @@ Label = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 def label(dims: tuple[str, ...], values: object, long_name: str, units: str = "") -> Label:
-    """Build a coordinate along ``dims``, with units in UDUNITS notation."""
+    """Build a coordinate of a Dataset along ``dims``, with units in UDUNITS notation."""
     return dims, values, {"long_name": long_name} | ({"units": units} if units else {})
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Choice(ReadOnlyState, Generic[_Values]):
-    """One value of an argument, or several, which become a dimension with the argument's name."""
+    """Checked values of an argument of a sweep.
+
+    If several values are given, the Dataset has a dimension with the name of the argument.
+    """
 
     name: str  # of the argument
     values: _Values  # all values in order, also if there is only one
@@ -39,17 +42,17 @@ class Choice(ReadOnlyState, Generic[_Values]):
 
     @property
     def labels(self) -> dict[str, Label]:
-        """Return the coordinate of the argument's dimension, by name; empty if it has one value."""
+        """Return the coordinate of the dimension, by its name; empty if one value is given."""
         if self.names is None:
             return {}
         kind, units = ("name", "") if self.names.dtype.kind == "U" else ("number", "1")
         return {self.name: label((self.name,), self.names, f"{kind} of the {self.name}", units)}
 
     def label(self, values: Array, dims: tuple[str, ...], long_name: str, units: str) -> Label:
-        """Build a coordinate along the argument's dimension and then ``dims``.
+        """Build a further coordinate: along the dimension of the argument, then along ``dims``.
 
-        ``values`` has a row for each value of the argument. For a single value, the coordinate has
-        the dimensions ``dims`` alone.
+        ``values`` has a row for each value of the argument. If the argument has only one value, the
+        coordinate has only the dimensions ``dims``.
         """
         if self.names is None:
             return label(dims, values[0], long_name, units)
@@ -59,7 +62,7 @@ class Choice(ReadOnlyState, Generic[_Values]):
 def laws_of(
     elasticity: Elasticity | Mapping[str, Elasticity] | None,
 ) -> Choice[tuple[Elasticity | None, ...]]:
-    """Check one law for all cables, or several laws by name; None keeps the laws of the arm."""
+    """Check laws of a sweep: one for all cables, or several by name; None: those of the arm."""
     if elasticity is None or isinstance(elasticity, Elasticity):
         return Choice("elasticity", (elasticity,), None)
     if not isinstance(elasticity, Mapping) or not all(
@@ -75,7 +78,10 @@ def laws_of(
 
 
 def bounds_of(minimum: ArrayLike, maximum: float) -> tuple[Choice[Array], float]:
-    """Check and return the lower bounds (M,) [N] of all tensions, and their upper bound [N]."""
+    """Check and return M lower bounds (M,) [N] and one upper bound [N].
+
+    Each of them holds for the tensions of all cables.
+    """
     lows = distinct("minimum", minimum)
     if lows.min() < 0.0:
         raise InvalidInput(
@@ -111,7 +117,10 @@ def vectors_of(
     value: Direction | Sequence[Direction] | Mapping[str, Direction],
     checked: Callable[[str, ArrayLike], Array],
 ) -> Choice[Array]:
-    """Check one vector or several, such as wrenches (W, 6), by the function ``checked``."""
+    """Check one vector, or several as rows or by name; ``checked`` checks and returns each one.
+
+    The values of the result have a row for each vector: wrenches (W, 6), directions (D, 3).
+    """
     if isinstance(value, str):
         return Choice(name, frozen(checked(name, value)[None]), None)
     if isinstance(value, (list, tuple)) and all(isinstance(each, str) for each in value):

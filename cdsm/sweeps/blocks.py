@@ -1,4 +1,4 @@
-"""Divide a sweep into blocks of postures, which are contiguous boxes of the pose set."""
+"""Divide the postures of a sweep into blocks; a block is a slice of each dimension of the poses."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Block = Mapping[str, slice]
 
 
 def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
-    """Return the size along each dimension of a block of up to ``most`` postures.
+    """Return the size of a block along each dimension, for blocks of at most ``most`` postures.
 
-    ``poses`` has the size of each dimension of the pose set. A block has the full size along the
-    last dimensions, a part of the dimension before them, and the size 1 along all others. So the
-    blocks cover all postures in order.
+    ``poses`` has the size of the pose set along each dimension. A block covers the last dimensions
+    completely, a part of the dimension before them, and one entry of each other dimension. So the
+    postures of a block follow each other in the pose set.
     """
     room, extent = most, {}
     for dim, size in reversed(list(poses.items())):
@@ -25,7 +25,10 @@ def extents(poses: Mapping[str, int], most: int) -> dict[str, int]:
 
 
 def blocks(poses: Mapping[str, int], extent: Mapping[str, int]) -> list[Block]:
-    """Return all blocks of a pose set in order; ``extent`` has the size of a block by dimension."""
+    """Return all blocks of a pose set, in order.
+
+    ``poses`` has the size of the set, ``extent`` that of a block, along each dimension.
+    """
     cuts = [
         [slice(start, min(start + extent[dim], size)) for start in range(0, size, extent[dim])]
         for dim, size in poses.items()

@@ -26,7 +26,7 @@ _GO_ON = "What a store holds is kept: run the same again with store= to go on fr
 
 
 def checked_client(client: object) -> None:
-    """Check that an object is a synchronous dask client, and open."""
+    """Check that an object is a dask client which is synchronous and open."""
     need("dask", "distributed")
     from distributed import Client
 
@@ -39,11 +39,12 @@ def checked_client(client: object) -> None:
 def on_cluster(
     client: Client, specification: Specification, blocks: Iterable[Block]
 ) -> Iterator[tuple[Block, BlockResult | None]]:
-    """Yield each block with its result as soon as a cluster has computed it; None if lost.
+    """Compute blocks on a cluster; yield each with its result as soon as it is finished.
 
     If a worker dies, dask gives its blocks to other workers, at most ``allowed-failures`` times.
-    Then dask gives up these blocks, even those that were only waiting in the worker. Each of them
-    is computed once more, one after the other.
+    Then dask gives up these blocks, even those that the worker had not begun. They are submitted
+    once more at the end, one after the other. The result of a block that dask gives up again is
+    None.
     """
     from distributed import as_completed
     from distributed.protocol.pickle import dumps  # pickles classes of a notebook by value
@@ -116,7 +117,7 @@ def _on_worker(payload: bytes, client_version: str, q: Array) -> BlockResult:
 
 @lru_cache(maxsize=4)
 def _task(payload: bytes) -> SweepTask:
-    """Unpickle a task, only once in each worker, since building its arm takes milliseconds."""
+    """Unpickle a task; a worker keeps it, since to build its arm again takes milliseconds."""
     from distributed.protocol.pickle import loads
 
     task: SweepTask = loads(payload)

@@ -1,4 +1,4 @@
-"""Describe an arm and its laws of elasticity as texts, by which a Dataset identifies its arm."""
+"""Describe an arm and its laws of elasticity as texts; in a Dataset they identify the arm."""
 
 from __future__ import annotations
 
@@ -45,7 +45,9 @@ def attributes_of(arm: Manipulator) -> dict[str, str]:
 def law_text(law: Elasticity) -> str:
     """Return an elasticity as text; equal laws have equal texts, even in another process.
 
-    The text of a user-defined law has its class, and digests of its state, domain, EA and strain.
+    The text of a user-defined law has its class, a digest of its pickled state, and a digest of its
+    domain, and of EA and strain at sampled tensions. If the law cannot be pickled, the text has its
+    class and its address in memory.
     """
     text = repr(law)
     if type(law).__module__.startswith("cdsm.") and "..." not in text:  # numpy shortens arrays
@@ -60,10 +62,10 @@ def law_text(law: Elasticity) -> str:
 
 
 def changed_laws(one: str, other: str) -> tuple[str, ...]:
-    """Return the classes of the laws whose samples differ in two texts of an arm.
+    """Return the classes of user-defined laws whose code has changed between two texts of an arm.
 
-    The samples are those of :func:`law_text`. The result is empty if the texts also differ in
-    something else.
+    The texts contain those of :func:`law_text`. Such a law has the same class and state in both,
+    but other digests of the samples. The result is empty if the texts also differ elsewhere.
     """
     if _SAMPLED.sub(r"\1 \2", one) != _SAMPLED.sub(r"\1 \2", other):
         return ()
@@ -72,7 +74,7 @@ def changed_laws(one: str, other: str) -> tuple[str, ...]:
 
 
 def _answers(law: Elasticity) -> str:
-    """Return a text of the domain of a law, and of EA and strain at sampled tensions, exactly."""
+    """Return a text with the domain of a law, and EA and strain at sampled tensions, all digits."""
     domain = law.domain
     first, high = domain.first, domain.high
     tensions = _SAMPLES[(first <= _SAMPLES) & (high >= _SAMPLES)]
@@ -83,7 +85,10 @@ def _answers(law: Elasticity) -> str:
 
 
 def _answer(law: Elasticity, name: str, tension: float) -> str:
-    """Return the exact answer of method ``name`` of a law at a tension [N], or its error's name."""
+    """Return what method ``name`` of a law returns at a tension [N], as a text with all digits.
+
+    If the method raises an error, the text is the name of this error.
+    """
     try:
         value: Array = np.asarray(getattr(law, name)(np.array([tension])), dtype=np.float64)
         return float(value.reshape(())).hex()
@@ -96,7 +101,10 @@ def _digest(data: bytes) -> str:
 
 
 def _cable(cable: Cable, laws: list[str]) -> dict[str, object]:
-    """Return a cable for JSON in SI units; its elasticity is an index into ``laws``."""
+    """Return the attributes of a cable for JSON, in SI; its elasticity is an index into ``laws``.
+
+    ``laws`` are texts of :func:`law_text`.
+    """
     series = cable.series_stiffness
     holes = [[site.friction, site.wrap] for site in cable.sites]
     return {

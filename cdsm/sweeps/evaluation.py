@@ -1,4 +1,7 @@
-"""Compute all cases at a block of postures, each with its status."""
+"""Compute a block of a sweep: all cases at some postures, with the status of each.
+
+A case is a combination of an elasticity, a wrench and a lower bound of the tensions (a minimum).
+"""
 
 from __future__ import annotations
 
@@ -52,9 +55,10 @@ _BATCH_NAMES = {
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SweepTask(ReadOnlyState):
-    """Arm, quantities and cases of a sweep, which a worker computes at the postures that it gets.
+    """What a sweep computes at each posture: the arm, the outputs, the cases.
 
-    Raises InvalidInput if an output needs an argument that is missing, or an argument is invalid.
+    Workers receive the task once, and postures with each block. Raises InvalidInput if an output
+    needs an argument that is missing, or an argument is invalid.
     """
 
     arm: Manipulator
@@ -82,13 +86,13 @@ class SweepTask(ReadOnlyState):
 
     @property
     def cases(self) -> int:
-        """Return the number of cases (stiffness matrices) at each posture."""
+        """Return the number of cases at each posture; each has a stiffness matrix of its own."""
         choices = self.laws.values, self.wrenches.values, self.minima.values
         return math.prod(map(len, choices))
 
     @cached_property
     def arms(self) -> tuple[Manipulator, ...]:
-        """Return the arm with each elasticity; springs, leads and control stay unchanged."""
+        """Return an arm for each elasticity; springs, leads and control stay unchanged."""
         return tuple(
             self.arm
             if law is None
@@ -101,8 +105,9 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     """Compute all cases of ``task`` at joint angles q (P, nv) [rad]; a failure sets the status.
 
     Returns:
-        ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs. The
-        first axes of an output are P, and each of E, W and M on which the output depends.
+        ``status`` (P, E, W, M), for E elasticities, W wrenches and M minima, and all outputs. An
+        output has the axis P, then those of the axes E, W and M on which it depends
+        (:attr:`Quantity.cases`), then its own axes.
     """
     wrenches = task.wrenches.values
     shape = len(q), len(wrenches), len(task.minima.values)
@@ -172,11 +177,12 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 def _bounds(
     task: SweepTask, q: Array, threads: int | None
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Return the bounds of the tensions at the motors, and the friction, for each of R rows.
+    """Return bounds of the tensions at the motors, and the friction, for R rows q (R, nv) [rad].
 
-    The results are lower bounds (R, C) [N], upper bounds (R, C) [N], the largest ratio of two
-    tensions along a cable (R, C), and whether the bounds of a row are consistent (R,). The ratio is
-    1 if the task has no ``worst_friction``.
+    A row is a posture with a wrench and a minimum. The results are the lower bounds (R, C) [N], the
+    upper bounds (R, C) [N], the largest ratio of two tensions along each cable (R, C) [-], and
+    whether the lower bounds of a row are below its upper ones (R,). The ratio is 1 if the task has
+    no ``worst_friction``.
     """
     lows = task.minima.values
     minima = np.tile(lows, len(q) // len(lows))
@@ -192,7 +198,11 @@ def _bounds(
 
 
 def _needed(names: list[str]) -> list[str]:
-    """Return the outputs of a batch that the quantities ``names`` need, the margin among them."""
+    """Return the outputs that a batch must compute for the quantities ``names``.
+
+    The margin is one of them, since the status UNSTABLE needs it. The result is empty if ``names``
+    is.
+    """
     if not names:
         return []
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
@@ -209,10 +219,12 @@ def _finish(
     loss: Array,
     names: list[str],
 ) -> None:
-    """Add the outputs in ``names`` that a batch does not compute to ``rows``; set ``status``.
+    """Add to ``rows`` those quantities in ``names`` that a batch does not compute.
 
-    These outputs are ``wire_strain`` and the quantities of the stage ``principal``. ``tension`` [N]
-    and ``loss`` have the shape (R, C); ``loss`` is the largest ratio of two tensions along a cable.
+    They are ``wire_strain`` and the extreme stiffnesses with their directions (the stage
+    ``principal``). Also set ``status`` (R,) where a strain is outside its law or the arm buckles.
+    ``tension`` [N] and ``loss`` [-] are (R, C); ``loss`` is the largest ratio of two tensions along
+    a cable.
     """
     if "wire_strain" in names:
         # friction may take a tension along a cable out of the domain of its law
@@ -245,10 +257,11 @@ def _rows(
     bounded: NDArray[np.bool_] | None = None,
     threads: int | None,
 ) -> tuple[Rows, Statuses]:
-    """Compute the quantities ``names`` and the status of each row of the arguments.
+    """Compute the quantities ``names`` and a status for R rows q (R, nv) [rad], wrench (R, 6).
 
-    A quantity that does not exist is NaN. Rows that are False in ``bounded`` have no consistent
-    bounds of tension; their status is INFEASIBLE.
+    ``tension`` is (R, C) [N]; without it the least tensions within the bounds are computed. A
+    quantity that does not exist is NaN. ``bounded`` (R,) is False where a lower bound is above the
+    upper one; the status of these rows is INFEASIBLE.
     """
     outputs = [_BATCH_NAMES.get(name, name) for name in names]
     found = batch.evaluate(
@@ -279,7 +292,7 @@ def _rows(
 
 
 def _spread(values: Array, place: NDArray[np.bool_]) -> Array:
-    """Return ``values`` at the rows where ``place`` is True, and NaN at all other rows."""
+    """Return an array with ``values`` in the rows where ``place`` is True, NaN in all others."""
     full = np.full((len(place), *values.shape[1:]), np.nan)
     full[place] = values
     return full

@@ -24,9 +24,9 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep`, or a part of it.
         path: The file; replaced if it exists. ``.nc`` writes NetCDF, which :func:`read_sweep` reads
-            back bit by bit. ``.csv`` writes a row for each posture and case. Each coordinate and
-            each component of an output is a column, with the SI unit in the header. The status is a
-            word; a value that does not exist is an empty cell.
+            back bit by bit. ``.csv`` writes a row for each posture and case (elasticity, wrench and
+            minimum). Each coordinate and each component of an output is a column, with the SI unit
+            in the header. The status is a word; a value that does not exist is an empty cell.
 
     Raises:
         InvalidInput: ``dataset`` is not a sweep, or its status has a number without a word; or
@@ -40,10 +40,11 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def sweep_to_pandas(dataset: xarray.Dataset) -> pandas.DataFrame:
-    """Return a sweep as a tidy table: a row for each posture and case, a column for each component.
+    """Return a sweep as a table: a row for each posture and case, a column for each component.
 
-    The columns are those of the CSV file of :func:`write_sweep`, with the SI unit in each name.
-    The status is a word; a value that does not exist is NaN.
+    A case is a combination of elasticity, wrench and minimum. The columns are those of the CSV file
+    of :func:`write_sweep`, with the SI unit in each name. The status is a word; a value that does
+    not exist is NaN.
 
     Args:
         dataset: Result of :func:`~cdsm.sweeps.run.sweep`, or a part of it.

@@ -1,7 +1,7 @@
 """Pose sets: grids over named joints, paths along a polyline, Sobol points within the limits.
 
-A pose set does not depend on an arm; :func:`poses_of` builds its postures for an arm. Joint angles
-are computed block by block, so a large grid is never in memory.
+A pose set does not depend on an arm; :func:`poses_of` builds its postures for an arm. The joint
+angles of a grid are computed block by block, so a large grid is never in memory.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _DRAWN = 2**16  # number of Sobol points drawn at once
 
 
 class Poses(NamedTuple):
-    """Postures of an arm."""
+    """Postures of a sweep, built for an arm from a pose set or an array."""
 
     sizes: dict[str, int]  # length of each dimension
     angles: Callable[[Block], Array]  # joint angles of a block (n, nv) [rad], in C order
@@ -42,7 +42,7 @@ class PoseSet(ABC):
 
     @abstractmethod
     def _of(self, arm: Manipulator) -> Poses:
-        """Build the postures for an arm."""
+        """Build the postures of this set for an arm."""
 
 
 @final
@@ -50,11 +50,13 @@ class PoseSet(ABC):
 class GridPoses(PoseSet):
     """Grid of all combinations of angles of named joints; each joint name becomes a dimension.
 
-    Every joint of the arm names a coordinate of the Dataset. A sweep refuses joints whose names the
-    Dataset has already, or NetCDF and Zarr do not take, such as ``along`` or ``a/b``.
+    In the Dataset each joint of the arm, also one that does not move, is a coordinate with the name
+    of the joint. So a sweep refuses a joint name that the Dataset uses already, such as ``along``,
+    or that NetCDF and Zarr do not accept, such as ``a/b``.
 
     Args:
-        angles: Angles [rad] of each joint of the grid, by joint name: (n,) or one number.
+        angles: Angles [rad] of each joint of the grid, by joint name: (n,) or one number; [m] for
+            prismatic joints.
         rest: Angles [rad] of joints that do not move, by joint name; 0 for all joints not named.
 
     Attributes:
@@ -125,7 +127,7 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     Attributes:
         waypoints: Joint angles (n, nv) [rad] of two or more postures.
-        count: Number of postures, evenly spaced in √Σδθ² along the path, including both ends; None
+        count: Number of postures at equal distances √Σδθ² along the path, both ends included; None
             uses the waypoints themselves.
 
     Raises:
@@ -151,7 +153,7 @@ class PathPoses(ReadOnlyState, PoseSet):
 
     @property
     def _distances(self) -> Array:
-        """Return the distance √Σδθ² along the path from the first waypoint to each (n,) [rad]."""
+        """Return the length of the path, summed √Σδθ², up to each waypoint, (n,) [rad]."""
         steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
 

@@ -18,7 +18,7 @@ Each stage needs all earlier stages, except that ``principal`` does not need ``m
 @final
 @dataclass(frozen=True)
 class Quantity:
-    """Output of a sweep: a variable of the Dataset."""
+    """Description of an output of a sweep, which is a variable of the Dataset."""
 
     long_name: str  # in words
     units: str  # SI, in the notation of UDUNITS
@@ -27,7 +27,7 @@ class Quantity:
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Return the dimensions of :data:`CASES` on which the quantity depends."""
+        """Return those dimensions in :data:`CASES` on which the quantity depends."""
         return {"pose": (), "tension": CASES[1:]}.get(self.stage, CASES)
 
 

@@ -87,8 +87,9 @@ def sweep(
         breaking_load: Breaking load of the wire [N], for ``wire_safety``.
         bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
         store: Zarr folder to which entries are written during the run. A new run with the same
-            arguments computes only missing entries, including those of lost workers; the bits are
-            the same as without interruption. The returned Dataset reads from the store when needed.
+            arguments computes only missing entries, including those of lost workers. The results
+            are then the same, bit by bit, as without interruption. The returned Dataset reads from
+            the store when needed.
             A user-defined law is identified by its class, its state, and EA and strain at up to 185
             tensions; if these have changed, the store has another sweep.
         client: Client of a dask cluster; the run waits while the cluster has no workers. None uses
@@ -97,8 +98,9 @@ def sweep(
         progress: Show a bar with rate and time left, if there is a terminal.
 
     Returns:
-        Dataset of the outputs [SI] and ``status``. Each has the dimensions of the poses, of the
-        cases and of its quantity.
+        Dataset of the outputs [SI] and ``status``. The dimensions of each are those of the
+        postures; then ``elasticity``, ``wrench`` and ``minimum``, if several are given and the
+        output depends on them; then its own, such as ``cable``.
 
     Raises:
         InvalidInput: An argument is wrong; the error names it and the reason.
@@ -153,9 +155,10 @@ def _run(
     progress: bool,
     path: Path | None = None,
 ) -> None:
-    """Compute all pending blocks, of the size ``extent``, and write the results into ``arrays``.
+    """Compute all blocks that are pending or were lost, and write the results into ``arrays``.
 
-    ``arrays`` are numpy arrays by name, or zarr arrays of the store at ``path``.
+    ``extent`` is the size of a block along each dimension. ``arrays`` are numpy arrays by name, or
+    zarr arrays of the store at ``path``.
     """
     task, poses = specification.task, specification.poses
     every = blocks(poses.sizes, extent)
@@ -183,9 +186,9 @@ def _run(
 def _side_by_side(
     specification: Specification, blocks: Sequence[Block]
 ) -> Iterator[tuple[Block, BlockResult]]:
-    """Yield each block and its result in order; others are computed meanwhile, in threads.
+    """Compute blocks in parallel threads; yield each with its result, in the order of ``blocks``.
 
-    If there are fewer blocks than threads of the machine, each block has several threads.
+    If the machine has more threads than there are blocks, each block uses several threads.
     """
     task, poses, cores = specification.task, specification.poses, checked_threads(None)
     workers = max(1, min(cores, len(blocks)))

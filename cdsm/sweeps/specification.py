@@ -54,7 +54,7 @@ EMPTY = {"status": np.int8(SweepStatus.PENDING)}
 @final
 @dataclass(frozen=True, eq=False)
 class Specification:
-    """Postures and task of a sweep; they determine the dimensions and attributes of its Dataset."""
+    """What a sweep computes, at which postures, and the form of the Dataset that follows."""
 
     task: SweepTask  # quantities and cases to compute at each posture
     poses: Poses
@@ -80,7 +80,7 @@ class Specification:
         return (*self.task.outputs, "status")
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Return the dimensions of an output or ``status``: of the poses, the cases, its own."""
+        """Return the dimensions of an output or ``status``: of postures and cases, then its own."""
         quantity = QUANTITIES.get(name, _STATUS)
         wanted = (*self.poses.sizes, *quantity.cases, *quantity.dims)
         return tuple(dim for dim in wanted if dim in self.frame.sizes)
@@ -90,7 +90,7 @@ class Specification:
         return tuple(self.frame.sizes[dim] for dim in self.dims(name))
 
     def region(self, name: str, block: Block) -> tuple[slice, ...]:
-        """Return the part of an output or of ``status`` that belongs to a block."""
+        """Return the slices of the array of an output or of ``status`` that a block fills."""
         return tuple(block.get(dim, slice(0, self.frame.sizes[dim])) for dim in self.dims(name))
 
     def attributes(self, name: str) -> dict[str, Any]:
@@ -114,7 +114,10 @@ class Specification:
         }
 
     def empty(self, name: str) -> NDArray[Any]:
-        """Build an array for an output or ``status``, filled with its initial value."""
+        """Build an array for an output, filled with NaN, or for ``status``, filled with PENDING.
+
+        Raises InvalidInput if the array does not fit into memory.
+        """
         try:
             return np.full(self.shape(name), EMPTY.get(name, np.float64(np.nan)))
         except (MemoryError, ValueError):  # numpy raises ValueError for sizes beyond all memory
@@ -126,7 +129,7 @@ class Specification:
             ) from None
 
     def dataset(self, values: Mapping[str, NDArray[Any]]) -> xarray.Dataset:
-        """Build the Dataset of outputs and ``status``."""
+        """Build the Dataset from the arrays of outputs and ``status``, given by name."""
         return self.frame.assign(
             {
                 name: (self.dims(name), array, self.attributes(name))
@@ -172,7 +175,10 @@ def _labels(task: SweepTask, poses: Poses) -> dict[str, Label]:
 
 
 def _require_own_names(poses: Poses, taken: set[str]) -> None:
-    """Raise InvalidInput if the Dataset cannot have a coordinate with the name of a joint."""
+    """Raise InvalidInput if a joint has a name that no coordinate of the Dataset can have.
+
+    Such names are those in ``taken``, and those that NetCDF or Zarr do not accept.
+    """
     for name in poses.labels:
         if name in taken:
             why = "is a name that the Dataset has already"

@@ -15,9 +15,9 @@ from cdsm.sweeps.quantities import STAGES
 class SweepStatus(IntEnum):
     """Status of an entry of a sweep; the names are the ``flag_meanings`` of ``status``.
 
-    The first eight are those of :class:`~cdsm.Status`. NaN stands in a Dataset only where the
-    status says so, as listed here. Infinity is a value: the stiffness in a direction in which no
-    joint moves the tip.
+    The first eight are those of :class:`~cdsm.Status`. A quantity is NaN in a Dataset only if it
+    does not exist for the status, as listed here. Infinity is a valid result: the stiffness in a
+    direction in which no joint moves the tip.
     """
 
     OK = Status.OK
@@ -64,5 +64,9 @@ LOST: Final[dict[SweepStatus, tuple[str, ...]]] = {
 
 
 def exists(stage: str, status: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Return for each entry of ``status`` whether the quantities of a stage exist."""
+    """Return for each entry of ``status`` whether the quantities of a stage exist.
+
+    ``stage`` is one of :data:`~cdsm.sweeps.quantities.STAGES`. The result has the shape of
+    ``status``.
+    """
     return np.array([stage not in LOST[kind] for kind in sorted(LOST)])[status]

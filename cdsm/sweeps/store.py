@@ -1,7 +1,8 @@
 """Store of a sweep: a Zarr folder that keeps computed blocks, so a stopped run can continue.
 
-Every block is a chunk of each array, written to a temporary file that is then renamed. The
-``status`` of a block is written last: if it is not pending, all outputs of the block exist.
+A block of postures is one chunk (a file) in each array. A chunk is written to a temporary file,
+which is then renamed. The ``status`` of a block is written last: if it is not pending, all outputs
+of the block exist.
 """
 
 from __future__ import annotations
@@ -45,9 +46,11 @@ _ORDER = "order"  # attribute with the names of all variables in order, since a 
 def opened(
     path: Path, specification: Specification, extent: Mapping[str, int]
 ) -> Iterator[Mapping[str, Any]]:
-    """Open or create the store at ``path``; yield an array for each output and ``status``.
+    """Open or create the store at ``path``; yield the arrays of outputs and ``status``, by name.
 
-    The store is locked against other runs; the system removes the lock when the process ends.
+    ``extent`` is the size of a chunk of a new store. The store is locked against other runs; the
+    system removes the lock when the process ends. Raises StoreError if the store has another sweep
+    or is locked.
     """
     import zarr
 
@@ -93,7 +96,7 @@ def read(path: Path) -> xarray.Dataset:
 
 
 def _dataset(path: Path) -> tuple[xarray.Dataset, Any]:
-    """Return the Dataset of a store and its Zarr group; None for the group if xarray wrote it."""
+    """Return the Dataset of a store, and its Zarr group, or None if xarray wrote the folder."""
     import xarray
     import zarr
 
@@ -131,13 +134,13 @@ def _dataset(path: Path) -> tuple[xarray.Dataset, Any]:
 
 
 def _once(path: Path, array: Any) -> Any:
-    """Return an array of a store that is read when it is needed, at most once."""
+    """Return an array that is read from the store when first needed, and then stays in memory."""
     lazy: Any = LazilyIndexedArray(_OnDisk(path, array))
     return MemoryCachedArray(CopyOnWriteArray(lazy))  # type: ignore[no-untyped-call]
 
 
 class _OnDisk(BackendArray):
-    """Array of a store, read when needed; FileError if a file of it is damaged."""
+    """Array of a store that xarray reads when needed; FileError if one of its files is damaged."""
 
     def __init__(self, path: Path, array: Any) -> None:
         self.path, self.array = path, array
@@ -154,7 +157,7 @@ class _OnDisk(BackendArray):
 
 
 def _damage(path: Path, array: Any, error: Exception) -> FileError:
-    """Return the error that names the first damaged file of an array of a store."""
+    """Return a FileError that names the first damaged file of an array of the store at ``path``."""
     for place in np.ndindex(array.cdata_shape):
         try:
             array.blocks[place]
@@ -168,7 +171,10 @@ def _damage(path: Path, array: Any, error: Exception) -> FileError:
 
 
 def _gaps(path: Path, group: Any) -> Iterator[tuple[Path, tuple[slice, ...]]]:
-    """Yield each missing file of a computed block, and the slices of this block in ``status``."""
+    """Yield each output file that is missing although its block is computed.
+
+    With each file go the slices of the block in ``status``.
+    """
     status = group["status"]
     outputs = [group[name] for name in QUANTITIES if name in group]
     try:
@@ -187,10 +193,10 @@ def _gaps(path: Path, group: Any) -> Iterator[tuple[Path, tuple[slice, ...]]]:
 
 
 def _make(path: Path, specification: Specification, extent: Mapping[str, int]) -> bool:
-    """Make an empty store at ``path`` with chunks of the size ``extent``.
+    """Make an empty store at ``path`` with chunks of the size ``extent``; return True.
 
-    It is written beside ``path``, then renamed. Returns False if another run has made a store at
-    ``path`` in the meantime.
+    The store is written to a folder beside ``path``, which is then renamed. Returns False if
+    another run has made a store at ``path`` in the meantime.
     """
     import zarr
     from zarr.codecs import ZstdCodec
@@ -266,7 +272,10 @@ def _check(path: Path, specification: Specification) -> None:
 
 
 def _difference(name: str, stored: NDArray[Any], wanted: NDArray[Any]) -> list[str]:
-    """Return a list with the first difference of ``stored`` and ``wanted``; empty if equal."""
+    """Return a text about the first difference of two arrays, in a list; empty if they are equal.
+
+    ``name`` is the coordinate of which the store has the values ``stored``, not ``wanted``.
+    """
     if stored.shape == wanted.shape:
         places = np.argwhere(stored != wanted)
         if not len(places):
