@@ -41,7 +41,7 @@ ANOTHER_ARM = (
 
 
 class ArmFacts(Printed):
-    """Base class of :class:`~cdsm.Manipulator`: properties of the arm, and changed copies of it."""
+    """Base class of :class:`~cdsm.Manipulator`: properties; methods that return a changed arm."""
 
     _cables: Cables
     _gravity: Array
@@ -71,8 +71,8 @@ class ArmFacts(Printed):
     def length(self) -> float:
         """Length of the path from the base through the joints to the tip, all joints at zero [m].
 
-        For a robot from a URDF the length is at least the largest distance of a cable site from its
-        joint. It is never zero, since numerical tolerances are multiples of it.
+        For an arm from a URDF the length is at least the largest distance of a cable site from the
+        joint that moves the site. So the length is never zero: tolerances are multiples of it.
         """
         if self.is_serpentine:
             return self.geometry.length
@@ -101,7 +101,7 @@ class ArmFacts(Printed):
 
     @property
     def original_length(self) -> OriginalLength:
-        """Which length is l_0 in a wire's EA/l_0: ``"unstrained"``, or ``"stretched"`` (paper)."""
+        """Length of a wire that is l_0 in EA/l_0: ``"unstrained"``, or ``"stretched"`` (paper)."""
         return self._parts.original_length
 
     @cached_property
@@ -135,11 +135,11 @@ class ArmFacts(Printed):
         return JointUnits(self.slides).coordinates
 
     def torque_unit(self, joint: int | None = None) -> str:
-        """Return the torque unit of a joint or (None) of all joints: N m, N, or "N m or N"."""
+        """Return the unit of torque of a joint or, if None, of all: "N m", "N" or "N m or N"."""
         return JointUnits(self.slides).torque(joint)
 
     def stiffness_unit(self) -> str:
-        """Return the unit of eigenvalues of K_θ: N m/rad, N/m (all joints prismatic), or both."""
+        """Return the unit of eigenvalues of K_θ: "N m/rad", "N/m" or "N m/rad or N/m"."""
         return JointUnits(self.slides).stiffness()
 
     @property
@@ -233,9 +233,11 @@ class ArmFacts(Printed):
             cables: One or more cables, or the path of their file.
 
         Raises:
-            InvalidInput: ``cables`` is not a list or tuple of cables, or the rigidity of a law is
-                discontinuous.
+            InvalidInput: ``cables`` is empty or not a list or tuple of cables, or the rigidity of a
+                law is discontinuous.
             CableError: Two cables have the same name, or a cable is on an unknown link.
+            FileError: The file cannot be read or does not describe cables.
+            MissingWire: The file names no wire for some cables.
         """
         return self._replace(cables=_checked_cables(cables))
 
@@ -252,7 +254,9 @@ class ArmFacts(Printed):
         return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
 
     def with_gravity(self, gravity: Direction) -> Self:
-        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or ``"-y"``.
+        """Return the same arm under another gravity (3,) [m/s²] in base axes.
+
+        The name of an axis, such as ``"-y"``, means 9.81 m/s² along this axis.
 
         Raises:
             InvalidInput: Gravity is neither an axis nor three numbers.

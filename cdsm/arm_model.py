@@ -83,7 +83,7 @@ class ArmModel:
         self.laws.require_continuity()
 
     def with_laws(self, cables: tuple[Cable, ...]) -> ArmModel:
-        """Return the model with the laws of ``cables``, whose sites are the same as before."""
+        """Return a model with the laws of ``cables``, whose sites must be those of this model."""
         model = type(self).__new__(type(self))
         same = "body", "tree", "masses", "routing", "blocks", "arrays", "lowest", "highest"
         model.__dict__.update({name: self.__dict__[name] for name in same})
@@ -93,7 +93,7 @@ class ArmModel:
 
     @cached_property
     def chains(self) -> Chains:
-        """Cables, divided into segments between holes."""
+        """All cables of the arm, divided at their holes into segments."""
         return Chains.of(self._cables)
 
     @cached_property

@@ -137,7 +137,7 @@ class Cable:
 
     @property
     def _holes(self) -> range:
-        """Indices of the sites that are holes, which the cable passes."""
+        """Indices of the sites that are holes, through which the cable passes."""
         return range(0 if self.lead > 0.0 else 1, len(self.sites) - 1)
 
     @property
@@ -159,8 +159,8 @@ class Cable:
     def elongation(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute the elongation Δl = l_0 ε(F) + (F − F_0)/k_series [m], zero at F_0 = ``rest``.
 
-        Wire and series spring carry the same tension, and their elongations add up. Examples are
-        the paper's hybrid cable, a wire and a spring (Fig. 11), and a wire on a compliant drive.
+        The wire and the series spring carry the same tension; their elongations add up. The spring
+        may be a real one, as in the paper's hybrid cable (Fig. 11), or a compliant drive.
 
         Args:
             tension: F [N], any shape.

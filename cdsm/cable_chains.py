@@ -56,7 +56,7 @@ class Chains:
 
     @classmethod
     def of(cls, cables: Sequence[Cable]) -> Self:
-        """Divide cables into segments and holes."""
+        """Divide cables at their holes into segments."""
         segments: list[Cable] = []
         cable_of, start, hole, where = [], [0], [], []
         for c, cable in enumerate(cables):
@@ -117,7 +117,8 @@ class Segments(ReadOnlyState):
     def grip(self) -> Array:
         """Product μ φ of friction coefficient and wrap angle at each hole (P,) [-].
 
-        A cable sticks in a hole while the ratio of its two tensions there is below e^μφ.
+        A cable sticks in a hole while the larger of the tensions before and behind the hole is
+        below e^μφ times the smaller one.
         """
         return self.chains.friction * self.wrap
 

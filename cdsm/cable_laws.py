@@ -123,7 +123,7 @@ class CableLaws:
         )
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the bounds ``low``, ``high`` (…, C) [N], narrowed by each cable's own bounds."""
+        """Return the tension bounds ``low``, ``high`` (…, C) [N], narrowed to the cables' own."""
         if not self._bounded:
             return low, high
         return frozen(np.maximum(low, self._least)), frozen(np.minimum(high, self._most))
@@ -154,9 +154,10 @@ class CableLaws:
         return rigidity
 
     def stretched_rigidity(self, law: Elasticity, tension: Array) -> Array:
-        """Compute EA (1 + ε) [N] of a law at ``tension``, in the shape of ``tension``.
+        """Compute EA (1 + ε) [N] of a law at ``tension`` [N], in the shape of ``tension``.
 
-        If ``original_length`` of the arm is "stretched", as in the paper, the result is EA.
+        Divided by the length ℓ under tension, this is the stiffness EA/l_0 of the wire. If
+        ``original_length`` is "stretched", as in the paper, the result is EA.
         """
         if isinstance(law, LinearElasticity):
             rigidity = law.rigidity(tension)
@@ -183,10 +184,11 @@ class CableLaws:
         return frozen(wire)
 
     def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
-        """Compute dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of the cable stiffness k at F (C,).
+        """Compute dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] at a constant posture.
 
-        The posture is constant, so l_0 changes with F. A prime is d/dF. With R = EA (1 + ε),
-        G = R′/R and w = 1 − k/k_series, the wire's share of the cable compliance,
+        F (C,) [N] is ``tension``, and k (C,) [N/m] is ``stiffness``, that of each cable at F. The
+        cable length is constant, so l_0 changes with F. A prime is d/dF, R = EA (1 + ε) and
+        G = R′/R. The wire's share of the compliance of the cable is w = 1 − k/k_series. Then
 
             k′ = k A,  k″ = k (A² + A′),  A = (1 − w)/R + w G,
             A′ = (1 − w) (A/R − G/R − A G) + w G′.

@@ -1,7 +1,7 @@
 """An arm with its cables.
 
-:class:`Manipulator` has all data that do not change. :class:`Posture` has all results that depend
-only on the joint angles. A posture is frozen and always complete.
+:class:`Manipulator` has all data that do not depend on the joint angles. :class:`Posture` has all
+results that depend only on them. A posture is frozen: :meth:`Manipulator.at` makes each one.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class Manipulator(ArmFacts):
         geometry: The arm.
         elasticity: One law for all cables, or one law per cable. The cables are then routed by
             :func:`~cdsm.serpentine_cables`.
-        cables: The cables, if ``elasticity`` is not given; their sites may be on any links of
-            :attr:`urdf`. Or the path of a file that :func:`~cdsm.write_cables` has written.
+        cables: The cables, or the path of their file (:func:`~cdsm.read_cables`), if ``elasticity``
+            is not given. Their sites may be on any links of :attr:`urdf`.
         gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s² along
             it; (0, 0, 0) for none.
         original_length: Which length is l_0 in the stiffness EA/l_0 of a wire of length ℓ under
@@ -60,6 +60,8 @@ class Manipulator(ArmFacts):
             three numbers, or the rigidity of a user-defined law is discontinuous.
         CableError: Two cables have the same name, or a cable is on an unknown link.
         UnknownName: ``original_length`` is unknown.
+        FileError: The file of the cables cannot be read.
+        MissingWire: The file of the cables names no wire for some of them.
     """
 
     def __init__(
@@ -112,7 +114,8 @@ class Manipulator(ArmFacts):
             original_length: As for :class:`Manipulator`.
 
         Raises:
-            FileError: The file cannot be read.
+            FileError: The file of the URDF or of the cables cannot be read.
+            MissingWire: The file of the cables names no wire for some of them.
             UrdfError: The URDF is not a supported robot; lists every fault.
             UnknownName: No link is called ``tip``, or ``original_length`` is unknown.
             InvalidInput: ``urdf`` is neither a path nor a text, ``joint_names`` does not name each

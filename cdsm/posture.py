@@ -117,12 +117,12 @@ class Posture(ReadOnlyState):
 
     @property
     def bones(self) -> tuple[Array, ...]:
-        """Lines from joint to joint and to the tip, (2, 3) each [m]: a stick figure."""
+        """The links as a stick figure: lines (2, 3) [m] from joint to joint and to the tip."""
         return tuple(bone for bones in self._bones for bone in bones)
 
     @property
     def brackets(self) -> tuple[Array, ...]:
-        """Lines from each cable site to the nearest bone of its link, (2, 3) each [m]."""
+        """Lines (2, 3) [m] from each cable site to the nearest of the bones of the site's link."""
         lines = []
         for row, site in zip(self.arm._model.routing.row, self._frames.site, strict=True):
             feet = [foot(site, bone) for bone in self._bones[row]] or [self._frames.origin[row]]
@@ -159,7 +159,7 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def self_contacts(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of links that overlap. Neighbours are left out, since joint limits separate them.
+        """Pairs of links that overlap, by name, but no neighbours: joint limits keep these apart.
 
         The body of a link is the cylinder around its disks. Overlaps raise no error. The result is
         empty for a robot from a URDF, since the shapes of its links are unknown.
@@ -290,11 +290,11 @@ class MomentArms(ReadOnlyState):
 
 
 def site_paths(cables: Sequence[Cable], sites: Array) -> list[Array]:
-    """Divide the sites of all cables (sites, 3) into one array for each cable."""
+    """Divide the positions of all cable sites, (P, 3) [m], into one array for each cable."""
     return np.split(sites, np.cumsum([len(cable.sites) for cable in cables])[:-1])
 
 
 def foot(point: Array, line: Array) -> Array:
-    """Return the point of a line segment (2, 3) that is nearest to a point (3,)."""
+    """Return the point (3,) of a line segment ``line`` (2, 3) that is nearest to ``point`` (3,)."""
     span = line[1] - line[0]
     return np.asarray(line[0] + np.clip((point - line[0]) @ span / (span @ span), 0.0, 1.0) * span)

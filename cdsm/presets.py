@@ -1,6 +1,7 @@
-"""Arms and strand of the paper; values that the paper does not give are named assumptions.
+"""The arms and the strand of the paper.
 
-Assumptions are parameters: change them to see their effect.
+Values that the paper does not give are assumed. They are parameters: change them to see their
+effect.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Rigid-body model of an arm. Only this module imports Pinocchio.
 
 Pinocchio crashes on wrong ids, misreads unusual memory layouts, and its scratch data are not
-thread-safe. This module handles these cases when it builds a model. Callers pass checked arrays and
-receive copies.
+thread-safe. Therefore this module finds links by name, and each thread has scratch data of its own.
+Callers must pass checked arrays; they receive copies.
 """
 
 from __future__ import annotations

@@ -62,4 +62,4 @@ def _restore(kind: type[CdsmError], args: tuple[object, ...], data: dict[str, ob
 
 
 class CdsmWarning(UserWarning):
-    """Base class of all warnings of cdsm: an input is possible, but probably not intended."""
+    """Class of all warnings of cdsm: an input is possible, but probably not intended."""

@@ -49,7 +49,10 @@ def read_text(path: str | os.PathLike[str], *, any_encoding: bool = False) -> st
 
 
 def _decoded(data: bytes) -> str:
-    """Decode UTF-16 (it has a byte-order mark, or a zero byte first), UTF-8, or Windows-1252."""
+    """Decode the text of a file in UTF-16, UTF-8 or, if it is neither, Windows-1252.
+
+    UTF-16 has a byte-order mark, or a zero among its first two bytes.
+    """
     if data.startswith(_MARKS):
         return data.decode("utf-16")
     if b"\0" in data[:2]:

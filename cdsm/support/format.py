@@ -71,7 +71,7 @@ def plural(count: int, noun: str) -> str:
 
 
 def place(value: float, unit: str) -> str:
-    """Return a joint coordinate [rad or m] in units shown to the user: ``12.5°`` or ``30 mm``."""
+    """Return a joint coordinate [``unit``: rad or m] as text for people: ``12.5°`` or ``30 mm``."""
     return f"{math.degrees(value):.4g}°" if unit == "rad" else f"{1e3 * value:.4g} mm"
 
 
@@ -112,11 +112,18 @@ class JointUnits(NamedTuple):
         return tuple(("mm", 1e-3) if slides else ("deg", math.pi / 180.0) for slides in self.slides)
 
     def torque(self, joint: int | None = None) -> str:
-        """Return the torque unit of a joint or (None) of all joints: N m, N, or "N m or N"."""
+        """Return the unit of torque of one joint, or of all joints if ``joint`` is None.
+
+        It is "N m" for revolute joints, "N" for prismatic ones, "N m or N" for joints of both.
+        """
         return self.joined("N m", "N", joint)
 
     def stiffness(self) -> str:
-        """Return the unit of eigenvalues of K_θ: N m/rad, N/m (all joints prismatic), or both."""
+        """Return the unit of the eigenvalues of K_θ, the joint stiffness.
+
+        It is "N m/rad" if all joints are revolute, "N/m" if all are prismatic, else
+        "N m/rad or N/m".
+        """
         return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
@@ -124,7 +131,10 @@ class JointUnits(NamedTuple):
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
-        """Return q (..., nv) by joint name, in ``angles_rad`` or, if prismatic, in ``ways_m``."""
+        """Return joint coordinates q (..., nv) for JSON, by joint name.
+
+        Angles are under the key ``angles_rad``, displacements of prismatic joints under ``ways_m``.
+        """
         found: dict[str, object] = {}
         for key_of, chosen in (("angles_rad", ~self.slides), ("ways_m", self.slides)):
             if chosen.any() or key_of == "angles_rad":

@@ -45,8 +45,8 @@ def progress_bar(
     """Show a bar called ``what``, and yield a function that advances it by a number of items.
 
     ``done`` of the ``total`` items (None: unknown) are finished already. If ``rate`` is True, the
-    bar also shows how many items are finished per second. If the bar is not ``wanted``, bars inside
-    it are not shown either.
+    bar also shows how many items are finished per second. A bar that is opened while another one
+    is open is never shown, even if the outer one is not ``wanted``.
     """
     outermost = _outermost.get()
     token = _outermost.set(False)

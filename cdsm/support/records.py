@@ -81,7 +81,10 @@ ONE, EACH = "(one)", "(each)"
 
 
 def one_or_each(value: object) -> str:
-    """Return the pydantic tag of a value: EACH for a list or array (per joint), else ONE."""
+    """Return EACH if a value is a list or array, with one entry for each joint; else ONE.
+
+    pydantic chooses by this tag how it checks a field of the type PerJoint.
+    """
     return EACH if isinstance(value, (list, tuple)) or getattr(value, "ndim", False) else ONE
 
 
@@ -103,7 +106,7 @@ _HINTED = 20  # maximum number of unknown keys for which a similar known key is 
 
 
 class CrossFaults(ValueError):
-    """Faults that concern several fields of a record, raised during pydantic's validation."""
+    """Error that a check of a record raises for faults that concern several of its fields."""
 
     def __init__(self, faults: Iterable[str]) -> None:
         self.faults = tuple(faults)
@@ -122,7 +125,7 @@ def record(cls: type[_Record]) -> type[_Record]:
 
 
 def checked_keywords(function: _Function) -> _Function:
-    """Decorate a function to check its keywords like the fields of a :func:`record`."""
+    """Decorate a function: its keywords are checked like the fields of a :func:`record`."""
     return _reporting(validate_call(config=_STRICT)(function), function)
 
 

@@ -20,9 +20,9 @@ def rising_root(
 ) -> tuple[Array, Array]:
     """Solve stretch(F) = wanted for tensions F [N]; stretch must increase with F.
 
-    The function ``slope`` is the derivative of stretch. The search begins at ``guess`` and stays
-    between ``lower`` and ``upper``, which may be inf. Returns F and slope(F). All arrays have the
-    same shape. Newton's method runs inside a shrinking bracket, so it converges for every
+    The function ``slope`` is the derivative of ``stretch``. The search begins at ``guess`` and
+    stays between ``lower`` and ``upper``, which may be inf. Returns F and slope(F). All arrays have
+    the same shape. Newton's method runs inside a shrinking bracket, so it converges for every
     increasing function. scipy's ``find_root`` and ``brentq`` take ten times as long.
     """
     first, last, previous = lower, upper, np.full(np.shape(wanted), math.inf)

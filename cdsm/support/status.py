@@ -21,11 +21,11 @@ from cdsm.support.format import plural
 
 @unique
 class Status(IntEnum):
-    """Status of one posture of a batch: which quantities exist; the others are NaN.
+    """Status of one posture of a batch. It says which quantities exist; the others are NaN.
 
-    The status names the first failure; for a single posture, the error in brackets is raised. A
-    negative margin (unstable arm) and an infinite stiffness ``along`` (immobile direction) are not
-    failures.
+    The status names the first failure. A computation of a single posture raises the error in
+    brackets instead. A negative margin (unstable arm) and an infinite stiffness ``along`` (immobile
+    direction) are not failures.
     """
 
     OK = 0

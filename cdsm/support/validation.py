@@ -97,7 +97,8 @@ _MANY = 5000  # numbers from which BLAS may use threads of its own, which compet
 def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
     """Return a new native float64 array of finite numbers, or raise :class:`InvalidInput`.
 
-    Only the upper end of the range ``kind`` is checked: small magnitudes may be rounding.
+    ``kind`` is a key of :data:`RANGES`. Only the upper end of this range is checked, since small
+    magnitudes may be rounding.
     """
     array = _native(name, value)
     unit, _, largest = ("", 0.0, LARGEST) if kind is None else RANGES[kind]
@@ -153,9 +154,10 @@ def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | Non
 
 
 def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Array:
-    """Check bounds of tension [N]: a number or (size,), ±inf allowed; return (size,), read-only.
+    """Check bounds of tension [N], a number or (size,), and return them as (size,), read-only.
 
-    If ``rows`` is given, an array (rows, size) is also allowed and keeps its shape.
+    ±inf is allowed. If ``rows`` is given, an array (rows, size) is also allowed and keeps its
+    shape. Raises InvalidInput.
     """
     _, least, most = RANGES["tension"]
     # one float for all cables is the usual case and must be fast

@@ -27,10 +27,11 @@ _Kept = TypeVar("_Kept", covariant=True)
 
 
 class Given(Protocol[_Given, _Kept]):
-    """Type of a dataclass field that accepts values of one type and stores those of another.
+    """Type of a dataclass field whose constructor accepts another type than the attribute has.
 
-    Type checkers read both types from these methods, which nothing calls. mypy does so only if the
-    field has a default.
+    For example, a field accepts a list and stores an array. Type checkers read the accepted type
+    from ``__set__`` and the stored type from ``__get__``; at run time nothing calls these methods.
+    mypy reads them only if the field has a default.
     """
 
     def __get__(self, owner: Any, kind: type) -> _Kept: ...
@@ -46,7 +47,7 @@ class Printed:
 
 
 class Named:
-    """Base class of values that are indexed by name; ``in`` and iteration use the names."""
+    """Base class of results that are indexed by name: iteration and ``in`` go over the names."""
 
     def keys(self) -> tuple[Any, ...]:
         """Return the names, in the order of the arrays."""

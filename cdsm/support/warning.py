@@ -1,4 +1,4 @@
-"""Issue warnings of cdsm at the line of the user's program."""
+"""Issue warnings of cdsm that point to a line of the user's program."""
 
 from __future__ import annotations
 
