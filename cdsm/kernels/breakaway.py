@@ -1,4 +1,4 @@
-"""Numba kernel of breakaway, for blocks of postures: the load at which the first hole slides.
+"""Numba kernel of breakaway, for blocks of postures: the load at which a cable first slides.
 
 An arm is stuck while its cables stick in their holes. Then a force f e at the tip, with a unit
 vector e, moves the joints by θ̇ = K_θ⁻¹ J_vᵀ e per newton; a dot is a derivative with respect to f.

@@ -33,8 +33,8 @@ inside a bracket. A locked motor makes y_1 = y*_1; a motor that controls the ten
 Then y_{j+1} = z, segment by segment. The cable slides in a hole if z is not y*_{j+1}; then
 s_j = −V_{j+1}′(z). The code uses T instead of y, so that a slack cable, T = 0, is an ordinary case.
 
-V_j′ has one term for each segment up to the next hole that sticks. So N segments take O(N) where
-few holes slide, and O(N²) where all do.
+V_j′ has one term for each segment up to the next hole in which the cable sticks. So N segments take
+O(N) time if the cable slides in few holes, and O(N²) if it slides in all.
 
 In this kernel 1 + ε(T) = base + softness · T. For other laws :mod:`cdsm.friction.chain_problem`
 calls the kernel repeatedly with the tangent of the law, which is Newton's method.
@@ -100,7 +100,7 @@ def _slope(
 
     V_j and y*_i are explained at the top of the module. ``best`` (S,) has exp(y*_i) of the segments
     i after j [N]; ``last`` is the cable's last segment. The scale is the sum of the natural lengths
-    of the segments up to the next hole that sticks.
+    of the segments up to the next hole in which the cable sticks.
     """
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.natural[j])
@@ -153,11 +153,12 @@ def solve_chains(
     ratio: Array,
     near: Array,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Solve the chain problem of all cables; see :class:`Wire` for the arrays (S,).
+    """Compute tensions along all cables, and the wire that slips through their holes.
 
-    ``start`` (C+1,) is the index of the first segment of each cable, and S at the end. ``forced``
-    (C,) [N] is the tension that a motor keeps in the first segment; NaN if the motor is locked.
-    Newton's method starts at the tensions ``near`` (S,) [N].
+    The arrays (S,) of the segments are the fields of :class:`Wire`. ``start`` (C+1,) is the index of
+    the first segment of each cable, and S at the end. ``forced`` (C,) [N] is the tension that a
+    motor keeps in the first segment; NaN if the motor is locked. Newton's method starts at the
+    tensions ``near`` (S,) [N].
 
     Returns:
         Three arrays (S,): the tension T [N] of each segment; the natural length [m] of wire that
