@@ -155,8 +155,8 @@ def solve_chains(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Compute tensions along all cables, and the wire that slips through their holes.
 
-    The arrays (S,) of the segments are the fields of :class:`Wire`. ``start`` (C+1,) is the index of
-    the first segment of each cable, and S at the end. ``forced`` (C,) [N] is the tension that a
+    The arrays (S,) of the segments are the fields of :class:`Wire`. ``start`` (C+1,) is the index
+    of the first segment of each cable, and S at the end. ``forced`` (C,) [N] is the tension that a
     motor keeps in the first segment; NaN if the motor is locked. Newton's method starts at the
     tensions ``near`` (S,) [N].
 

@@ -138,7 +138,7 @@ def clearance_rows(
         routing: Points of the arm: cable sites, ends of bones, centres of disks and points on
             their axes. Indices of points below refer to it.
         segment: Number of the cable, and indices of both end points, of each segment (S, 3).
-        bone: Indices of both end points of each bone (n, 2).
+        bone: Indices of both end points of each bone, the bar that stands for a link (n, 2).
         bone_radius: Radius of each bone (n,) [m].
         disk: Indices of two points of each disk: its centre, and a point on its axis 1 m from the
             centre (D, 2).
