@@ -1,8 +1,8 @@
 """Numba kernel of the clearances of cables: from each other, from links, from the rims of disks.
 
-A cable is a chain of straight segments. A link is a straight round bar, called its bone. A disk is
-a flat circular plate. The distances of two segments, and of a segment and a disk, are minima of
-convex functions.
+A cable is a chain of straight segments. A link is a straight round bar, its backbone ("bone"). A
+disk is a flat circular plate. The distances of two segments, and of a segment and a disk, are
+minima of convex functions.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def clearance_rows(
         routing: Points of the arm: cable sites, ends of bones, centres of disks and points on
             their axes. Indices of points below refer to it.
         segment: Number of the cable, and indices of both end points, of each segment (S, 3).
-        bone: Indices of both end points of each bone, the bar that stands for a link (n, 2).
+        bone: Indices of both end points of each bone, the backbone of a link (n, 2).
         bone_radius: Radius of each bone (n,) [m].
         disk: Indices of two points of each disk: its centre, and a point on its axis 1 m from the
             centre (D, 2).
