@@ -14,7 +14,7 @@ from cdsm.support.values import Array, frozen
 
 
 class Arm(NamedTuple):
-    """Arrays of an arm with nv joint coordinates and C cables, as ``evaluate_rows`` takes them."""
+    """An arm with nv joint coordinates and C cables, as arrays for ``evaluate_rows``."""
 
     tree: Tree  # joints
     routing: Routing  # cables
@@ -48,7 +48,7 @@ class Rows(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """Requested quantities; each quantity has a number, see :mod:`cdsm.batch.layout`."""
+    """The quantities that a batch must compute; :mod:`cdsm.batch.layout` gives each a number."""
 
     start: Indices  # index in the record at which each quantity begins
     stored: Flags  # whether the kernel copies each quantity to its output
@@ -58,7 +58,7 @@ class Asked(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Arrays that the kernel fills, and from which readings such as ``along`` are computed.
+    """Arrays that ``evaluate_rows`` fills for the readings of K_θ, such as ``along``.
 
     There are B blocks of W postures. B is 0 for an array that no requested reading needs.
     """

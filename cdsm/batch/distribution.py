@@ -56,7 +56,10 @@ class Tensions(ReadOnlyState):
         return frozen(self.status == OK)
 
     def plot(self) -> Figure:
-        """Plot each cable's median tension [N] and range; InvalidInput if none were found."""
+        """Plot the median and the range of the tensions [N] of each cable over all postures.
+
+        Raises InvalidInput if no tensions were found.
+        """
         return cdsm.plots.plot_tensions(self)
 
     def to_xarray(self) -> xarray.Dataset:
@@ -87,8 +90,9 @@ def distribute_tensions(
     """Compute the least tensions that balance an arm at B postures: min ‖F‖² (Eqs. 13, 17).
 
     Tensions are accepted only if they meet the optimality conditions of
-    :func:`~cdsm.distribute_tension`. A posture is called infeasible only with a proof. If the
-    kernels find neither tensions nor a proof, :func:`~cdsm.distribute_tension` solves the posture.
+    :func:`~cdsm.distribute_tension`. A posture gets the status ``INFEASIBLE`` only with a proof. If
+    the kernels find neither tensions nor a proof, :func:`~cdsm.distribute_tension` solves the
+    posture.
 
     Args:
         arm: The arm.

@@ -47,8 +47,8 @@ class Batch(ReadOnlyState, Named):
     ``dict(batch)`` use them too. Names, shapes and units are as in :class:`~cdsm.Posture` and
     :class:`~cdsm.Stiffness`, with the posture as an additional first axis. A quantity that does not
     exist is NaN; :attr:`status` says why. A batch has no ``plot``, since its rows have no order.
-    Plot the table of :meth:`to_pandas`, or
-    compute a :func:`~cdsm.sweep` and plot it with :func:`cdsm.plots.plot_map`.
+    Plot the table of :meth:`to_pandas`, or compute a :func:`~cdsm.sweep` and plot it with
+    :func:`cdsm.plots.plot_map`.
 
     Attributes:
         arm: The arm.
@@ -132,7 +132,7 @@ def evaluate(
     check_limits: bool = True,
     threads: int | None = None,
 ) -> Batch:
-    """Compute posture and stiffness of an arm at B postures, in microseconds each.
+    """Compute tip, stiffness and other quantities at B postures, in microseconds each.
 
     A posture that cannot be evaluated raises no error; its :attr:`Batch.status` says why.
 
@@ -155,8 +155,9 @@ def evaluate(
             slides, to first order (:attr:`Breakaway.first_order`). The tensions: ``"tension"``.
         direction: u of ``"along"``, ``"stuck_along"`` and ``"breakaway"``: an axis such as ``"z"``,
             or (3,), any length. For several directions (D, 3) these outputs are (B, D).
-        minimum: Lower bounds [N] for :func:`distribute_tensions`, which then finds the tensions.
-        maximum: Upper bounds [N] of distributed tensions; no bounds if not given.
+        minimum: Lower bounds [N] of the tensions, as for :func:`distribute_tensions`; tensions are
+            then distributed first.
+        maximum: Upper bounds [N] of these tensions; no bounds if not given.
         check_limits: Skip postures beyond the joint limits; their status is ``BEYOND_LIMITS``.
         threads: Maximum number of threads; by default one for each core. A user-defined elasticity
             is called from all threads.
@@ -230,9 +231,9 @@ def _checked_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 def _checked_load(
     arm: Manipulator, q: Array, tension: Tensions | ArrayLike | None, wrench: ArrayLike | None
 ) -> tuple[Array | None, Array, Codes]:
-    """Return checked tensions (or None) and wrench, and the status (B,) before evaluation.
+    """Check tensions and wrench; return both, and the status (B,) of the postures so far.
 
-    The status is the one of given :class:`Tensions`, else OK.
+    The tensions are None if not given. The status is that of given :class:`Tensions`, else OK.
     """
     if not isinstance(tension, Tensions):
         given = None if tension is None else given_tension(arm, tension, len(q))

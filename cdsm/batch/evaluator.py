@@ -46,12 +46,13 @@ _INVERSE = QUANTITIES[layout.PSEUDOINVERSE + 1 :]
 
 
 class Evaluator:
-    """Evaluates a batch in ranges of rows (postures); arguments as in :func:`cdsm.evaluate`.
+    """Evaluates a batch in ranges of rows; a row is a posture.
 
-    ``tension`` is F (C,) or (B, C) [N]. ``bounds`` are the lower and the upper bounds of
-    distributed tensions, (C,) or (B, C) [N]. If neither is given, no output may depend on tensions.
-    In the private methods, ``rows`` are the inputs of b postures, and ``wanted`` the numbers of the
-    wanted quantities. The methods fill the status ``found`` (b,) and the outputs ``out`` (b, n).
+    Arguments are those of :func:`cdsm.evaluate`. ``tension`` is F (C,) or (B, C) [N]. With lower
+    and upper ``bounds`` instead, (C,) or (B, C) [N], tensions are distributed. If neither is given,
+    no output may depend on tensions. In the private methods, ``rows`` are the inputs of b postures,
+    and ``wanted`` the numbers of the wanted quantities. The methods fill the status ``found`` (b,)
+    and the outputs ``out`` (b, n).
 
     Attributes:
         values: The outputs in the order of ``names``, filled by :meth:`run`.
@@ -127,7 +128,7 @@ class Evaluator:
             out[:, self._place["tension"]] = rows.tension
 
     def _distribute(self, rows: Rows, found: Codes, out: Array) -> None:
-        """Distribute the tensions of the postures ``rows``; fill their status and outputs."""
+        """Distribute the tensions of the postures ``rows``; compute all wanted quantities."""
         balance = self._empty_balance(len(found))
         if self._asks:  # rigidities that only Python computes need the tensions first
             self._evaluate(rows, np.array([layout.TENSION]), found, balance.tension, balance)
@@ -173,10 +174,10 @@ class Evaluator:
         out: Array,
         balance: Balance | None = None,
     ) -> None:
-        """Compute the quantities ``wanted`` of the postures ``rows``, which may have bounds.
+        """Compute the quantities ``wanted`` of the postures ``rows``; fill ``found`` and ``out``.
 
-        Fills the status ``found`` (b,) and the values ``out`` (b, …). With bounds the tensions are
-        guessed and proved; ``balance`` keeps the balance of the postures without proof.
+        If ``rows`` have bounds, the kernel guesses the tensions and verifies them. ``balance`` then
+        gets the moment arms and torques of UNDECIDED postures, and tensions of POSTPONED ones.
         """
         balance = balance or self._empty_balance(0)
         read, (nv, width) = wanted > layout.STUCK_JOINT, (self._arm.nv, self._block)
@@ -212,7 +213,11 @@ class Evaluator:
                     values[:, self._place[name]] = math.nan
 
     def _with_rigidities(self, rows: Rows, found: Codes) -> Rows:
-        """Return ``rows`` with rigidities, if they are needed and some law is a Python function."""
+        """Return ``rows``, with rigidities filled in if laws are functions of Python.
+
+        Kernels cannot call these functions. Nothing is filled in if no output needs rigidities, or
+        as long as the tensions are not known.
+        """
         if not (self._asks and len(rows.tension)):
             return rows
         model, usable = self._arm._model, found == OK
@@ -233,7 +238,8 @@ class Evaluator:
     ) -> None:
         """Compute readings from the arrays ``kept``; fill ``out`` and update the status ``found``.
 
-        ``names`` has two lists of readings: of the frictionless arm, and of the stuck arm.
+        ``names`` has two lists of readings: those of the arm without friction, and those of the arm
+        whose cables stick.
         """
         status = np.full(len(kept.jacobian) * self._block, UNREAD)
         status[: found.size][found == OK] = READ

@@ -1,6 +1,7 @@
-"""Fused kernel: it computes all requested quantities of many postures up to K_θ, block by block.
+"""Fused kernel: one kernel that computes the quantities of many postures up to K_θ, in blocks.
 
-The physics is in :mod:`cdsm.kernels`. This kernel calls it without allocating memory per block.
+The physics is in :mod:`cdsm.kernels`, whose kernels this one calls. Memory is allocated once for
+all blocks. Readings of K_θ, such as ``along``, are computed later from its results.
 """
 
 from __future__ import annotations

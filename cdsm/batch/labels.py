@@ -30,10 +30,10 @@ def to_dataset(
     values: dict[str, Array],
     directions: Array | None = None,
 ) -> xarray.Dataset:
-    """Build a Dataset of quantities (B, …) by name, with joint angles and status (B,).
+    """Build a Dataset of the quantities ``values`` (B, …), joint angles (B, nv) and status (B,).
 
-    ``directions`` (D, 3) label the dimension of several directions. Raises MissingExtra if xarray
-    is not installed.
+    ``directions`` (D, 3), or (3,) for one, label the values that depend on a direction. Raises
+    MissingExtra if xarray is not installed.
     """
     units = {"torque": arm.torque_unit(), "stiffness": arm.stiffness_unit()}
     units["lever"] = JointUnits(arm.slides).joined("m/rad", "1")

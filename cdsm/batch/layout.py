@@ -1,4 +1,4 @@
-"""Layout of a record: the quantities of one posture, one after the other."""
+"""Layout of a record, an array of all quantities of one posture, one after the other."""
 
 from __future__ import annotations
 
@@ -90,9 +90,9 @@ def shapes(nv: int, cables: int, directions: int) -> dict[str, tuple[int, ...]]:
 
 
 def starts(nv: int, cables: int, directions: int) -> Indices:
-    """Return the index at which each quantity begins in a record, and the record's length.
+    """Return the index at which each quantity begins in a record; its length is the last entry.
 
-    A record is the row of all quantities of a posture.
+    The arguments are the numbers of joints, of cables, and of directions u.
     """
     sizes = [math.prod(shape) for shape in shapes(nv, cables, directions).values()]
     return np.array([0, *np.cumsum(sizes)], dtype=np.intp)

@@ -14,8 +14,8 @@ from cdsm.support.values import Array, frozen
 def rigidities(laws: CableLaws, tension: Array, usable: Flags) -> Array:
     """Return EA (1 + ε) (b, C) [N] at tensions F (b, C) [N] in the rows that are ``usable`` (b,).
 
-    Other rows are 0, and so are cables that ``laws`` treats as force-controlled. Outside a law's
-    domain an entry is −1.
+    Entries are 0 in other rows, and for cables that ``laws`` treats as force-controlled. They are
+    −1 where F is outside the domain of the law.
     """
     if not usable.any():  # a user-defined law may fail on empty arrays
         return frozen(np.zeros_like(tension))

@@ -1,4 +1,4 @@
-"""Readings of an arm whose cables stick: tip stiffness, load at which the first cable slides."""
+"""Readings of a stuck arm, whose cables stick in their holes: tip stiffness and breakaway load."""
 
 from __future__ import annotations
 
@@ -33,11 +33,12 @@ def read_stuck(
     names: Collection[str],
     status: Indices,
 ) -> dict[str, Array]:
-    """Compute readings of the stuck arm at the postures ``rows`` under tensions F (b, C) [N].
+    """Compute the readings ``names`` of the stuck arm at the postures ``rows``.
 
-    ``names`` are the names of the wanted readings, which are computed from the arrays ``kept``.
-    ``directions`` (D, 3) are unit vectors. ``status`` is READ or UNREAD for B blocks of W postures
-    (B, W); it becomes SINGULAR where K_θ is singular. The last axis of all results is the posture.
+    ``tension`` is F (b, C) [N], and ``kept`` has K_θ and J_X of the postures. ``directions`` (D, 3)
+    are unit vectors. ``status`` is READ or UNREAD for B blocks of W postures (B, W); it becomes
+    SINGULAR where K_θ is singular. The last axis of all results is the posture. Without friction,
+    no cable sticks: the only result is a breakaway load of 0.
     """
     blocks, width = status.shape
     load = np.zeros((status.size, len(directions)))

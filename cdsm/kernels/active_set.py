@@ -2,19 +2,19 @@
 
     min ½‖F‖²   subject to   J_Lᵀ F = b   and   low ≤ F ≤ high.
 
-The search runs where the guess of :mod:`cdsm.kernels.serpentine_guess` fails. It starts at the
-optimum without bounds. It adds one violated bound after the other, and drops a bound whose
-multiplier would change its sign. It ends at the optimum, or at a proof of infeasibility. A cable is
-free if it is at no bound. With multipliers z of the bounds, positive at the lower one, negative at
-the upper one,
+F are the tensions of the C cables, and b is the torque that they must balance. The search runs
+where the guess of :mod:`cdsm.kernels.serpentine_guess` is not optimal. It starts at the optimum F₀
+without bounds. It adds one violated bound after the other, and drops a bound whose multiplier would
+change its sign. It ends at the optimum, or at a proof of infeasibility. A cable is free if it is at
+no bound. With multipliers z of the bounds, positive at the lower one, negative at the upper one,
 
     F = F₀ + T z,    T = 1 − J_L S⁻¹ J_Lᵀ,    S = J_Lᵀ J_L.
 
-For a free cable, z is known: it is 0. For the others, F is known: it is the bound. A step exchanges
-the roles of z and F of one cable: this is a principal pivot in the tableau T. It costs C²
-operations; no equations are solved. When the search ends, tensions and multipliers are computed
-again from the bounds that it found, so errors of the steps do not accumulate. The caller verifies
-the optimum or the proof.
+A free cable has z = 0, and F is unknown. For a cable at a bound, F is that bound, and z is unknown.
+A step exchanges the known and the unknown of one cable: this is a principal pivot in the tableau T.
+It costs C² operations; no equations are solved. At the end, tensions and multipliers are computed
+again from the bounds that the search found, so errors of the steps do not accumulate. The caller
+verifies the optimum or the proof.
 """
 
 from __future__ import annotations
@@ -46,17 +46,19 @@ class State(NamedTuple):
     """Iterates of a block of W postures, and working memory of the search.
 
     Attributes:
-        F: Tensions (C, W).
-        y: Multipliers of balance, or a proof of infeasibility (nv, W).
+        F: Tensions (C, W) [N].
+        y: Multipliers of the balance J_Lᵀ F = b, or a proof of infeasibility (nv, W).
         side: 1 for a cable at its lower bound, −1 at its upper bound, 0 for a free one (C, W).
         z: Multipliers of the bounds (C, W).
-        tableau: T (C, C, W).
+        tableau: T (C, C, W), as explained at the top of the module.
         system: S, b and J_Lᵀ side by side; b and J_Lᵀ become S⁻¹ b and S⁻¹ J_Lᵀ (nv, nv + 1 + C,
             W).
-        free: Σ J_cᵀ J_c over the free cables c, and a right-hand side (nv, nv + 1, W).
+        free: Σ J_cᵀ J_c over the rows J_c of J_L of the free cables c, and a right-hand side (nv,
+            nv + 1, W).
         cables: Scratch, such as a column and a row of the tableau (2, max(C, nv), W).
-        scratch: Scratch (4, W). Its last row is the size below which an entry of T is zero.
-        chosen: The entering cable, which moves to its bound, and the cable of the pivot (2, W).
+        scratch: Scratch (4, W). Entries of T below its last row count as zero.
+        chosen: Numbers of two cables (2, W): the entering cable, which moves to its violated bound,
+            and the cable of the pivot.
     """
 
     F: Array
@@ -144,7 +146,10 @@ def _start(J: Array, b: Array, state: State, width: Width) -> None:
 
 @inner
 def _set_gram(J: Array, side: Array, system: Array, width: Width) -> None:
-    """Fill the first columns of ``system`` with Σ J_cᵀ J_c over the free cables c."""
+    """Fill the first nv columns of ``system`` with Σ J_cᵀ J_c over the free cables c.
+
+    J_c is row c of J_L ``J`` (C, nv, W). A cable is free where ``side`` (C, W) is 0.
+    """
     for i in upwards(0, J.shape[1]):
         for j in upwards(i, J.shape[1]):
             for w in lanes(width):
@@ -160,7 +165,10 @@ def _set_gram(J: Array, side: Array, system: Array, width: Width) -> None:
 def _choose(
     F: Array, low: Array, high: Array, side: Array, entering: Indices, worst: Array, width: Width
 ) -> None:
-    """Where ``entering`` (W,) is _NONE, choose the free cable farthest outside its bounds."""
+    """Where ``entering`` (W,) is _NONE, set it to the free cable farthest outside its bounds.
+
+    It stays _NONE if all free cables are within their bounds. ``worst`` (W,) is scratch.
+    """
     for w in lanes(width):
         worst[w] = 0.0 if entering[w] == _NONE else math.inf
     for c in upwards(0, F.shape[0]):
@@ -177,9 +185,11 @@ def _choose(
 
 @inner
 def _step(low: Array, high: Array, state: State, width: Width) -> None:
-    """Move the entering cables towards their bounds, until z of another cable would change sign.
+    """Move the entering cable of each posture to its violated bound, or less far.
 
-    Sets the second row of ``state.chosen`` to the cable of the pivot, _NONE if there is no pivot.
+    The move ends earlier where the multiplier z of another cable would change its sign. The second
+    row of ``state.chosen`` becomes the cable of the pivot that follows: the entering cable, or that
+    other one. It becomes _NONE if there is no pivot.
     """
     F, z, side, T, rate = state.F, state.z, state.side, state.tableau, state.cables[0]
     sign, step, limit = state.scratch[0], state.scratch[1], state.scratch[2]
@@ -230,7 +240,7 @@ def _step(low: Array, high: Array, state: State, width: Width) -> None:
 
 @inner
 def _exchange(state: State, width: Width) -> None:
-    """Exchange the roles of z and F of the pivot cable in the tableau T (a principal pivot)."""
+    """Make the principal pivot in the tableau T that frees the pivot cable or fixes its tension."""
     T, pivot, inverse, nothing = state.tableau, state.chosen[1], state.scratch[0], state.scratch[3]
     column, row = state.cables[0], state.cables[1]
     for w in lanes(width):
@@ -259,12 +269,13 @@ def _exchange(state: State, width: Width) -> None:
 
 @inner
 def _finish(J: Array, b: Array, low: Array, high: Array, state: State, width: Width) -> None:
-    """Fill F and y of ``state``. Cables at a bound get this bound, ``low`` or ``high``.
+    """Compute F and y of ``state`` from the bounds that the search found.
 
-    Free cables get the least tensions that balance the rest of the torque b (nv, W). If the search
-    ended because cable p cannot reach its bound, y is the proof: J_c y = 0 for the other free
-    cables c, and J_p y is −1 if F_p is too low, 1 if it is too high. The solution is refined twice,
-    because the system of equations squares the condition number of J_L.
+    Cables at a bound get this bound, ``low`` or ``high``. Free cables get the least tensions that
+    balance the rest of the torque b (nv, W). If the search ended because cable p cannot reach its
+    bound, y is the proof of infeasibility: J_c y = 0 for the other free cables c, and J_p y is −1
+    if F_p is too low, 1 if it is too high. The solution is refined twice, because the matrix
+    Σ J_cᵀ J_c has the square of the condition number of J_L.
     """
     F, y, side, system, entering = state.F, state.y, state.side, state.free, state.chosen[0]
     sign, torque, nv = state.cables[0, 0], state.cables[1], np.uint64(y.shape[0])

@@ -1,13 +1,13 @@
 """Numba kernels of the rigid bodies: tip pose, tip Jacobian, gravity torque and stiffness.
 
 Pinocchio computes the same, but its calls from Python take longer than all other computations. A
-test compares the two to rounding. Joint i turns about the axis z_i through o_i. It moves bodies of
-total mass M and first moment S = Σ m c, with their centres of mass c. With r_i = S − M o_i and the
-acceleration of gravity γ,
+test compares the two to rounding. Joint i turns about the axis z_i through the point o_i. The
+bodies that it moves have masses m, centres of mass c, the total mass M_i = Σ m and the first moment
+S_i = Σ m c. With r_i = S_i − M_i o_i and the acceleration of gravity γ,
 
     g_i = −γ·(z_i × r_i),    ∂g_i/∂θ_j = −γ·(z_i × (z_j × r_j)) if i is j or moves joint j.
 
-If joint j is prismatic with direction s, M s replaces z_j × r_j, and z_j is 0.
+If joint j is prismatic with direction s, M_j s replaces z_j × r_j, and z_j is 0.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from cdsm.support.values import Array
 
 
 class Masses(NamedTuple):
-    """Masses that the joints carry, and the position of the tip; rows as those of :class:`Tree`.
+    """Masses that the joints carry, and the place of the tip; rows are those of :class:`Tree`.
 
     Attributes:
         mass: Mass of the bodies fixed to each joint's frame, (nv+1,) [kg].
         centre: Centre of mass of these bodies in the joint's frame, (nv+1, 3) [m].
         gravity: Gravity in base axes (3,) [m/s²].
-        tip: Row of the joint that moves the tip.
+        tip: Row of the last joint before the tip.
         tip_joints: Indices in q of the joints that move the tip, from the base on.
         rotation: Rotation of the tip in the frame of joint ``tip``, (3, 3).
         point: Origin of the tip in the frame of joint ``tip``, (3,) [m].
@@ -97,9 +97,10 @@ def gravity_torque(
     torque: Array,
     width: Width,
 ) -> None:
-    """Fill ``torque`` (nv, W) with g, and ``carried`` (nv+1, 7, W) with γ × z, z × r and M.
+    """Fill ``torque`` (nv, W) with the gravity torque g = ∂V/∂θ.
 
-    ``carried`` has a row for each joint. The symbols are explained at the top of the module.
+    Also fills ``carried`` (nv+1, 7, W) with γ × z_i, z_i × r_i and M_i of each joint i. The symbols
+    are explained at the top of the module.
     """
     parent, order = tree.parent, tree.order
     origin, axis, slide, _ = frames
@@ -144,9 +145,9 @@ def gravity_torque(
 
 @inner
 def set_gravity_stiffness(parent: Indices, carried: Array, gravity: Array, width: Width) -> None:
-    """Fill ``gravity`` (nv, nv, W) with ∂g_i/∂θ_j for i ≤ j, from ``carried``.
+    """Fill ``gravity`` (nv, nv, W) with ∂g_i/∂θ_j for i ≤ j.
 
-    :func:`gravity_torque` fills ``carried``.
+    ``carried`` is a result of :func:`gravity_torque`, ``parent`` a field of :class:`Tree`.
     """
     for j in range(parent.shape[0] - 1, 0, -1):
         last = np.uint64(j)

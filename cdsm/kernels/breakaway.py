@@ -1,15 +1,17 @@
-"""Numba kernel of breakaway, for blocks of postures: the load at which the first hole slides.
+"""Numba kernel of breakaway, for blocks of postures: the load at which a cable first slides.
 
-A force f e at the tip of a stuck arm, e a unit vector, moves the joints by θ̇ = K_θ⁻¹ J_vᵀ e per
-newton; a dot is a derivative with respect to f. A section is the part of a cable between two holes
-where it sticks, with tension T, length l and stiffness k. Without the force, all sections of a
-cable have the tension F. Per newton of f, the tension changes by Ṫ = k l̇ before a hole, and by
-Ṫ′ = k′ l̇′ after it. With friction μ and wrap angle φ, the hole begins to slide, to first order, at
+An arm is stuck while its cables stick in their holes. Then a force f e at the tip, with a unit
+vector e, moves the joints by θ̇ = K_θ⁻¹ J_vᵀ e per newton; a dot is a derivative with respect to f.
+A cable sticks in a hole that has friction if it bends there. The part of a cable between two such
+holes is a section, with tension T, length l and stiffness k. Without the force, all sections of a
+cable have the tension F. Per newton of f, the tension changes by Ṫ = k l̇ in the section before a
+hole, and by Ṫ′ = k′ l̇′ in the section after it. With the friction coefficient μ and the wrap angle
+φ of the hole, the cable begins to slide in it, to first order, at
 
     f = μ φ/(|Ṫ′ − Ṫ|/F − μ φ̇),   φ̇ = −(u̇·v + u·v̇)/sin φ,
 
-with the directions u and v of the cable before and after it. The breakaway load is the least f of
-all holes.
+where u and v are the directions of the cable before and after the hole. The breakaway load is the
+least f of all holes.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ ROUNDING = 1e-12
 
 
 class Velocities(NamedTuple):
-    """Derivatives of positions and lengths with respect to the force f, called velocities."""
+    """Velocities of the arm: derivatives of positions with respect to the force f at the tip."""
 
     turn: Array  # angular velocity of each joint (nv+1, 3, W)
     origin: Array  # velocity of the origin of each joint (nv+1, 3, W)
@@ -53,9 +55,10 @@ class Velocities(NamedTuple):
 
 
 class SlipRates(NamedTuple):
-    """Terms of the breakaway load of the holes that hold a cable.
+    """Terms of the load at which a cable begins to slide, for each hole where it sticks.
 
-    They are in the row of the next site at which a section ends: another hole, or the cable's end.
+    A section follows the hole. The terms are stored in the row of the site where this section ends:
+    the next hole where the cable sticks, or the end of the cable.
     """
 
     jump: Array  # |Ṫ′ − Ṫ|/F (P, W)
@@ -86,10 +89,11 @@ def set_breakaway(
         wires: Laws of its cables.
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N].
-        wire: EA (1 + ε) (b, C) or (1, C) [N]; (0, C) if it follows from ``wires``.
-        motion: ∂θ/∂load of the stuck arm in B blocks of W postures (B, nv, D, W) [rad/N].
+        wire: EA (1 + ε) (b, C) or (1, C) [N]; empty, (0, C), to compute it from ``wires``.
+        motion: Joint motion θ̇ of the stuck arm per load, in B blocks of W postures (B, nv, D, W)
+            [rad/N].
         width: W, the number of postures in a block.
-        out: The loads; inf where no hole ever slides, 0 where no cable sticks.
+        out: The loads; inf where no cable ever slides, 0 where no cable sticks.
     """
     nv, cables = motion.shape[1], routing.fixed.shape[0]
     rows, sites = tree.parent.shape[0], routing.row.shape[0]
@@ -233,10 +237,10 @@ def _store_hole(
     slips: SlipRates,
     width: Width,
 ) -> None:
-    """Where hole p holds cable c, store the slip rates of the hole before, in row p of ``slips``.
+    """Where cable c sticks in hole p, end the section there and begin the next one.
 
-    The hole before is the last one that holds; the section after it ends at p. Then p becomes the
-    last hole, and the next section starts there. v (3, W) is the direction of the cable after p.
+    Both sections of the last hole before p are then known, so its terms go to row p of ``slips``.
+    Then p becomes the last hole. v (3, W) is the direction of the cable after p.
     """
     set_stiffness(wire, c, section, width)
     u, mu, own = section.before, holes.friction[p], holes.wrap[p]
@@ -266,9 +270,9 @@ def _store_hole(
 
 @inlined
 def _set_loads(slips: SlipRates, load: Array, width: Width) -> None:
-    """Fill ``load`` (W,) with the breakaway load, the least of all holes in ``slips``.
+    """Fill ``load`` (W,) [N] with the breakaway load, the least load of all holes in ``slips``.
 
-    It is inf if no hole ever slides, and 0 if no cable sticks.
+    It is inf if no cable ever slides, and 0 if no cable sticks.
     """
     for w in lanes(width):
         most, found, held = 0.0, math.inf, False

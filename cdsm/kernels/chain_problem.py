@@ -1,14 +1,14 @@
 """Numba kernel of the chain problem: tensions along a cable that sticks and slips in its holes.
 
-Segment j of a cable lies between two holes. At a fixed posture it has the length l_j. The natural
-length a_j of its wire is its length at zero strain. From one posture to the next it changes only by
-wire that slips through the holes. Coulomb friction at the hole between segments j and j + 1, with
-the capstan ratio ρ_j = exp(μ φ_j), demands
+Segment j of a cable lies between two holes. At a fixed posture it has the length l_j. The wire in
+it has the natural length a_j, its length at zero strain. From one posture to the next, a_j changes
+only by wire that slips through the holes. Coulomb friction at the hole between segments j and
+j + 1, with the capstan ratio ρ_j = exp(μ φ_j), demands
 
     T_j/ρ_j ≤ T_{j+1} ≤ ρ_j T_j.
 
 Wire s_j > 0 moves from j to j + 1 only if T_{j+1} = ρ_j T_j, and back (s_j < 0) only if
-T_j = ρ_j T_{j+1}. Under T a segment has the natural length
+T_j = ρ_j T_{j+1}. A segment of length l_j that has the tension T has the natural length
 
     A_j(T) = (l_j − c_j (T − T⁰_j))/(1 + ε(T)).
 
@@ -21,19 +21,20 @@ optimality (KKT) conditions of
 and the slips are the multipliers. D_j′ increases with y, so the problem is strictly convex and has
 one solution. If one segment of a cable is under tension, all are.
 
-Dynamic programming on the chain solves it exactly ("taut string"). Let V_j(y) be the least sum over
-the segments from j to the end of the cable if segment j has y. Let y*_j be its minimizer. The
-best y_{j+1} is the point z nearest to y*_{j+1} within y ± μφ_j. Therefore
+Dynamic programming on the chain solves it exactly ("taut string"). Let V_j(y) be the least sum of
+D over the segments from j to the end of the cable if segment j has the value y. Let y*_j be the
+minimizer of V_j. If segment j has y, friction allows y_{j+1} from y − μφ_j to y + μφ_j. The best
+y_{j+1} is the point z of this interval nearest to y*_{j+1}. Therefore
 
-    V_j′(y) = D_j′(y) + V_{j+1}′(z) if y*_{j+1} is beyond y ± μφ_j,   and D_j′(y) if not.
+    V_j′(y) = D_j′(y) + V_{j+1}′(z) if y*_{j+1} is outside the interval,   and D_j′(y) if inside.
 
 From the end of the cable to the motor, the root y*_j of the rising V_j′ is found by Newton's method
 inside a bracket. A locked motor makes y_1 = y*_1; a motor that controls the tension prescribes y_1.
-Then y_{j+1} = z, segment by segment. A hole slides if z is not y*_{j+1}; then s_j = −V_{j+1}′(z).
-The code uses T instead of y, so that a slack cable, T = 0, is an ordinary case.
+Then y_{j+1} = z, segment by segment. The cable slides in a hole if z is not y*_{j+1}; then
+s_j = −V_{j+1}′(z). The code uses T instead of y, so that a slack cable, T = 0, is an ordinary case.
 
-V_j′ has one term for each segment up to the next hole that sticks. So N segments take O(N) where
-few holes slide, and O(N²) where all do.
+V_j′ has one term for each segment up to the next hole in which the cable sticks. So N segments take
+O(N) time if the cable slides in few holes, and O(N²) if it slides in all.
 
 In this kernel 1 + ε(T) = base + softness · T. For other laws :mod:`cdsm.friction.chain_problem`
 calls the kernel repeatedly with the tangent of the law, which is Newton's method.
@@ -59,7 +60,7 @@ _ITERATIONS = 200
 
 
 class Wire(NamedTuple):
-    """Arrays (S,) of the segments of all cables: cable by cable, each from its motor to its end."""
+    """Properties of all S segments, (S,) each: cable by cable, from the motor to the end."""
 
     length: Array  # l [m]
     natural: Array  # a before the slips [m]
@@ -72,9 +73,9 @@ class Wire(NamedTuple):
 
 @inner
 def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
-    """Compute D_j′ = a_j − A_j(T) [m] of segment j, and its derivative with respect to T [m/N].
+    """Compute the surplus of wire in segment j, D_j′ = a_j − A_j(T) [m], and ∂D_j′/∂T [m/N].
 
-    a_j is the natural length of the segment before wire slips. A_j(T) is the natural length with
+    a_j is the natural length in the segment before wire slips. A_j(T) is the natural length with
     which the segment has the tension T.
     """
     stretch = wire.base[j] + wire.softness[j] * T
@@ -84,9 +85,9 @@ def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
 
 @inner
 def _next(T: float, ratio: float, best: float) -> float:
-    """Return the tension [N] nearest to ``best`` that friction allows: T/ratio to T · ratio.
+    """Return the tension [N] nearest to ``best`` that friction at a hole allows after the hole.
 
-    T is the tension of the segment before, and ``ratio`` is exp(μ φ) of the hole between the two.
+    Friction allows T/ratio to T · ratio. T is the tension before the hole, ``ratio`` is exp(μ φ).
     """
     return min(max(best, T / ratio), T * ratio)
 
@@ -99,7 +100,7 @@ def _slope(
 
     V_j and y*_i are explained at the top of the module. ``best`` (S,) has exp(y*_i) of the segments
     i after j [N]; ``last`` is the cable's last segment. The scale is the sum of the natural lengths
-    of the segments up to the next hole that sticks.
+    of the segments up to the next hole in which the cable sticks.
     """
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.natural[j])
@@ -116,9 +117,10 @@ def _slope(
 
 @inner
 def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
-    """Find the tension exp(y*_j) [N] of segment j at which V_j′ is zero; 0 if V_j′ is never < 0.
+    """Find the tension exp(y*_j) [N] of segment j at which V_j′ is zero.
 
-    The search starts at the tension ``near`` [N]. The other arguments are as for :func:`_slope`.
+    The result is 0, for a slack segment, if V_j′ is not negative at any tension. The search starts
+    at the tension ``near`` [N]. The other arguments are as for :func:`_slope`.
     """
     if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
         return 0.0
@@ -151,16 +153,17 @@ def solve_chains(
     ratio: Array,
     near: Array,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Solve the chain problem of all cables; see :class:`Wire` for the arrays (S,).
+    """Compute tensions along all cables, and the wire that slips through their holes.
 
-    ``start`` (C+1,) is the index of the first segment of each cable, and S at the end. ``forced``
-    (C,) [N] is the tension that a motor keeps in the first segment; NaN if the motor is locked.
-    Newton's method starts at the tensions ``near`` (S,) [N].
+    The arrays (S,) of the segments are the fields of :class:`Wire`. ``start`` (C+1,) is the index
+    of the first segment of each cable, and S at the end. ``forced`` (C,) [N] is the tension that a
+    motor keeps in the first segment; NaN if the motor is locked. Newton's method starts at the
+    tensions ``near`` (S,) [N].
 
     Returns:
-        Three arrays (S,): the tension T [N] of each segment, the natural length [m] of wire that
-        slips from it to the next segment, and whether the hole between them slides. A hole without
-        friction always slides.
+        Three arrays (S,): the tension T [N] of each segment; the natural length [m] of wire that
+        slips from it to the next segment, negative if wire slips back; and whether the cable slides
+        in the hole between them. In a hole without friction it always slides.
     """
     wire = Wire(length, natural, base, softness, spring, rest, ratio)
     size = length.shape[0]
@@ -196,9 +199,10 @@ def chain_tangent(
 ) -> Array:
     """Compute ∂T/∂θ (S, nv) [N/rad] of the tensions from :func:`solve_chains`.
 
-    A block is a run of segments joined by sliding holes; its first segment is a. In it, T_j =
-    T_a exp(Σ ± μ φ), and wire is conserved. With g = ∂l/∂θ, the sum ψ_j = Σ ± μ ∂φ/∂θ over the
-    holes from segment a to segment j, and the compliance −∂A/∂T of the segments,
+    A block is a run of segments joined by holes in which the cable slides; a is its first segment.
+    Within a block, T_j = T_a exp(Σ ± μ φ) over the holes from segment a to segment j, with + where
+    T rises at the hole, and wire is conserved. With g = ∂l/∂θ, ψ_j = Σ ± μ ∂φ/∂θ over the same
+    holes, and the compliance −∂A/∂T of each segment,
 
         ∂ln T_a/∂θ = Σ_j (g_j/(1 + ε_j) − compliance_j T_j ψ_j) / Σ_j compliance_j T_j,
         ∂T_j/∂θ = T_j (∂ln T_a/∂θ + ψ_j).

@@ -1,7 +1,7 @@
 """Numba kernels of cables as chains of segments: lengths, wrap angles and their gradients.
 
-Each segment is routed as a cable of its own, so its length and its derivatives come from
-``segments.py``: L is then l (S,), J_L is ∂l/∂θ (S, nv), and H_L·F is Σ T_j ∂²l_j/∂θ².
+These kernels treat each of the S segments as a cable of its own. So ``segments.py`` computes their
+lengths and derivatives: L is then l (S,), J_L is ∂l/∂θ (S, nv), and H_L·F is Σ T_j ∂²l_j/∂θ².
 
 The wrap angle φ of a hole is the angle between the directions u and v of the cable before and after
 it, φ = atan2(|u × v|, u·v). With the unit vectors p ⊥ u and q ⊥ v in their plane,
@@ -9,9 +9,9 @@ it, φ = atan2(|u × v|, u·v). With the unit vectors p ⊥ u and q ⊥ v in the
     ∂φ/∂θ_i = −(p·d_i/ℓ_u + q·e_i/ℓ_v),   p = ((u × v) × u)/|u × v|,   q = (v × (u × v))/|u × v|.
 
 The segments before and after the hole have the lengths ℓ_u and ℓ_v. d_i and e_i are the derivatives
-of the vectors along them (end minus start) with respect to θ_i, in the link of the hole. Where the
-cable goes straight through, φ has a kink, |a·δθ| with some vector a; the gradient is set to 0, the
-mean of both sides.
+with respect to θ_i of the vectors along them (end minus start), seen from the link of the hole.
+Where the cable goes straight through, φ has a kink: it grows like |a·δθ| with some vector a. There
+the gradient is set to 0, the mean of both sides.
 """
 
 from __future__ import annotations
@@ -49,12 +49,13 @@ def _set_wraps(
     wrap: Array,
     gradient: Array,
 ) -> None:
-    """Fill ``wrap`` (P,) with φ of every hole of one posture; add ∂φ/∂θ to ``gradient``.
+    """Fill ``wrap`` (P,) with φ [rad] of every hole of one posture; add ∂φ/∂θ to ``gradient``.
 
     Segment s is between the sites 2 s and 2 s + 1; ``hole`` (P,) is the segment before each hole.
-    The joints of a segment follow each other in ``joint``. ``span`` (S, 3) has the index of the
-    first one, of the first one on the path to the segment's second site, and the end. ``own`` (P,)
-    is a constant angle added to φ [rad]. ``gradient`` is (P, nv), zero on entry.
+    ``joint`` lists the joints between both ends of a segment, one segment after the other. ``span``
+    (S, 3) has three indices in ``joint`` for each segment: of its first joint, of its first joint
+    on the path to its second site, and of the end. ``own`` (P,) is a constant angle added to φ
+    [rad]. ``gradient`` is (P, nv), zero on entry.
     """
     u, v = before.direction.reshape(3), after.direction.reshape(3)
     normal, arm = np.empty(3), np.empty(3)
@@ -126,9 +127,9 @@ def grip_rows(
 ) -> None:
     """Fill ``grip`` (B, C) [-] with Σ μ φ over the holes of each cable at angles q (B, nv) [rad].
 
-    In ``routing``, each segment is a cable. Each hole has the friction coefficient ``friction``
-    (P,) and is a hole of the cable ``cable`` (P,). ``hole`` and ``own`` (P,) are the segment before
-    it, and the constant angle [rad] added to its wrap angle φ.
+    In ``routing``, each segment is a cable. Four arrays (P,) describe the holes: the segment before
+    the hole (``hole``), the constant angle [rad] added to its wrap angle φ (``own``), its cable,
+    and its friction coefficient μ.
     """
     rows, nv = q.shape
     before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)

@@ -1,7 +1,8 @@
 """Numba kernel of the clearances of cables: from each other, from links, from the rims of disks.
 
-A cable is a chain of straight segments, a link a straight bone, a disk a flat circular plate. The
-distances of two segments, and of a segment and a disk, are minima of convex functions.
+A cable is a chain of straight segments. A link is a straight round bar, its backbone ("bone"). A
+disk is a flat circular plate. The distances of two segments, and of a segment and a disk, are
+minima of convex functions.
 """
 
 from __future__ import annotations
@@ -44,9 +45,11 @@ def _between(p: Array, q: Array, r: Array, s: Array) -> float:
 
 @inner
 def _to_disk(p: Array, q: Array, centre: Array, axis: Array, radius: float) -> float:
-    """Compute the distance [m] of segment pq from a disk; if pq pierces it, −distance to the rim.
+    """Compute the distance [m] of segment pq from a disk.
 
-    The disk is flat, with a ``centre`` (3,) [m], a unit normal ``axis`` (3,) and a ``radius`` [m].
+    If pq pierces the disk, the result is negative: its size is the distance of the piercing point
+    from the rim. The disk is flat, with a ``centre`` (3,) [m], a unit normal ``axis`` (3,) and a
+    ``radius`` [m].
     """
     z0 = z1 = 0.0
     for i in range(3):
@@ -101,9 +104,9 @@ def _off(
 
 @inner
 def _sphere_distance(p: Array, q: Array, r: Array, s: Array) -> float:
-    """Return the distance of the spheres whose diameters are the segments pq and rs [m].
+    """Return a lower bound [m] of the distance between the segments pq and rs, fast to compute.
 
-    It is a lower bound of the distance of the segments, and negative where the spheres overlap.
+    It is the distance of the spheres that have the segments as diameters; negative if they overlap.
     """
     first = second = between = 0.0
     for i in range(3):
@@ -128,14 +131,14 @@ def clearance_rows(
     distance: Array,
     nearest: Indices,
 ) -> None:
-    """Fill the smallest distances of cables at B postures, and the pairs of bodies that have them.
+    """Compute the smallest distances of cables at B postures, and which bodies have them.
 
     Args:
         tree: The joints.
         routing: Points of the arm: cable sites, ends of bones, centres of disks and points on
             their axes. Indices of points below refer to it.
         segment: Number of the cable, and indices of both end points, of each segment (S, 3).
-        bone: Indices of both end points of each bone (n, 2).
+        bone: Indices of both end points of each bone, the backbone of a link (n, 2).
         bone_radius: Radius of each bone (n,) [m].
         disk: Indices of two points of each disk: its centre, and a point on its axis 1 m from the
             centre (D, 2).

@@ -100,15 +100,15 @@ class CacheFile(IndexDataCacheFile):
     """Cache of one kernel on disk: an index of signatures, and a file for each.
 
     numba numbers the files. If two processes compile a kernel for different signatures at the same
-    time, both may write the same file, and a third process runs the wrong machine code. Here names
-    are unique.
+    time, both may write the same file, and a third process runs the wrong machine code. This class
+    gives each file a unique name.
     """
 
     def _data_name(self, number: int) -> str:
         return f"{Path(self._index_name).stem}.{uuid.uuid4().hex}.nbc"
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
-        """Save the index, and remove the files of older sources, which it does not name."""
+        """Save the index, and remove files that it does not name, compiled from older sources."""
         super()._save_index(overloads)  # type: ignore[no-untyped-call]
         for path in Path(self._cache_path).glob(
             f"{glob.escape(Path(self._index_name).stem)}.*.nbc"
@@ -131,7 +131,10 @@ def _sources(file: str) -> str:
 
 @cache
 def _own_folder() -> str:
-    """Return a temporary folder that only this user can write, and log a warning."""
+    """Return a temporary folder for compiled kernels, where only this user can write.
+
+    It is used if no folder of numba's cache is writable; a warning says so.
+    """
     user = os.getuid() if hasattr(os, "getuid") else "user"
     folder = Path(tempfile.gettempdir()) / f"cdsm-kernels-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -166,7 +169,10 @@ def at_once() -> Iterator[None]:
 
 
 def _patient(function: _Function) -> _Function:
-    """Return a kernel that Python runs until loading it from the disk or compiling it pays."""
+    """Let Python run the first calls of a kernel, until loading or compiling it is worth the time.
+
+    A kernel in the cache on the disk is loaded; another one is compiled.
+    """
     if not isinstance(function, Dispatcher):  # compilation is switched off
         return function
     kernel: Any = function
@@ -216,7 +222,10 @@ def _patient(function: _Function) -> _Function:
 
 
 def is_new(kernel: Callable[..., Any]) -> bool:
-    """Return whether Python would run the next call of ``kernel`` on a block wider than WIDTH."""
+    """Return whether ``kernel`` is not compiled yet, so that numpy would run a wide block.
+
+    A block is wide if it has more than :data:`WIDTH` postures.
+    """
     new: Callable[[], bool] = getattr(kernel, "is_new", lambda: False)
     return new()
 
@@ -264,11 +273,11 @@ def lanes(width: Width) -> Iterable[Index]:
 
 @inner
 def axes(count: int, width: Width) -> Iterable[Index]:
-    """Return range(3); LLVM knows its length for one posture (``width`` None), but not for a block.
+    """Return range(3), for loops over x, y and z that LLVM unrolls for one posture only.
 
-    LLVM unrolls loops of a known length. For one posture they then run two or three times as fast.
-    For a block they would not run faster, but compile half as long again. ``count`` must be 3; LLVM
-    does not know its value.
+    LLVM unrolls loops of a constant length. For one posture (``width`` None) they then run two or
+    three times as fast. For a block they would not run faster, but take half as long again to
+    compile. There the length is ``count``, which must be 3, but is not a constant for LLVM.
     """
     return range(np.uint64(3)) if width is None else range(np.uint64(count))
 

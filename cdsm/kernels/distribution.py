@@ -63,7 +63,10 @@ def set_arms(J: Array, smallest: float, arms: Array, width: Width) -> None:
 
 @inner
 def keep_balance(arms: Array, torque: Array, balance: Balance, row: Index, w: Index) -> None:
-    """Copy ``arms`` (C, nv, W) and ``torque`` (nv, W) of posture w to a ``row`` of ``balance``."""
+    """Keep the balance of posture w for a later search: copy it to a ``row`` of ``balance``.
+
+    ``arms`` is J_L (C, nv, W), and ``torque`` (nv, W) the torque to balance.
+    """
     for i in upwards(0, torque.shape[0]):
         balance.torque[row, i] = torque[i, w]
     for c in upwards(0, arms.shape[0]):
@@ -113,9 +116,9 @@ def single_guess(
 ) -> tuple[Array, bool]:
     """Guess the least tensions (C,) [N] of one posture, and say whether they are optimal.
 
-    The first four arguments are the fields of :class:`Blocks`, which are followed by J_X, J_L, g, W
-    and the bounds (C,). Moment arms below ``smallest`` [m] become zero. The result has the same
-    bits as in a block of postures.
+    The first four arguments are the fields of :class:`Blocks`. J_X (6, nv), J_L (C, nv), g (nv,),
+    W (6,) and the bounds (C,) follow. Moment arms below ``smallest`` [m] become zero. The result
+    has the same bits as in a block of postures.
     """
     count, nv = length_jacobian.shape
     blocks = Blocks(row, row_start, cable, cable_start)
@@ -138,8 +141,8 @@ def search_tensions(
     """Search for the least tensions of r postures for which the guess is not optimal.
 
     J is J_L (r, C, nv), and b (r, nv) the torque to balance. The bounds ``low`` and ``high`` are
-    (r, C), or (1, C) for all postures. Fills ``tension`` (r, C) and ``outcome`` (r,). Tensions are
-    valid only if the outcome is OPTIMAL.
+    (r, C), or (1, C) for all postures. Fills ``tension`` (r, C), and ``outcome`` (r,) with OPTIMAL,
+    INFEASIBLE or UNDECIDED. Tensions are valid only if the outcome is OPTIMAL.
     """
     rows, count, nv = J.shape
     width = max(1, min(WIDTH, rows, _NUMBERS // (count * (count + nv))))

@@ -38,16 +38,18 @@ def stiffness_of_draws(
     length_jacobian: Array,
     torque: Array,
 ) -> None:
-    """Fill the last five arguments with results for N arms.
+    """Compute K_θ and what else depends on the dimensions of N arms, drawn by Monte Carlo.
 
-    ``joint_stiffness`` is K_θ (N, nv, nv), ``tip_rows`` J_v (N, 3, nv), ``tips`` the tip position
-    (N, 3), ``length_jacobian`` J_L (N, C, nv) and ``torque`` J_Xᵀ W − g (N, nv).
+    The last five arguments are filled: ``joint_stiffness`` with K_θ (N, nv, nv), ``tip_rows`` with
+    J_v (N, 3, nv), ``tips`` with the tip positions (N, 3), ``length_jacobian`` with J_L (N, C, nv)
+    and ``torque`` with J_Xᵀ W − g (N, nv).
 
     All arms share the arguments before ``q``: ``first`` (C+1,) is the first site of each cable,
-    ``series`` (C,) is 1/k_series, ``rest`` (C,) the tension of the unstrained springs, ``wrench``
-    W (6,). The others have an entry for each arm: q (N, nv), tensions F, ``rigidity`` EA (1 + ε)
-    and leads (N, C), masses (N, nv+1), and the positions of sites, joint origins, centres of mass
-    and tip (N, …).
+    ``series`` (C,) is 1/k_series [m/N], ``rest`` (C,) the tension [N] at which the springs are
+    unstrained, ``wrench`` W (6,). The others have one row for each arm: q (N, nv); tensions F [N],
+    ``rigidity`` EA (1 + ε) [N] and leads [m], (N, C) each; masses (N, nv+1) [kg]; and positions
+    [m] of the sites (N, P, 3), of joint origins and centres of mass (N, nv+1, 3) and of the tip
+    (N, 3), as in :class:`Routing`, :class:`Tree` and :class:`Masses`.
     """
     row, tip_joints, count = routing.row, masses.tip_joints, tension.shape[1]
     fixed, none = np.empty(count), np.zeros(count)

@@ -6,7 +6,7 @@ them as operations of numpy on the last axis of its arrays:
     for w in lanes(width):                             w = slice(None)
         c[i, w] = a[w] if b[w] > 0.0 else 0.0          c[i, w] = select(b[w] > 0.0, a[w], 0.0)
 
-Both give the bits of the compiled kernel: numpy rounds each operation as the loop does.
+Both ways give the same bits as the compiled kernel: numpy rounds each operation as the loop does.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from numba.core.dispatcher import Dispatcher
 
 
 def python_kernel(function: FunctionType, wide: bool) -> Callable[..., Any]:
-    """Return a kernel as a Python function, for a block of postures if ``wide``, else for one.
+    """Return a kernel as a Python function: for a block of postures if ``wide``, else for one.
 
     The kernels that it calls become Python functions too.
     """
@@ -36,9 +36,9 @@ def python_kernel(function: FunctionType, wide: bool) -> Callable[..., Any]:
 
 @cache
 def _names(module: str, wide: bool) -> dict[str, Any]:
-    """Return the names that ``module`` defines, with its kernels as functions that Python runs.
+    """Return the global names of ``module``, its kernels replaced by Python functions.
 
-    If ``wide``, they run for a block of postures, else for one posture.
+    If ``wide``, the functions compute a block of postures, else one posture.
     """
     home = sys.modules[module]
     names: dict[str, Any] = {**vars(home), **_OPERATIONS}
@@ -102,7 +102,10 @@ def _found(node: ast.AST) -> set[str]:
 
 
 class _Loops(ast.NodeTransformer):
-    """Replace each loop over postures by operations on arrays, unless its order matters."""
+    """Replace each loop over postures by operations on arrays.
+
+    A loop that cannot be rewritten stays: for example, if a posture depends on the one before.
+    """
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         node.decorator_list = []
@@ -129,7 +132,7 @@ class _Loops(ast.NodeTransformer):
 class _Operations(ast.NodeTransformer):
     """Replace Python's operations on numbers by numpy's operations on arrays.
 
-    ``arrays`` are the names of the variables that have a value per posture; None for all names.
+    ``arrays`` has the names of the variables that have one value per posture; None means all names.
     """
 
     def __init__(self, arrays: set[str] | None) -> None:
@@ -166,7 +169,10 @@ class _Operations(ast.NodeTransformer):
         return node
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
-        """Make ``node`` assign copies instead of views, since a view changes with its array."""
+        """Make ``node`` assign a copy where it would assign a view of an array.
+
+        A view would change later, when the array is overwritten.
+        """
         self.generic_visit(node)
         if not isinstance(node.targets[0], ast.Subscript):
             copies = [

@@ -42,10 +42,11 @@ Exchanges are slow, since they are made posture by posture. K_θ of a stable arm
 
 @inner
 def eliminate(M: Array, pivots: Array, width: Width) -> None:
-    """Solve A X = B: replace the columns B, right of A (n, n) in M (n, n + k, W), by A⁻¹ B.
+    """Solve A X = B. M (n, n + k, W) has A (n, n) on the left and B (n, k) on the right.
 
-    The first two rows of ``pivots`` (4, W) become the smallest and the largest magnitude of a
-    pivot; the other two are scratch. If a pivot is zero, the result is not valid.
+    A⁻¹ B replaces B; A is overwritten. The first two rows of ``pivots`` (4, W) become the smallest
+    and the largest magnitude of a pivot; the other two are scratch. If a pivot is zero, the result
+    is not valid.
     """
     n, columns = M.shape[0], M.shape[1]
     smallest, largest, factor, inverse = pivots[0], pivots[1], pivots[2], pivots[3]
@@ -139,11 +140,12 @@ def smallest_eigenvalue(A: Array, scratch: Array, x: Array, width: Width) -> Non
 def _set_derivatives(
     d: Array, e: Array, x: Array, sums: Array, scratch: Array, width: Width
 ) -> None:
-    """Fill the rows of ``sums`` (3, W) with min g, G = Σ 1/(λ − x) and H = Σ 1/(λ − x)².
+    """Fill the rows of ``sums`` (3, W) with what a step of Laguerre's method at x (W,) needs.
 
-    λ are the eigenvalues of the tridiagonal matrix T with diagonal d and off-diagonal e, (n, W)
-    each. A ratio g is a leading minor of T − x divided by the leading minor before it: if the
-    smallest g is positive, x (W,) is below all λ.
+    The first is the smallest ratio of a leading minor of T − x to the leading minor before it: if
+    it is positive, x is below all eigenvalues λ of T. The others are Σ 1/(λ − x) and Σ 1/(λ − x)².
+    T is the tridiagonal matrix with diagonal d and off-diagonal e, (n, W) each; e[0] is 0.
+    ``scratch`` is (5, W).
     """
     least, G, H = sums[0], sums[1], sums[2]
     # inverse, slope and bend are 1/g, g′/g and g″/g of the row above

@@ -1,4 +1,4 @@
-"""Numba kernels of velocities and accelerations at one posture, for joint motions q̇ = z, q̈ = 0."""
+"""Numba kernels of velocities and accelerations at one posture, if q̇ = z and q̈ = 0."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdsm.support.values import Array
 
 
 class Motion(NamedTuple):
-    """Motion of all joint frames if q̇ = z and q̈ = 0; arrays are (nv+1, 3)."""
+    """Motion of the joint frames if q̇ = z and q̈ = 0; arrays (nv+1, 3), vectors in base axes."""
 
     turning: Array  # angular velocity ω
     turning_rate: Array  # ω̇
@@ -83,9 +83,9 @@ def set_motion(
 
 @inner
 def to_frame(rotation: Array, vector: Array, turned: Array) -> None:
-    """Fill ``turned`` (3,) with Rᵀ v, which gives a vector v in the axes of a joint frame.
+    """Fill ``turned`` (3,) with Rᵀ v: a vector v of base axes in the axes of a joint frame.
 
-    ``vector`` is v (3,) in base axes, and ``rotation`` (3, 3, 1) the rotation R of the frame.
+    ``vector`` is v (3,), and ``rotation`` (3, 3, 1) the rotation R of the frame.
     """
     for r in range(3):
         turned[r] = (
@@ -97,11 +97,13 @@ def to_frame(rotation: Array, vector: Array, turned: Array) -> None:
 
 @inner
 def pull_back(turning: Array, rate: Array, weight: Array, scratch: Array, pulled: Array) -> None:
-    """Fill ``pulled`` (3,) with ∂Ψ/∂δ = X + V × ω + A × ω̇ + (A × ω) × ω.
+    """Compute the derivative of a scalar Ψ with respect to a displacement δ of a point of a link.
 
-    δ displaces a point in a frame that turns with ω ``turning`` and ω̇ ``rate``. The rows X, V and
-    A of ``weight`` (3, 3) are the derivatives of a scalar Ψ with respect to the position, velocity
-    and acceleration of the point.
+    The rows X, V and A of ``weight`` (3, 3) are the derivatives of Ψ with respect to the position,
+    velocity and acceleration of the point. The link turns with ω ``turning`` and ω̇ ``rate``, so δ
+    changes these by δ, ω × δ and ω̇ × δ + ω × (ω × δ). Fills ``pulled`` (3,) with
+
+        ∂Ψ/∂δ = X + V × ω + A × ω̇ + (A × ω) × ω.
     """
     X, V, A = weight[0], weight[1], weight[2]
     cross(A, turning, scratch)

@@ -21,8 +21,9 @@ def compute_pose(tree: Tree, routing: Routing, masses: Masses, q: Array) -> _Pos
     """Compute everything that depends only on the joint angles q (nv,) of one posture.
 
     Returns:
-        Tip pose, J_X, L, J_L, g, ∂g/∂θ, and the fields of :class:`Frames`, all without the axis of
-        postures; then the length of the shortest cable segment [m].
+        Tip pose (4, 4), J_X (6, nv), L (C,), J_L (C, nv), g (nv,), ∂g/∂θ (nv, nv), the four fields
+        of :class:`Frames` without the axis of postures, and the length of the shortest cable
+        segment [m].
     """
     nv, cables, rows = q.shape[0], routing.fixed.shape[0], tree.parent.shape[0]
     frames, segments = empty_frames(tree, routing, 1), segment_scratch(nv, 1)
@@ -56,6 +57,6 @@ def single_pose(arm: tuple[Any, ...], q: Array) -> _Pose:
     """Compute a posture at q (nv,), as :func:`compute_pose` does.
 
     ``arm`` has the fields of :class:`Tree`, then of :class:`Routing`, then of :class:`Masses`.
-    Python passes and receives plain arrays: named tuples would take a third of the total time.
+    Python passes and receives plain arrays: to pass named tuples takes a third of the total time.
     """
     return compute_pose(Tree(*arm[:6]), Routing(*arm[6:11]), Masses(*arm[11:]), q)

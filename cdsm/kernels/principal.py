@@ -23,9 +23,10 @@ def principal_stiffness(compliance: Array) -> dict[str, Array]:
         compliance: C_vv (..., 3, 3) [m/N], positive semidefinite, as for stable arms.
 
     Returns:
-        Values by name. ``softest`` and ``stiffest`` [N/m] are inf if the tip is rigid;
-        ``softest_direction`` and ``stiffest_direction`` are (..., 3). ``anisotropy`` is
-        stiffest/softest, or 1 if the tip cannot move; ``isotropy`` is its inverse.
+        Values by name. ``softest`` and ``stiffest`` [N/m] are the smallest and the largest
+        stiffness, inf where the tip cannot move in that direction; ``softest_direction`` and
+        ``stiffest_direction`` are (..., 3). ``anisotropy`` is stiffest/softest, or 1 if the tip
+        cannot move at all; ``isotropy`` is its inverse.
     """
     values, vectors = np.linalg.eigh((compliance + compliance.swapaxes(-1, -2)) / 2.0)
     most = values[..., 2]

@@ -58,7 +58,10 @@ known.
 
 @threaded
 def set_margins(K: Array, margin: Array, width: Width) -> None:
-    """Fill ``margin`` (B, W) with the smallest eigenvalues of the symmetric parts of K."""
+    """Fill ``margin`` (B, W) with the smallest eigenvalues of the symmetric parts of K.
+
+    K is (B, nv, nv, W).
+    """
     nv, side = K.shape[1], K.shape[3]
     symmetric, scratch = np.empty((nv, nv, side)), np.empty((4 * nv + 10, side))
     for b in range(K.shape[0]):
@@ -81,10 +84,11 @@ def solve(
 ) -> int:
     """Replace the last n columns X of ``system`` by K_θ⁻¹ X; count the K_θ that may be singular.
 
-    ``system`` (B, nv, nv + 1 + n, W) has nv columns of scratch for K_θ, one for a probe torque, and
-    X. ``K`` is K_θ, and ``parts`` is P, the sum of the magnitudes of its terms, (B, nv, nv, W).
-    With the diagonal D of P, ``scale`` (B, nv, W) becomes D^-½. ``peak`` (B, W) becomes the largest
-    entry of D^-½ P D^-½ where K_θ may be singular, else 0. Returns the number of these postures.
+    ``system`` (B, nv, nv + 1 + n, W) has nv columns of scratch for K_θ, one column of scratch for a
+    probe torque, and X. ``K`` is K_θ, and ``parts`` is P, the sum of the magnitudes of its terms,
+    (B, nv, nv, W) each. With the diagonal D of P, ``scale`` (B, nv, W) is filled with D^-½, and
+    ``peak`` (B, W) with the largest entry of D^-½ P D^-½ where K_θ may be singular, else with 0.
+    Returns the number of postures where it may be.
     """
     rows, largest, doubtful = np.empty((4, K.shape[3])), np.empty(K.shape[3]), 0
     moved = np.empty(K.shape[3])
@@ -102,9 +106,10 @@ def solve(
 
 @inner
 def _set_probe(system: Array, width: Width) -> None:
-    """Fill column nv of ``system`` with a probe torque that excites almost every motion.
+    """Fill column nv of ``system`` with a probe torque, the same for all postures.
 
-    Its entries vary irregularly from 1 to 2.
+    A large joint motion under it reveals a K_θ that may be singular. Its entries vary irregularly
+    from 1 to 2, so it excites almost every motion.
     """
     nv = np.uint64(system.shape[0])
     for i in upwards(0, nv):
@@ -117,10 +122,11 @@ def _set_probe(system: Array, width: Width) -> None:
 def _equilibrate(
     K: Array, parts: Array, scale: Array, largest: Array, system: Array, width: Width
 ) -> None:
-    """Fill the first columns of ``system`` with D^-½ K_θ D^-½, and multiply the last by D^-½.
+    """Scale the equations in ``system``, whose solution is K_θ⁻¹ X, with the diagonal D of P.
 
-    D is the diagonal of P, which is ``parts``. Fills ``scale`` (nv, W) with D^-½, and ``largest``
-    (W,) with the largest entry of D^-½ P D^-½ (inf if D is singular).
+    D^-½ K_θ D^-½ fills the first nv columns, and D^-½ X replaces X, the columns from nv + 1 on.
+    ``parts`` is P. Fills ``scale`` (nv, W) with D^-½, and ``largest`` (W,) with the largest entry
+    of D^-½ P D^-½ (inf if D is singular).
     """
     nv = np.uint64(K.shape[0])
     for w in lanes(width):
@@ -143,7 +149,7 @@ def _equilibrate(
 
 @inner
 def _rescale(scale: Array, system: Array, moved: Array, width: Width) -> None:
-    """Multiply the last columns of ``system`` by ``scale`` D^-½, so that they become K_θ⁻¹ X.
+    """Multiply the last n columns of ``system`` by D^-½ (``scale``): they become K_θ⁻¹ X.
 
     Fills ``moved`` (W,) with the largest scaled joint motion that the probe torque causes.
     """
@@ -199,7 +205,7 @@ def _set_torques(
 def set_along(
     JX: Array, directions: Array, system: Array, status: Indices, along: Array, width: Width
 ) -> None:
-    """Fill the NaN of ``along`` (B, D, W) with 1/(uᵀ C_vv u), except where K_θ is singular.
+    """Replace NaN in ``along`` (B, D, W) by 1/(uᵀ C_vv u) [N/m], except where K_θ is singular.
 
     The columns of ``system`` from nv + 1 on are K_θ⁻¹ J_vᵀ u for the unit ``directions`` u (D, 3).
     """

@@ -1,8 +1,8 @@
-"""Kernels that copy values between rows of postures, blocks of postures, and their records.
+"""Kernels that copy values between arrays of rows, blocks and records.
 
-In rows, the posture is the first axis of an array; in a block of W postures it is the last one. A
-record (size, W) holds all quantities of a block, one after the other. Quantity number n begins at
-its row ``start[n]``.
+In an array of rows, the posture is the first axis; in a block of W postures it is the last one. A
+record (size, W) holds all quantities of a block, one after the other. Quantity number n begins in
+row ``start[n]`` of the record.
 """
 
 from __future__ import annotations
@@ -81,10 +81,11 @@ def store(
     out: Array,
     status: NDArray[np.uint8],
 ) -> None:
-    """Copy the quantities of a block that are ``stored`` to the rows of ``out`` from ``first`` on.
+    """Copy quantities and status of a block to ``out`` and ``status``, from row ``first`` on.
 
-    ``code`` (W,) is copied to ``status``. For posture w of the block, quantities of number
-    ``known[w]`` and above do not exist; they become NaN.
+    ``stored`` says for each quantity of the ``record`` whether it is copied. ``code`` (W,) has the
+    status codes. For posture w of the block, quantities of number ``known[w]`` and above do not
+    exist; they become NaN.
     """
     count = min(record.shape[1], out.shape[0] - first)
     for w in lanes(count):

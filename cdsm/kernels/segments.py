@@ -5,18 +5,19 @@ derivative d_i = ∂(b − a)/∂θ_i,
 
     ∂ℓ/∂θ_i = u·d_i,    ∂²ℓ/∂θ_i∂θ_j = (d_i·d_j − (u·d_i)(u·d_j))/ℓ + u·∂²(b − a)/∂θ_i∂θ_j.
 
-Only the joints between the two links matter. They have two sides: joints on the path to b have the
-sign +, joints on the path to a have the sign −. Let x be the end, b or a, that a joint moves. A
+Only the joints between the links of a and b change ℓ. A joint on the path to b moves b and has the
+sign +; a joint on the path to a moves a and has the sign −. Let x be the site that a joint moves. A
 revolute joint with the axis z through o has d = ±z × (x − o), a prismatic joint with the direction
-s has d = ±s and z = 0. If joint i is not after joint j and both are on the same side, the second
-derivative of b − a is z_i × d_j.
+s has d = ±s and z = 0. If joints i and j have the same sign, and j is not nearer to the base than
+i, the second derivative of b − a is z_i × d_j; it is 0 if their signs differ.
 
-For i not after j, the second derivative of ℓ is therefore c_i·d_j with the left factor
+If j is not nearer to the base than i, the second derivative of ℓ is therefore c_i·d_j, with the
+left factor
 
     c_i = (d_i − (u·d_i) u)/ℓ + u × z_i.
 
-The last term is used only if both joints are on the same side: u·(z_i × d_j) = (u × z_i)·d_j. A
-left factor is computed once per joint, and each pair of joints needs one dot product.
+The last term is used only if both joints have the same sign: u·(z_i × d_j) = (u × z_i)·d_j. A left
+factor is computed once per joint, and each pair of joints needs one dot product.
 """
 
 from __future__ import annotations
@@ -124,8 +125,8 @@ def _add_rate(
 ) -> None:
     """Add u·d to ``rate`` (W,), with d = ±z × (x − o) of a revolute joint.
 
-    ``point`` is x, the end of the segment that the joint moves; ``sign`` is 1 if it is b, −1 if it
-    is a. ``origin`` is o, ``axis`` is z. Vectors are (3, W).
+    u is the unit vector from site a to site b. ``point`` is x, the site that the joint moves;
+    ``sign`` is 1 if it is b, −1 if it is a. ``origin`` is o, ``axis`` is z. Vectors are (3, W).
     """
     for w in lanes(width):
         x, y = sign * (point[0, w] - origin[0, w]), sign * (point[1, w] - origin[1, w])
@@ -139,7 +140,10 @@ def _add_rate(
 
 @inner
 def _add_slide_rate(u: Array, slide: Array, sign: float, rate: Array, width: Width) -> None:
-    """Add u·d to ``rate`` (W,), with d = ``sign`` · s of a prismatic joint; s is ``slide``."""
+    """Add u·d to ``rate`` (W,), with d = ``sign`` · s of a prismatic joint.
+
+    u is the unit vector along the segment, and s the direction ``slide`` of the joint, (3, W) each.
+    """
     for w in lanes(width):
         rate[w] += sign * (u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w])
 
@@ -188,7 +192,10 @@ def _set_factors(
 def _add_slide_factor(
     slide: Array, u: Array, inverse: Array, sign: float, weight: Array, c: Array, width: Width
 ) -> None:
-    """Add ``weight`` times ±(s − (u·s) u)/ℓ to the left factor c (3, W); s is ``slide``."""
+    """Add ``weight`` times ±(s − (u·s) u)/ℓ, of a prismatic joint, to the left factor c (3, W).
+
+    s is the direction ``slide`` of the joint, and ``inverse`` (W,) is 1/ℓ.
+    """
     for r in axes(c.shape[0], width):
         for w in lanes(width):
             along = u[0, w] * slide[0, w] + u[1, w] * slide[1, w] + u[2, w] * slide[2, w]
@@ -205,7 +212,7 @@ def set_lengths(
     shortest: Array,
     width: Width,
 ) -> None:
-    """Fill L (C, W), J_L ``jacobian`` (C, nv, W), and the length of the shortest segment (W,).
+    """Fill L (C, W) [m], J_L ``jacobian`` (C, nv, W), and the length of the shortest segment (W,).
 
     Where two sites coincide, L and J_L of the posture are meaningless.
     """

@@ -1,11 +1,12 @@
 """Numba kernel of derivatives of a stiffness with respect to dimensions and masses of an arm.
 
-All of them follow from the derivatives of one number. With a fixed joint motion z,
+All of them follow from the derivatives of one scalar. With a fixed joint motion z,
 
     Φ = zᵀ K_θ z = Σ_c (F_c L̈_c + k_c L̇_c²) − Σ_b m_b γ·ẍ_b − f·ẍ_tip − m·ω̇_tip,
 
-where a dot is the derivative along q̇ = z, q̈ = 0. The cables c have tensions F and stiffnesses k,
-the bodies b have masses m_b and centres x_b; γ is gravity, W = (f, m) the load at the tip. If z is
+where a dot is the derivative along q̇ = z, q̈ = 0. The cables c have lengths L, tensions F and
+stiffnesses k; the bodies b have masses m_b and centres of mass x_b. γ is the acceleration of
+gravity, W = (f, m) the load at the tip, and ω the angular velocity of a link. If z is
 the unit eigenvector of the smallest eigenvalue of K_θ, this eigenvalue has the same gradient as Φ.
 For the compliance κ = uᵀ J_v K_θ⁻¹ J_vᵀ u, with z = K_θ⁻¹ J_vᵀ u kept constant,
 
@@ -54,7 +55,7 @@ def _add_cable(
     """Add the derivatives of F L̈ + k L̇² + p L̇ of one cable to ``weight``; return L̈ and L̇.
 
     The cable has the sites from ``begin`` to ``end`` − 1. ``tension`` is F, ``stiffness`` k,
-    ``pull`` p, and ``slope`` ∂k/∂L. ``point`` (N, 3, 3) has x, ẋ and ẍ of each point, and
+    ``pull`` a factor p, and ``slope`` ∂k/∂L. ``point`` (N, 3, 3) has x, ẋ and ẍ of each point, and
     ``weight`` (N, 3, 3) the derivatives X, V and A with respect to them.
     """
     rate = bend = 0.0
@@ -108,10 +109,11 @@ def _by_joint(
     tip: Index,
     placement: Array,
 ) -> float:
-    """Fill ``placement`` (3,) with ∂Ψ/∂(origin of joint i) in base axes; return ∂Ψ/∂q_i.
+    """Return ∂Ψ/∂q_i of joint i, and fill ``placement`` with the derivative by its origin.
 
-    ``before`` is the row of the parent of joint i, and ``beyond`` (nv+1,) is not 0 for the rows
-    that joint i moves. ``frames`` are origin, axis and slide of all joints. For each point, ``row``
+    ``placement`` (3,) is the derivative with respect to the joint's origin, in base axes.
+    ``before`` is the row of the joint's parent, and ``beyond`` (nv+1,) is not 0 for the rows that
+    the joint moves. ``frames`` are origin, axis and slide of all joints. For each point, ``row``
     has the row of its joint, ``point`` x, ẋ and ẍ, and ``weight`` X, V and A. ``spin`` and
     ``spin_rate`` (3,) are ∂Ψ/∂ω and ∂Ψ/∂ω̇ of the tip, whose row is ``tip``.
     """
@@ -189,10 +191,10 @@ def single_gradient(
         Ψ = Σ_c (F_c L̈_c + k_c L̇_c² + p_c L̇_c) + v·ẋ_tip
             − a (Σ_b m_b γ·ẍ_b + f·ẍ_tip + m·ω̇_tip) − b (Σ_b m_b γ·ẋ_b + f·ẋ_tip + m·ω_tip)
 
-    With a = 1 and p = b = 0 it is zᵀ K_θ z + v·ẋ_tip. With F = k = v = a = 0, b = 1 and p the
-    tensions, it is zᵀ (J_Lᵀ F + g − J_Xᵀ W), the work of the residual of Eq. 13 on the motion z.
+    With a = 1 and p = b = 0, Ψ is zᵀ K_θ z + v·ẋ_tip. With F = k = v = a = 0, b = 1 and p the
+    tensions, Ψ is zᵀ (J_Lᵀ p + g − J_Xᵀ W), the work of the residual of Eq. 13 on the motion z.
 
-    Dots are derivatives for θ̇ = z, θ̈ = 0; γ is gravity. ``first`` (C+1,) is the first site of each
+    The symbols are those at the top of the module. ``first`` (C+1,) is the first site of each
     cable. v is ``velocity`` (3,), F ``tension`` (C,), k ``stiffness`` (C,), ∂k/∂L ``slope`` (C,), p
     ``pull`` (C,), W ``wrench`` (6,), a ``bent`` and b ``turned``.
 

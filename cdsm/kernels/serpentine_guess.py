@@ -27,7 +27,9 @@ _MOST = 2
 
 
 class Blocks(NamedTuple):
-    """Joint axes and cables of the K blocks of J_Lᵀ from base to tip; empty if J_Lᵀ has no blocks.
+    """Joint axes and cables of the K blocks of J_Lᵀ, from base to tip.
+
+    The arrays are empty (K = 0) if J_Lᵀ is not block triangular.
 
     Attributes:
         row: Joint axes (columns of J_L), block by block (nv,).
@@ -43,7 +45,10 @@ class Blocks(NamedTuple):
 
 
 def find_blocks(routing: Routing, nv: int) -> Blocks:
-    """Find the blocks of J_Lᵀ of an arm with nv joints; none if it is not block triangular."""
+    """Find the blocks of J_Lᵀ of an arm with nv joint axes; K = 0 if it is not block triangular.
+
+    A block also needs at most two joint axes, and at least one cable for each.
+    """
     turned: list[set[int]] = [set() for _ in routing.fixed]
     ends = routing.segment[1:, 3]
     for (cable, _, _, first, _), end in zip(routing.segment[:-1], ends, strict=True):
@@ -82,14 +87,15 @@ class Guess(NamedTuple):
     Attributes:
         F: Tensions (C, W) [N].
         y: Multipliers (nv, W): J_L y = F for the cables above their lower bounds.
-        failed: The block at which the guess fails, since no pair of its cables balances it (W,); −1
-            if none fails.
+        failed: Number of the first block, from the tip on, that no pair of its cables balances
+            (W,); −1 if none.
         lacking: Missing torque of the current block (2, W).
         missing: Missing torque of the block that failed (2, W).
         chosen: The two cables above their lower bounds in each of the K blocks, as numbers within
             the block (K, 2, W).
-        best: Best pair of cables so far (5, W): cost, two tensions to add, two cable numbers.
-        pair: Scratch of the pair that is tried (4, W).
+        best: Best pair of cables so far (5, W): its increase of ‖F‖², the two tensions to add, the
+            two cable numbers.
+        pair: Scratch for the pair that is tried (4, W).
     """
 
     F: Array
@@ -171,8 +177,8 @@ def _set_best(
 ) -> None:
     """Find the pair of cables that gives the missing torque about axes i and j at the least ‖F‖².
 
-    If i is j, one cable is enough, and the best one is found. ``own`` are the cables of the block
-    of J_Lᵀ, ``low`` and ``high`` the bounds (C, W). Stores the result in ``guess.best``.
+    If i is j, the joint has one axis, and the best single cable is found. ``own`` are the cables of
+    the block of J_Lᵀ, ``low`` and ``high`` the bounds (C, W). Stores the result in ``guess.best``.
     """
     lacking, best, pair = guess.lacking, guess.best, guess.pair
     for r in range(5):
@@ -225,11 +231,11 @@ def _keep_better(
     best_q: Array,
     width: Width,
 ) -> None:
-    """Store a pair of cables, p and q, as the best where it is admissible and costs less.
+    """Make the cables p and q the best pair where they are admissible and cost less than it.
 
-    x and y (W,) are tensions to add to the lower bounds ``least``. They are admissible if they are
-    not negative and the sums do not exceed the upper bounds ``most``. The cost is the increase of
-    ‖F‖².
+    x and y (W,) are the tensions that p and q need beyond their lower bounds ``least``. They are
+    admissible if they are not negative and the sums do not exceed the upper bounds ``most``. The
+    ``cost`` (W,) is the increase of ‖F‖².
     """
     for w in lanes(width):
         # cables that cannot give the torque have infinite x and y, or NaN

@@ -15,10 +15,11 @@ from cdsm.support.values import Array
 def set_multipliers(
     blocks: Blocks, J: Array, F: Array, guess: Guess, y: Array, width: Width
 ) -> None:
-    """Fill y (nv, W) so that J_L y = F for the chosen cables of each block of J_Lᵀ.
+    """Fill the multipliers y (nv, W): J_L y = F for the chosen cables of each block of J_Lᵀ.
 
-    J is J_L (C, nv, W), and F is (C, W). If a block of ``guess`` failed, y changes only in the
-    blocks after it.
+    The chosen cables are those whose tensions the guess raised above their lower bounds. J is J_L
+    (C, nv, W), and F is (C, W). If a block of ``guess`` failed, y changes only in the blocks after
+    it, which are nearer to the tip.
     """
     row, row_start, cable, cable_start = blocks
     failed, chosen, p, q = guess.failed, guess.chosen, guess.best, guess.pair
@@ -63,10 +64,11 @@ def set_proof(
 ) -> None:
     """Fill ``guess.y`` with a vector y that usually proves that no tensions balance the arm.
 
-    In the block of J_Lᵀ that failed, y is t + s n, with the missing torque t and n normal to t. In
-    later blocks, J_c y = 0 for the chosen cables c. A proof needs J_c y ≤ 0 for all other cables; s
-    is the number nearest to 0 that gives this, if any does. ``normal`` (nv, W) is scratch, ``zero``
-    (C, W) are zeros.
+    y is 0 in the blocks of J_Lᵀ before the failed one. In the failed block it is t + s n, where t
+    is the missing torque, and n is normal to t. In later blocks it makes J_c y = 0 for the chosen
+    cables c. y is a proof if J_c y ≤ 0 for all other cables, and s is the number nearest to 0 for
+    which this holds, if there is one. The caller must verify y. ``normal`` (nv, W) is scratch,
+    ``zero`` (C, W) are zeros.
     """
     row, row_start, cable, cable_start = blocks
     y, failed, missing, chosen = guess.y, guess.failed, guess.missing, guess.chosen

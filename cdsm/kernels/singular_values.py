@@ -21,7 +21,7 @@ _ROUNDING = 2.0**-52
 
 @inner
 def singular_values(rows: Array, left: Array, values: Array, scratch: Array, width: Width) -> None:
-    """Decompose matrices ``rows`` (3, n, W) of three rows as U S V.
+    """Compute the singular value decomposition U S V of matrices ``rows`` (3, n, W).
 
     ``left`` (3, 3, W) becomes U, ``rows`` becomes V, and ``values`` (3, W) the diagonal of S, not
     sorted. Jacobi rotations make the rows orthogonal; rows of length zero stay zero. ``scratch`` is

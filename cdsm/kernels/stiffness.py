@@ -25,11 +25,11 @@ def set_cable_stiffness(
 ) -> None:
     """Fill ``stiffness`` (C, W) [N/m] with k = 1/(l_0/EA + 1/k_series).
 
-    If the motor controls the force, EA is given as 0, and k is 0. The wire alone has the length
-    ℓ = L − (F − F_0)/k_series: the rest of L is the elongation of the series spring. So l_0/EA is
-    ℓ/(EA (1 + ε)). ``length`` is L [m], ``tension`` F [N] and ``rigidity`` EA (1 + ε) [N], (C, W)
-    each. ``series`` is 1/k_series (C,) [m/N], and ``rest`` is F_0 (C,) [N], the tension at which
-    the spring is unstrained.
+    ``length`` is L [m], ``tension`` F [N] and ``rigidity`` EA (1 + ε) [N], (C, W) each. ``series``
+    is 1/k_series (C,) [m/N], and ``rest`` is F_0 (C,) [N], the tension at which the series spring
+    is unstrained. The spring is longer by (F − F_0)/k_series, and the wire has the rest of L, the
+    length ℓ. So l_0/EA is ℓ/(EA (1 + ε)). If the motor controls the force, EA is given as 0, and k
+    becomes 0.
     """
     for c in upwards(0, length.shape[0]):
         for w in lanes(width):
@@ -79,8 +79,8 @@ def _add_rows(
 ) -> None:
     """Add p₀ x + p₁ y + p₂ z to ``upper``, and p₃ x + p₄ y + p₅ z to ``lower``, both (nv, W).
 
-    ``rows`` are three rows x, y and z (nv, W) of J_L, and p is (6, W). Only the entries ``first``
-    to ``end`` − 1 change.
+    These are two rows of the passive stiffness. ``rows`` are the rows x, y and z (nv, W) of J_L of
+    three cables, and p is (6, W). Only the entries ``first`` to ``end`` − 1 change.
     """
     x, y, z = rows
     for j in upwards(first, end):
@@ -181,8 +181,8 @@ def single_stiffness(
 ) -> Array:
     """Compute five matrices of one posture (5, nv, nv): active, passive and load term, P, and K_θ.
 
-    An entry of P is |active| + |passive| + |gravity| + |load|, the scale of the rounding errors of
-    K_θ; ``gravity`` (nv, nv) is the gravity term. ``segment`` and ``joint`` are fields of
+    ``gravity`` (nv, nv) is the gravity term. P is |active| + |passive| + |gravity| + |load|, entry
+    by entry: the scale of the rounding errors of K_θ. ``segment`` and ``joint`` are fields of
     :class:`Routing`, the next four arguments are the fields of :class:`Frames`. No array has an
     axis of postures.
     """

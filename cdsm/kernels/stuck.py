@@ -1,13 +1,14 @@
-"""Numba kernels of stuck cables, for blocks of postures: their passive stiffness.
+"""Numba kernels of the passive stiffness of cables that stick in holes, for blocks of postures.
 
 A hole holds a cable if it has friction and the cable bends there. The part of a cable between two
-such holes is called a section. While the cable sticks, a section of length l and original length
-l_0 is a spring with
+such holes is called a section. While the cable sticks, each section is a spring of length l and
+original length l_0, with
 
     k = 1/(l_0/EA + 1/k_series),   passive stiffness Σ k g gᵀ over all sections,   g = ∂l/∂θ.
 
-Only the first section of a cable has the series spring; its k is 0 if the motor controls the force.
-Which holes hold depends on the posture, so sections end at other holes in other postures.
+Only the first section of a cable has the series spring. The k of the first section is 0 if the
+motor controls the force. The holes that hold depend on the posture, so sections end at other holes
+in other postures.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Holes(NamedTuple):
         axis: Direction of each lead in the frame of the joint of its first site (C, 3).
         locked: 1 for each cable with a locked motor, 0 where the motor controls the force (C,).
         series: 1/k_series of each cable (C,) [m/N].
-        rest: Tension at which the series springs are at rest (C,) [N].
+        rest: Tension at which the series spring of each cable is unstrained (C,) [N].
     """
 
     first: Indices
@@ -49,7 +50,7 @@ class Holes(NamedTuple):
 
 
 class Sticking(NamedTuple):
-    """Scratch for the current section of a cable, whose segments are being added, in W postures."""
+    """The section of a cable to which a kernel is adding segments, in W postures."""
 
     length: Array  # l without the spring (W,) [m]
     soft: Array  # compliance of the spring (W,) [m/N]
@@ -81,7 +82,7 @@ def add_stuck_stiffness(
     passive: Array,
     width: Width,
 ) -> None:
-    """Add Σ k g gᵀ over the sections of all cables to ``passive`` (nv, nv, W), for i ≤ j only.
+    """Add the passive stiffness Σ k g gᵀ of all sections to ``passive`` (nv, nv, W), i ≤ j only.
 
     k is the stiffness of a section, and g the gradient of its length. ``wire`` is EA (1 + ε) (C, W)
     [N], also of cables whose motor controls the force.
@@ -200,7 +201,7 @@ def set_holding(own: float, a: Array, b: Array, holds: Array, width: Width) -> N
 
 @inner
 def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> None:
-    """Fill ``section.stiffness`` (W,) with the k of sections that end at the current hole.
+    """Fill ``section.stiffness`` (W,) [N/m] with k of the sections that end at the current hole.
 
     It is 0 where the hole does not hold the cable. ``wire`` is EA (1 + ε) (C, W) [N].
     """
@@ -211,7 +212,10 @@ def set_stiffness(wire: Array, c: Index, section: Sticking, width: Width) -> Non
 
 @inner
 def open_next_section(section: Sticking, width: Width) -> None:
-    """Begin the next section where the current hole holds; it has no series spring or motor."""
+    """Begin a new section in the postures in which the current hole holds the cable.
+
+    The new section has the length 0, no series spring, and a stiffness as with a locked motor.
+    """
     length, soft, locked, holds = section.length, section.soft, section.locked, section.holds
     for w in lanes(width):
         length[w] = 0.0 if holds[w] > 0.0 else length[w]

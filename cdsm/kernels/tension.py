@@ -3,8 +3,8 @@
     min ½‖F‖²   subject to   J_Lᵀ F = τ   and   low ≤ F ≤ high.
 
 The problem is strictly convex. A point from any solver or guess is the optimum if it meets the
-Karush-Kuhn-Tucker conditions. A Farkas vector proves that the constraints are infeasible. Single
-postures and batches use the same tolerances.
+Karush-Kuhn-Tucker conditions. A Farkas vector v proves that no tensions meet the constraints:
+vᵀτ > vᵀJ_Lᵀ F for all F within the bounds. Single postures and batches use the same tolerances.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Scaled(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """Balance J_Lᵀ F = τ of r postures."""
+    """Balance J_Lᵀ F = τ of r postures for which a search must find the tensions."""
 
     arms: Array  # J_L (r, C, nv) [m]; moment arms that are rounding errors are set to zero
     torque: Array  # τ (r, nv) [N m]
@@ -65,7 +65,7 @@ class Balance(NamedTuple):
 
 
 class Certificate(NamedTuple):
-    """Scratch and result of :func:`set_optimal` and :func:`set_infeasible`."""
+    """Result of :func:`set_optimal` or :func:`set_infeasible` for W postures, and scratch."""
 
     y: Array  # multipliers of the balance (nv, W)
     z: Array  # multipliers of the bounds (C, W)
@@ -76,7 +76,7 @@ class Certificate(NamedTuple):
 
 @inner
 def certificate(nv: int, cables: int, width: int) -> Certificate:
-    """Allocate a :class:`Certificate` for a block of postures."""
+    """Allocate a :class:`Certificate` for a block of ``width`` postures."""
     return Certificate(
         np.empty((nv, width)),
         np.empty((cables, width)),
@@ -116,7 +116,7 @@ def scaled_balance(
 
 @inner
 def _power_of_two(value: float) -> float:
-    """Return the next power of two at or above a magnitude; 1 for zero."""
+    """Return the smallest power of two that is not below ``value``; 1 if ``value`` is zero."""
     return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
 
 
@@ -124,7 +124,7 @@ def _power_of_two(value: float) -> float:
 def single_optimality(
     A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
 ) -> tuple[float, float, float]:
-    """Measure how far one point x is from the optimum of the problem of :func:`set_violations`.
+    """Measure how far x is from the optimum of one posture; see :func:`set_violations`.
 
     A is Jᵀ (m, n). No array has an axis of postures. Returns the largest violation of balance and
     bounds, the largest violation of stationarity, and the duality gap.
@@ -244,7 +244,8 @@ def set_infeasible(
 ) -> None:
     """Set ``scratch.certified`` (W,) to 1 where v (nv, W) proves infeasibility, else to 0.
 
-    It does if vᵀb > vᵀJ_Lᵀ F for all low ≤ F ≤ high; J is J_L, and b the torque to balance.
+    v is a proof if vᵀb > vᵀJ_Lᵀ F for all F with low ≤ F ≤ high. J is J_L (C, nv, W), b (nv, W)
+    the torque to balance, and ``low`` and ``high`` (C, W) are the bounds.
     """
     _, work, sums, force, certified = scratch
     left, size, steepest = sums[0], sums[1], sums[2]

@@ -5,8 +5,8 @@ linear part C_vv,
 
     compliance = C,    cartesian = (C_vv)⁻¹,    pseudoinverse = J_v⁺ᵀ K_θ J_v⁺.
 
-Near a flat posture C_vv is too ill-conditioned for inversion. With the singular value decomposition
-J_v = U S V and O = U S⁻¹,
+Where the tip can hardly move in some direction, C_vv is too ill-conditioned for inversion. With the
+singular value decomposition J_v = U S V and O = U S⁻¹,
 
     cartesian = O (V K_θ⁻¹ Vᵀ)⁻¹ Oᵀ,    pseudoinverse = O (V K_θ Vᵀ) Oᵀ.
 """
@@ -30,8 +30,8 @@ from cdsm.support.values import Array
 def decompose(JX: Array, left: Array, right: Array, status: Indices, width: Width) -> None:
     """Decompose J_v = U S V (singular values S); fill ``left`` with O = U S⁻¹ and ``right`` with V.
 
-    ``left`` is (B, 3, 3, W) and ``right`` (B, 3, nv, W). JX is J_X (B, 6, nv, W), whose first rows
-    are J_v. Where the tip is immobile, the status (B, W) changes from READ to IMMOBILE.
+    ``left`` is (B, 3, 3, W) and ``right`` (B, 3, nv, W). JX is J_X (B, 6, nv, W), and J_v its first
+    three rows. Where the tip is immobile, the status (B, W) changes from READ to IMMOBILE.
     """
     scratch, S = np.empty((5, JX.shape[3])), np.empty((3, JX.shape[3]))
     for b in range(JX.shape[0]):
@@ -135,7 +135,7 @@ def _congruence(
 ) -> None:
     """Fill out (3, 3, W) with O X Oᵀ, or NaN where the tip is immobile.
 
-    O is ``factor``; X are the three columns of ``middle`` from ``first`` on.
+    O is ``factor`` (3, 3, W); X (3, 3, W) are the three columns of ``middle`` from ``first`` on.
     """
     for i in upwards(0, factor.shape[0]):
         for j in upwards(0, factor.shape[0]):

@@ -18,15 +18,15 @@ class Tree(NamedTuple):
     """The kinematic tree as plain arrays; row 0 is the base, row i is joint i in the order of q.
 
     Attributes:
-        parent: Row of the previous joint, (nv+1,).
+        parent: Row of each joint's parent, the joint before it on the way from the base, (nv+1,).
         order: Rows of the joints, sorted so that each joint comes after its parent, (nv,).
         turn: Matrices A, B and C of each joint, (nv+1, 3, 3, 3). The rotation of the joint's frame
             in its parent's frame is A + B cos q + C sin q (Rodrigues' formula).
-        translation: Origin in the parent's frame, (nv+1, 3) [m].
+        translation: Origin of the joint's frame in its parent's frame at q = 0, (nv+1, 3) [m].
         axis: Unit axis of a revolute joint in the parent's frame, (nv+1, 3); zero for a prismatic
             joint.
         slide: Unit direction of a prismatic joint in the parent's frame, (nv+1, 3); zero for a
-            revolute joint. (0, 3) if no joint is prismatic: this usual case then takes no time.
+            revolute joint. Empty, (0, 3), if no joint is prismatic: this usual case takes no time.
     """
 
     parent: Indices
@@ -68,7 +68,7 @@ class Tree(NamedTuple):
 class Routing(NamedTuple):
     """All cable sites, and the cable segments that joints can change.
 
-    There are few arrays, since to pass one from Python takes as long as to compute a segment.
+    There are few arrays, since passing one from Python takes as long as computing a segment.
 
     Attributes:
         row: Row, in :class:`Tree`, of the joint that moves each site, (P,).
@@ -131,9 +131,9 @@ def one_frames(origin: Array, axis: Array, slide: Array, site: Array) -> Frames:
 
 @inlined
 def turned(rotation: Array, i: Index, r: Index, x: float, y: float, z: float, w: Index) -> float:
-    """Compute component r, in base axes, of the vector (x, y, z) in the frame of joint i.
+    """Compute component r, in base axes, of a vector (x, y, z) given in the frame of joint i.
 
-    w is the posture in the block.
+    ``rotation`` (nv+1, 3, 3, W) has the rotations of the frames; w is the posture in the block.
     """
     turned: float = rotation[i, r, 0, w] * x + rotation[i, r, 1, w] * y + rotation[i, r, 2, w] * z
     return turned

@@ -28,15 +28,15 @@ class Wires(NamedTuple):
     """Laws EA(F) of all C cables as arrays. Laws that are not linear consist of pieces, P in all.
 
     Attributes:
-        constant: Constant part of EA (1 + ε) of linear laws (C,) [N]; 0 for other laws and
-            force-controlled cables.
-        linear: Factor (C,) of the tension in EA (1 + ε): 1 for linear laws, else 0.
+        constant: EA of linear laws (C,) [N]; 0 for other laws and force-controlled cables.
+        linear: Factor (C,) of the tension F in EA (1 + ε) = EA + F of linear laws: 1, or 0 if the
+            original length is the stretched one; 0 for all other cables.
         pieces: First and last piece of the law of each cable, and its kind, POLYNOMIAL or CURVE (C,
-            3). If the law is linear or a function of Python, last is below first.
+            3). Without pieces (linear law, function of Python, force control) last is below first.
         ends: Six numbers for each cable (C, 6). 0 and 1: least and largest tension of its law [N].
             2: tension below which the cable is slack and EA is constant, or −inf [N]. 3: least
             tension of the pieces [N]. 4: EA at that tension [N]. 5: 1 if the original length is the
-            unstrained one, 0 if it is the stretched one.
+            unstrained one, 0 if it is the stretched one, as in the paper.
         edges: Start and end of each piece [N], and the strain at its start (3, P).
         coefficients: A column for each piece (rows, P). POLYNOMIAL: coefficients, lowest power
             first. CURVE: slope and rise of the chord, then a and b of
@@ -81,8 +81,9 @@ def set_rigidity(
 ) -> None:
     """Fill ``rigidity`` (C, W) [N] with EA (1 + ε) at tensions F (C, W) [N].
 
-    It is −1 outside the domain of the law, and EA alone if the original length of a wire is the
-    stretched one. It is 0 for laws that are functions of Python.
+    It is EA alone if the stretched length counts as the original length, as in the paper. It is −1
+    where F is outside the domain of the law, or EA outside the range that cdsm allows. It is 0 for
+    laws that are functions of Python, and for cables whose ``constant`` and ``linear`` are 0.
     """
     piece, x, begin, end, before, strain, _, value, coefficients = scratch
     for c in upwards(0, tension.shape[0]):
@@ -124,7 +125,7 @@ def set_rigidity(
 
 @inner
 def _set_curve(scratch: WireScratch, width: Width) -> None:
-    """Fill EA, and the strain from the start of the piece, if the piece is a curve of strain."""
+    """Fill EA, and the strain since the start of the piece, for pieces of the kind CURVE."""
     _, x, begin, end, _, strain, _, rigidity, coefficients = scratch
     chord, rise, a, b = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
     for w in lanes(width):
@@ -137,7 +138,10 @@ def _set_curve(scratch: WireScratch, width: Width) -> None:
 
 @inner
 def _set_integral(nodes: Array, scratch: WireScratch, width: Width) -> None:
-    """Fill the strain from the start of the piece, ∫ dF/EA of a polynomial EA, by a Gauss rule."""
+    """Fill the strain since the start of the piece, ∫ dF/EA, for pieces of the kind POLYNOMIAL.
+
+    EA is a polynomial; a Gauss rule integrates its inverse.
+    """
     _, x, begin, _, _, integral, node, value, coefficients = scratch
     for w in lanes(width):
         integral[w] = 0.0
@@ -154,7 +158,10 @@ def _set_integral(nodes: Array, scratch: WireScratch, width: Width) -> None:
 
 @inner
 def _set_polynomial(coefficients: Array, x: Array, value: Array, width: Width) -> None:
-    """Fill ``value`` (W,) with polynomials at x (W,): Horner's rule, four powers at a time."""
+    """Evaluate a polynomial for each posture at x (W,), by Horner's rule; fill ``value`` (W,).
+
+    ``coefficients`` (rows, W) has the lowest power first. A step takes four powers.
+    """
     for w in lanes(width):
         value[w] = 0.0
     for r in range(coefficients.shape[0] - AT_ONCE, -1, -AT_ONCE):
