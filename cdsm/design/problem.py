@@ -164,10 +164,7 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def bounds(self) -> Array:
-        """Smallest and largest value of each variable (n, 2) in SI.
-
-        For a variable with choices, they are the indices of the first and the last choice.
-        """
+        """Smallest and largest value of each variable (n, 2) in SI; for choices, their indices."""
         return frozen(
             np.array(
                 [
@@ -255,10 +252,7 @@ class DesignProblem(ReadOnlyState):
 
     @cached_property
     def start(self) -> Array | None:
-        """The design (n,) [m, rad, N, -] of the given :attr:`arm`.
-
-        It is None if the value of a variable in this arm is outside its range.
-        """
+        """:attr:`arm` as a design (n,) [m, rad, N, -]; None if a variable is outside its range."""
         found = []
         for variable, (low, high) in zip(self.variables, self.bounds.tolist(), strict=True):
             value: Value | None = present(variable, self.arm.geometry, self.minimum)

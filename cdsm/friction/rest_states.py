@@ -109,8 +109,7 @@ class RestStates:
     def displacement(self, u: Array) -> Maximum:
         """Compute the largest displacement [m] of the tip along a unit direction u (3,).
 
-        ``value`` and ``reach`` of the result are those of the linear program. ``bound`` includes
-        the terms of higher order.
+        Only ``bound`` of the result includes the terms of higher order.
         """
         near, cost = self._near, np.zeros(self._program[-1].size)
         cost[: near.joints.size] = (u @ self._pose.jacobian[:3]) * near.joints
@@ -134,8 +133,7 @@ class RestStates:
     def load(self, u: Array) -> float:
         """Compute the largest force [N] along u (3,) that some tensions of the polyhedron balance.
 
-        It is a proved upper bound. The neighbourhood must have ρ = 0, so that no joint moves; see
-        :meth:`Neighbourhood.still`.
+        It is a proved upper bound. The neighbourhood must be :meth:`Neighbourhood.still`.
         """
         from scipy.sparse import csc_array, hstack
 

@@ -244,10 +244,7 @@ def _candidates(
     steps: int,
     **shared: Any,
 ) -> list[WeightLoop]:
-    """Return a loop for each combination of posture, direction and weight.
-
-    ``shared`` are fields of :class:`WeightLoop` that all loops have in common.
-    """
+    """Return a loop for each posture, direction and weight; ``shared`` are its other fields."""
     angles, forces = number_array("postures", postures), number_array("weights", weights, "force")
     if angles.ndim != 2 or not angles.size:
         raise InvalidInput(

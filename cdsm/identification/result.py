@@ -79,10 +79,7 @@ class Identification(ReadOnlyState):
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom of χ²: n − :attr:`rank` − number of offsets.
-
-        Each axis of a loop has one fitted offset.
-        """
+        """Degrees of freedom of χ²: n − :attr:`rank`, less one offset per axis of each loop."""
         loops = (each for each in self.measurements if isinstance(each, WeightLoop))
         zeros = sum(len(loop.axes) for loop in loops)
         return len(self.predicted) - zeros - self.rank

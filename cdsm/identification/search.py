@@ -250,10 +250,7 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
 
 
 def _optima(problem: LeastSquares, starts: Sequence[Array]) -> list[Array]:
-    """Search for a minimum of χ² from each of ``starts``; return the points found, best first.
-
-    The best point is refined by a second search with central differences.
-    """
+    """Search from each of ``starts``; return the minima of χ², the best one first and refined."""
     coarse, fine = (_OF_LOOPS, _OF_LOOPS) if problem.followed else (_COARSE, _FINE)
     found = [
         problem.search(point, method="trf", tolerances=coarse, most=_EVALUATIONS)
@@ -271,10 +268,7 @@ def _optima(problem: LeastSquares, starts: Sequence[Array]) -> list[Array]:
 def _result(
     model: Model, problem: LeastSquares, best: Array, ends: Sequence[Array]
 ) -> Identification:
-    """Build the result at the optimum ``best``: profiles, confidence intervals and warnings.
-
-    ``ends`` are the ends of the other searches, where another minimum may be.
-    """
+    """Build the result at the optimum ``best``; other minima may be at ``ends`` of the searches."""
     values = problem.parameters(best)
     arm, predicted = model.predict(values)
     jacobian = problem.jacobian(best, central=True)

@@ -13,8 +13,7 @@ no bound. With multipliers z of the bounds, positive at the lower one, negative 
 A free cable has z = 0, and F is unknown. For a cable at a bound, F is that bound, and z is unknown.
 A step exchanges the known and the unknown of one cable: this is a principal pivot in the tableau T.
 It costs C² operations; no equations are solved. At the end, tensions and multipliers are computed
-again from the bounds that the search found, so errors of the steps do not accumulate. The caller
-verifies the optimum or the proof.
+again from the bounds found, so errors do not accumulate. The caller verifies optimum or proof.
 """
 
 from __future__ import annotations
@@ -53,12 +52,10 @@ class State(NamedTuple):
         tableau: T (C, C, W), as explained at the top of the module.
         system: S, b and J_Lᵀ side by side; b and J_Lᵀ become S⁻¹ b and S⁻¹ J_Lᵀ (nv, nv + 1 + C,
             W).
-        free: Σ J_cᵀ J_c over the rows J_c of J_L of the free cables c, and a right-hand side (nv,
-            nv + 1, W).
+        free: Σ J_cᵀ J_c over the free cables c, and a right-hand side (nv, nv + 1, W).
         cables: Scratch, such as a column and a row of the tableau (2, max(C, nv), W).
         scratch: Scratch (4, W). Entries of T below its last row count as zero.
-        chosen: Numbers of two cables (2, W): the entering cable, which moves to its violated bound,
-            and the cable of the pivot.
+        chosen: The entering cable, which moves to its bound, and the cable of the pivot (2, W).
     """
 
     F: Array
@@ -146,10 +143,7 @@ def _start(J: Array, b: Array, state: State, width: Width) -> None:
 
 @inner
 def _set_gram(J: Array, side: Array, system: Array, width: Width) -> None:
-    """Fill the first nv columns of ``system`` with Σ J_cᵀ J_c over the free cables c.
-
-    J_c is row c of J_L ``J`` (C, nv, W). A cable is free where ``side`` (C, W) is 0.
-    """
+    """Fill the first nv columns of ``system`` with Σ J_cᵀ J_c over the free cables c."""
     for i in upwards(0, J.shape[1]):
         for j in upwards(i, J.shape[1]):
             for w in lanes(width):
@@ -165,10 +159,7 @@ def _set_gram(J: Array, side: Array, system: Array, width: Width) -> None:
 def _choose(
     F: Array, low: Array, high: Array, side: Array, entering: Indices, worst: Array, width: Width
 ) -> None:
-    """Where ``entering`` (W,) is _NONE, set it to the free cable farthest outside its bounds.
-
-    It stays _NONE if all free cables are within their bounds. ``worst`` (W,) is scratch.
-    """
+    """Where ``entering`` (W,) is _NONE, set it to the free cable farthest outside its bounds."""
     for w in lanes(width):
         worst[w] = 0.0 if entering[w] == _NONE else math.inf
     for c in upwards(0, F.shape[0]):

@@ -56,8 +56,7 @@ class StiffnessRange(ReadOnlyState):
         high: Largest attainable ``along(u)`` [N/m] that the searches found.
         low_tension: Tensions that give ``low``.
         high_tension: Tensions that give ``high``.
-        floor: Limit of the smallest eigenvalue of K_θ; below it an arm counts as unstable
-            [N m/rad].
+        floor: Smallest eigenvalue of K_θ at which an arm still counts as stable [N m/rad].
         low_found: Stiffness at the end of each search for ``low``, ascending (S,) [N/m]. It shows
             how many of the starts found ``low``.
         high_found: Stiffness at the end of each search for ``high``, descending (S,) [N/m].
@@ -142,9 +141,8 @@ def stiffness_range(
     From the softest corner found, the tension of one cable after the other is moved to its other
     bound, until no softer corner is found. This does not prove that ``low`` is the smallest. With
     the default number of starts, it was at most 0.3 % too high in 47 of 48 random arms (Eq. 19 or
-    constant rigidity, up to 20 cables). It was 1.9 % too high in the other arm, which tension can
-    buckle. It was up to 5.5 % too high with a user-defined law whose rigidity rises and falls
-    again.
+    constant rigidity, up to 20 cables), and 1.9 % in the other, which tension can buckle. It was up
+    to 5.5 % too high with a user-defined law whose rigidity rises and falls again.
 
     Args:
         pose: The posture.
@@ -273,11 +271,10 @@ def _bounded_ends(
 
 
 def _beside(region: Admissible, anchor: Evaluation, F: Array) -> Iterator[Evaluation]:
-    """Yield stable tensions near F (C,) [N], from which the search for a softer arm continues.
+    """Yield stable tensions near F (C,) [N], each with one tension moved to its farther bound.
 
-    The tension of one cable after the other is moved to its farther bound, and the nearest tensions
-    that balance the arm are taken. If the arm is unstable under them, they are moved back towards
-    ``anchor``.
+    The nearest tensions that balance the arm are taken. If the arm is unstable under them, they are
+    moved back towards ``anchor``.
     """
     for c, (low, high) in enumerate(zip(region.low, region.high, strict=True)):
         wanted = F.copy()
@@ -289,10 +286,7 @@ def _beside(region: Admissible, anchor: Evaluation, F: Array) -> Iterator[Evalua
 
 
 def _rigidities_rise(region: Admissible) -> bool:
-    """Return whether no rigidity EA(F) falls anywhere within the bounds.
-
-    It is False if a cable has a user-defined law.
-    """
+    """Return whether no rigidity EA(F) falls within the bounds; False for user-defined laws."""
     cables = region.least.posture.arm.cables
     for cable, low, high in zip(cables, region.low, region.high, strict=True):
         law = cable.elasticity

@@ -5,13 +5,11 @@ r"""Sequential quadratic programming over the admissible tensions of a stable ar
 c are the constraints on the stiffness, τ = J_Xᵀ W − g is the torque that the cables balance. Only c
 and the last condition, reserve = λ_min − floor ≥ 0, are nonlinear. Every iterate balances the arm
 and is stable, so K_θ can be inverted there. scipy's SLSQP with the same gradients ends at the same
-tensions (tests/planning/test_sqp.py), but needs twice the evaluations, sometimes a hundred times as
-many. SLSQP with finite differences takes three times as long
-(tests/benchmarks/test_planning_speed.py).
+tensions (tests/planning/test_sqp.py), but needs twice to a hundred times the evaluations, and with
+finite differences three times as long (tests/benchmarks/test_planning_speed.py).
 
-**The quadratic program of a step.** Let d = ΔF/size with the largest tension ``size``, g = ∂f/∂d
-and G = ∂c/∂d. The Lagrangian is L = f + y·c − z·reserve, with the multipliers y and z of the step
-before. Solve
+**The quadratic program of a step.** Let d = ΔF/size (size: the largest tension), g = ∂f/∂d and
+G = ∂c/∂d. With y and z of the step before, the Lagrangian is L = f + y·c − z·reserve. Solve
 
     min ½ dᵀ W d + g·d + ρ Σ(s + t) + ½ ρ Σ(s² + t²)
     subject to  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
@@ -93,11 +91,7 @@ class Program:
     centre: Array | float = 0.0  # tensions (C,) [N] at which the effort is zero, or 0
 
     def merit(self, at: ConstraintValues, price: float) -> float:
-        """Return the merit of a point, which a search reduces: the objective f.
-
-        If f is the effort, the penalty ``price`` · (‖c‖₁ + ½ ‖c‖²) of the constraint values c is
-        added.
-        """
+        """Return the merit: f; if f is the effort, plus a penalty ``price`` · (‖c‖₁ + ½ ‖c‖²)."""
         c = at.values
         if self.objective.effort:
             x = (at.evaluation.F - self.centre) / self.unit
@@ -105,10 +99,7 @@ class Program:
         return self.objective.linear * float(c.sum()) + 0.5 * self.objective.square * float(c @ c)
 
     def met(self, at: ConstraintValues) -> bool:
-        """Return whether all constraint values |c| are at most 1e-9 [-] at a point.
-
-        It is True for other objectives than the effort: they have no constraint c = 0.
-        """
+        """Return whether all |c| ≤ 1e-9 [-]; True if no c = 0 is asked (f is not the effort)."""
         return not self.objective.effort or bool((abs(at.values) <= MET).all())
 
     def better(self, one: ConstraintValues, other: ConstraintValues) -> bool:
@@ -124,10 +115,7 @@ class Program:
 
 
 def search(program: Program, start: Evaluation) -> ConstraintValues:
-    """Find a local optimum of ``program`` from the stable point ``start``.
-
-    The search also crosses kinks of the rigidities EA(F); see the module's docstring.
-    """
+    """Find a local optimum from the stable point ``start``, also across kinks of EA(F)."""
     best = _search(program, start, in_piece=False)
     for _ in range(_CROSSINGS):
         for F in _beyond_kinks(program.region, best.evaluation.F):
@@ -142,10 +130,7 @@ def search(program: Program, start: Evaluation) -> ConstraintValues:
 
 
 def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
-    """Yield F (C,) [N], moved just across the kinks of EA(F) at which its tensions lie.
-
-    First the tensions of all these cables are moved together, then each one alone.
-    """
+    """Yield F (C,) [N] moved just across its kinks of EA(F): all together, then each one alone."""
     at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
     for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
         beyond = F.copy()
@@ -155,10 +140,7 @@ def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
 
 
 def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
-    """Find a local optimum of ``program`` from the stable point ``start``.
-
-    If ``in_piece`` is True, the tensions stay between the kinks of EA(F) around ``start``.
-    """
+    """Find a local optimum from ``start``; if ``in_piece``, between the kinks of EA around it."""
     region, iterate = program.region, program.constraints.at(start)
     multipliers = np.zeros(iterate.values.size if program.objective.effort else 0)
     step, radius = _Step(np.zeros_like(start.F), multipliers, 0.0, 0.0, _FIRST_PRICE), _FIRST_RADIUS
@@ -210,8 +192,8 @@ class _Step(NamedTuple):
 class _LocalModel:
     """Quadratic program at an iterate, for the step d = ΔF/size.
 
-    ``size`` [N] is of the order of the tensions. ``before`` is the previous step. ``bounds`` (low,
-    high) limit the tensions [N], and ``radius`` limits |d_c| of each cable.
+    ``before`` is the previous step. ``bounds`` (low, high) limit the tensions [N], and ``radius``
+    limits |d_c| of each cable.
     """
 
     def __init__(
@@ -247,8 +229,7 @@ class _LocalModel:
     def step(self, price: float, c: Array) -> _Step:
         """Solve the quadratic program for constraint values ``c`` (n,) at d = 0.
 
-        ``price`` is the first weight ρ of the violation of the constraints; it is raised until they
-        are met.
+        ``price`` is the first weight ρ of their violation; it is raised until they are met.
         """
         region, evaluation, size = self.program.region, self.iterate.evaluation, self.size
         count, rank, m = self.g.size, len(region.rows), c.size
@@ -295,10 +276,7 @@ class _LocalModel:
         return _Step(d, best.y[rank:], float(best.z[0]), predicted, price)
 
     def take(self, step: _Step) -> tuple[ConstraintValues | None, float]:
-        """Take a step; return the new point and the fall of the merit.
-
-        The point is None if no stable one is found.
-        """
+        """Take a step; return the new point (None if none is stable) and the fall of the merit."""
         candidate, fall = self._after(step.d, step.price)
         if candidate is not None and fall < 0.75 * step.predicted and self.c.size:
             # second-order correction: use the value of c after the step, not of its tangent

@@ -50,10 +50,7 @@ class LockedCable(NamedTuple):
     free_length: float  # original length l_0, which the motor keeps [m]
 
     def tensions(self, longer: Array) -> Array:
-        """Compute the tension (P,) [N] of this cable at P places near the posture.
-
-        There, the cables of the arm are longer than at the posture by ``longer`` (P, C) [m].
-        """
+        """Compute the tension (P,) [N] of this cable if the cables are longer by (P, C) [m]."""
         cable, start = self.cable, self.free_length
         more = longer[:, self.number]
         return evaluate_law(
@@ -61,11 +58,7 @@ class LockedCable(NamedTuple):
         )
 
     def stored(self, longer: Array) -> Array:
-        """Compute the gain of stored energy less F ΔL (P,) [J] of this cable.
-
-        ΔL is its elongation since the posture; the argument ``longer`` (P, C) [m] has that of all
-        cables.
-        """
+        """Compute gain of energy minus F ΔL (P,) [J] if the cables are longer by ΔL (P, C) [m]."""
         cable, F, start = self.cable, self.tension, self.free_length
         tensions = self.tensions(longer)
         more = evaluate_law(cable, lambda: cable.energy(tensions, start) - cable.energy(F, start))
@@ -86,10 +79,7 @@ class LockedCable(NamedTuple):
         return min(abs(F - edge) for edge in edges)
 
     def one_sided(self) -> list[str]:
-        """Return a message for each bound or kink of the law that is at the tension; usually none.
-
-        K_θ has another value on either side of it.
-        """
+        """Return a message for each bound or kink of the law at the tension; usually none."""
         F, name = self.tension, self.cable.name
         if F == 0.0:
             return [f"{name} is slack (0 N), and K_θ counts it as if it were taut"]
@@ -108,11 +98,7 @@ class LockedCable(NamedTuple):
 
 
 def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
-    """Return ``answer()``, which evaluates the law of ``cable``.
-
-    Raises InvalidInput if a law of a user raises another error than a CdsmError, or if a number is
-    not finite.
-    """
+    """Return ``answer()``, which evaluates the law of ``cable``; InvalidInput if the law fails."""
     try:
         values = np.asarray(answer(), dtype=np.float64)
     except CdsmError:
