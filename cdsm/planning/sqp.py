@@ -9,7 +9,7 @@ tensions (tests/planning/test_sqp.py), but needs twice to a hundred times the ev
 finite differences three times as long (tests/benchmarks/test_planning_speed.py).
 
 **The quadratic program of a step.** Let d = ΔF/size (size: the largest tension), g = ∂f/∂d and
-G = ∂c/∂d. With y and z of the step before, the Lagrangian is L = f + y·c − z·reserve. Solve
+G = ∂c/∂d. L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve
 
     min ½ dᵀ W d + g·d + ρ Σ(s + t) + ½ ρ Σ(s² + t²)
     subject to  J_Lᵀ d = 0,  c + G d = s − t,  s, t ≥ 0,  reserve + ∂reserve·d ≥ 0,
