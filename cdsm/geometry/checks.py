@@ -1,4 +1,4 @@
-"""Find the faults of a geometry, and reasons to doubt it."""
+"""Find faults for which a geometry is refused, and doubts for which a warning is issued."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def faults_of(geometry: GeometryFields) -> list[str]:
 
 
 def _short_links(geometry: GeometryFields) -> list[str]:
-    """Return one fault for all links that are too short for their disks."""
+    """Return a list with one text on all links too short for their disks; empty if none is."""
     offsets = [joint.disk_offset for joint in geometry.joints]
     short = [
         f"link {k} is {link.length:g} m long, its {'disks need' if after else 'disk needs'} "

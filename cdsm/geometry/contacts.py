@@ -1,4 +1,4 @@
-"""Find links of an arm that overlap at a posture."""
+"""Find links of an arm that touch or overlap at a posture."""
 
 from __future__ import annotations
 

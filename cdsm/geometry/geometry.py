@@ -1,4 +1,4 @@
-"""Geometry of a serpentine arm, a frozen value: built of joints or sections, or read from TOML."""
+"""Geometry of a serpentine arm: build it from joints or sections, or read it from TOML."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ class Geometry(GeometryFields):
     def sections(
         cls, sections: Sequence[Geometry], *, spread: float = 0.0, name: str = "arm"
     ) -> Geometry:
-        """Join arms end to end to one arm of two or more sections.
+        """Join arms end to end to one arm, each as a section.
 
         Each section keeps its joints, links, radii and cables. Its base frame is the tip of the
         section before, whose last link therefore becomes longer by its ``base_length``. Its cables
@@ -217,7 +217,7 @@ class Geometry(GeometryFields):
         )
 
     def replace(self, **changes: Any) -> Geometry:
-        """Return this geometry with other attributes, e.g. ``replace(hole_radius=0.02)``.
+        """Return a copy of this geometry with other attributes, e.g. ``replace(hole_radius=0.02)``.
 
         If ``hole_radius`` is given without ``joints``, all joints get it. Raises GeometryError,
         which lists every fault, if the changed geometry is invalid.

@@ -47,7 +47,7 @@ def spread_out(cables: Sequence[CableRoute], spread: float) -> tuple[CableRoute,
 
 
 def same_angle(cables: Sequence[CableRoute]) -> list[list[int]]:
-    """Return groups of two or more cables, as indices, whose holes have the same angle."""
+    """Return groups of cables with the same hole angle, each as two or more indices."""
     turn = 2.0 * math.pi
     angles = [cable.angle % turn for cable in cables]
     order = sorted(range(len(cables)), key=angles.__getitem__)
@@ -63,7 +63,7 @@ def same_angle(cables: Sequence[CableRoute]) -> list[list[int]]:
 
 
 def sharing(cables: Sequence[CableRoute], disks: Sequence[Disk]) -> list[list[int]]:
-    """Return groups of two or more cables, as indices, that share a hole of some disk."""
+    """Return groups of cables that share a hole of some disk, each as two or more indices."""
     found: dict[tuple[int, ...], None] = {}
     for group in same_angle(cables):
         for d, disk in enumerate(disks):

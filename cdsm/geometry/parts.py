@@ -52,7 +52,7 @@ class Joint:
             is None.
         hole_radius: R: distance of the holes of its two disks from the arm's axis [m]; None: the
             ``hole_radius`` of the :class:`Geometry`.
-        disk_radius: Outer radius of its two disks [m]; None: 1.1 times the distance of the farthest
+        disk_radius: Outer radius of the two disks [m]; None: 1.1 times the distance of the farthest
             hole from the axis.
 
     Raises:
@@ -130,7 +130,7 @@ class Disk(NamedTuple):
     Attributes:
         link: Name in the URDF of the link that carries it.
         x: Position along x of the link [m].
-        joint: Number of the joint next to it, from 1.
+        joint: Number of the joint next to the disk, from 1.
         hole_radius: R: distance of its holes from the axis [m].
         radius: Outer radius [m].
     """
@@ -146,6 +146,6 @@ class Disk(NamedTuple):
         return self.hole_radius if route.radius is None else route.radius
 
     def hole(self, route: CableRoute) -> tuple[float, float, float]:
-        """Return the hole (x, R cos φ, R sin φ) of a cable ``route``, in the link's frame [m]."""
+        """Return the position (x, R cos φ, R sin φ) [m] of a cable's hole, in the link's frame."""
         radius = self.radius_of(route)
         return self.x, radius * math.cos(route.angle), radius * math.sin(route.angle)

@@ -113,7 +113,10 @@ def text_of(geometry: Geometry) -> str:
 
 
 def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
-    """Return the TOML lines of a geometry; ``prefix``, e.g. ``geometry.``, precedes table names."""
+    """Return the TOML lines of a geometry, a table for each joint, link and cable.
+
+    ``prefix``, e.g. ``geometry.``, precedes the names of the tables.
+    """
     lines = toml_lines(geometry, ("name", "base_length", "hole_radius"))
     for joint in geometry.joints:
         lines += ["", f"[[{prefix}joints]]", *toml_lines(joint)]

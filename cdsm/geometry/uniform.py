@@ -1,4 +1,7 @@
-"""Build joints, links and cables of uniform arms; a size is one number, or one per joint."""
+"""Build joints, links and cables of arms whose joints are alike.
+
+A size of these arms is one number for all joints, or a list with one for each joint.
+"""
 
 from __future__ import annotations
 
@@ -112,7 +115,7 @@ def uniform(
 
 
 def _without_angles(hole_angles: Sequence[float | Sequence[float]]) -> str:
-    """Return the names of the empty lists of hole angles as text; empty if no list is empty."""
+    """Return a text that names empty lists of hole angles; an empty text if there are none."""
     lists = [each for each in hole_angles if isinstance(each, Sequence)]
     if not hole_angles or (lists and not any(lists)):
         return "hole_angles"

@@ -42,16 +42,17 @@ def read_caspr(
 ) -> Manipulator:
     """Read a robot from its CASPR model files.
 
-    Links keep CASPR's names. A link becomes ``link1``, ``link2``, … if its name is missing or used
-    twice. Link 0 is called ``base``. Each CASPR joint is split into single joints. Their names have
-    the link and the axis: ``link 1_x`` turns about x, ``link 1_slide_x`` moves along x. ``tool0``
-    is at the end of the link with the highest number. A repeated cable name gets the suffix ``#2``.
+    Links keep CASPR's names. A link is called ``link1``, ``link2``, … by its number if its name is
+    missing or used twice. Link 0 is called ``base``. Each CASPR joint is split into joints of one
+    coordinate. The name of such a joint has the link and the axis: ``link 1_x`` turns about x,
+    ``link 1_slide_x`` moves along x. ``tool0`` is at the end of the link with the highest number. A
+    repeated cable name gets the suffix ``#2``.
 
     The joint coordinates q have CASPR's sign and order: link by link in the order of the numbers,
     and within a link as in the name of its joint type, translations first (``S_FIXED_XYZ``: angles
-    x, y, z; ``PLANAR_XZ``: translations x and z, then the angle). ``joint_names`` lists them. Force
-    bounds become ``Cable.minimum`` and ``.maximum``. CASPR's cables do not stretch, so you choose
-    their elasticity.
+    x, y, z; ``PLANAR_XZ``: translations x and z, then the angle). ``joint_names`` lists them.
+    CASPR's force bounds become ``Cable.minimum`` and ``.maximum``. CASPR's cables do not stretch,
+    so you choose their elasticity.
 
     Args:
         bodies: File of the bodies, or folder with one ``*_bodies.xml`` and one ``*_cables.xml``.
@@ -185,7 +186,7 @@ def _cable(
 
 
 def _urdf(name: str, bodies: Sequence[Body]) -> str:
-    """Return the URDF text of a robot; ``tool0`` is at the end of the last of ``bodies``."""
+    """Return the URDF text of a robot with ``bodies`` as links; ``tool0`` ends the last one."""
     links, joints = [E.link(name=BASE)], []
     names = [BASE, *(body.name for body in bodies)]
     for body in bodies:

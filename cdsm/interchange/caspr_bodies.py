@@ -1,4 +1,4 @@
-"""Read the links of a CASPR model with their joints, and helpers for its XML."""
+"""Read the links of a CASPR model with their joints; read the values of its XML."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _OBLIQUE: Final = {"R_AXIS": ("turn", "revolute"), "P_AXIS": ("slide", "prismati
 
 
 class SingleJoint(NamedTuple):
-    """Joint of one coordinate, as in a URDF."""
+    """Joint of a URDF: one axis, one coordinate."""
 
     name: str
     kind: str  # type in URDF: revolute or prismatic
@@ -194,7 +194,7 @@ def whole(where: str, text: str | None) -> int:
 
 
 def refuse(path: Path, faults: Sequence[str]) -> None:
-    """Raise a FileError that lists all faults, if there are any."""
+    """Raise a FileError that lists all ``faults`` of the file, if there are any."""
     if faults:
         raise FileError(path, f"cannot be read as a CASPR model, {counted(faults, most=20)}")
 

@@ -158,7 +158,7 @@ def mujoco_model(
     damping_ratio: float | None = None,
     damping: float | None = None,
 ) -> MuJoCoModel:
-    """Build the model of :func:`to_mjcf`, with its settings; the arguments are the same."""
+    """Build the MJCF text of :func:`to_mjcf`, with its settings; the arguments are the same."""
     instance("arm", arm, Manipulator)
     if (pose is None) != (tension is None):
         raise InvalidInput("tension", "give pose and tension, or neither.")
@@ -220,7 +220,7 @@ def _checked(name: str, value: float | None) -> float | None:
 
 
 def _missing(K: Stiffness) -> Iterator[str]:
-    """Yield a line if the model lacks a load, and one if the tensions do not balance the arm."""
+    """Yield a remark if K has a wrench, which the model lacks, and one if K is out of balance."""
     if K.wrench.any():
         load = f"{coordinates(K.wrench[:3])} N, {coordinates(K.wrench[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"
@@ -242,9 +242,10 @@ def _as_force_controlled(K: Stiffness) -> Stiffness:
 def _cables(
     root: etree._Element, arm: Manipulator, K: Stiffness | None, actuators: str, damping: Array
 ) -> list[float]:
-    """Add a tendon for each cable to ``root``, and actuators; return ``ctrl`` at the posture.
+    """Add tendons and their actuators to ``root``; return ``ctrl`` of each actuator at the posture.
 
-    ``damping`` (C,) [N s/m] is the damping of each tendon.
+    ``actuators`` is the kind of these; see :func:`to_mjcf`. ``damping`` (C,) [N s/m] is the damping
+    coefficient of each tendon.
     """
     tendon, motors = etree.SubElement(root, "tendon"), etree.Element("actuator")
     at_start = []

@@ -1,4 +1,4 @@
-"""Write bodies, joints, shapes and sites of an arm for MuJoCo, in its initial configuration."""
+"""Write bodies, joints, shapes and sites of an arm for MuJoCo, at the initial joint positions."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _inertia(inertia: etree._Element, R: Array) -> Array:
 
 
 def _shape(body: etree._Element, visual: etree._Element) -> bool:
-    """Draw a cylinder, box or sphere of a URDF; return False for another shape, such as a mesh."""
+    """Add a geom for a cylinder, box or sphere of a URDF to a body; False for another shape."""
     shape = visual.find("geometry/*")
     if shape is None or shape.tag not in ("cylinder", "box", "sphere"):
         return False

@@ -38,7 +38,7 @@ def solve_joint_angles(
 ) -> JointSolution:
     """Find joint angles from cable lengths: min ‖L(θ) − L‖² within the joint limits (Eq. 5).
 
-    If many angles give these lengths, those with min ½‖θ − guess‖² are returned.
+    If many postures have these lengths, the one with min ½‖θ − guess‖² is returned.
 
     Args:
         arm: The arm.
@@ -54,7 +54,8 @@ def solve_joint_angles(
 
     Raises:
         InvalidInput: ``cable_lengths`` or ``guess`` has a wrong shape or is not numbers, a length
-            is not positive, the guess is beyond the limits, or ``tolerance`` is not in 1e-12 … 1.
+            is not positive, the guess is beyond the limits, or ``tolerance`` is not from 1e-12 to
+            below 1.
         CableError: Two sites of a cable coincide at a posture of the search.
     """
     guess = _checked_guess(instance("arm", arm, Manipulator), guess)
@@ -98,7 +99,8 @@ def inverse_kinematics(
 
     Raises:
         InvalidInput: ``target`` or ``guess`` has a wrong shape or is not numbers, the target is not
-            a rigid transform, the guess is beyond the limits, or ``tolerance`` is not in 1e-12 … 1.
+            a rigid transform, the guess is beyond the limits, or ``tolerance`` is not from 1e-12 to
+            below 1.
     """
     guess = _checked_guess(instance("arm", arm, Manipulator), guess)
     target = _checked_target(target)

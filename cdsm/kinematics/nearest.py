@@ -64,11 +64,11 @@ _Newton = Callable[[Array, NDArray[np.bool_]], _NewtonStep]
 
 
 def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, int]:
-    """Find the joint angles nearest to ``guess`` with ‖r‖ ≤ ``tolerance``, or else least ‖r‖.
+    """Find the joint angles nearest to ``guess`` (nv,) with r = 0, or else with the least ‖r‖.
 
     r is the ``residual``. The angles are nearest locally; a differently folded arm may be nearer
-    still. If the search from the guess finds no solution, it is repeated from random postures, the
-    same ones in each call.
+    still. If the search from the guess ends with ‖r‖ > ``tolerance``, it is repeated from random
+    postures, the same ones in each call.
 
     Returns:
         The joint angles (nv,) [rad] within the limits, and the number of evaluations of r.
@@ -90,7 +90,7 @@ def nearest(residual: Residual, guess: Array, tolerance: float) -> tuple[Array, 
 
 
 class _Search:
-    """Searches for the joint angles of :func:`nearest`, and counts the evaluations of r."""
+    """The searches that :func:`nearest` makes, with a count of the evaluations of r."""
 
     def __init__(self, residual: Residual, guess: Array) -> None:
         self.residual = residual
@@ -212,10 +212,10 @@ class _Search:
 
 
 def _downhill(H: Array, gradient: Array) -> tuple[Array, bool]:
-    """Return the step −|H|⁻¹ gradient, and whether H has no negative eigenvalue.
+    """Return the descent step −|H|⁻¹ gradient, and whether H has no negative eigenvalue.
 
-    |H| has the magnitudes of the eigenvalues of H. The step is zero along eigenvectors whose
-    eigenvalue is zero to rounding.
+    |H| has the eigenvectors of H and the magnitudes of its eigenvalues. The step is zero along
+    eigenvectors whose eigenvalue is zero to rounding.
     """
     values, vectors = np.linalg.eigh((H + H.T) / 2.0)
     flat = abs(values) <= _FLAT * abs(values).max(initial=0.0)

@@ -40,7 +40,7 @@ class Residual(ABC):
     def curvature(self, q: Array, weight: Array) -> Array:
         """Compute the Hessian (nv, nv) of weight · r with respect to q, for constant weights (m,).
 
-        It is exact where r = 0, elsewhere perhaps approximate.
+        It is exact where r = 0, and may be approximate elsewhere.
         """
 
     def hessian(self, q: Array) -> Array:
@@ -85,9 +85,9 @@ class TipResidual(Residual):
         return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
-        """Compute the Hessian (nv, nv) of weight · r as ∂(J_Xᵀ W)/∂θ; it is exact where r = 0.
+        """Compute the Hessian (nv, nv) of weight · r as ∂(J_Xᵀ W)/∂θ; exact where r = 0.
 
-        The wrench W has the force weight[:3]/arm length and the moment weight[3:].
+        The force of the wrench W is weight[:3]/arm length, its moment weight[3:].
         """
         # at r = 0, ∂r/∂q is J_X up to the length
         wrench = np.zeros(6)

@@ -93,7 +93,7 @@ class JointSolution(_Solution):
         cable_lengths: Wanted cable lengths (C,) [m], lead included.
         guess: Joint angles at which the search started (nv,) [rad].
         angles: Joint angles of the solution (nv,) [rad], within the limits.
-        lengths: Cable lengths L (C,) [m] at ``angles``: the wanted lengths, or the nearest ones.
+        lengths: Cable lengths L (C,) [m] at ``angles``: the wanted ones, or the nearest found.
         tolerance: Largest misfit at which the lengths count as reached, in arm lengths [-].
         iterations: Number of evaluations of L.
     """

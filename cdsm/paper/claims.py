@@ -1,4 +1,4 @@
-"""Compare claims of the paper with computed numbers, and write both as text or JSON."""
+"""Compare numbers that the paper states with computed ones, and write both as text or JSON."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _deviation(claim: Claim) -> float:
 
 
 def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
-    """Return one row of text per claim of ``figures``; :data:`HEADER` names the columns."""
+    """Return a row of text for each claim of ``figures``; :data:`HEADER` names the columns."""
     return [
         (
             claim.figure,
@@ -143,7 +143,7 @@ def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
 
 
 def to_markdown(figures: Sequence[Figure]) -> str:
-    """Return a Markdown table of all claims with assumptions, then the tables of each figure."""
+    """Return Markdown: a table of all claims with assumptions, then the tables of each figure."""
     further = [table for figure in figures for table in figure.tables()]
     return "\n\n".join([markdown_table(HEADER, to_rows(figures)), EXPLANATION, *further]) + "\n"
 

@@ -34,7 +34,10 @@ FROM_FIG_6: Final = "prototype searched for Fig. 6"
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Curve:
-    """Stiffness in x, y and z as a function of a swept quantity.
+    """Stiffness in x, y and z as a function of a swept quantity, at N values.
+
+    It has the total stiffness, and the part of the stiffness that comes from one term of K_θ. The
+    ``part`` of the figure names this term.
 
     Attributes:
         label: Name of the curve in its figure.
@@ -42,9 +45,9 @@ class Curve:
         swept: Swept quantity (N,): Young's modulus [Pa] or lower bound of tension [N].
         tension: Smallest, mean and largest cable tension (N, 3) [N].
         pseudoinverse: Diagonal of the paper's K_R (N, 3) [N/m].
-        pseudoinverse_part: Diagonal of K_R from the figure's ``part`` of K_θ alone (N, 3) [N/m].
+        pseudoinverse_part: Diagonal of K_R computed from this term alone (N, 3) [N/m].
         along: Stiffness that a small weight measures along x, y, z (N, 3) [N/m].
-        along_part: Contribution of the figure's ``part`` of K_θ to ``along`` (N, 3) [N/m].
+        along_part: Contribution of this term to ``along`` (N, 3) [N/m].
     """
 
     label: str
@@ -101,7 +104,7 @@ class StiffnessFigure(Figure):
 
 
 class Pair(NamedTuple):
-    """The same curve computed twice: from EA/L, L the stretched length, and from EA/l_0."""
+    """The same curve computed twice, with two lengths in the cable stiffness."""
 
     stretched: Curve
     original: Curve
@@ -161,7 +164,7 @@ def over_minimum(label: str, law: Elasticity, q: Array, minima: Array) -> Pair:
 
 
 def at_minimum(arm: Manipulator, q: Array, minimum: float) -> Stiffness:
-    """Compute the stiffness at q (nv,) under the least tensions with this lower bound [N]."""
+    """Compute the stiffness at q (nv,) [rad] under the least tensions above ``minimum`` [N]."""
     pose = arm.at(q)
     return stiffness(pose, distribute_tension(pose, minimum))
 

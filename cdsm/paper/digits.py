@@ -43,10 +43,11 @@ _PRINTED, _HALF = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
 
 
 def least_bend() -> tuple[float, float]:
-    """Return dEA/dF [-] just below and above 31 N, for the smallest kink that Eq. 19 can have.
+    """Return the slopes dEA/dF [-] just below and just above 31 N whose difference is smallest.
 
-    EA is continuous at 31 N. The coefficient of F⁶ below 31 N may be any number; all others round
-    to their printed digits. Even then the two slopes differ.
+    All laws are searched that are continuous at 31 N and round to the printed digits of Eq. 19,
+    except that the coefficient of F⁶ below 31 N may be any number. Even so, the slopes differ: no
+    such law is without a kink.
     """
     below, above = _branches(powers(JOIN, slope=True)[0])
     free: list[tuple[float | None, float | None]] = [(-1.0, 1.0)] * 14
@@ -58,8 +59,8 @@ def least_bend() -> tuple[float, float]:
 def band(tension: ArrayLike) -> tuple[Array, Array]:
     """Find the least and the largest EA [N] that the printed digits allow at each ``tension`` [N].
 
-    Both have the shape of ``tension``. All laws are allowed that round to the printed digits, are
-    continuous at 31 N, and are positive below it.
+    Both results have the shape of ``tension``. All laws are considered that round to the printed
+    digits, are continuous at 31 N, and are not negative below 31 N.
 
     Raises:
         InvalidInput: ``tension`` is not finite numbers.
@@ -75,7 +76,10 @@ def band(tension: ArrayLike) -> tuple[Array, Array]:
 
 
 def powers(tension: ArrayLike, slope: bool = False) -> Array:
-    """Return the powers Fⁱ (N, 7), i = 0 to 6, of N tensions; if ``slope``, i Fⁱ⁻¹ instead."""
+    """Return the powers Fⁱ (N, 7), i = 0 to 6, of N tensions; if ``slope``, the derivatives i Fⁱ⁻¹.
+
+    Multiplied by the coefficients of Eq. 19, they give EA, or dEA/dF.
+    """
     F, i = np.atleast_1d(np.asarray(tension, dtype=np.float64))[:, None], np.arange(7)
     return np.asarray(i * F ** np.maximum(i - 1, 0) if slope else F**i)
 

@@ -1,8 +1,8 @@
 """Recompute Figs. 10, 12 and 13 and Table II of Section V by virtual experiments.
 
-:mod:`cdsm.paper.prototype_fit` identifies a prototype from the numbers of these experiments.
-Agreement only shows that such a prototype is possible. Disagreement contradicts the model, an
-assumption or the other data.
+The prototype is unknown: :mod:`cdsm.paper.prototype_fit` identifies it from the numbers that these
+experiments gave in the paper. So agreement only shows that such a prototype is possible.
+Disagreement contradicts the model, an assumption or the other data.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ _POINTS: Final = 40
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trace:
-    """One curve of a virtual experiment, with the values that the paper prints.
+    """One curve of a virtual experiment, with the paper's values beside it.
 
     Attributes:
         label: Name of the curve.
-        swept: Swept quantity (N,), a tension [N] or a stiffness [N/m].
+        swept: Swept quantity (N,): a tension [N] or the stiffness of the cables [N/m].
         computed: Stiffness (N,) [N/m], or its ratio to the first value [-].
-        paper_at: Values of ``swept`` at which the paper prints the stiffness (M,).
-        paper: Stiffness in the paper (M,), in the unit of ``computed``.
+        paper_at: Values of ``swept`` that belong to ``paper`` (M,); some are assumed or identified.
+        paper: Stiffness in the paper (M,), in the unit of ``computed``; for some fits of Fig. 10
+            with x and y exchanged.
     """
 
     label: str
@@ -182,9 +183,10 @@ def _over_tension(fit: PrototypeFit) -> list[Trace]:
 def _configurations(
     fit: PrototypeFit, swept: Array, curves: Sequence[Array], paper: Sequence[float]
 ) -> tuple[Trace, ...]:
-    """Build a trace per configuration: a curve against ``swept``, divided by its first value.
+    """Build a trace for each configuration: its curve against ``swept`` (N,), over its first value.
 
-    ``paper`` has the paper's ratio of the last to the first value of each curve.
+    ``curves`` has a stiffness (N,) [N/m] for each configuration, ``paper`` the paper's ratio of the
+    last to the first value.
     """
     configurations = np.rad2deg(fit.prototype.configurations)
     return tuple(

@@ -1,9 +1,9 @@
 """Fit Table II with effects that Section V leaves out: friction, bearings, another strand.
 
-Each test begins on a shaken arm, whose cables have one tension along their length. Then a weight is
-applied slowly, so cables stick in the holes at first. A bearing acts as a spring about its joint:
-the model has a pair of springs between the disks beside the joint. The rigidity of all cables is
-Eq. 19 times one factor, since they come from one spool.
+Each simulated test begins on a shaken arm: the tension of a cable is the same in all its segments.
+Then a weight is applied slowly, so cables stick in the holes at first. The bearing of a joint
+resists rotation like a spring: the model has a pair of springs between the two disks beside the
+joint. The rigidity of all cables is Eq. 19 times one factor, since they come from one spool.
 """
 
 from __future__ import annotations
@@ -109,9 +109,10 @@ class RoughPrototype:
         ]
 
     def tips_to_first_order(self, paths: Sequence[LoadingPath]) -> Array:
-        """Compute the tips (15, 3) [m] under the weights from the ``paths`` of a similar prototype.
+        """Estimate the tip positions (15, 3) [m] under the weights from a similar prototype.
 
-        The tips are correct to first order in the differences of the two prototypes.
+        ``paths`` is the result of :meth:`weigh` for that prototype. The tips are correct to first
+        order in the differences of the two prototypes.
         """
         pose = self.arm().at(POSTURE)
         tensions = np.repeat(self._tensions(pose), 3, axis=0)
@@ -156,7 +157,7 @@ class RoughPrototype:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RoughFit:
-    """The prototype that explains Table II best, with added parameters.
+    """The prototype, with friction, bearings and rigidity, that explains Table II best.
 
     Attributes:
         prototype: Identified parameters.

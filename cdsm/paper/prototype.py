@@ -34,7 +34,7 @@ class Prototype:
     Attributes:
         link_length: Length of the links between the joints [m].
         tool_length: Distance from the last joint to the weights [m].
-        hole_radius: R [m].
+        hole_radius: R: distance of the holes from the arm's axis [m].
         lead: Lead (the straight cable between its actuator and the base disk) of all cables [m].
         link_mass: Mass of every link [kg].
         drive_stiffness: Stiffness of the drive in series with every strand [N/m].
@@ -191,7 +191,7 @@ def arm_of(
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Predicted:
-    """Predictions of the 20 numbers of Section V, or of the 15 of Table II alone."""
+    """Predictions of the 20 numbers that Section V prints, or only of the 15 of Table II."""
 
     table: Array  # Table II (5, 3) [N/m]
     drops: tuple[float, ...] = ()  # reductions of Fig. 12 (2,) [-], or empty
@@ -199,9 +199,10 @@ class Predicted:
     check: float | None = None  # stiffness in z of Section V-B [N/m], or None
 
     def residuals(self, table: Array) -> Array:
-        """Compute residuals (20,) [-], or (15,) for Table II alone; ``table`` is (5, 3) [N/m].
+        """Compute the residuals of the predictions (20,) [-], or (15,) for Table II alone.
 
         They are ln(model/paper) for a stiffness, (model − paper)/paper for a drop or a rise.
+        ``table`` (5, 3) [N/m] is the paper's Table II, perhaps with x and y exchanged.
         """
         of_table = np.log(self.table / table).ravel()
         if self.check is None:

@@ -1,9 +1,10 @@
-"""Identify one prototype from all measurements of Section V.
+"""Identify the prototype of Section V from all numbers that the section prints.
 
-The paper prints 20 numbers of its prototype and none of its dimensions. Every unknown is a
+The paper prints 20 numbers of its prototype, but no dimensions. Every unknown is a
 parameter within :data:`BOUNDS`. For each of four interpretations of Section V (:data:`STEPS`), a
 search finds the parameters that explain the numbers best. The residual of a stiffness is
-ln(model/paper), because its errors are factors. That of a drop or a rise is (model − paper)/paper.
+ln(model/paper), because its errors are factors. The residual of a drop or a rise of stiffness is
+(model − paper)/paper.
 """
 
 from __future__ import annotations
@@ -84,12 +85,12 @@ class Step:
 
     @property
     def numbers(self) -> tuple[str, ...]:
-        """Names of the numbers of the paper to which the prototype is fitted."""
+        """Names of the paper's numbers that are fitted, such as ``Table II, x, row 1``."""
         return NAMES[: TABLE_II.size] if self.table_alone else NAMES
 
     @property
     def count(self) -> str:
-        """How many parameters are free, for how many numbers of the paper, as text."""
+        """Text with the count of free parameters and of fitted numbers."""
         return f"{len(self.free)} free parameters for {len(self.numbers)} numbers"
 
 
@@ -125,7 +126,7 @@ STEPS: Final = (
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PrototypeFit:
-    """The prototype that explains the numbers best, with its residuals.
+    """Result of fitting a prototype to one interpretation of Section V.
 
     Attributes:
         step: The interpretation of Section V that was fitted: its numbers and free parameters.

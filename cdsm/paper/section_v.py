@@ -1,4 +1,4 @@
-"""Numbers that Section V of the paper prints of its experiments, in SI units."""
+"""Numbers in Section V of the paper, which describes its experiments, in SI units."""
 
 from __future__ import annotations
 

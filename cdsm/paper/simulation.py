@@ -1,7 +1,7 @@
 """Recompute Figs. 3, 4, 6, 7 and 8 of the paper.
 
-Where the paper is silent, :mod:`cdsm.presets` and this module assume values, which
-``Claim.assumption`` names. ``Claim.searched`` names assumptions chosen to meet the paper's number.
+Where the paper is silent, :mod:`cdsm.presets` and this module assume values. ``Claim.assumption``
+states them; ``Claim.searched`` states which of them were chosen to meet the paper's numbers.
 """
 
 from __future__ import annotations
@@ -198,7 +198,10 @@ def _figure(
 
 
 def _highest_minimum(pose: Posture) -> float:
-    """Find the lower bound [N] at which the largest of the tensions is just :data:`STRAND_END`."""
+    """Find the lower bound [N] of all tensions at which the largest reaches :data:`STRAND_END`.
+
+    The result is 0.001 N lower, so that all tensions stay inside the domain of the law.
+    """
 
     def excess(minimum: float) -> float:
         return float(distribute_tension(pose, minimum).values.max()) - STRAND_END

@@ -28,7 +28,7 @@ class StrandFigure(Figure):
     Attributes:
         gauge_length: Length of the tested wire [m].
         tension: F (N,) [N].
-        displacement: Elongation of the wire since 2.2 N, ∫ l_0 dF/EA (N,) [m].
+        displacement: Elongation of the wire from 2.2 N on, ∫ l_0 dF/EA (N,) [m].
         tangent: Tangent rigidity EA of the repaired Eq. 19 (N,) [N].
         secant: Secant rigidity (Eq. 18) of the repaired Eq. 19 (N,) [N].
         low: Least EA of all continuous laws that round to the printed digits (N,) [N].

@@ -42,15 +42,15 @@ def plot_arm(
 ) -> Figure:
     """Plot an arm in 3D: backbone, disks and cables, with equal axes in mm.
 
-    For a robot from a URDF the joints are drawn: circles are revolute, squares prismatic. A thin
-    line joins each cable site to its link.
+    A robot from a URDF has no disks. Its joints are drawn instead: circles are revolute, squares
+    prismatic. A thin line joins each cable site to its link.
 
     Args:
         pose: Posture to draw.
         tension: Tensions that colour the cables, if given.
-        stiffness: If given and stable, the ellipsoid C_vv f, |f| = 1, is drawn at the tip. It
-            shows the displacement under a force of 1 N in any direction, enlarged as the legend
-            says. The title says if the arm is unstable.
+        stiffness: If it is given and the arm is stable, an ellipsoid at the tip shows the
+            displacement C_vv f under a force f of 1 N in each direction, at the scale that the
+            legend states. If the arm is unstable, the title says so.
 
     Raises:
         InvalidInput: An argument has the wrong type, or belongs to another arm or posture.
@@ -85,7 +85,7 @@ def plot_arm(
 
 
 def tension_bar(figure: Figure, colors: ScalarMappable) -> None:
-    """Draw the colour scale of the tensions at the right edge of a figure."""
+    """Draw the colour bar of the tensions [N] at the right edge of a figure."""
     bar = figure.colorbar(colors, cax=figure.add_axes((BESIDE_BAR + 0.01, 0.15, 0.025, 0.6)))
     bar.set_label("cable tension [N]", fontsize=TEXT)
     bar.ax.tick_params(labelsize=SMALL)
@@ -98,7 +98,7 @@ _LARGEST = 0.3  # largest half axis of a drawn ellipsoid, as a fraction of the a
 
 
 class Ellipsoid(NamedTuple):
-    """Surface of the tip displacements C_vv f, |f| = 1 N, to be drawn at the tip."""
+    """Ellipsoid of the tip displacements C_vv f under all forces f of 1 N, to be drawn."""
 
     surface: Array  # points of the drawn surface (3, 13, 25) [m]
     scale: float  # drawn displacement over true displacement [-], a power of ten
@@ -112,8 +112,8 @@ class Ellipsoid(NamedTuple):
 def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
     """Compute the ellipsoid of a compliance C_vv (3, 3) [m/N] at the tip (3,) [m] of an arm.
 
-    It is enlarged by a power of ten, so that its longest half axis is 3 to 30 % of the ``length``
-    of the arm [m]. None if no force moves the tip.
+    It is scaled by a power of ten, so that its longest half axis is 3 to 30 % of the ``length`` of
+    the arm [m]. None if no force moves the tip.
     """
     longest = float(np.linalg.norm(compliance, 2))
     if longest == 0.0:
@@ -137,7 +137,7 @@ def _draw_ellipsoid(axes: Any, stiffness: Stiffness) -> None:
 
 
 def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
-    """Draw an arm on existing 3D axes; ``colors`` are RGBA of its cables (C, 4), if given."""
+    """Draw an arm on existing 3D axes; ``colors`` (C, 4) are the RGBA colours of its cables."""
     if pose.arm.is_serpentine:
         _draw_disks(axes, pose)
     else:
@@ -150,10 +150,10 @@ def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
 
 
 def frame_arms(axes: Any, limits: Array | None, label: str = "{} [mm]") -> None:
-    """Set the limits (3, 2) of 3D axes with equal scales, and their labels.
+    """Give 3D axes equal scales, the limits (3, 2) [mm], and labels.
 
-    In ``label``, {} stands for the name of the axis. If ``limits`` is None, the axes contain all
-    that is drawn.
+    If ``limits`` is None, the axes contain everything drawn so far. In ``label``, {} stands for the
+    name of the axis.
     """
     axes.tick_params(labelsize=SMALL, pad=-3)
     if limits is None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def plot_uncertainty(budget: Uncertainty) -> Figure:
-    """Plot the contribution of each source to the standard uncertainty, and their root sum square.
+    """Plot the contribution of each source to the standard uncertainty, and the whole uncertainty.
 
     Raises InvalidInput if ``budget`` is not a result of :func:`~cdsm.uncertainty`.
     """
@@ -37,10 +37,9 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
 
 
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
-    """Plot the values of a Monte Carlo run as a histogram, and a normal distribution.
+    """Plot a histogram of a Monte Carlo run beside the result of first-order error propagation.
 
-    The normal distribution has the uncertainty of first-order error propagation. Dashed lines mark
-    the 95 % intervals of both.
+    The latter is drawn as a normal distribution. Dashed lines mark the 95 % intervals of both.
 
     Raises InvalidInput if ``run`` is not a result of :func:`~cdsm.monte_carlo`.
     """

@@ -69,12 +69,13 @@ def plot_shares(shares: Shares) -> Figure:
 
 
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
-    """Plot the planned tension of each cable, and its tensions in the softest and stiffest arm.
+    """Plot the planned tension of each cable, beside those of the softest and the stiffest arm.
 
     Args:
         plan: Result of :func:`~cdsm.plan_stiffness`.
-        attainable: Result of :func:`~cdsm.stiffness_range` at the posture of the plan, along its
-            single direction. If given, its softest and stiffest tensions are drawn too.
+        attainable: Result of :func:`~cdsm.stiffness_range` at the posture and along the direction
+            of the plan, which must have one direction. If it is given, the tensions of the softest
+            and of the stiffest arm are drawn too.
 
     Raises:
         InvalidInput: The arguments are not a plan and a range, or differ in posture or direction.
@@ -139,7 +140,7 @@ def _name_cables(axes: Any) -> None:
 
 
 def _ends(attainable: StiffnessRange) -> tuple[tuple[Tension, str, str], ...]:
-    """Return tensions, label and marker for the softest and the stiffest arm of ``attainable``."""
+    """Return the tensions, a label and a marker for the softest arm, then for the stiffest."""
     return (
         (attainable.low_tension, f"softest: {N_PER_MM * attainable.low:.4g} N/mm", "v"),
         (attainable.high_tension, f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm", "^"),

@@ -43,8 +43,8 @@ _SEEN = 2e-3  # a narrower range, relative to the axis, cannot be seen
 def plot_weight_test(test: WeightTest) -> Figure:
     """Plot load against tip displacement, nonlinear and linear, and tensions against load.
 
-    Up to 24 cables have names, more have colours by their number. Raises InvalidInput if ``test``
-    is not a result of :func:`~cdsm.weight_test`.
+    The legend names up to 24 cables; a colour bar numbers more. Raises InvalidInput if ``test`` is
+    not a result of :func:`~cdsm.weight_test`.
     """
     expect("test", test, "WeightTest")
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
@@ -69,7 +69,7 @@ def plot_weight_test(test: WeightTest) -> Figure:
 
 
 def plot_critical_tension(critical: CriticalTension) -> Figure:
-    """Plot the stability margin against the lower bound of all tensions, unstable ranges shaded.
+    """Plot the stability margin against the lower bound of all tensions; shade unstable ranges.
 
     Raises InvalidInput if ``critical`` is not a result of :func:`~cdsm.critical_tension`.
     """
@@ -135,7 +135,9 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
 
 
 def plot_bifurcation(found: Bifurcation) -> Figure:
-    """Plot how far a slight push moves the tip, against the lower bound of all tensions.
+    """Plot the tip displacement [mm] under a small push against the lower bound of all tensions.
+
+    The displacement grows near the bound at which the arm buckles; a dashed line marks that bound.
 
     Raises InvalidInput if ``found`` is not a result of :func:`~cdsm.bifurcation`.
     """
@@ -162,9 +164,9 @@ def plot_bifurcation(found: Bifurcation) -> Figure:
 def plot_load_history(history: LoadHistory) -> Figure:
     """Plot the force against the displacement of the tip, and the tensions of one cable's segments.
 
-    Both curves begin at the reference. Force and displacement are components along the largest
-    force of the history. If no load has a force, the displacement is plotted against the number of
-    the load. The cable is the one whose segments differ most in tension.
+    Both panels begin at the reference posture. Force and displacement are components along the
+    largest force of the history. If no load has a force, the displacement is plotted against the
+    number of the load. The second panel shows the cable whose segments differ most in tension.
 
     Raises InvalidInput if ``history`` is not a result of :func:`~cdsm.load_cycle`.
     """

@@ -29,7 +29,7 @@ _ROOM = 0.05  # margin around the tips, divided by their largest extent; at leas
 
 
 class Slice(NamedTuple):
-    """A slab of tips, seen along its normal."""
+    """A slab of the workspace: one panel shows the tips in it, seen along the slab's normal."""
 
     title: str  # title of the panel
     normal: int  # index of the axis normal to the slab
@@ -43,7 +43,7 @@ class Slice(NamedTuple):
 
 
 class Map(NamedTuple):
-    """What one panel of a workspace map shows."""
+    """The tips in one panel of a workspace map, with their values and statuses."""
 
     title: str
     points: Array  # tips (N, 2) [mm]
@@ -54,7 +54,7 @@ class Map(NamedTuple):
 
     @property
     def limits(self) -> Array:
-        """Limits (2, 2) [mm] of the two axes of the panel."""
+        """Limits (2, 2) [mm] of the two axes of the panel: a row (low, high) for each."""
         if not len(self.points):
             return np.array([[-1.0, 1.0], [-1.0, 1.0]])
         low, high = self.points.min(axis=0), self.points.max(axis=0)
@@ -65,12 +65,12 @@ class Map(NamedTuple):
 
     @property
     def shows_base(self) -> bool:
-        """Whether the base is in the panel."""
+        """Whether the panel shows the base: it is in the slab and within the limits."""
         return self.base and bool((self.limits.prod(axis=1) <= 0.0).all())
 
 
 class Case(NamedTuple):
-    """The plotted quantity for one case of a sweep, such as one bound of tension."""
+    """The plotted quantity at all postures, for one case of a sweep: say, one tension bound."""
 
     title: str
     values: Array  # at each of N postures (N,), NaN if missing

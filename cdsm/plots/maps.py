@@ -273,9 +273,9 @@ def _draw(
 def _legend(
     figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
 ) -> None:
-    """Draw the legend of the statuses: marker, word, and percentage of all entries of ``counted``.
+    """Draw the legend of the statuses: marker, name, and percentage of the entries of ``counted``.
 
-    Entries with a value are not in the legend.
+    It lists the statuses of entries without a value, and the base if one of ``maps`` shows it.
     """
     status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
     total = sum(each.status.size for each in counted)

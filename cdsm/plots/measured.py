@@ -40,7 +40,7 @@ _MOST_LABELS = 30  # above this number of measurements the axis shows numbers, n
 
 
 def plot_tensile_fit(fit: TensileFit) -> Figure:
-    """Plot force against strain with the fit, and the rigidity EA against tension.
+    """Plot force against strain, measured and fitted, and the fitted rigidity EA against tension.
 
     The second panel also shows the stages of the wire, and the 95 % band of EA if the fit has one.
     """
@@ -72,7 +72,10 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
 
 
 def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: str = "x") -> None:
-    """Shade ``stages``, each a name and two tensions [N]; the axis ``along`` shows the tension."""
+    """Shade and name the ``stages`` of a wire: each has a name, a lowest and a highest tension [N].
+
+    ``along`` is the axis of the tension: ``"x"`` or ``"y"``.
+    """
     whole = stages[-1][2] - stages[0][1]
     for (name, low, high), shade in zip(stages, cycle(("0.93", "0.98", "0.88")), strict=False):
         middle, shown = (low + high) / 2.0, {"fontsize": SMALL, "color": "0.3"}
@@ -90,7 +93,7 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
     """Plot predicted and measured values, and residuals divided by σ.
 
-    ``labels`` has a text for each residual.
+    ``labels`` has a text for each residual; more than 30 residuals are numbered instead.
     """
     rows = fit._rows
     loops: list[tuple[int, Any]] = [

@@ -53,9 +53,10 @@ _WIDE: Final = {"linewidth": 4.0, "alpha": 0.4}  # a line under another one, bot
 def plot_paper(result: paper.Figure) -> Figure:
     """Plot one recomputed figure of the paper, with the numbers that the paper prints.
 
-    Figures of stiffness show two readings: the paper's K_R above, a hung weight below. Each is
-    computed from EA/L with the stretched length, as in the paper, and from EA/l_0. The tension on
-    the horizontal axis is the mean of all cables; bars show their range, as in the paper.
+    Figures of stiffness show the paper's K_R, and the stiffness that a hung weight measures. Both
+    are computed from EA/L with the stretched length L, as in the paper, and from EA/l_0 with the
+    original length l_0. The tension on a horizontal axis is the mean of all cables; bars show the
+    range over the cables, as in the paper.
 
     Args:
         result: Result of a function in :data:`cdsm.paper.FIGURES`.
@@ -74,7 +75,10 @@ def plot_paper(result: paper.Figure) -> Figure:
 def _grid(
     result: paper.StiffnessFigure, height: float, rows: int, **options: Any
 ) -> tuple[Figure, Any]:
-    """Build a figure as wide as two columns, ``height`` [inch]; each row has panels x, y and z."""
+    """Build a figure of ``rows`` with the panels x, y and z; it is two columns wide.
+
+    ``height`` is in inches; ``options`` are passed to ``Figure.subplots``.
+    """
     figure, grid = panels(TWO_COLUMNS, height, 3, rows, sharex=True, **options)
     for axes, axis in zip(grid[0], XYZ, strict=True):
         caption(axes, axis)
@@ -84,9 +88,9 @@ def _grid(
 
 
 def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings of Fig. 3, and the error of the passive part [%], against Young's modulus.
+    """Plot Fig. 3: K_R, stiffness for a hung weight, and a difference, against Young's modulus.
 
-    The error is the passive part minus the total stiffness, divided by the total stiffness.
+    The difference is the passive part minus the total stiffness, over the total stiffness [%].
     """
     figure, grid = _grid(result, 5.4, 3)
     ratio, limit = (result.claims[k].paper or () for k in (0, 1))
@@ -125,7 +129,10 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_directions(result: paper.StiffnessFigure) -> Figure:
-    """Plot both readings of Fig. 6 against the tension, and the increment that the paper states."""
+    """Plot Fig. 6: K_R and the stiffness for a hung weight, against tension.
+
+    The increment that the paper states is marked.
+    """
     figure, grid = _grid(result, 4.4, 2)
     increments = result.claims[0].paper or ()
     for row, (name, reading) in zip(grid, _READINGS.items(), strict=True):
@@ -150,7 +157,7 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
-    """Plot the active part and the relative change of stiffness against tension, for x, y and z."""
+    """Plot Figs. 4 and 7: active part of K_R, and changes [%] of both stiffnesses, over tension."""
     figure, grid = _grid(result, 5.6, 3, sharey="row")
     first, stated = result.curves[0], result.claims[0].paper or ()
     for i in range(3):
@@ -181,7 +188,10 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
 
 
 def _plot_lead(result: paper.LeadFigure) -> Figure:
-    """Plot the change of stiffness against the lead: a panel per reading, a colour per axis."""
+    """Plot the change of K_R, and of the stiffness for a hung weight, against the lead.
+
+    Each has a panel, with a colour for each of x, y and z.
+    """
     figure, (pair,) = panels(TWO_COLUMNS, 3.4, 2, sharey=True)
     for axes, (name, reading) in zip(pair, _READINGS.items(), strict=True):
         for i, (axis, color) in enumerate(zip(XYZ, COLORS, strict=True)):
@@ -204,7 +214,7 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
 
 
 def _plot_postures(result: paper.StiffnessFigure) -> Figure:
-    """Plot a column for each posture: a picture of the arm, and a curve for each direction."""
+    """Plot Fig. 8: for each posture, a picture of the arm, K_R and stiffness for a hung weight."""
     figure = Figure(figsize=(TWO_COLUMNS, 6.4), dpi=SCREEN, layout="constrained")
     grid = figure.add_gridspec(3, 3, height_ratios=(1.1, 1.0, 1.0))
     for column, (curve, original, pose) in enumerate(
@@ -234,7 +244,10 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
 
 
 def _draw_curve(axes: Any, curve: paper.Curve, values: Array, **line: Any) -> None:
-    """Draw a stiffness (N,) [N/m] against the mean tension; bars show the range of tensions."""
+    """Draw stiffnesses ``values`` (N,) [N/m] against the mean tension of the cables.
+
+    Bars show the range of tensions over the cables.
+    """
     low, mean, high = curve.tension.T
     axes.plot(mean, N_PER_MM * values, **line)
     some = np.linspace(0, len(mean) - 1, _BARS).round().astype(int)

@@ -38,7 +38,10 @@ _STAGES: Final = (
 
 
 def plot_strand(result: paper.StrandFigure) -> Figure:
-    """Plot force against displacement (a), rigidity against tension (b), and the paper's stages."""
+    """Plot Fig. 5: force against displacement (a) and rigidity against tension (b).
+
+    Shades and names mark the stages of the strand that the paper distinguishes.
+    """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.4, 2)
     left.plot(MM * result.displacement, result.tension, color=BLUE, label="Eq. 19, repaired")
     shade_stages(left, _STAGES, "y")
@@ -80,7 +83,7 @@ def plot_strand(result: paper.StrandFigure) -> Figure:
 
 
 def plot_experiment(result: paper.ExperimentFigure) -> Figure:
-    """Plot each trace in a panel: computed values as a line, the paper's as dots."""
+    """Plot Fig. 10, 12 or 13, a panel per trace: computed values as a line, the paper's as dots."""
     scale = 1.0 if result.relative else N_PER_MM
     unit = "stiffness in y\nover the first [-]" if result.relative else "stiffness [N/mm]"
     tension = result.swept == "tension"
@@ -106,7 +109,7 @@ def plot_experiment(result: paper.ExperimentFigure) -> Figure:
 
 
 def plot_prototype(result: paper.PrototypeFigure) -> Figure:
-    """Plot the residual of each number of Section V, for each interpretation of Section V."""
+    """Plot the residual of each number in Section V, for each fit of a prototype to them."""
     names = result.fits[0].step.numbers
     figure, ((axes,),) = panels(TWO_COLUMNS, 5.0, 1)
     places = np.arange(len(names))

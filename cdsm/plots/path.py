@@ -1,4 +1,4 @@
-"""Plot an arm that moves: pictures over each other, an animation, and natural modes."""
+"""Plot an arm that moves: several postures in one picture, an animation, and natural modes."""
 
 from __future__ import annotations
 

@@ -50,9 +50,9 @@ and the change after it. Changes of the other sign do not matter."""
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
     """Plot the attainable stiffness [N/mm] against the direction, as a polar diagram.
 
-    Each entry of ``ranges`` gives a curve of its largest stiffness. The area inside the smallest
-    stiffness of the last entry is shaded. Both halves of the circle are equal, since ``along(-u)``
-    is ``along(u)``.
+    A curve for each label shows the largest stiffness. The smallest stiffness is shown for the last
+    label only: the area inside its curve is shaded. Directions u and −u have equal stiffness, so
+    half a turn of directions gives the whole diagram.
 
     Args:
         ranges: For each label, such as a bound of the tensions, a list of ranges, one for each
@@ -104,7 +104,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 
 
 def plot_saturation(found: Saturation) -> Figure:
-    """Plot stiffness, and its gain per newton of the bound, against the lower bound of tension.
+    """Plot stiffness, and its slope [N/mm per N], against the lower bound of all tensions.
 
     Raises InvalidInput if ``found`` is not a result of :func:`~cdsm.saturation`.
     """
@@ -137,9 +137,9 @@ def plot_saturation(found: Saturation) -> Figure:
 def plot_path_plan(plan: PathPlan) -> Figure:
     """Plot wanted and planned stiffness, and tensions, against the samples of a path.
 
-    Infeasible samples are shaded. Up to 24 cables have names, more have colours by their number.
-    Raises InvalidInput if ``plan`` is not a result of :func:`~cdsm.plan_path`, or its target is the
-    Cartesian matrix.
+    Infeasible samples are shaded. The legend names up to 24 cables; a colour bar numbers more.
+    Raises InvalidInput if ``plan`` is not a result of :func:`~cdsm.plan_path`, or if its target is
+    a Cartesian stiffness matrix instead of a stiffness along directions.
     """
     expect("plan", plan, "PathPlan")
     if plan.direction is None:

@@ -1,4 +1,4 @@
-"""Draw all figures alike: sizes, colours, units, axes and legends that the plots share.
+"""Give all figures one style: sizes, colours, units, axes and legends that the plots share.
 
 A figure is as wide as one or two columns of a journal, with text of 7 and 8 points. The palette of
 Okabe and Ito (2008) is distinct to all kinds of colour vision; lines also differ in style.
@@ -99,26 +99,27 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
 
 
 def expect(name: str, value: object, kind: str) -> None:
-    """Raise :class:`InvalidInput` for argument ``name`` unless its class is called ``kind``.
+    """Raise :class:`InvalidInput` unless ``value``, an argument called ``name``, is a ``kind``.
 
-    A class derived from one called ``kind`` is also allowed. The class itself cannot be imported
-    here: its module imports this package.
+    ``kind`` is the name of a class; instances of derived classes are allowed. The class cannot be
+    imported here, since its module imports this package.
     """
     if kind not in (base.__name__ for base in type(value).__mro__):
         raise InvalidInput(name, f"{value!r} given; a {kind} is needed.")
 
 
 def direction_name(u: Array) -> str:
-    """Format a direction (3,) as text; rounding errors become zero."""
+    """Format a direction (3,) as text, with components below 1e-9 as zero."""
     return coordinates(np.round(u, 9), "z.3g")
 
 
 def panels(
     width: float, height: float, columns: int, rows: int = 1, **options: Any
 ) -> tuple[Figure, Any]:
-    """Build a figure of a size [inch], and its panels (rows, columns), each with grid lines.
+    """Build a figure, and an array (rows, columns) of its panels with grid lines.
 
-    ``options`` are passed to ``Figure.subplots`` of matplotlib.
+    ``width`` and ``height`` of the figure are in inches. ``options`` are passed to
+    ``Figure.subplots`` of matplotlib.
     """
     figure = Figure(figsize=(width, height), dpi=SCREEN, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
@@ -154,7 +155,7 @@ def from_zero(axes: Any, *values: Array) -> None:
 
 
 def plain_log_ticks(axis: Any) -> None:
-    """Put ticks of a logarithmic axis at 1, 2 and 5 of each decade, as plain numbers."""
+    """Put the ticks of a logarithmic axis at 1, 2 and 5 in each decade, as plain numbers."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(lambda x, _: f"{x:.4g}")
     axis.set_minor_locator(NullLocator())
@@ -168,7 +169,7 @@ def legend(axes: Any, **options: Any) -> Any:
 
 
 def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> None:
-    """Draw one legend below all panels, with each label of ``axes`` (one or several) once."""
+    """Draw one legend below all panels; a label that several of ``axes`` have appears once."""
     found: dict[str, Any] = {}
     for panel in np.ravel(axes):
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
@@ -183,10 +184,10 @@ def legend_below(figure: Figure, axes: Any, columns: int, **options: Any) -> Non
 
 
 def cable_lines(axes: Any, x: Array, values: Array, names: Sequence[str], **line: Any) -> None:
-    """Draw values (N, C) against x (N,) as a line per cable.
+    """Draw values (N, C) against x (N,), a line for each of C cables.
 
-    Up to 24 cables have lines of their own and a legend with ``names``; more are coloured by their
-    number. ``line`` has further options of the lines.
+    Up to 24 cables have a legend with their ``names``. The lines of more cables are coloured by the
+    number of the cable, with a colour bar. ``line`` has further options of the lines.
     """
     if len(names) > NAMED:
         for color, own in zip(number_colors(axes, len(names), "cable"), values.T, strict=True):
@@ -212,7 +213,7 @@ def number_colors(axes: Any, count: int, name: str) -> Array:
 
 
 def equal_axes(axes: Any, zoom: float = 1.0) -> None:
-    """Give 3D axes equal scales, and ticks away from the corners, where axes meet.
+    """Give 3D axes equal scales, and no ticks near the corners, where two axes meet.
 
     ``zoom`` < 1 makes the drawing smaller.
     """
@@ -251,7 +252,7 @@ def picture_axes() -> tuple[Figure, Any]:
 
 
 def finish_picture(figure: Figure, axes: Any, title: str, right: float = 1.0) -> None:
-    """Write title and legend of a 3D picture, then enlarge it by :func:`fill_canvas`."""
+    """Write title and legend of a 3D picture, then call :func:`fill_canvas`."""
     heading(figure, title)
     handles, labels = axes.get_legend_handles_labels()
     if handles:
@@ -260,7 +261,10 @@ def finish_picture(figure: Figure, axes: Any, title: str, right: float = 1.0) ->
 
 
 def fill_canvas(axes: Any, right: float = 1.0) -> None:
-    """Enlarge a 3D picture up to the fraction ``right`` of its figure's width; fit its height."""
+    """Enlarge a 3D picture to fill its figure, and set the height of the figure to fit.
+
+    ``right`` is the right end of the picture, as a fraction of the figure's width.
+    """
     figure = axes.figure
     legends, titles = figure.legends, [figure._suptitle] if figure._suptitle else []
     for _ in range(4):  # text keeps its size, so the right scale is found step by step

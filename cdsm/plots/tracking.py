@@ -36,9 +36,8 @@ _HALF = 0.5
 def plot_tracking_run(run: TrackingRun) -> Figure:
     """Plot a closed loop over time: tip error, stiffness, displacement of the tip, tensions.
 
-    The third panel shows the displacement of the tip from the equilibrium without friction, along
-    the first direction of the plan. The shaded band contains all displacements at which friction
-    lets the tip rest.
+    The third panel shows the displacement of the tip from the frictionless equilibrium, along the
+    first direction of the plan. Friction can hold the tip at rest only within the shaded band.
 
     Raises InvalidInput if ``run`` is not a result of :func:`~cdsm.track`.
     """

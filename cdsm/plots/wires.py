@@ -38,7 +38,7 @@ def plot_elasticity(law: Elasticity) -> Figure:
     """Plot tangent and secant rigidity EA [kN] against the tension [N].
 
     A law without a highest tension is drawn up to 1000 N. Raises InvalidInput if ``law`` is not an
-    elasticity.
+    :class:`~cdsm.Elasticity`.
     """
     expect("law", law, "Elasticity")
     tension = _tensions(law.domain)

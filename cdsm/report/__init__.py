@@ -1,4 +1,4 @@
-"""Report on a stiffness matrix: checks that show whether it can be trusted."""
+"""Check a stiffness matrix, and report whether it can be trusted."""
 
 from cdsm.report.facts import CableState, Rank, Readings
 from cdsm.report.optimality import Optimality

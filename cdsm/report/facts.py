@@ -1,4 +1,4 @@
-"""Compute the numbers that the report shows: ranks, residual, cable states, tip stiffnesses."""
+"""Compute numbers of the report: ranks, residual, state of each cable, tip stiffnesses."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ RANK = 1e-9
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rank(ReadOnlyState):
-    """Rank and condition number of a matrix made dimensionless with the arm's length.
+    """Rank and condition number of a matrix whose entries all have the same unit.
 
     Attributes:
         rank: Number of singular values above :data:`RANK` times the largest.
         full: Largest possible rank: the smaller of the numbers of rows and columns.
-        values: Singular values (n,) [-], the largest first.
+        values: Singular values (n,), in the unit of the entries, the largest first.
     """
 
     rank: int
@@ -81,12 +81,12 @@ class CableState:
 
     @property
     def below(self) -> float:
-        """Return F minus the low end of the law's domain [N]; negative if F is lower."""
+        """Return the tension minus ``low`` [N]; negative if it is below the domain of the law."""
         return self.tension - self.low
 
     @property
     def above(self) -> float:
-        """Return the high end of the law's domain minus F [N]; negative if F is higher."""
+        """Return ``high`` minus the tension [N]; negative if it is above the domain of the law."""
         return self.high - self.tension
 
     @property
@@ -127,7 +127,11 @@ class Readings(ReadOnlyState):
 
 
 def ranks(K: Stiffness) -> tuple[Rank, Rank, Rank]:
-    """Compute the ranks of J_X (6, nv), of its linear rows (3, nv), and of J_Lᵀ (nv, C)."""
+    """Compute the ranks of J_X (6, nv), of its linear rows (3, nv), and of J_Lᵀ (nv, C).
+
+    First, rows and columns are scaled with the arm's length where units differ, so that all entries
+    of J_X have no unit and all entries of J_Lᵀ have the unit m.
+    """
     pose, unit = K.posture, joint_unit(K.posture.arm)
     rows = np.repeat([1.0 / pose.arm.length, 1.0], 3)
     tip = pose.jacobian * rows[:, None] * unit
@@ -184,7 +188,7 @@ def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sticking(ReadOnlyState):
-    """Tip stiffnesses that small loads measure on an arm with friction in its holes.
+    """Tip stiffness of an arm under loads so small that friction holds all cables in their holes.
 
     Attributes:
         along: Stiffness along x, y, z while all cables stick (3,) [N/m]; inf if the tip cannot move

@@ -22,16 +22,18 @@ if TYPE_CHECKING:
 class Optimality:
     """Optimality conditions of distributed tensions: balance, bounds and stationarity (Eq. 17).
 
-    Violations are relative to the largest tension and moment arm. The multipliers do not come from
-    the solver: least squares computes them, with the required sign at the bounds.
+    Violations are relative to the largest tension and the largest moment arm. The Lagrange
+    multipliers do not come from the solver: this module computes them by least squares, with the
+    required sign at the bounds.
 
     Attributes:
         solver: Name of the solver.
         at_minimum: Names of the cables at their lower bound.
         at_maximum: Names of the cables at their upper bound.
         feasibility: Largest violation of balance and bounds [-].
-        stationarity: Largest entry of the KKT residual F + J_L λ + μ [-]; None if the tensions are
-            those of a stiffness plan, which need not be the least.
+        stationarity: Largest entry of the KKT residual F + J_L λ + μ [-], with the multipliers λ of
+            the balance and μ of the bounds; None if the tensions are those of a stiffness plan,
+            which need not be the least.
     """
 
     solver: str

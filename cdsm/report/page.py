@@ -55,7 +55,10 @@ def _wrapped(text: str, first: str) -> str:
 
 
 def to_fragment(report: Report, about: str = "") -> str:
-    """Return the report as an HTML element, for another page; ``about`` stands under its title."""
+    """Return the report as an HTML element to include in a page.
+
+    ``about`` is text below the title, such as the file of the arm.
+    """
     parts = [
         element("h1", _title(report)),
         *(element("p", line) for line in about.splitlines()),
@@ -76,7 +79,7 @@ def to_fragment(report: Report, about: str = "") -> str:
 
 
 def to_document(report: Report, about: str = "") -> str:
-    """Return the report as a self-contained HTML file; ``about`` stands under its title."""
+    """Return the report as a self-contained HTML file; ``about`` is text below the title."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'

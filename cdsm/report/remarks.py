@@ -1,4 +1,4 @@
-"""Remarks on a stiffness: faults are reasons not to trust it, notes explain how to read it."""
+"""Write remarks on a stiffness: faults say why not to trust it, notes say how to read it."""
 
 from __future__ import annotations
 

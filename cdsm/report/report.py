@@ -1,4 +1,4 @@
-"""Report that shows whether a stiffness can be trusted."""
+"""The report on a stiffness: every check, and whether the stiffness can be trusted."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Report(ReadOnlyState):
 
     @cached_property
     def faults(self) -> tuple[str, ...]:
-        """Return the reasons not to trust the stiffness, one text each; empty if trustworthy."""
+        """Return the reasons not to trust the stiffness, a text for each; empty if none."""
         return tuple(remarks.faults(self))
 
     @cached_property
@@ -157,7 +157,7 @@ class Report(ReadOnlyState):
         """Return the report as a self-contained HTML file.
 
         Args:
-            about: Lines under its title, such as the file of the arm and what was assumed.
+            about: Lines below the title, such as the file of the arm and the assumptions.
         """
         return to_document(self, about)
 

@@ -126,7 +126,7 @@ class SelfCheck(ReadOnlyState):
 
     @property
     def passed(self) -> bool:
-        """Return whether all comparisons agree: nothing differs, everything could be checked."""
+        """Return whether all comparisons were possible and agree."""
         return all(each.verdict == "agrees" for each in self.compared)
 
     @property
@@ -228,7 +228,7 @@ def _differentiated(
 
 
 def _summed(parts: list[_SecondValue]) -> _SecondValue:
-    """Add values and error bounds of ``parts``; if a value is missing, return the reason."""
+    """Add values and error bounds of ``parts``; if one has no value, return its reason instead."""
     values = [each.value for each in parts if each.value is not None]
     if len(values) < len(parts):
         return _SecondValue(None, next(each.reason for each in parts if each.value is None))
@@ -280,7 +280,10 @@ def _compare(
 
 
 def _with_sum_checked(found: Agreement, matrix: Array, parts: Array, what: str) -> Agreement:
-    """Change the verdict of ``found`` to DIFFERS if ``matrix`` is not the sum of ``parts``."""
+    """Change the verdict of ``found`` to DIFFERS if ``matrix`` is not the sum of ``parts``.
+
+    ``what`` names this sum in the reason.
+    """
     off = float(abs(matrix - parts.sum(axis=0)).max())
     if off <= _SUM * float(abs(parts).sum(axis=0).max()) or found.verdict == "DIFFERS":
         return found

@@ -1,7 +1,7 @@
 """Live view of an arm in the browser, with sliders. The page shows mm, degrees and N/mm.
 
 :func:`show` computes the results for a :class:`Setting` of the sliders, without a browser.
-:func:`serve` serves a page with these results and updates it.
+:func:`serve` starts a server whose page shows these results and follows the sliders.
 """
 
 from cdsm.view.live_view import View

@@ -1,4 +1,4 @@
-"""Label cables in the picture: all cables, or one that was clicked."""
+"""Label cables in the 3D scene: all cables, or the one that was clicked."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _angle(start: Array, span: Array, u: Array) -> float:
 
 
 class CableNames:
-    """Labels at the ends of cables, with name and tension."""
+    """Labels with name and tension, at the ends of all cables or of the clicked one."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._scene = server.scene
@@ -61,7 +61,7 @@ class CableNames:
             self.chosen = clicked_cable(shown.posture.cable_paths, origin, direction)
 
     def update(self, shown: Shown) -> None:
-        """Label all cables of ``shown``, or the chosen one; hide the other labels."""
+        """Update the labels to ``shown``: of all cables, or of the chosen one; hide the others."""
         pose, tensions = shown.posture, shown.tensions
         wanted: set[int] = set()
         if pose is not None:

@@ -37,7 +37,7 @@ _FREE = 0.4  # part of the height of a phone that this sheet leaves free
 @final
 @dataclass(frozen=True)
 class Ball:
-    """Ball around points: middle (3,) [m] and radius [m]."""
+    """Ball that cameras must show: middle (3,) [m] and radius [m]."""
 
     middle: Array
     radius: float
@@ -49,7 +49,7 @@ class Ball:
         return cls(middle, max(float(np.linalg.norm(points - middle, axis=1).max()), least))
 
     def fits(self, other: Ball) -> bool:
-        """Whether a camera fitted to this ball shows ``other`` completely and not too small."""
+        """Whether a camera fitted to this ball shows ``other`` completely and large enough."""
         reach = float(np.linalg.norm(other.middle - self.middle)) + other.radius
         return _SMALL * self.radius < reach < _OUTSIDE * self.radius
 
@@ -108,7 +108,7 @@ class Cameras:
                 self.fit(client)
 
     def fit(self, client: viser.ClientHandle) -> None:
-        """Move the camera of ``client`` to see the whole ball; its direction of view stays."""
+        """Move the camera of ``client`` to show the ball; keep its direction of view."""
         self._place(client, client.camera.position - client.camera.look_at)
 
     def _place(self, client: viser.ClientHandle, direction: Array) -> None:

@@ -1,4 +1,4 @@
-"""Write the ``cdsm`` command, or lines of Python, that compute the numbers of the page."""
+"""Write the ``cdsm`` command, or the lines of Python, that compute the numbers on the page."""
 
 from __future__ import annotations
 
@@ -77,7 +77,10 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
 
 
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
-    """Return HTML with the command (Python if ``arm_arguments`` is None) and two buttons."""
+    """Return HTML with two buttons below the command, or below Python if there are no arguments.
+
+    The buttons copy this text and save a picture of the scene.
+    """
     if arm_arguments is None:
         where, command = "in Python", python_lines(arm, setting)
     else:

@@ -106,7 +106,7 @@ class Controls:
         self._command.content = command_text(self._arm, shown.setting, self._arm_arguments)
 
     def move(self, q: Array) -> None:
-        """Move the sliders of the joints to angles (nv,) [rad]."""
+        """Move the sliders of the joints to q (nv,) [rad], or [m] for prismatic joints."""
         for joint, angle in zip(self._joints, q.tolist(), strict=True):
             joint.move(angle)
 

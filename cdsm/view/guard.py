@@ -76,7 +76,7 @@ class _Address(str):
 
 @final
 class Guard:
-    """Filter between viser and the clients of one live view at the address ``host``.
+    """Filter between viser and the clients of one live view that listens at ``host``.
 
     Attributes:
         token: First part of every path if other machines can connect, else empty.
@@ -90,11 +90,11 @@ class Guard:
         self._controls: dict[str, Control] = {}
 
     def start(self, port: int) -> viser.ViserServer:
-        """Start a viser server that is filtered by this guard.
+        """Start a viser server whose requests and messages pass through this guard.
 
-        viser has no option to filter its websocket server. This method therefore replaces the
-        function that starts this server while viser starts. If the port is taken, viser uses the
-        next free port.
+        viser has no option to filter its websocket server. While viser starts, this method
+        therefore replaces the function that starts the websocket server. If the port is taken,
+        viser uses the next free port. Raises CdsmError if viser does not call that function.
         """
         original, made = websocket_server.serve, threading.Event()
 
@@ -131,13 +131,16 @@ class Guard:
         return server
 
     def admit(self, control: Control) -> None:
-        """Allow clients to use this control."""
+        """Allow clients to use ``control``; all other controls are refused."""
         self._controls[control._impl.uuid] = control
 
     def _answer(
         self, reply: _Reply, connection: ServerConnection, request: Request
     ) -> Response | None:
-        """Answer a request for a page or a websocket: a refusal, or viser's ``reply``."""
+        """Answer a request for a page or a websocket: refuse it, or let viser's ``reply`` answer.
+
+        ``reply`` returns None for a websocket, which is then opened.
+        """
         hosts = request.headers.get_all("Host")
         _, first, rest = [*request.path.partition("?")[0].split("/", 2), "", ""][:3]
         fault = self._fault(hosts, request.headers.get_all("Origin"), first)
@@ -154,10 +157,10 @@ class Guard:
         return response
 
     def _fault(self, hosts: list[str], origins: list[str], first: str) -> str:
-        """Return why a request is refused; empty if it is not.
+        """Return the reason to refuse a request; empty if the request is allowed.
 
-        ``hosts`` and ``origins`` are its Host and Origin headers, ``first`` the first part of its
-        path.
+        ``hosts`` and ``origins`` are the Host and Origin headers of the request, ``first`` is the
+        first part of its path.
         """
         if len(hosts) != 1:
             return f"a request for {len(hosts)} hosts"
@@ -173,7 +176,7 @@ class Guard:
         return ""
 
     def _permitted(self, raw: bytes) -> bytes | None:
-        """Return ``raw``, a message of a client, packed again for viser; None if it is refused."""
+        """Check a client's message ``raw``; return its allowed part, packed for viser, or None."""
         try:
             # packed again: of two fields with one name, viser may read the one not checked here
             message = msgspec.msgpack.decode(raw)
@@ -235,7 +238,7 @@ class _Connection(ServerConnection):
 
 
 def _is_loopback(name: str) -> bool:
-    """Return whether a host name always means this machine, however it is resolved."""
+    """Return whether a host name always means this machine: a loopback address, or localhost."""
     try:
         return ipaddress.ip_address(name).is_loopback
     except ValueError:

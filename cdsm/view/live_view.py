@@ -1,4 +1,4 @@
-"""A running live view: it connects the scene, the controls and the computation."""
+"""Run a live view: compute results when a control changes, and draw them."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class View:
 
     @property
     def shown(self) -> Shown:
-        """Content of the page, after all slider moves so far are computed."""
+        """Results on the page, after waiting until all slider moves so far are computed."""
         self._worker.wait()
         return self._shown
 
@@ -108,9 +108,9 @@ class View:
         return f"<View of {self.arm.name} at {self.url}>"
 
     def _add_path(self, path: Array, tips: Array) -> None:
-        """Draw the tips (S, 3) [m] of a path, and add controls that play it.
+        """Draw the tips (S, 3) [m] of a path, and add controls that play the path.
 
-        ``path`` has joint angles (S, nv), or is ``tips`` itself.
+        ``path`` is the joint angles (S, nv) [rad]; for a path given by its tips it is ``tips``.
         """
         self._scene.draw_path(tips)
         go = self._handle.aim if path is tips else self._controls.move

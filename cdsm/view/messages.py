@@ -1,4 +1,4 @@
-"""Check the messages of a page about its 3D scene: camera, clicks, and the handle at the tip."""
+"""Check messages from browsers about the 3D scene: camera, clicks, and the handle at the tip."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ _FARTHEST = 1e6  # largest coordinate [m]; farther away no arm is seen
 
 
 def scene_message(message: Any) -> dict[str, Any] | None:
-    """Return the allowed part of a message about the scene; None if the message is refused.
+    """Return the allowed part of a message about the scene; None for any other message.
 
-    Raises ValueError if a point of the message is not three numbers of at most 1e6 m.
+    Raises ValueError if a point in the message is not three numbers of magnitude up to 1e6 [m].
     """
     match message:
         case {"type": "ViewerCameraMessage"}:  # viser keeps a camera for each client
@@ -47,7 +47,7 @@ def scene_message(message: Any) -> dict[str, Any] | None:
 
 
 def _point(value: object) -> list[float]:
-    """Return three numbers of magnitude up to 1e6; raise ValueError for any other value."""
+    """Return ``value`` as three floats; ValueError unless it is numbers of magnitude up to 1e6."""
     if not isinstance(value, list) or len(value) != 3:
         raise ValueError(f"{value!a:.40} is not a point")
     for number in value:

@@ -48,9 +48,10 @@ class _Row(NamedTuple):
 
 
 def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
-    """Write the panel of results; each number is in an element with ``data-cdsm="name"``.
+    """Write the results ``shown`` as HTML: condition, remarks, table of numbers, legend.
 
-    ``force_scale`` [m/N] is the length of the force arrow per newton.
+    ``force_scale`` [m/N] is the length of the force arrow per newton. ``remark`` stands above the
+    numbers.
     """
     color = _COLORS.get(shown.condition, _GREY)
     badge = f"background:{color};color:white;font-weight:bold;text-align:center;padding:0.2em"
@@ -71,7 +72,7 @@ def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
 
 
 def basis_text(arm: Manipulator) -> str:
-    """Write what all numbers of the page assume: arm, wires, gravity, friction."""
+    """Write as HTML for which arm, wires, gravity and friction the numbers on the page hold."""
     friction = "friction in its holes where it sags" if arm.has_friction else "frictionless"
     words = f"with wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
     lines = element("div", str(arm)), element("div", _named("basis", f"{words}; {friction}"))
@@ -79,7 +80,7 @@ def basis_text(arm: Manipulator) -> str:
 
 
 def tensions_text(shown: Shown) -> str:
-    """Write the list of cables with their tensions; cables at a bound or slack are marked."""
+    """Write the tensions of all cables as HTML; mark slack cables and tensions at a bound."""
     if shown.tensions is None or shown.posture is None or shown.cable_colors is None:
         return str(element("div", "unknown", style=_LIST))
     marks: dict[str, str] = {}
@@ -150,7 +151,10 @@ def _row(row: _Row) -> Markup:
 
 
 def _legend(shown: Shown, force_scale: float) -> Iterator[Markup]:
-    """Yield the meaning and the scale of the ellipsoid and the arrow (``force_scale`` [m/N])."""
+    """Yield HTML that explains what is drawn: ellipsoid, force arrow, marks of holes.
+
+    ``force_scale`` [m/N] is the length of the force arrow per newton.
+    """
     if shown.ellipsoid is not None:
         yield _key(ELLIPSOID, "ellipsoid", f"ellipsoid: {shown.ellipsoid}")
     if shown.posture is not None and shown.setting.force.any():

@@ -1,4 +1,4 @@
-"""Play a path: joint angles or tip positions, sample by sample."""
+"""Play a path of the arm in the live view, sample by sample."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _PLAY, _PAUSE = "Play", "Pause"
 
 
 class PathPlayer:
-    """Controls that play ``path``: joint angles (S, nv) or tip positions (S, 3).
+    """Slider and button that play ``path``: joint angles (S, nv) [rad] or tips (S, 3) [m].
 
-    ``go`` moves the arm to a row of ``path``, and returns when the page shows it. ``admit`` is
-    called with every control that browsers may use.
+    ``go`` moves the arm to a row of ``path``, and returns when the page shows the arm there.
+    ``admit`` is called with every control that browsers may use.
     """
 
     def __init__(

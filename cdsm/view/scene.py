@@ -1,4 +1,4 @@
-"""Draw the arm in 3D: scene nodes are made once in viser, then moved and recoloured."""
+"""Draw the arm in 3D. Its scene nodes in viser are made once, then moved and recoloured."""
 
 from __future__ import annotations
 
@@ -32,10 +32,11 @@ _ABOVE = 0.1  # height of the label above the tip, as a fraction of the arm's le
 
 
 class Scene:
-    """An arm in a viser server; ``force_scale`` is the length of its force arrow [m/N].
+    """3D scene with an arm in a viser server.
 
-    Pinocchio's visualiser draws the links from the shapes in the URDF. Sticks join the joints of
-    links without shapes, or of all links if a mesh cannot be read.
+    Pinocchio's visualiser draws links with shapes in the URDF. Other links, or all links if a mesh
+    cannot be read, are drawn as sticks between joints. ``force_scale`` [m/N] is the length of the
+    force arrow per newton.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Manipulator, force_scale: float) -> None:
@@ -89,7 +90,7 @@ class Scene:
         self.cameras = Cameras(server, self._ball(_straight(arm)))
 
     def update(self, shown: Shown, follow: bool) -> None:
-        """Draw the results ``shown``; ``follow`` allows the cameras to be fitted again."""
+        """Draw the results ``shown``; ``follow`` lets the cameras follow the arm."""
         pose, force, ellipsoid = shown.posture, shown.setting.force, shown.ellipsoid
         for part in self._parts:
             part.visible = pose is not None
@@ -154,7 +155,10 @@ class Scene:
 
 
 def _straight(arm: Manipulator) -> Posture | None:
-    """Return the straightest posture within the limits; None if two sites of a cable coincide."""
+    """Return the posture with each joint as near zero as its limits allow.
+
+    None if two sites of a cable coincide there.
+    """
     try:
         return arm.at(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
     except CableError:
@@ -162,7 +166,10 @@ def _straight(arm: Manipulator) -> Posture | None:
 
 
 def _faces(rows: int, columns: int) -> NDArray[np.uint32]:
-    """Build two triangles (n, 3) per cell of a grid of points (rows, columns), as point indices."""
+    """Return the triangles (n, 3) of a surface through a grid of points, as indices of points.
+
+    The grid has ``rows`` and ``columns`` of points; each of its cells is two triangles.
+    """
     points = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[:-1, 1:], points[1:, 1:]
     return np.stack([a, b, c, c, b, d], axis=-1).reshape(-1, 3)

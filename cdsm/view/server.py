@@ -50,8 +50,8 @@ def serve(
     """Serve a live view of an arm: sliders, a 3D picture, and the stiffness.
 
     The view runs in background threads until it is closed. All browsers share one set of sliders.
-    Pages of other sites cannot connect. Other machines can connect only if ``host`` allows it, and
-    only with the token in the URL. In this case a warning is logged.
+    Web pages of other sites cannot connect. Other machines can connect only if ``host`` allows it
+    (then a warning is logged), and only with the token in the URL.
 
     Args:
         arm: The arm; it is not changed.
@@ -66,9 +66,8 @@ def serve(
         angles: A path to play, as joint angles (S, nv) [rad]; the arm starts at the first.
         tips: A path to play, as tip positions (S, 3) [m]; give only one kind of path.
         solver: Solver of :func:`~cdsm.distribute_tension`.
-        largest_tension: Right end of the slider of the lower bound [N].
-        largest_force: The sliders of the force go from − to + this value [N], or further if
-            ``force`` is larger.
+        largest_tension: Right end of the slider of the lower bound [N]; larger if ``minimum`` is.
+        largest_force: Each force slider goes from − to + this value [N]; larger if ``force`` is.
         arm_arguments: Arguments of the command ``cdsm`` that describe the arm. If given, the page
             shows the command that computes its numbers, otherwise lines of Python.
 
@@ -100,9 +99,10 @@ def serve(
 
 
 def _tips(arm: Manipulator, path: Array, of_tips: bool) -> Array:
-    """Return the tips (S, 3) [m] of a path of tips (``of_tips``) or of joint angles (S, nv).
+    """Return the tip positions (S, 3) [m] along a path.
 
-    Raises InvalidInput if a sample of joint angles is not a posture of the arm.
+    ``path`` has these positions if ``of_tips``, else joint angles (S, nv) [rad]. Raises
+    InvalidInput if a sample of joint angles is not a posture of the arm.
     """
     if of_tips:
         return path

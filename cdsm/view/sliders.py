@@ -1,4 +1,4 @@
-"""Compute the sliders of the page: round ends and steps, in degrees, mm and N."""
+"""Compute ranges of sliders with round ends and steps, in degrees, mm and N."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ class Range:
 
 
 def slider_range(label: str, low: float, high: float, initial: float, unit: float = 1.0) -> Range:
-    """Return the range of a slider with round ends and round steps, in a unit shown to the user.
+    """Return a range with round ends and steps in the unit that the user sees.
 
-    ``low``, ``high``, ``initial`` and the size of this ``unit`` are in SI. The ends are rounded
-    inwards, but the range always contains the first position ``initial``, which is not rounded.
+    ``low``, ``high``, the first position ``initial`` and the size of this ``unit`` are in SI. The
+    ends are rounded inwards. ``initial`` is not rounded; the range always contains it.
     """
     low, high, initial = (value / unit for value in (low, high, initial))
     if not high > low:
@@ -67,7 +67,10 @@ def slider_range(label: str, low: float, high: float, initial: float, unit: floa
 
 
 def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
-    """Return each joint's slider range [degrees or mm], with first positions q (nv,) [rad or m]."""
+    """Return the slider range of each joint in degrees or mm; q (nv,) is the first position.
+
+    q is in rad, or in m for prismatic joints.
+    """
     most = np.where(arm.slides, _LENGTHS * arm.length, _TURN)
     low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
     units = JointUnits(arm.slides).shown
@@ -80,23 +83,23 @@ def joint_ranges(arm: Manipulator, q: Array) -> tuple[Range, ...]:
 @final
 @dataclass(frozen=True)
 class Slider:
-    """A slider on the page, with its value in SI."""
+    """A slider on the page, read and moved in SI units."""
 
     handle: viser.GuiSliderHandle[float]
     range: Range
 
     @property
     def value(self) -> float:
-        """Current value in SI."""
+        """Current value in SI units."""
         return float(self.handle.value) * self.range.unit
 
     def move(self, value: float) -> None:
-        """Move the slider to a value in SI, which may be between two steps."""
+        """Move the slider to a value in SI units, which may lie between two steps."""
         position = round(value / self.range.unit, _DECIMALS) + 0.0  # no -0
         self.handle.value = position  # type: ignore[misc]
 
     def straighten(self) -> None:
-        """Move the slider to zero, or to the nearest end."""
+        """Move the slider to zero, or to the end nearest to zero."""
         self.handle.value = min(max(0.0, self.range.low), self.range.high)  # type: ignore[misc]
 
     def reset(self) -> None:

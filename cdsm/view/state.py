@@ -1,4 +1,4 @@
-"""Compute the results for a setting of the controls, or the reason why they do not exist."""
+"""Compute the results for a setting of the controls, or the reason why there are none."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _BEAD: Final = 0.013  # half the length of the mark of a hole, as a fraction of 
 
 
 class Condition(Enum):
-    """State of the arm at a setting; the value is the text on the page."""
+    """State of the arm at a setting, or why it is unknown; the value is the text on the page."""
 
     STABLE = "STABLE"
     UNSTABLE = "UNSTABLE"
@@ -80,9 +80,10 @@ class Setting(ReadOnlyState):
         minimum: Lower bound of all tensions [N].
         maximum: Upper bound of all tensions [N].
         force: Force at the tip, in base axes (3,) [N].
-        sag: Whether the force moves the arm. The cables are then tensioned at ``q`` without the
-            force, and the motors are locked; where holes have friction, cables stick and slide in
-            them. Otherwise the tensions balance the force at ``q``.
+        sag: Whether the force moves the arm. If True, the cables are tensioned at ``q`` without
+            the force, the motors are locked, and the arm sags under the force; where holes have
+            friction, cables stick and slide in them. If False, the tensions balance the force at
+            ``q``.
         solver: Solver of the tension distribution.
     """
 
@@ -102,7 +103,7 @@ class Setting(ReadOnlyState):
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shown(ReadOnlyState):
-    """Results on the page at one setting. A result that does not exist is None, never outdated.
+    """Results on the page at one setting. A missing result is None, never that of a past setting.
 
     Attributes:
         setting: Values of the controls.
@@ -130,12 +131,15 @@ class Shown(ReadOnlyState):
 
     @property
     def posture(self) -> Posture | None:
-        """Posture that is shown: at the equilibrium under the force, or else the reference."""
+        """Posture that is drawn: the equilibrium under the force, or else the reference.
+
+        None if neither exists.
+        """
         return self.reference if self.rest is None else self.rest.pose
 
     @property
     def tensions(self) -> Array | None:
-        """Tensions (C,) [N] at the posture that is shown; None if unknown."""
+        """Tensions (C,) [N] at the drawn posture; None if unknown."""
         if self.setting.sag:
             return None if self.rest is None else self.rest.tension
         return None if self.tension is None else self.tension.values
@@ -166,7 +170,10 @@ class Shown(ReadOnlyState):
 
     @cached_property
     def cable_colors(self) -> NDArray[np.uint8] | None:
-        """Red, green and blue of each cable (C, 3), by tension; grey if it is unknown."""
+        """Red, green and blue (C, 3), 0 to 255, of each cable, by its tension.
+
+        All cables are grey if their tensions are unknown. None if no posture exists.
+        """
         if self.posture is None:
             return None
         if self.tensions is None:
@@ -197,7 +204,7 @@ class Shown(ReadOnlyState):
 
     @cached_property
     def ellipsoid(self) -> Ellipsoid | None:
-        """Ellipsoid of :func:`cdsm.plots.plot_arm`; None if the arm is not stable."""
+        """Ellipsoid of displacements, as in :func:`cdsm.plots.plot_arm`; None if not stable."""
         pose = self.posture
         if self.compliance is None or pose is None:
             return None
@@ -205,7 +212,10 @@ class Shown(ReadOnlyState):
 
 
 def remedies_of(shown: Shown) -> tuple[str, ...]:
-    """Return the remedies for the unstable arm of ``shown``; takes a few tenths of a second."""
+    """Return sentences that say what would make an unstable arm stable.
+
+    This takes a few tenths of a second.
+    """
     return () if shown.stiffness is None else advice(shown.stiffness)
 
 

@@ -18,7 +18,7 @@ _ROUNDING = 1e-9  # rounding of a logarithm
 
 
 def draw_surroundings(server: viser.ViserServer, length: float) -> None:
-    """Draw light, base axes, and a grid below the base, for an arm of ``length`` [m]."""
+    """Add light, the base axes, and a grid below the base, sized for an arm of ``length`` [m]."""
     scene = server.scene
     # an environment map and shadows take seconds without a GPU
     scene.configure_environment_map(hdri=None)
@@ -52,7 +52,7 @@ def draw_surroundings(server: viser.ViserServer, length: float) -> None:
 
 
 def section(length: float) -> float:
-    """Compute the spacing [m] of labelled lines: 1, 2 or 5 times 10ⁿ, up to length/3."""
+    """Compute the spacing [m] of the labelled grid lines: 1, 2 or 5 times 10ⁿ, up to length/3."""
     power = math.log10(length / 3.0)
     decade = math.floor(power + _ROUNDING)
     part = max(part for part in (1.0, 2.0, 5.0) if math.log10(part) <= power - decade + _ROUNDING)

@@ -1,4 +1,4 @@
-"""A handle at the tip of the arm; inverse kinematics moves the joints so that the tip follows."""
+"""Drag the tip of the arm by a handle: inverse kinematics moves the joints to follow it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SIZE = 0.2  # size of the handle, as a fraction of the arm's length
 
 
 class TipHandle:
-    """Handle at the tip. When it is dragged, ``changed`` is called from any thread."""
+    """Handle at the tip, which users drag. Each drag calls ``changed``, in any thread."""
 
     def __init__(
         self, server: viser.ViserServer, arm: Manipulator, changed: Callable[[], None]
@@ -46,7 +46,7 @@ class TipHandle:
             self._changed()
 
     def aim(self, target: Array) -> None:
-        """Set the target of the tip (3,) [m], and request joint angles that reach it."""
+        """Set a new target of the tip (3,) [m], and call ``changed``, which requests a search."""
         self._target = target
         self._changed()
 

@@ -1,4 +1,4 @@
-"""Run a job in a thread on request; requests that arrive while it runs cause one further run."""
+"""Run a job in a thread on request. All requests during a run together cause one further run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from concurrent import futures
 
 
 class Worker:
-    """Thread that runs a job on request. All requests during a run cause one further run."""
+    """Thread that runs ``job`` on request. All requests during a run cause one further run."""
 
     def __init__(self, job: Callable[[], None]) -> None:
         self._job = job
@@ -30,9 +30,9 @@ class Worker:
         futures.wait([self._last] if self._last else [])
 
     def no_request_within(self, seconds: float) -> bool:
-        """Wait up to ``seconds`` [s] for a request; return True if none came since the run began.
+        """Wait up to ``seconds`` [s] for a request; return whether none came since the run began.
 
-        Only the job itself calls this.
+        Only the job itself calls this, to see whether its setting is outdated.
         """
         return not self._asked.wait(seconds)
 
