@@ -74,7 +74,7 @@ class Moment(NamedTuple):
 
     Attributes:
         reference: Reference of this step.
-        reading: Readings of this step.
+        reading: Readings of the sensors at this step.
         reference_before: Reference of the previous step.
         reading_before: Readings of the previous step.
         command: Wire commanded at the previous step (C,) [m].

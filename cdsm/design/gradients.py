@@ -130,8 +130,8 @@ def _margin_slopes(problem: DesignProblem, design: Array, measure: Measure) -> A
 def _reading(K: Stiffness, measure: Measure, posed: Posed, force: Array) -> tuple[float, Array]:
     """Return the quantity ``measure`` of K, and its derivatives (n,) with respect to the variables.
 
-    ``posed`` is the chain rule at the posture of K. ``force`` (3,) [N] is the force of the load,
-    which only the deflection needs.
+    ``posed`` turns derivatives by the inputs of the arm, at the posture of K, into those by the
+    variables. ``force`` (3,) [N] is that of the load; only the measure ``deflection`` uses it.
     """
     if measure.of == "deflection":
         value, partial = _displacement(K, force)

@@ -64,7 +64,7 @@ def explain(designs: Designs) -> NoReturn:
 
 
 def _first_reason(designs: Designs, best: int) -> str:
-    """Return, as text, the first posture at which design ``best`` is not held, and the reason."""
+    """Return a text: the first posture in which no tensions hold the design ``best``, and why."""
     problem, row = designs.problem, designs.designs[best]
     held, loads = 0, len(problem.loads)
     try:

@@ -19,13 +19,13 @@ class Neighbourhood:
 
     A state of rest is an equilibrium that friction allows. ``K`` is the frictionless stiffness at
     the reference, where each cable has one tension F. δ is the change of the joint angles, ΔT_j the
-    change of tension of segment j, and g_j the gradient of its length. In each cable, ΔT_j =
-    F (y_j + ȳ): ȳ is the mean of ΔT_j/F, weighted with the compliances of the segments, and y_j is
-    the deviation from ȳ. If the motor is locked, F ȳ = k Σ_j g_j·δ, with k the stiffness of the
+    change of tension of segment j, and g_j the gradient of its length. In each cable, ȳ is the mean
+    of ΔT_j/F, weighted with the compliances of the segments, and y_j is the deviation from it, so
+    ΔT_j = F (y_j + ȳ). If the motor is locked, F ȳ = k Σ_j g_j·δ, with k the stiffness of the
     whole cable. Equilibrium becomes K_θ δ = −Σ_j F y_j g_j. From segment to segment, y changes by
-    at most μ φ of the hole, up or down. So a linear function of y is largest if y changes by +μ φ
-    or by −μ φ at every hole. This gives its maximum in closed form. All μ φ are multiplied by
-    ``room``.
+    at most μ φ of the hole (friction times wrap angle), up or down. So a linear function of y is
+    largest if y changes by +μ φ or by −μ φ at every hole. This gives its maximum in closed form.
+    All μ φ are multiplied by ``room``.
 
     Attributes:
         joints: Largest |δ| (nv,) [rad].

@@ -131,9 +131,9 @@ class RestStates:
         return frozen(np.maximum(np.array(bounds), 0.0))
 
     def load(self, u: Array) -> float:
-        """Compute the largest force [N] along u (3,) that some tensions of the polyhedron balance.
+        """Compute an upper bound of the forces [N] along u (3,) that friction holds without motion.
 
-        It is a proved upper bound. The neighbourhood must be :meth:`Neighbourhood.still`.
+        No larger force is balanced by any state in the polyhedron, which must have ρ = 0.
         """
         from scipy.sparse import csc_array, hstack
 

@@ -127,9 +127,9 @@ def ambiguous(
 ) -> list[str]:
     """Return a list with one warning if the measurements fit at another minimum too, else [].
 
-    Searches from ``starts`` look for a minimum outside the 95 % intervals of ``result``, with a χ²
-    so low that the intervals should contain it. ``best`` is the optimum of ``result``. All points
-    (P,) are in the unit cube of ``problem``.
+    Searches from ``starts`` look for another minimum of χ², outside the 95 % intervals of
+    ``result``, that fits as well as points inside do. ``best`` is the optimum of ``result``. All
+    points (P,) are in the unit cube of ``problem``.
     """
     intervals = np.array(list(result.confidence().values()))
     other = other_minimum(problem, best, intervals, result._rise(0.95, scaled=False), starts)

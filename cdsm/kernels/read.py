@@ -91,10 +91,10 @@ def read_margin(K: Array) -> float:
 
 
 def _find_singular(K: Array, scale: Array, peak: Array, status: Indices) -> None:
-    """Set ``status`` to SINGULAR where ``peak`` > 0 and the singular values of K_θ confirm it.
+    """Set ``status`` to SINGULAR where K_θ may be singular and its singular values confirm it.
 
-    ``scale`` and ``peak`` come from :func:`~cdsm.kernels.readings.solve`. Singular values take ten
-    times as long as all the rest, and are rarely needed.
+    :func:`~cdsm.kernels.readings.solve` computes ``scale`` and ``peak``, and marks doubt by
+    ``peak`` > 0. Singular values take ten times as long as all the rest, and are rarely needed.
     """
     for b, w in np.argwhere(peak > 0.0):
         if peak[b, w] < math.inf:  # else a joint has zero stiffness in all terms

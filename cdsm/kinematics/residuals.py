@@ -75,7 +75,7 @@ class TipResidual(Residual):
     """
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Compute the residual r (3,) or (6,) and ∂r/∂q (3, nv) or (6, nv) at q (nv,)."""
+        """Compute the error r of the tip, (3,) or (6,), and ∂r/∂q (3, nv) or (6, nv) at q."""
         state, length = self.arm._model.body.state(q), self.arm.length
         linear, angular = state.jacobian[:3] / length, state.jacobian[3:]
         if self.target.ndim == 1:
@@ -105,9 +105,9 @@ class TipResidual(Residual):
 
 
 def usable_limits(arm: Manipulator) -> tuple[Array, Array]:
-    """Return lower and upper joint limits (nv,), reduced where two holes of a cable coincide.
+    """Return lower and upper joint limits (nv,) at which no two holes of a cable coincide.
 
-    A limit at which they do is multiplied by 1 − 1e-5.
+    A limit of the arm at which holes coincide is multiplied by 1 − 1e-5.
     """
     # a cable through coincident holes has no direction, so the arm cannot be evaluated there
     limits = arm.lower.copy(), arm.upper.copy()

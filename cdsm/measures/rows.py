@@ -148,10 +148,11 @@ def payloads(
 def capacity_margins(
     arm: Manipulator, q: Array, wrench: Array, minimum: ArrayLike, maximum: ArrayLike
 ) -> Array:
-    """Compute :meth:`ForcePolytope.margin` (B,) [N] of the zero force at postures q (B, nv).
+    """Compute how much more force the arm can balance in any direction, at postures q (B, nv).
 
-    Wrenches and bounds are given as for :func:`payloads`. The margin is 0 if tensions balance no
-    force at all. Each posture takes some milliseconds.
+    The result (B,) [N] is the distance of the force zero from the nearest facet of the force
+    polytope (:meth:`ForcePolytope.margin`). It is 0 if tensions balance no force at all. Wrenches
+    and bounds are given as for :func:`payloads`. Each posture takes some milliseconds.
     """
     margin = np.empty(len(q))
     rows = zip(*_balances(arm, q, wrench, minimum, maximum, None), strict=True)

@@ -176,7 +176,7 @@ def payload_rows(
 
     J is J_L (B, C, nv) of B postures, ``torque`` J_Xᵀ W − g (B, nv) [N m], ``motion`` J_vᵀ u
     (B, D, nv), ``reach`` the length of the arm [m]. The bounds of the tensions are (B, C) [N].
-    Forces without a proof are NaN.
+    A force is NaN if it is not proved to be the largest.
     """
     rows, count, nv = J.shape
     columns, x = np.empty((nv, count + 1)), np.empty(count + 1)

@@ -193,8 +193,8 @@ class Planner:
     def _bridges(self, seen: list[ConstraintValues]) -> list[Evaluation]:
         """Find stable points that hit a single target, on lines between points of ``seen``.
 
-        Each line connects one of the 6 nearest points below the target with one of the 6 nearest
-        above.
+        Each line connects one of the 6 points whose stiffness is closest below the target with one
+        of the 6 whose stiffness is closest above it.
         """
         order = sorted(seen, key=lambda place: float(abs(place.values[0])))
         below = [place.evaluation for place in order if place.values[0] < 0.0][:_SIDES]

@@ -203,11 +203,11 @@ class RangeEnd(NamedTuple):
 def range_ends(
     model: StiffnessModel, u: Array, starts: int, seed: int
 ) -> tuple[RangeEnd, RangeEnd]:
-    """Find the lowest and the highest stiffness of ``model`` along a unit direction ``u`` (3,).
+    """Find the tensions that give the lowest and the highest stiffness along ``u`` (3,).
 
-    Tensions without bound are capped at 1e2 times the largest of the least tensions, then at 1e4
-    and 1e6 times, until the tensions at both ends lie below the cap. :func:`stiffness_range`
-    explains ``starts`` and ``seed``.
+    Let F_0 be the largest of the tensions that hold the arm with least effort. Tensions without
+    bound are capped at 1e2 F_0, then at 1e4 and 1e6 F_0, until both ends lie below the cap.
+    :func:`stiffness_range` explains ``starts`` and ``seed``.
     """
     region = model.region
     if np.isfinite(region.high).all():
@@ -273,8 +273,7 @@ def _bounded_ends(
 def _beside(region: Admissible, anchor: Evaluation, F: Array) -> Iterator[Evaluation]:
     """Yield stable tensions near F (C,) [N], each with one tension moved to its farther bound.
 
-    The nearest tensions that balance the arm are taken. If the arm is unstable under them, they are
-    moved back towards ``anchor``.
+    They are the nearest that balance the arm; unstable ones are moved back towards ``anchor``.
     """
     for c, (low, high) in enumerate(zip(region.low, region.high, strict=True)):
         wanted = F.copy()

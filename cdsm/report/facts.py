@@ -224,7 +224,7 @@ def sticking(K: Stiffness, readings: Readings | None) -> Sticking | None:
 
 
 def readings(K: Stiffness) -> Readings | None:
-    """Compute the three tip stiffnesses along each base axis; None if K_θ is singular."""
+    """Compute ``along``, Cartesian and pseudoinverse stiffness; None if K_θ is singular."""
     try:
         along = np.array([K.along(axis) for axis in np.eye(3)])
     except SingularStiffness:

@@ -125,8 +125,8 @@ _ROOT = 2e-13  # relative error of a tension that is computed from the elongatio
 class Neighbourhood:
     """The arm near the posture at which K was computed, with its motors locked there.
 
-    ``places`` (P, nv) are joint displacements from the posture in units of :attr:`unit`, so all
-    derivatives of the potential U with respect to them are in N m.
+    The argument ``places`` (P, nv) of its methods are joint displacements from the posture in units
+    of :attr:`unit`, so all derivatives of the potential U by them are in N m.
 
     Attributes:
         locked: The position-controlled cables, except cables so slack that a small motion does not

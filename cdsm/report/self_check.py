@@ -146,7 +146,7 @@ class SelfCheck(ReadOnlyState):
 
 
 def self_check(K: Stiffness) -> SelfCheck:
-    """Compare K_θ, its terms and the residual of Eq. 13 with finite differences.
+    """Compare K_θ, its terms and the residual torque (Eq. 13) with finite differences.
 
     K_θ is compared with second differences of the potential and with first differences of the
     torque. The residual is compared with first differences of the potential. Motors do not move,

@@ -73,7 +73,10 @@ class Bifurcation(ReadOnlyState):
         return plain(numbers)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return tip displacements [m] at each lower bound [N]; needs pandas (MissingExtra)."""
+        """Return the curve as a table: tip displacement [m] at each bound of the tensions [N].
+
+        Raises MissingExtra if pandas is not installed.
+        """
         columns = dict(zip(("x [m]", "y [m]", "z [m]"), self.displacements.T, strict=True))
         return data_frame(columns, "minimum [N]", self.bounds)
 

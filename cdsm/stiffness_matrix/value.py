@@ -168,7 +168,7 @@ class Stiffness(CartesianReadings):
 
         Raises:
             InvalidInput: The stiffness is not frictionless.
-            SolverError: The linear program for the ratio of tensions fails.
+            SolverError: The linear program for the tension factor, a fact of the report, fails.
         """
         from cdsm.report import report_on  # here, since a stiffness does not need it
 

@@ -132,8 +132,8 @@ def checked_keywords(function: _Function) -> _Function:
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:
     """Wrap ``validated`` so that all faults that pydantic finds raise one GeometryError.
 
-    pydantic checks the values given to ``validated`` before it builds a record or runs a function.
-    ``kind`` is this record or function; messages name its keywords.
+    ``validated`` builds a record or runs a function, after pydantic has checked the values given.
+    ``kind`` is the record's class or the function: messages name the keywords of its signature.
     """
 
     @wraps(validated)

@@ -37,10 +37,10 @@ class Tolerances:
     """Uncertainties of the dimensions of an arm and of the values measured on it.
 
     Each source of uncertainty is a :class:`Tolerance`, or a standard uncertainty (one sigma) as a
-    number, or a list of tolerances, each for the inputs that its ``of`` names. A number for
-    ``rigidity`` or ``friction`` has the correlation 1: all cables are of one spool, all disks of
-    one material. Other numbers have the correlation 0: the errors of all joints, holes, disks and
-    links are independent.
+    number, or a list of tolerances; each entry is for the inputs in its attribute ``of``. A number
+    for ``rigidity`` or ``friction`` has the correlation 1: all cables are of one spool, all disks
+    of one material. Other numbers have the correlation 0: the errors of all joints, holes, disks
+    and links are independent.
 
     Attributes:
         rigidity: EA of the law of each cable; relative [-].

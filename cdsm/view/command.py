@@ -77,9 +77,10 @@ def python_lines(arm: Manipulator, setting: Setting) -> str:
 
 
 def command_text(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str] | None) -> str:
-    """Return HTML with two buttons below the command, or below Python if there are no arguments.
+    """Return HTML: the command that computes the numbers of the page, and two buttons.
 
-    The buttons copy this text and save a picture of the scene.
+    Without ``arm_arguments`` it shows lines of Python instead of the command. The buttons copy this
+    text and save a picture of the scene.
     """
     if arm_arguments is None:
         where, command = "in Python", python_lines(arm, setting)

@@ -186,7 +186,8 @@ class Curve:
     def _inverse(self, rows: Array) -> tuple[Array, Array]:
         """Return N⁻¹ of the normal matrix N = rowsᵀ rows + penalty, and the leverage of each row.
 
-        N is (k + 1, k + 1). ``rows`` (n, k + 1) are the weighted derivatives of the n forces.
+        N is (k + 1, k + 1) for the k + 1 parameters of the curve. ``rows`` (n, k + 1) are the
+        derivatives of the n measured forces by them, weighted.
         """
         factor, scale = self._factored(rows)
         inverse = cho_solve(factor, np.eye(len(scale))) / np.outer(scale, scale)
