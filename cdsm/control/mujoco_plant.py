@@ -131,5 +131,8 @@ class MuJoCoPlant:
         for c, cable in enumerate(self.arm.cables):
             if cable.control == "position":
                 stretch, wire = float(lengths[c] - command.wire[c]), float(command.wire[c])
-                F[c] = cable.tension(stretch, wire) if stretch > 0.0 else 0.0
+                # with a slack branch, a cable is slack only at a negative elongation
+                slack_below = 0.0 in cable.elasticity.domain
+                slack = float(cable.elongation(0.0, wire)) if slack_below else 0.0
+                F[c] = cable.tension(stretch, wire) if stretch > slack else 0.0
         return F

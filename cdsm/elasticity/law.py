@@ -172,6 +172,11 @@ class ScaledElasticity(Elasticity):
         """Domain of ``law``, which scaling does not change."""
         return self.law.domain
 
+    @property
+    def rest(self) -> float:
+        """Tension [N] at which the strain of ``law`` is zero."""
+        return self.law.rest
+
     def rigidity(self, tension: ArrayLike) -> Array:
         """Compute EA [N] at tensions [N]."""
         return self.factor * self.law.rigidity(tension)

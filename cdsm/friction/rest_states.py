@@ -210,7 +210,7 @@ def _locked(
     whole, lost = float(length[of].sum()), wire.share * float(longer)
     each_longer = straight[of] + near.curved(H[of]) + far.length[of]
     lost += float(each_longer.sum()) * wire.change
-    lost += spring * (wire.most - cable.elasticity.domain.low) * wire.change
+    lost += spring * abs(np.array(wire[:2]) - cable.elasticity.rest).max() * wire.change
     # a slack cable has more wire than its segments are long
     spare = whole * wire.change + lost if wire.least == 0.0 else 0.0
     return row, (whole * wire.below - lost, whole * wire.above + lost + spare)

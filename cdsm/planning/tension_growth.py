@@ -99,7 +99,7 @@ def saturation(
             last -= _INSET * (last - first)
 
     def slope(lower: float) -> float:
-        return _slope(at(lower), u)
+        return _slope(at(lower), lower, u)
 
     places = log_samples(first, last)
     bends = _kinks(at, places[(places >= first) & (places <= last)])
@@ -156,7 +156,7 @@ def _kinks(at: StiffnessAt, places: Array) -> Array:
     while todo:
         a, b = todo.pop()
         one, other = at(a), at(b)
-        if np.array_equal(_active(one), _active(other)):
+        if np.array_equal(_active(one, a), _active(other, b)):
             for cable, F, G in zip(one.posture.arm.cables, one.tension, other.tension, strict=True):
                 if cable.control == "position":
                     passed = (x for x in kinks(cable.elasticity) if min(F, G) <= x < max(F, G))
@@ -173,22 +173,26 @@ def _least(K: Stiffness) -> Tension:
     return K.distribution
 
 
-def _active(K: Stiffness) -> Array:
-    """Return for each cable (C,): 1 at its lower bound, −1 at its upper bound, 0 between both."""
-    least, tight = _least(K), OPTIMALITY * float(K.tension.max())
-    rises = (K.tension - least.minimum <= tight).astype(np.float64)
-    return np.where(least.maximum - K.tension <= tight, -1.0, rises)
+def _active(K: Stiffness, lower: float) -> Array:
+    """Return for each cable (C,): 1 at the bound ``lower`` [N], 0 between its bounds.
 
-
-def _slope(K: Stiffness, u: Array) -> float:
-    """Compute d along/db [1/m], where b is the lower bound of the least tensions.
-
-    Tensions at the lower bound rise with b, tensions at the upper bound stay, and the others change
-    so that the arm stays in balance.
+    It is 2 at a higher lower bound of the cable's own, and −1 at the upper bound.
     """
-    A, active = K.posture.length_jacobian.T, _active(K)
-    rate, free = np.maximum(active, 0.0), active == 0.0
-    rate[free] = np.linalg.lstsq(A[:, free], -A[:, active > 0.0].sum(axis=1), rcond=None)[0]
+    least, tight = _least(K), OPTIMALITY * float(K.tension.max())
+    own = np.where(least.minimum > lower, 2.0, 1.0)
+    low = np.where(K.tension - least.minimum <= tight, own, 0.0)
+    return np.where(least.maximum - K.tension <= tight, -1.0, low)
+
+
+def _slope(K: Stiffness, lower: float, u: Array) -> float:
+    """Compute d along/db [1/m] at b = ``lower``, the lower bound of the least tensions.
+
+    Tensions at b rise with it, tensions at other bounds stay, and the others change so that the arm
+    stays in balance.
+    """
+    A, active = K.posture.length_jacobian.T, _active(K, lower)
+    rate, free = (active == 1.0).astype(np.float64), active == 0.0
+    rate[free] = np.linalg.lstsq(A[:, free], -A[:, active == 1.0].sum(axis=1), rcond=None)[0]
     return float(stiffness_gradient(K).along(u) @ rate)
 
 

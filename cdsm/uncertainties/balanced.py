@@ -129,8 +129,9 @@ def buckling_gradient(
     respect to measured tensions is 0.
     """
     weights = margin["tension"]
-    moved, every = balance.gradient(inputs, weights), np.ones((len(weights), 1))
-    slope = float(balance.by_bounds(weights, every, 0.0 * every)[0])
+    low = balance.tension.minimum  # F_min, or a higher bound of the cable's own
+    moved, common = balance.gradient(inputs, weights), (low == low.min())[:, None].astype(float)
+    slope = float(balance.by_bounds(weights, common, 0.0 * common)[0])
     return {
         name: np.zeros_like(g) if name == "tension" else -(g + moved[name]) / slope
         for name, g in margin.items()

@@ -94,16 +94,18 @@ class DrawnArms:
     def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
         """Compute the least tensions (N, C) [N] that balance the N arms.
 
-        ``minimum`` (N,) [N] is the lower bound of all cables of each arm; None: the lower bounds of
-        the arm without errors. ``drawn`` is a result of :meth:`evaluate`; None: it is computed
-        here.
+        ``minimum`` (N,) [N] is the lower bound of each arm, beside those of its cables; None: the
+        lower bounds of the arm without errors. ``drawn`` is a result of :meth:`evaluate`; None: it
+        is computed here.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.
         """
         arms, given = drawn or self.evaluate(), self._K.distribution
         assert given is not None
-        bounds = given.minimum if minimum is None else minimum[:, None], given.maximum
+        own = np.array([cable.minimum for cable in self._K.posture.arm.cables])
+        least = given.minimum if minimum is None else np.maximum(minimum[:, None], own)
+        bounds = least, given.maximum
         low, high = (frozen(np.broadcast_to(x, self._tension.shape).copy()) for x in bounds)
         none = abs(arms.length_jacobian) < NO_ARM * self._K.posture.arm.length
         J, tension = np.where(none, 0.0, arms.length_jacobian), np.empty_like(low)

@@ -101,7 +101,7 @@ class Question(ReadOnlyState):
             return float(K.tension[self.cable])
         if self.of == "critical_tension":
             assert K.distribution is not None
-            return float(K.distribution.minimum.max())
+            return float(K.distribution.minimum.min())  # cables may have higher bounds of their own
         if self.direction is None:
             return K.margin
         if self.of in ("along", "stuck"):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -285,3 +286,32 @@ def test_bad_input_is_named(
     given = {"pose": arm.at(np.full(arm.nv, 0.1)), "direction": DOWN, "minimum": 5.0, **change}
     with pytest.raises(error, match=message):
         cdsm.saturation(**given)
+
+
+def test_cable_at_a_higher_bound_of_its_own_does_not_rise() -> None:
+    geometry = cdsm.Geometry.universal(
+        joints=2,
+        cables_per_joint=3,
+        link_length=0.06,
+        base_length=0.03,
+        disk_offset=0.012,
+        hole_radius=0.02,
+        link_mass=0.05,
+        lead=0.1,
+    )
+    plain = cdsm.Manipulator(geometry, presets.STRAND_1X19)
+    cables = [replace(each, minimum=60.0 if i == 2 else 0.0) for i, each in enumerate(plain.cables)]
+    pose = plain.with_cables(cables).at(np.deg2rad([6.0, -4.0, 5.0, 3.0]))
+
+    def along(lower: float) -> float:
+        return cdsm.stiffness(pose, cdsm.distribute_tension(pose, lower, 200.0)).along("z")
+
+    curve = cdsm.saturation(pose, "z", 10.0, 200.0).curve
+    # 60 N is where the common bound takes over; the slope jumps there and at kinks of the law
+    assert np.isclose(curve[:, 0], 60.0, rtol=1e-8).any()
+    for lower in (21.5, 36.0, 50.0, 72.0):
+        at = int(abs(curve[:, 0] - lower).argmin())
+        place, _, slope = curve[at]
+        step = 1e-6 * place
+        expected = (along(place + step) - along(place - step)) / (2.0 * step)
+        assert slope == pytest.approx(expected, rel=1e-6)

@@ -414,3 +414,39 @@ def test_reading_of_an_unstable_arm_says_so_first() -> None:
     # friction holds it while no cable slides
     stuck = cdsm.uncertainty(pose, tension, own, direction="z", of="stuck")
     assert "UNSTABLE" not in str(stuck)
+
+
+@pytest.mark.parametrize("number", [2, 5])
+def test_critical_tension_beside_a_higher_bound_of_one_cable(number: int) -> None:
+    """The value is that of critical_tension, and its slope that of its differences."""
+    geometry = cdsm.Geometry.universal(
+        joints=2,
+        cables_per_joint=3,
+        link_length=0.05,
+        base_length=0.02,
+        disk_offset=0.012,
+        hole_radius=0.03,
+        link_mass=0.3,
+        lead=0.3,
+    )
+    plain = cdsm.Manipulator(geometry, cdsm.LinearElasticity(9000.0))
+
+    def pose_of(spring: float) -> cdsm.Posture:
+        cables = [replace(each, series_stiffness=spring) for each in plain.cables]
+        cables[number] = replace(cables[number], minimum=13.6)
+        return plain.with_cables(cables).at(np.full(4, 0.05))
+
+    def critical(spring: float) -> float:
+        return cdsm.critical_tension(pose_of(spring)).minimum
+
+    pose, step = pose_of(600.0), 6e-2
+    tension = cdsm.distribute_tension(pose, critical(600.0))
+    tolerances = cdsm.Tolerances(spring=1e-3)
+    budget = cdsm.uncertainty(pose, tension, tolerances, of="critical_tension")
+    assert budget.value == pytest.approx(critical(600.0), rel=1e-12)
+    slope = 600.0 * (critical(600.0 + step) - critical(600.0 - step)) / (2.0 * step)
+    assert budget.sensitivities["spring"].sum() == pytest.approx(slope, rel=1e-6)
+    drawn = cdsm.monte_carlo(
+        pose, tension, tolerances, of="critical_tension", draws=100, progress=False
+    )
+    assert drawn.mean == pytest.approx(budget.value, abs=5.0 * budget.standard_uncertainty)

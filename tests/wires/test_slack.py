@@ -1,6 +1,7 @@
 """Slack branch of a law: continued to zero tension, and the same within the law."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from typer.testing import CliRunner
 
 import cdsm
 from cdsm.cli import app
+from cdsm.elasticity import ScaledElasticity
 from cdsm.support.values import Array
 from tests.support.arms import readme_geometry
 
@@ -166,3 +168,14 @@ def test_batches_know_the_branch() -> None:
     np.testing.assert_allclose(
         K["joint"][0], cdsm.stiffness(pose, pull).joint, rtol=1e-9, atol=1e-12
     )
+
+
+def test_scaled_law_is_at_rest_where_its_law_is() -> None:
+    """On a series spring the rest counts: the original length follows from it."""
+    slack = STRAND.slack_below()
+    assert ScaledElasticity(slack, 1.5).rest == slack.rest == STRAND.rest > 0.0
+    cable = cdsm.Manipulator(GEOMETRY, slack).cables[0]
+    sprung = replace(cable, series_stiffness=500.0)
+    scaled = replace(sprung, elasticity=ScaledElasticity(slack, 1.0))
+    F = np.array([1.0, 10.0, 50.0])
+    np.testing.assert_array_equal(scaled.elongation(F, 0.3), sprung.elongation(F, 0.3))
