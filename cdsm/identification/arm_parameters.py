@@ -7,8 +7,9 @@ from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 
+from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, named
 from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
@@ -71,6 +72,17 @@ class ArmParameters:
                 "arm",
                 "has other cables than those of its geometry, which the parameters describe. "
                 "Describe springs and wires in [cables.NAME] of the ARM.toml.",
+            )
+        plain = serpentine_cables(self.geometry, LinearElasticity(1.0))
+        if moved := [
+            own.name
+            for own, cable in zip(self.arm.cables, plain, strict=True)
+            if (own.lead, *_positions(own)) != (cable.lead, *_positions(cable))
+        ]:
+            raise InvalidInput(
+                "arm",
+                f"the lead or the holes of {named(moved)} are not those of its geometry, which the "
+                "parameters describe. Give them in the geometry.",
             )
         taken = set[tuple[str, int]]()
         for name in self.names:
@@ -185,3 +197,7 @@ def _joints_of(geometry: Geometry, part: str) -> list[int]:
     if part == "cables":
         return [route.joint for route in geometry.cables]
     return list(range(1, len(geometry.joints) + 1))
+
+
+def _positions(cable: Cable) -> list[tuple[str, tuple[float, ...]]]:
+    return [(site.link, tuple(site.position)) for site in cable.sites]

@@ -1,6 +1,7 @@
 """An arm as a function of parameters by name."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -74,3 +75,9 @@ def test_bad_values_are_refused() -> None:
     free = cdsm.Manipulator.from_urdf(ARM.urdf, ARM.cables, tip="tool0")
     with pytest.raises(cdsm.InvalidInput, match="geometry"):
         cdsm.ArmParameters(free, ("lead",))
+
+
+def test_leads_that_are_not_those_of_the_geometry_are_refused() -> None:
+    cables = [replace(each, lead=each.lead + 0.1 * (i == 1)) for i, each in enumerate(ARM.cables)]
+    with pytest.raises(cdsm.InvalidInput, match=f"lead or the holes of {cables[1].name} are not"):
+        cdsm.ArmParameters(ARM.with_cables(cables), ("lead",))
