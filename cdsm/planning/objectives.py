@@ -46,7 +46,7 @@ def target_constraints(
 def along_constraints(model: StiffnessModel, directions: Array, targets: Array) -> Constraints:
     """Build the constraints along(u)/target − 1 = 0 for directions u (m, 3), targets (m,) [N/m]."""
     parts = tuple(
-        Constraint(u[None] @ model.pose.jacobian[:3], np.full((1, 1, 1), 1.0 / target))
+        Constraint(u[None] @ model.jacobian[:3], np.full((1, 1, 1), 1.0 / target))
         for u, target in zip(directions, targets.tolist(), strict=True)
     )
     return Constraints(parts, np.ones(targets.size))
@@ -61,7 +61,7 @@ def cartesian_constraints(model: StiffnessModel, target: Array) -> Constraints:
     k, (i, j), E = np.arange(6), np.triu_indices(3), np.zeros((6, 3, 3))
     E[k, i, j] = E[k, j, i] = np.where(i == j, 1.0, np.sqrt(0.5))
     E /= np.linalg.norm(target)
-    part = Constraint(model.pose.jacobian[:3].copy(), E)
+    part = Constraint(model.jacobian[:3].copy(), E)
     return Constraints((part,), np.tensordot(E, target))
 
 

@@ -90,7 +90,8 @@ def plan_path(
         guess: Joint angles (nv,) [rad] from which the first of ``tips`` is solved. Default: the
             straight arm.
         rate: Largest change of a tension per step [N], for all cables or (C,); inf for no limit.
-        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest [-].
+        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest [-]. A
+            prismatic joint counts in lengths of the arm.
         starts: Number of starting tensions of a search from scratch, at most 1000.
         seed: Seed of the random starting tensions.
         progress: Show a bar on the standard error, if that is a terminal.

@@ -166,7 +166,8 @@ def plan_stiffness(
             of the elasticity and buckling limit the tensions.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest
-            eigenvalue under the least tensions [-], 1e-9 or more.
+            eigenvalue under the least tensions [-], 1e-9 or more. A prismatic joint counts in
+            lengths of the arm.
         starts: Number of starting tensions, at most 1000.
         seed: Seed of the random starting tensions.
         progress: Show a bar on the standard error, if that is a terminal.

@@ -150,7 +150,8 @@ def stiffness_range(
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest [-].
+        margin: Smallest eigenvalue of K_θ that counts as stable, as a part of the largest [-]. A
+            prismatic joint counts in lengths of the arm.
         starts: Number of starting tensions for ``low``, at most 1000. ``high`` has the same number,
             or a few if the rigidity of all cables is known to rise with the tension.
         seed: Seed of the random starting tensions.

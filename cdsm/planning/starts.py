@@ -115,10 +115,10 @@ def _stabilize(model: StiffnessModel, region: Admissible, start: Evaluation) -> 
             radius = float(abs(found.x[:count]).max()) / 2.0
     if iterate.reserve > 0.0:
         return iterate
-    unit_name = model.pose.arm.stiffness_unit()
+    motion = iterate.eigenvectors[:, 0] * model.unit
     raise unstable(
         model.pose.arm,
         "no admissible tensions make the arm stable: at best the smallest eigenvalue of K_θ is "
-        f"{iterate.eigenvalues[0]:.4g} {unit_name}, and {model.floor:.4g} {unit_name} is required",
-        iterate.eigenvectors[:, 0],
+        f"{iterate.eigenvalues[0]:.4g} N m/rad, and {model.floor:.4g} N m/rad is required",
+        motion / np.linalg.norm(motion),
     )

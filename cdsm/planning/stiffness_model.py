@@ -15,6 +15,7 @@ from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.planning import kernels
 from cdsm.planning.admissible import admissible
 from cdsm.posture import Posture
+from cdsm.support.format import JointUnits
 from cdsm.support.validation import SMALLEST, instance, scalar
 from cdsm.support.values import Array
 
@@ -43,6 +44,9 @@ class StiffnessModel:
     Attributes:
         pose: The posture.
         region: The admissible tensions.
+        unit: Unit of each joint coordinate (nv,): 1 rad, or the arm's length [m] if it is
+            prismatic. K_θ is in these units, so that its eigenvalues can be compared [N m/rad].
+        jacobian: Tip Jacobian (6, nv), per ``unit`` of each joint.
         scale: Largest magnitude of an eigenvalue of K_θ under the least tensions [N m/rad].
         floor: Limit of the smallest eigenvalue of K_θ; below it the arm counts as unstable
             [N m/rad].
@@ -62,12 +66,15 @@ class StiffnessModel:
         self.region = region = admissible(pose, minimum, maximum, wrench)
         part = checked_margin(margin)
         self.evaluations = self.iterations = 0
+        self.unit = unit = JointUnits(pose.arm.slides).levers(pose.arm.length)
+        squared = np.outer(unit, unit)
+        self.jacobian = pose.jacobian * unit
         # products with the cached tensor are faster than a loop over the cables
-        self.geometry = pose.length_hessian, pose.length_jacobian
+        self.geometry = pose.length_hessian * squared, pose.length_jacobian * unit
         load = single_load_stiffness(
             pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints
         )
-        self.constant = pose.gravity_stiffness + load
+        self.constant = (pose.gravity_stiffness + load) * squared
         self.scale = max(float(abs(self.at(region.least.values).eigenvalues).max()), SMALLEST)
         self.floor = part * self.scale
 
@@ -125,7 +132,7 @@ class Evaluation:
         the gradient of the length of cable c, k″_c the second derivative of its stiffness by F_c, δ
         the Kronecker symbol.
         """
-        J, v = self.model.pose.length_jacobian, np.ascontiguousarray(self.eigenvectors[:, :1])
+        (_, J), v = self.model.geometry, np.ascontiguousarray(self.eigenvectors[:, :1])
         first, second = self.spring_slopes
         mixed = kernels.form_by_tension(*self.model.geometry, first, self.eigenvectors, v)[:, 1:, 0]
         distances = self.eigenvalues[1:] - self.eigenvalues[0]

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm import presets
+from cdsm.planning.range import MARGIN
 from cdsm.support.values import Array
-from tests.support import arms
+from tests.support import arms, foreign
 from tests.support.locked import (
     BUCKLING,
     EA,
@@ -413,3 +414,43 @@ def test_more_starts_are_never_worse(seed: int) -> None:
         # the ends of searches that meet differ by their rounding
         assert more.high >= fewer.high * (1.0 - 1e-9)
         assert more.low <= fewer.low * (1.0 + 1e-9)
+
+
+def test_a_prismatic_joint_counts_in_lengths_of_the_arm() -> None:
+    """The slide of a finger has 10^5 N/m, which must not count as 10^5 N m/rad beside its hinge."""
+    urdf = "\n".join(
+        [
+            '<robot name="finger">',
+            foreign.link_element("palm", 0.1),
+            foreign.link_element("bone", 0.02),
+            foreign.link_element("nail", 0.01),
+            foreign.joint_element("a", "revolute", "palm", "bone", "0 0 0", "0 0 0", "0 1 0"),
+            foreign.joint_element("b", "prismatic", "bone", "nail", "0.05 0 0", "0 0 0", "1 0 0"),
+            "</robot>",
+        ]
+    )
+    law = cdsm.LinearElasticity(4e3)
+    sides = [(0.003, 0.003), (-0.003, -0.004), (0.003, -0.004), (-0.004, 0.003)]
+    back = [(0.045, 0.004), (0.045, -0.004)]
+    cables = [
+        cdsm.Cable(
+            f"pull{i}", (cdsm.Site("palm", (-0.01, 0, z)), cdsm.Site("nail", (0, 0, w))), law
+        )
+        for i, (z, w) in enumerate(sides)
+    ] + [
+        cdsm.Cable(f"push{i}", (cdsm.Site("bone", (0.08, 0, z)), cdsm.Site("nail", (x, 0, z))), law)
+        for i, (x, z) in enumerate((-0.05 + x, z) for x, z in back)
+    ]
+    arm = cdsm.Manipulator.from_urdf(urdf, cables, tip="nail")
+    pose = arm.at([0.05, 0.002])
+    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 5.0, 60.0))
+    assert K.is_stable
+    least, most = np.linalg.eigvalsh(K.joint)
+    assert least < MARGIN * most  # N m/rad beside N/m
+    found = cdsm.stiffness_range(pose, "z", 5.0, 60.0, progress=False)
+    bare = cdsm.stiffness_range(pose, "z", 5.0, 60.0, margin=1e-9, progress=False)
+    assert found.low == pytest.approx(bare.low, rel=1e-9)
+    assert found.high == pytest.approx(bare.high, rel=1e-9)
+    target = (found.low + found.high) / 2.0
+    plan = cdsm.plan_stiffness(pose, "z", target, 5.0, 60.0, progress=False)
+    assert plan.stiffness.along("z") == pytest.approx(target, rel=1e-6)
