@@ -17,7 +17,7 @@ from cdsm.cable import Cable, Site
 from cdsm.design.goals import Constraint, Measure, MeasureName, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed, check, present
 from cdsm.errors import InvalidInput
-from cdsm.geometry.cables import serpentine_cables
+from cdsm.geometry.cables import require_own_cables, serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import require
 from cdsm.support.format import plural
@@ -65,7 +65,7 @@ class DesignProblem(ReadOnlyState):
 
     Raises:
         InvalidInput: An argument is invalid; two variables change the same thing; the arm was made
-            from a URDF.
+            from a URDF, or its leads or holes are not those of its geometry.
         UnknownName: The arm does not have a cable that is named.
     """
 
@@ -86,6 +86,7 @@ class DesignProblem(ReadOnlyState):
 
     def __post_init__(self) -> None:
         geometry = instance("arm", self.arm, Manipulator).geometry  # raises without one
+        require_own_cables(geometry, self.arm.cables)
         variables = sequence_of("variables", self.variables, Variable)
         objectives = sequence_of("objectives", self.objectives, Objective)
         constraints = sequence_of("constraints", self.constraints, Constraint)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from cdsm.cable import Cable, Control, Site
 from cdsm.elasticity import Elasticity
 from cdsm.elasticity.law import checked_law
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, named
 from cdsm.geometry import Geometry
 from cdsm.support.validation import instance
 
@@ -67,3 +67,31 @@ def serpentine_cables(
             )
         )
     return tuple(cables)
+
+
+def require_own_cables(geometry: Geometry, cables: Sequence[Cable]) -> None:
+    """Refuse the ``cables`` of an arm that are not routed and led as its ``geometry`` says.
+
+    What is built from values of the geometry would replace them. Raises InvalidInput.
+    """
+    if tuple(cable.name for cable in cables) != geometry.cable_names:
+        raise InvalidInput(
+            "arm",
+            "has other cables than those of its geometry, which alone is varied. "
+            "Describe springs and wires in [cables.NAME] of the ARM.toml.",
+        )
+    routed = serpentine_cables(geometry, [cable.elasticity for cable in cables])
+    if moved := [
+        own.name
+        for own, cable in zip(cables, routed, strict=True)
+        if (own.lead, *_positions(own)) != (cable.lead, *_positions(cable))
+    ]:
+        raise InvalidInput(
+            "arm",
+            f"the lead or the holes of {named(moved)} are not those of its geometry, which "
+            "alone is varied. Give them in the geometry.",
+        )
+
+
+def _positions(cable: Cable) -> list[tuple[str, tuple[float, ...]]]:
+    return [(site.link, tuple(site.position)) for site in cable.sites]

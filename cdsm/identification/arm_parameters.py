@@ -7,11 +7,10 @@ from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 
-from cdsm.cable import Cable
 from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.errors import InvalidInput, named
+from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
-from cdsm.geometry.cables import serpentine_cables
+from cdsm.geometry.cables import require_own_cables, serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import instance, one_of, scalar, text
 
@@ -57,8 +56,8 @@ class ArmParameters:
 
     Raises:
         UnknownName: There is no such parameter.
-        InvalidInput: The arm has no such joint, no geometry, or other cables than its geometry; or
-            a name is given twice, or both for all joints and for one joint.
+        InvalidInput: The arm has no such joint, no geometry, or other cables, leads or holes than
+            its geometry; or a name is given twice, or both for all joints and for one joint.
     """
 
     arm: Manipulator
@@ -67,23 +66,7 @@ class ArmParameters:
     def __post_init__(self) -> None:
         instance("arm", self.arm, Manipulator)
         object.__setattr__(self, "names", tuple(text("names", name) for name in self.names))
-        if self.arm.cables.names != self.geometry.cable_names:
-            raise InvalidInput(
-                "arm",
-                "has other cables than those of its geometry, which the parameters describe. "
-                "Describe springs and wires in [cables.NAME] of the ARM.toml.",
-            )
-        plain = serpentine_cables(self.geometry, LinearElasticity(1.0))
-        if moved := [
-            own.name
-            for own, cable in zip(self.arm.cables, plain, strict=True)
-            if (own.lead, *_positions(own)) != (cable.lead, *_positions(cable))
-        ]:
-            raise InvalidInput(
-                "arm",
-                f"the lead or the holes of {named(moved)} are not those of its geometry, which the "
-                "parameters describe. Give them in the geometry.",
-            )
+        require_own_cables(self.geometry, self.arm.cables)
         taken = set[tuple[str, int]]()
         for name in self.names:
             kind, where = self._place(name)
@@ -170,7 +153,7 @@ class ArmParameters:
             cables=cables,
             gravity=self.arm.gravity,
             original_length=self.arm.original_length,
-        )
+        ).with_tolerances(self.arm.tolerances)
 
     def _values(self, name: str) -> list[float]:
         """Return the values in SI that the parameter ``name`` has now, at each of its joints."""
@@ -197,7 +180,3 @@ def _joints_of(geometry: Geometry, part: str) -> list[int]:
     if part == "cables":
         return [route.joint for route in geometry.cables]
     return list(range(1, len(geometry.joints) + 1))
-
-
-def _positions(cable: Cable) -> list[tuple[str, tuple[float, ...]]]:
-    return [(site.link, tuple(site.position)) for site in cable.sites]

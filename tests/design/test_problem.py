@@ -604,3 +604,10 @@ def test_a_page_of_a_long_front_shows_some_of_it(monkeypatch: pytest.MonkeyPatch
     assert {0, found.compromise, count - 1} == set(shown)
     assert page.count("<img") == len(shown) == page.count('<g id="design-')
     assert f"{len(shown)} of {count} best of 32 designs" in page
+
+
+def test_leads_that_are_not_those_of_the_geometry_are_refused() -> None:
+    arm = small_arm()
+    cables = [replace(each, lead=each.lead + 0.1 * (i == 1)) for i, each in enumerate(arm.cables)]
+    with pytest.raises(cdsm.InvalidInput, match=f"lead or the holes of {cables[1].name} are not"):
+        problem(arm=arm.with_cables(cables))

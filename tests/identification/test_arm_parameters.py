@@ -81,3 +81,9 @@ def test_leads_that_are_not_those_of_the_geometry_are_refused() -> None:
     cables = [replace(each, lead=each.lead + 0.1 * (i == 1)) for i, each in enumerate(ARM.cables)]
     with pytest.raises(cdsm.InvalidInput, match=f"lead or the holes of {cables[1].name} are not"):
         cdsm.ArmParameters(ARM.with_cables(cables), ("lead",))
+
+
+def test_the_arm_keeps_its_tolerances() -> None:
+    tolerances = cdsm.Tolerances(lead=1e-3)
+    arm = ARM.with_tolerances(tolerances)
+    assert cdsm.ArmParameters(arm, ("lead",))(lead=0.2).tolerances == tolerances
