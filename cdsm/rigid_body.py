@@ -21,15 +21,6 @@ from cdsm.support.validation import one_of, sequence_of
 from cdsm.support.values import Array, frozen
 
 
-class BodyState(NamedTuple):
-    """Pose and Jacobian of the tip, and torque and stiffness of gravity, at joint angles."""
-
-    tip: Array  # pose (4, 4)
-    jacobian: Array  # of the tip (6, nv), linear rows first, base axes
-    gravity_torque: Array  # g (nv,) [N m]
-    gravity_stiffness: Array  # ∂g/∂θ (nv, nv) [N m/rad]
-
-
 class Shapes(NamedTuple):
     """Shapes of a URDF that a viser server draws: a function that moves them, and their joints."""
 
@@ -62,7 +53,6 @@ class RigidBody:
         # index in Pinocchio's order of each of our coordinates, and the inverse permutation
         self._theirs = frozen(np.array([names.index(name) for name in self.joint_names]))
         self._ours = frozen(np.argsort(self._theirs))
-        self._reordered = self.joint_names != names
         self._ids: tuple[int, ...] = tuple((1 + self._theirs).tolist())
         self.nv: int = model.nv
         self.name: str = model.name
@@ -143,24 +133,17 @@ class RigidBody:
             point=tip.placement.translation.copy(),
         )
 
-    def state(self, q: Array) -> BodyState:
-        """Compute the fields of :class:`BodyState` at joint angles q (nv,) [rad]."""
+    def tip(self, q: Array) -> tuple[Array, Array]:
+        """Compute the pose (4, 4) of the tip and its Jacobian (6, nv), at joint angles q (nv,).
+
+        The Jacobian has the linear rows first, in base axes.
+        """
         model, data = self._model, self._data()
-        if self._reordered:
-            q = q[self._ours]
-        pin.computeJointJacobians(model, data, q)
+        pin.computeJointJacobians(model, data, q[self._ours])
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
-        tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
-        stiffness = pin.computeGeneralizedGravityDerivatives(model, data, q)
-        # for a model with one joint, Pinocchio returns vectors instead of matrices
-        jacobian = np.ascontiguousarray(jacobian).reshape(6, self.nv)
-        stiffness = np.ascontiguousarray(stiffness).reshape(self.nv, self.nv)
-        torque = data.g.copy()
-        if self._reordered:
-            i = self._theirs
-            jacobian = jacobian.take(i, axis=1)
-            torque, stiffness = torque[i], stiffness[np.ix_(i, i)]
-        return BodyState(tip, jacobian, torque, stiffness)
+        pose: Array = pin.updateFramePlacement(model, data, self._tip).homogeneous
+        # for a model with one joint, Pinocchio returns a vector
+        return pose, jacobian.reshape(6, self.nv).take(self._theirs, axis=1)
 
     def placement(self, q: Array, link: str) -> Array:
         """Compute the pose of a link's frame in the base frame (4, 4), or raise UnknownName."""
@@ -176,9 +159,8 @@ class RigidBody:
     def mass_matrix(self, q: Array) -> Array:
         """Compute the joint-space mass matrix M (nv, nv) [kg m²] at joint angles (nv,) [rad]."""
         M = np.array(pin.crba(self._model, self._data(), q[self._ours])).reshape(self.nv, self.nv)
-        upper = np.triu(M)  # some versions of Pinocchio fill only this part
-        whole: Array = (upper + np.triu(upper, 1).T)[np.ix_(self._theirs, self._theirs)]
-        return whole
+        ours: Array = M[np.ix_(self._theirs, self._theirs)]
+        return ours
 
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
         """Draw the visual shapes of a URDF below a node of a viser server, and return them.

@@ -137,7 +137,7 @@ def _read_back(path: Path, length: float) -> None:
     for q in (np.zeros(ours.nv), ours.lower, ours.upper, *random):
         theirs.update_cfg(dict(zip(ours.joint_names, q, strict=True)))
         # only the tip: all joints move it, and yourdfpy takes long to compute the pose of a link
-        difference = abs(ours.state(q).tip - theirs.get_transform(TIP, "base_link")).max()
+        difference = abs(ours.tip(q)[0] - theirs.get_transform(TIP, "base_link")).max()
         # rounding of rotations and lengths adds up over the joints
         if not difference < 1e-13 * (1 + ours.nv) * max(1.0, length):
             raise UrdfError(

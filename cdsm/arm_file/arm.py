@@ -179,7 +179,10 @@ def arm_text(parts: ArmParts) -> str:
     lines += [*shared, "", *tables]
     tolerances = tolerance_lines(parts.tolerances)
     lines += ["[tolerances]", *tolerances, ""] if tolerances else []
-    lines += _urdf_lines(parts) if geometry is None else _geometry_lines(geometry)
+    if geometry is None:
+        lines += _urdf_lines(parts)
+    else:
+        lines += ["[geometry]", *lines_of(geometry, "geometry."), ""]
     plain = () if geometry is None else serpentine_cables(geometry, LinearElasticity(1.0))
     if [_path(cable) for cable in plain] != [_path(cable) for cable in cables]:
         return "\n".join([*lines, *cable_lines(cables, wires, settings)])
@@ -192,10 +195,6 @@ def arm_text(parts: ArmParts) -> str:
 
 def _path(cable: Cable) -> tuple[object, ...]:
     return cable.name, cable.sites, cable.lead
-
-
-def _geometry_lines(geometry: Geometry) -> list[str]:
-    return ["[geometry]", *lines_of(geometry, "geometry."), ""]
 
 
 def _urdf_lines(parts: ArmParts) -> list[str]:

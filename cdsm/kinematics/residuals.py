@@ -76,12 +76,12 @@ class TipResidual(Residual):
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """Compute the error r of the tip, (3,) or (6,), and ∂r/∂q (3, nv) or (6, nv) at q."""
-        state, length = self.arm._model.body.state(q), self.arm.length
-        linear, angular = state.jacobian[:3] / length, state.jacobian[3:]
+        (tip, jacobian), length = self.arm._model.body.tip(q), self.arm.length
+        linear, angular = jacobian[:3] / length, jacobian[3:]
         if self.target.ndim == 1:
-            return (state.tip[:3, 3] - self.target) / length, linear
-        turn, turn_jacobian = rotation_vector(state.tip[:3, :3] @ self.target[:3, :3].T)
-        offset = (state.tip[:3, 3] - self.target[:3, 3]) / length
+            return (tip[:3, 3] - self.target) / length, linear
+        turn, turn_jacobian = rotation_vector(tip[:3, :3] @ self.target[:3, :3].T)
+        offset = (tip[:3, 3] - self.target[:3, 3]) / length
         return np.concatenate([offset, turn]), np.vstack([linear, turn_jacobian @ angular])
 
     def curvature(self, q: Array, weight: Array) -> Array:
@@ -93,14 +93,14 @@ class TipResidual(Residual):
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
-        jacobian, joints = self.arm._model.body.state(q).jacobian, self.arm._model.masses.tip_joints
+        jacobian, joints = self.arm._model.body.tip(q)[1], self.arm._model.masses.tip_joints
         return -single_load_stiffness(frozen(jacobian), frozen(wrench), joints)
 
     def hessian(self, q: Array) -> Array:
         """Compute the Hessian of ½‖r‖² (nv, nv) with respect to q; it is exact for all r."""
         # ∂(½φ²) = φ·ω exactly, so the second derivative contains that of φ only once
         r, J = self.evaluate(q)
-        angular = self.arm._model.body.state(q).jacobian[3 : r.size]
+        angular = self.arm._model.body.tip(q)[1][3 : r.size]
         return self.curvature(q, r) + J[:3].T @ J[:3] + angular.T @ J[3:]
 
 

@@ -63,8 +63,7 @@ def plot_arm(
             raise InvalidInput("tension", "belongs to another arm than the posture.")
     if stiffness is not None:
         expect("stiffness", stiffness, "Stiffness")
-        taken = stiffness.posture
-        if taken is not pose and not (taken.arm == pose.arm and (taken.q == pose.q).all()):
+        if not stiffness.posture._equals(pose):
             raise InvalidInput(
                 "stiffness", "belongs to another posture or arm; compute it for this one."
             )

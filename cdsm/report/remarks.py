@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdsm.errors import named
 from cdsm.geometry import doubts_about_units
 from cdsm.stiffness_matrix.prints import missing_leads
 
@@ -25,8 +26,6 @@ CLOSE = 0.05
 
 _SINGULAR = 1e-12  # an eigenvalue of at most this part of the norm of K_θ is rounding
 _DIGITS = 1e10  # condition number of K_θ above which K_θ⁻¹ has less than six digits
-
-_NAMED = 4
 
 _LABELS = {"joint": "sum K_θ", "torque": "torque out of balance", "lengths": "length of a cable"}
 
@@ -112,15 +111,15 @@ def _of_tensions(report: Report) -> Iterator[str]:
     locked = [each for each in report.cables if each.control == "position"]
     taut = [each for each in locked if not each.is_slack]
     if slack := [each.name for each in locked if each.is_slack]:
-        yield f"slack cables, 0 N: {_listed(slack)}. They stiffen one direction; raise minimum=."
+        yield f"slack cables, 0 N: {named(slack)}. They stiffen one direction; raise minimum=."
     if forced := [each.name for each in report.cables if each.control == "force"]:
-        yield f"force-controlled, no passive stiffness: {_listed(forced)}."
+        yield f"force-controlled, no passive stiffness: {named(forced)}."
     low = [each.name for each in taut if each.below <= CLOSE * each.tension]
     high = [each.name for each in taut if each.above <= CLOSE * each.tension]
     for names, end in ((low, "low"), (high, "high")):
         if names:
             yield (
-                f"within {100.0 * CLOSE:g} % of the {end} end of their law: {_listed(names)}. "
+                f"within {100.0 * CLOSE:g} % of the {end} end of their law: {named(names)}. "
                 "The law is not defined beyond it."
             )
     yield from missing_leads(K)
@@ -151,8 +150,3 @@ def _of_ranks(report: Report) -> Iterator[str]:
 
 def _numbers(values: Array) -> str:
     return ", ".join(f"{value:.4g}" for value in values)
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _NAMED
-    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -86,15 +86,6 @@ class Remedy(ReadOnlyState):
         )
 
 
-def find_remedies(K: Stiffness) -> tuple[Remedy, ...]:
-    """Return the remedies of an unstable arm, one per quantity; see :attr:`Stiffness.remedies`.
-
-    Empty for a stable arm; also if K_θ includes friction, or original lengths of another posture,
-    and the arm would be stable without them.
-    """
-    return () if K.is_stable else tuple(_remedies(K))
-
-
 def verdict(K: Stiffness) -> str:
     """Return a sentence about an unstable arm: which joint buckles most, and the margin."""
     arm, motion = K.posture.arm, abs(K.critical_direction)
@@ -113,7 +104,12 @@ def advice(K: Stiffness) -> tuple[str, ...]:
     return (f"no other {tried} alone would hold it: change the posture, the load or the arm",)
 
 
-def _remedies(K: Stiffness) -> Iterator[Remedy]:
+def remedies(K: Stiffness) -> Iterator[Remedy]:
+    """Yield the remedies of an unstable arm, one per quantity; see :attr:`Stiffness.remedies`.
+
+    None if K_θ includes friction, or original lengths of another posture, and the arm would be
+    stable without them.
+    """
     pose, arm = K.posture, K.posture.arm
     locked = [cable for cable in arm.cables if cable.control == "position"]
 

@@ -16,7 +16,7 @@ from cdsm.support.values import Array
 from cdsm.view.controls import Controls
 from cdsm.view.path_player import PathPlayer
 from cdsm.view.scene import Scene
-from cdsm.view.state import Condition, Setting, Shown, remedies_of, show
+from cdsm.view.state import Condition, Setting, Shown, show
 from cdsm.view.tip_handle import TipHandle
 from cdsm.view.worker import Worker
 
@@ -137,8 +137,10 @@ class View:
         try:
             shown = show(self.arm, setting)
             self._put(shown)
-            if shown.condition is Condition.UNSTABLE and self._worker.no_request_within(_SETTLED):
-                self._put(replace(shown, problem="\n".join([shown.problem, *remedies_of(shown)])))
+            unstable = shown.stiffness if shown.condition is Condition.UNSTABLE else None
+            if unstable is not None and self._worker.no_request_within(_SETTLED):
+                # tenths of a second: what would make the arm stable
+                self._put(replace(shown, problem="\n".join(unstable.warnings)))
         except Exception as error:  # a bug must not leave outdated numbers on the page
             _LOG.exception("the view cannot show %s", setting)
             problem = f"{type(error).__name__}: {error}"

@@ -22,7 +22,7 @@ from cdsm.statics.load_cycle import load_cycle
 from cdsm.statics.load_history import LoadHistory
 from cdsm.statics.rest_search import equilibrium
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.stiffness_matrix.instability import advice, verdict
+from cdsm.stiffness_matrix.instability import verdict
 from cdsm.stiffness_matrix.sticking import holding
 from cdsm.support.status import Status
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -209,14 +209,6 @@ class Shown(ReadOnlyState):
         if self.compliance is None or pose is None:
             return None
         return ellipsoid(self.compliance, pose.tip[:3, 3], pose.arm.length)
-
-
-def remedies_of(shown: Shown) -> tuple[str, ...]:
-    """Return sentences that say what would make an unstable arm stable.
-
-    This takes a few tenths of a second.
-    """
-    return () if shown.stiffness is None else advice(shown.stiffness)
 
 
 def show(arm: Manipulator, setting: Setting) -> Shown:
