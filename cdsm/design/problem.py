@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable, Site
 from cdsm.design.goals import Constraint, Measure, MeasureName, Objective
-from cdsm.design.variables import WHOLE, Value, Variable, changed, check, present
+from cdsm.design.variables import WHOLE, Value, Variable, changed, present, require_compatible
 from cdsm.errors import InvalidInput
 from cdsm.geometry.cables import require_own_cables, serpentine_cables
 from cdsm.manipulator import Manipulator
@@ -92,16 +91,7 @@ class DesignProblem(ReadOnlyState):
         constraints = sequence_of("constraints", self.constraints, Constraint)
         if not variables or not objectives:
             raise InvalidInput("variables", "give one variable and one objective or more.")
-        for variable in variables:
-            check(variable, geometry)
-        for name, count in Counter(variable.name for variable in variables).items():
-            if count > 1:
-                raise InvalidInput("variables", f"{name} is named twice.")
-        kinds = {variable.of for variable in variables}
-        if "cables_per_joint" in kinds and kinds & {"end", "hole_angle"}:
-            raise InvalidInput(
-                "variables", "cables_per_joint replaces the cables that end or hole_angle name."
-            )
+        require_compatible(variables, geometry)
         loads = np.atleast_2d(number_array("loads", self.loads, "wrench"))
         if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
             raise InvalidInput("loads", f"shape {loads.shape} given, (n, 6) needed.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal, final, get_args
@@ -250,7 +251,24 @@ def _common(values: Sequence[float]) -> float:
     return values[0] if len(set(values)) == 1 else math.nan
 
 
-def check(variable: Variable, geometry: Geometry) -> None:
+def require_compatible(variables: Sequence[Variable], geometry: Geometry) -> None:
+    """Raise InvalidInput or UnknownName unless variables fit the arm and each other.
+
+    The arm must have their joints and cables, and no two may change the same thing.
+    """
+    for variable in variables:
+        _require_present(variable, geometry)
+    for name, count in Counter(variable.name for variable in variables).items():
+        if count > 1:
+            raise InvalidInput("variables", f"{name} is named twice.")
+    kinds = {variable.of for variable in variables}
+    if "cables_per_joint" in kinds and kinds & {"end", "hole_angle"}:
+        raise InvalidInput(
+            "variables", "cables_per_joint replaces the cables that end or hole_angle name."
+        )
+
+
+def _require_present(variable: Variable, geometry: Geometry) -> None:
     """Raise InvalidInput or UnknownName if the arm lacks the joint or the cable of a variable."""
     if isinstance(variable.at, str):
         one_of("cable", variable.at, geometry.cable_names)

@@ -104,11 +104,11 @@ def advice(K: Stiffness) -> tuple[str, ...]:
     return (f"no other {tried} alone would hold it: change the posture, the load or the arm",)
 
 
-def remedies(K: Stiffness) -> Iterator[Remedy]:
+def find_remedies(K: Stiffness) -> Iterator[Remedy]:
     """Yield the remedies of an unstable arm, one per quantity; see :attr:`Stiffness.remedies`.
 
-    None if K_θ includes friction, or original lengths of another posture, and the arm would be
-    stable without them.
+    There are none if K_θ includes friction, or original lengths of another posture, and the arm
+    would be stable without them.
     """
     pose, arm = K.posture, K.posture.arm
     locked = [cable for cable in arm.cables if cable.control == "position"]

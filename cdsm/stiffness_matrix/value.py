@@ -12,7 +12,7 @@ from cdsm.errors import InvalidInput
 from cdsm.kernels.read import read_margin
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.cartesian import CartesianReadings, Term
-from cdsm.stiffness_matrix.instability import Remedy, advice, remedies, verdict
+from cdsm.stiffness_matrix.instability import Remedy, advice, find_remedies, verdict
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.markup import element, row
@@ -152,7 +152,7 @@ class Stiffness(CartesianReadings):
         distributed again: for them only wires and springs are tried. This takes a few tenths of a
         second.
         """
-        return () if self.is_stable else tuple(remedies(self))
+        return () if self.is_stable else tuple(find_remedies(self))
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -1,5 +1,7 @@
 """The rigid-body model: gravity, mass, and the order of its coordinates."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -15,10 +17,12 @@ NAMES = BODY.joint_names
 BACKWARDS = RigidBody(to_urdf(POSE.arm.geometry), TIP, POSE.arm.gravity, tuple(reversed(NAMES)))
 
 
-def test_gravity_torque_is_the_derivative_of_the_potential_energy() -> None:
+def test_gravity_torque_and_stiffness_are_derivatives_of_the_potential_energy() -> None:
     assert_second_order(
         lambda q: np.array([BODY.potential_energy(q)]), POSE.gravity_torque[None], POSE.q
     )
+    at = partial(POSE.arm.at, check_limits=False)
+    assert_second_order(lambda q: at(q).gravity_torque, POSE.gravity_stiffness, POSE.q)
 
 
 def test_mass_matrix_is_symmetric_and_positive() -> None:
@@ -32,6 +36,12 @@ def test_other_order_of_joints_permutes_everything() -> None:
     (ours, J), (theirs, same) = BODY.tip(POSE.q), BACKWARDS.tip(POSE.q[::-1].copy())
     np.testing.assert_array_equal(theirs, ours)
     np.testing.assert_array_equal(same, J[:, ::-1])
+    arm = POSE.arm
+    turned = cdsm.Manipulator.from_urdf(
+        arm.urdf, arm.cables, tip=TIP, joint_names=NAMES[::-1], gravity=arm.gravity
+    ).at(POSE.q[::-1])
+    np.testing.assert_array_equal(turned.gravity_torque, POSE.gravity_torque[::-1])
+    np.testing.assert_array_equal(turned.gravity_stiffness, POSE.gravity_stiffness[::-1, ::-1])
     np.testing.assert_array_equal(
         BACKWARDS.mass_matrix(POSE.q[::-1].copy()), BODY.mass_matrix(POSE.q)[::-1, ::-1]
     )
