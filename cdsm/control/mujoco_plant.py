@@ -12,9 +12,10 @@ from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 
+from cdsm.cable import Cable
 from cdsm.control.laws import Command, Reading
 from cdsm.control.plant import require_unstrained
-from cdsm.errors import InvalidInput, SolverError
+from cdsm.errors import ElasticityRangeError, InvalidInput, SolverError
 from cdsm.interchange.mjcf import to_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -125,14 +126,27 @@ class MuJoCoPlant:
         """Compute F (C,) [N] from cable lengths (C,) [m], leads included, and the command.
 
         A position-controlled cable has the commanded wire, a force-controlled one the commanded
-        tension.
+        tension. Raises ElasticityRangeError as :meth:`move` does.
         """
         F = command.tension.copy()
         for c, cable in enumerate(self.arm.cables):
             if cable.control == "position":
                 stretch, wire = float(lengths[c] - command.wire[c]), float(command.wire[c])
-                # with a slack branch, a cable is slack only at a negative elongation
-                slack_below = 0.0 in cable.elasticity.domain
-                slack = float(cable.elongation(0.0, wire)) if slack_below else 0.0
-                F[c] = cable.tension(stretch, wire) if stretch > slack else 0.0
+                try:
+                    F[c] = _tension(cable, stretch, wire)
+                except ElasticityRangeError as error:
+                    raise ElasticityRangeError(error.problem, (), [c], [cable.name]) from None
         return F
+
+
+def _tension(cable: Cable, elongation: float, wire: float) -> float:
+    """Compute F [N] of a cable; 0 N if it is slack.
+
+    A law that begins above 0 N is not defined for a slack cable: ElasticityRangeError is raised. A
+    law with a slack branch is slack only below the elongation at 0 N, which is negative.
+    """
+    domain = cable.elasticity.domain
+    slack = float(cable.elongation(0.0, wire)) if 0.0 in domain else 0.0
+    if domain.low == 0.0 and elongation <= slack:
+        return 0.0
+    return float(cable.tension(elongation, wire))

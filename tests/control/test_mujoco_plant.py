@@ -75,3 +75,15 @@ def test_a_slack_branch_pulls_below_the_range_of_its_law() -> None:
         wire = slack._model.laws.original_lengths(lengths, F)
         command = Command(wire, F, np.zeros(6, dtype=np.bool_))
         np.testing.assert_allclose(plant._tensions(lengths, command), F, atol=1e-9)
+
+
+def test_a_law_that_begins_above_0_n_ends_where_its_cable_would_be_slack() -> None:
+    """The strand is defined from 2.2 N; a wire longer than its cable has no tension there."""
+    plan = small_path()
+    plant, wire = cdsm.MuJoCoPlant(plan.arm), plan.unstrained_lengths[0].copy()
+    wire[1] = plan.arm.cable_lengths(plan.angles[0])[1] + 1e-3
+    state = plant.begin(plan.angles[0], plan.tensions[0], np.zeros(6))
+    command = Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
+    with pytest.raises(cdsm.ElasticityRangeError, match=r"cable.*elongation -0\.001") as refused:
+        plant.move(state, command, np.zeros(6))
+    assert refused.value.cables == (plan.arm.cables.names[1],)
