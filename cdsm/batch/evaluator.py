@@ -80,7 +80,8 @@ class Evaluator:
         )
         self._kernel_arm = kernel_arm(arm, check_limits)
         count = len(self._directions)
-        self._start = layout.starts(nv, cables, count)
+        shapes = layout.shapes(nv, cables, count)
+        self._start = layout.starts(shapes)
         same = {} if arm.has_friction else WITHOUT_FRICTION
         numbers = {QUANTITIES.index(same.get(name, name)) for name in names}
         self._sticks = arm.has_friction and not numbers.isdisjoint(STUCK)
@@ -102,7 +103,6 @@ class Evaluator:
         if WIDTH // 2 < len(q) <= _BATCH // record and is_new(evaluate_rows):
             self._block = max(WIDTH + 1, min(_BLOCK // record, len(q)))  # numpy runs wide blocks
 
-        shapes = layout.shapes(nv, cables, count)
         if direction is not None and direction.ndim == 1:
             shapes |= dict.fromkeys(layout.DIRECTIONAL, ())
         # one row for each posture, which the kernel fills; the outputs are views of it
@@ -181,7 +181,7 @@ class Evaluator:
         """
         balance = balance or self._empty_balance(0)
         read, (nv, width) = wanted > layout.STUCK_JOINT, (self._arm.nv, self._block)
-        stuck = np.isin(wanted, STUCK)
+        stuck = np.array([number in STUCK for number in wanted.tolist()], dtype=np.bool_)
         blocks = -(-len(found) // width)
         if read.any():  # keep K_θ of few blocks, for the cache, but not too few: calls take time
             blocks = min(blocks, max(_FEWEST, _CACHE // (2 * width * nv**2)))

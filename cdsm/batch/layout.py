@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -89,10 +90,7 @@ def shapes(nv: int, cables: int, directions: int) -> dict[str, tuple[int, ...]]:
     }
 
 
-def starts(nv: int, cables: int, directions: int) -> Indices:
-    """Return the index at which each quantity begins in a record; its length is the last entry.
-
-    The arguments are the numbers of joints, of cables, and of directions u.
-    """
-    sizes = [math.prod(shape) for shape in shapes(nv, cables, directions).values()]
+def starts(shapes: Mapping[str, tuple[int, ...]]) -> Indices:
+    """Return the index at which each quantity begins in a record; its length is the last entry."""
+    sizes = [math.prod(shape) for shape in shapes.values()]
     return np.array([0, *np.cumsum(sizes)], dtype=np.intp)

@@ -64,7 +64,11 @@ def explain(designs: Designs) -> NoReturn:
 
 
 def _first_reason(designs: Designs, best: int) -> str:
-    """Return a text: the first posture in which no tensions hold the design ``best``, and why."""
+    """Return a text: the first posture that design number ``best`` does not hold, and why.
+
+    Either no tensions balance it under one of the loads, or the arm is unstable, or another error
+    is raised. If all postures are held here, the text says that the tensions are at the edge.
+    """
     problem, row = designs.problem, designs.designs[best]
     held, loads = 0, len(problem.loads)
     try:

@@ -163,7 +163,9 @@ def set_lead(
 def set_vector(site: Array, p: Index, scratch: Segments, width: Width) -> None:
     """Fill ``scratch`` with the vector (3, W) from site p to the next one, and its length (W,).
 
-    The vector takes the place of the unit vector u: only its direction matters here.
+    The vector is stored as ``direction``, but it is not divided by its length. For
+    :func:`set_holding` only its direction counts; :func:`add_stuck_stiffness` divides by the length
+    itself. ``site`` has the positions of the sites (P, 3, W) [m].
     """
     across, length = scratch.direction, scratch.length
     far = p + np.uint64(1)

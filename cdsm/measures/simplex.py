@@ -1,4 +1,6 @@
-"""Kernels for small linear programs: the simplex method with bounds (Dantzig, 1963), and a proof.
+"""Kernels for small linear programs: the simplex method with bounds (Dantzig, 1963).
+
+A result counts only if it is proved to be a maximum, up to rounding.
 
 Programs here have about ten equations and about twenty variables, so a dense inverse of the basis
 is fastest. A program takes tens of microseconds; a general solver takes a millisecond to begin.

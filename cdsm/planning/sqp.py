@@ -276,7 +276,13 @@ class _LocalModel:
         return _Step(d, best.y[rank:], float(best.z[0]), predicted, price)
 
     def take(self, step: _Step) -> tuple[ConstraintValues | None, float]:
-        """Take a step; return the new point (None if none is stable) and the fall of the merit."""
+        """Take a step; return the new point and the fall of the merit.
+
+        An unstable point is moved back towards the anchor. If that finds no stable point, the
+        result is None and -inf. If there are constraints c, and the merit falls by less than 3/4 of
+        the prediction, a step with the second-order correction is tried too. The larger fall
+        counts.
+        """
         candidate, fall = self._after(step.d, step.price)
         if candidate is not None and fall < 0.75 * step.predicted and self.c.size:
             # second-order correction: use the value of c after the step, not of its tangent

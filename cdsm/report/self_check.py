@@ -64,12 +64,12 @@ _NONE = _SecondValue(None)
 @final
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """Difference between a matrix or vector and its second value, in the unit of its entries.
+    """Difference between a matrix or vector and the same one computed in another way.
 
     Attributes:
-        found: Largest magnitude of an entry of the difference.
-        expected: Bound of ``found`` if both values are right: truncation of the central
-            differences, and rounding.
+        found: Largest magnitude of an entry of the difference, in the unit of the entries.
+        expected: Bound of ``found`` if both are right: truncation of the central differences (none
+            for the lengths of cables), and rounding.
     """
 
     found: float

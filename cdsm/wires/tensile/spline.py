@@ -165,10 +165,11 @@ class Curve:
     def interval(self, points: Points, probability: float) -> tuple[Array, Array]:
         """Compute a confidence interval of log EA at each tension of the grid: middle, half-width.
 
-        It contains log EA with the given ``probability`` from 0 to 1. The most likely curve is
-        smooth, so it is biased where EA bends. The interval therefore belongs to a rougher curve,
-        with :data:`_ROUGHER` times less smoothing than the likelihood allows: its bias is far below
-        its scatter. Scatter and degrees of freedom are those of the neighbouring points.
+        At each tension it contains log EA with the given ``probability`` from 0 to 1. Its middle is
+        not this curve, which is smooth and therefore biased where EA bends. A rougher curve is
+        fitted instead: its smoothing is that of :meth:`loosest`, divided by :data:`_ROUGHER`. Its
+        bias is far below its scatter. Scatter and degrees of freedom are those of the neighbouring
+        points.
         """
         loosest = self.loosest(points)
         rough = replace(loosest, smoothing=loosest.smoothing / _ROUGHER).refitted(points)
