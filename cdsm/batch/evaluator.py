@@ -15,7 +15,7 @@ from cdsm.batch.layout import OK, POSTPONED, QUANTITIES, UNDECIDED, Codes
 from cdsm.batch.rigidities import rigidities
 from cdsm.batch.stuck_readings import STUCK, WITHOUT_FRICTION, read_stuck
 from cdsm.errors import InfeasibleTension, SolverError
-from cdsm.kernels.compiling import WIDTH, is_new
+from cdsm.kernels.compiling import FULL, WIDTH, is_new
 from cdsm.kernels.distribution import search_tensions
 from cdsm.kernels.read import read
 from cdsm.kernels.readings import IMMOBILE, READ, SINGULAR, UNREAD
@@ -28,7 +28,7 @@ from cdsm.tension import distribute_tension
 
 _SHORT, _LONG = 2**11, 2**15
 """Size of a posture's record [numbers] from which a block has only 1/2, or 1/4, of :data:`WIDTH`
-postures, so that it fits into the processor's cache."""
+postures, so that it fits into the processor's cache. Blocks of smaller records are full."""
 
 _CACHE, _FEWEST = 2**17, 4
 """Readings are computed for several blocks at a time: for as many as have K_θ and P of ``_CACHE``
@@ -98,10 +98,10 @@ class Evaluator:
         laws = arm._model.wire_laws if self._sticks else arm._model.laws
         self._asks = needs_springs and bool(laws.without_kernel)
         record = int(self._start[-1])
-        width = WIDTH // (1 if record < _SHORT else 2 if record < _LONG else 4)
-        self._block = max(1, min(width, len(q)))
+        width = WIDTH // (2 if record < _LONG else 4)
+        self._block = FULL if record < _SHORT else max(1, min(width, len(q)))
         if WIDTH // 2 < len(q) <= _BATCH // record and is_new(evaluate_rows):
-            self._block = max(WIDTH + 1, min(_BLOCK // record, len(q)))  # numpy runs wide blocks
+            self._block = max(WIDTH, min(_BLOCK // record, len(q)))  # numpy runs wide blocks
 
         if direction is not None and direction.ndim == 1:
             shapes |= dict.fromkeys(layout.DIRECTIONAL, ())
@@ -251,7 +251,7 @@ class Evaluator:
             if kind:
                 F = out[:, self._place.get("tension", slice(0))]
                 arm, u = self._kernel_arm, self._directions
-                values = read_stuck(arm, rows, F, kept, u, quantities, blocks)
+                values = read_stuck(arm, rows, F, kept, u, quantities, blocks, self._block)
             else:
                 values = read(*kept[:3], self._directions, quantities, blocks, self._block)
             state = own[: found.size]

@@ -32,17 +32,17 @@ def read_stuck(
     directions: Array,
     names: Collection[str],
     status: Indices,
+    width: int,
 ) -> dict[str, Array]:
     """Compute the readings ``names`` of the stuck arm at the postures ``rows``.
 
     ``tension`` is F (b, C) [N], and ``kept`` has K_θ and J_X of the postures. ``directions`` (D, 3)
     are unit vectors. ``status`` is READ or UNREAD for B blocks of W postures (B, W); it becomes
-    SINGULAR where K_θ is singular. The last axis of all results is the posture. Without friction,
-    no cable sticks: the only result is a breakaway load of 0.
+    SINGULAR where K_θ is singular. ``width`` is W. The last axis of all results is the posture.
+    Without friction, no cable sticks: the only result is a breakaway load of 0.
     """
-    blocks, width = status.shape
     load = np.zeros((status.size, len(directions)))
-    found = {"breakaway": np.moveaxis(load.reshape(blocks, width, -1), 1, 2)}
+    found = {"breakaway": np.moveaxis(load.reshape(*status.shape, -1), 1, 2)}
     if not arm.holes.friction.any():
         return found
     wanted = {WITHOUT_FRICTION.get(name, "along") for name in names}

@@ -18,7 +18,7 @@ def warm(as_json: AsJson = False) -> None:
 
     start = time.perf_counter()
     arm = cdsm.presets.virtual_prototype()
-    with at_once(), progress_bar("compiling kernels, up to two minutes"):
+    with at_once(), progress_bar("compiling kernels, two or three minutes"):
         pose = arm.at(np.full(arm.nv, 0.05))
         tension = cdsm.distribute_tension(pose, minimum=40.0)
         K = cdsm.stiffness(pose, tension)
@@ -26,10 +26,12 @@ def warm(as_json: AsJson = False) -> None:
         up = (0.0, 0.0, 1.0)
         cdsm.plan_stiffness(pose, up, 1.01 * K.along(up), minimum=40.0)
         readings = ("margin", "along", "compliance", "cartesian", "pseudoinverse")
-        cdsm.evaluate(arm, pose.q[None], minimum=40.0, direction=up, outputs=readings)
-        cdsm.distribute_tensions(arm, pose.q[None], 40.0, 60.0)  # runs the search for tensions
         rough = cdsm.presets.virtual_prototype(friction=0.1).at(pose.q)
-        cdsm.evaluate(rough.arm, pose.q[None], tension.values, direction=up, outputs=("breakaway",))
-        cdsm.load_cycle(rough, tension.values, np.zeros((1, 6)))
+        q, F = pose.q[None], tension.values
+        for directions in (up, [up] * 999):  # so many numbers for a posture as if the arm were long
+            cdsm.evaluate(arm, q, minimum=40.0, direction=directions, outputs=readings)
+            cdsm.evaluate(rough.arm, q, F, direction=directions, outputs=("breakaway",))
+        cdsm.distribute_tensions(arm, q, 40.0, 60.0)  # runs the search for tensions
+        cdsm.load_cycle(rough, F, np.zeros((1, 6)))
     seconds = time.perf_counter() - start
     answer(as_json, lambda: {"seconds": seconds}, f"kernels are compiled: {seconds:.0f} s")

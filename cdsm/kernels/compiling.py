@@ -152,7 +152,7 @@ The first pair is for a new kernel, the second for one whose compiled form is on
 """
 
 _PATIENCE = 8.0
-"""Largest total time [s] that Python runs a new kernel on blocks wider than :data:`WIDTH`."""
+"""Largest total time [s] that Python runs a new kernel on wide blocks; see :func:`is_new`."""
 
 _at_once = False
 
@@ -206,7 +206,7 @@ def _patient(function: _Function) -> _Function:
         numba calls this when the kernel is not compiled for these types of arguments.
         """
         start = time.thread_time()
-        wide = (dict(zip(names, arguments, strict=False)).get("width") or 1) > WIDTH
+        wide = (dict(zip(names, arguments, strict=False)).get("width") or 1) >= WIDTH
         known = is_kept(*map(kernel.typeof_pyval, arguments))
         seconds, numbers = _KEPT if known else _NEW
         few = _largest(arguments) <= numbers and spent < seconds
@@ -224,7 +224,7 @@ def _patient(function: _Function) -> _Function:
 def is_new(kernel: Callable[..., Any]) -> bool:
     """Return whether ``kernel`` is not compiled yet, so that numpy would run a wide block.
 
-    A block is wide if it has more than :data:`WIDTH` postures.
+    A block is wide if it has :data:`WIDTH` postures or more.
     """
     new: Callable[[], bool] = getattr(kernel, "is_new", lambda: False)
     return new()
@@ -246,28 +246,37 @@ def _native(result: Any) -> Any:
 
 @cache
 def _announce() -> None:
-    """Log once that kernels are compiled: the first use on a machine takes a minute or two."""
-    _log.warning("compiling kernels, once on this machine: one or two minutes in all")
+    """Log once that kernels are compiled: the first use on a machine takes two or three minutes."""
+    _log.warning("compiling kernels, once on this machine: two or three minutes in all")
 
 
 WIDTH = 64
 """Largest number of postures in a block of a compiled kernel: it fills several vector registers."""
 
+FULL = cast(int, np.int32(WIDTH))
+"""WIDTH, with a type of its own: for this type kernels are compiled with a constant.
+
+Loops over a constant number of postures take a tenth less time.
+"""
+
 Index = int | np.integer[Any]
 """Index in a loop over postures. If it may be negative, numba does not vectorise the loop."""
 
-Width = int | None
+Width = int | np.int32 | None
 """Number of postures side by side in a block, or None for one posture.
 
 The last axis of all arrays of a block is the posture. A loop over it is vectorised, so a block of
-32 postures takes only about ten times as long as one. For None, kernels are compiled a second
-time, with the constant 1, which removes the loops over postures. Both give the same bits.
+32 postures takes only about ten times as long as one. Kernels are compiled once for any number of
+postures, once for :data:`FULL`, and once for None, with the constant 1, which removes the loops
+over postures. All give the same bits.
 """
 
 
 @inner
 def lanes(width: Width) -> Iterable[Index]:
     """Return the range of the postures of a block; its indices are unsigned (:func:`upwards`)."""
+    if isinstance(width, np.int32):  # FULL
+        return range(np.uint64(WIDTH))
     return range(np.uint64(1)) if width is None else range(np.uint64(width))
 
 

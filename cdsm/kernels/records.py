@@ -64,10 +64,10 @@ def vector(record: Array, start: Indices, quantity: int) -> Array:
 
 
 @inlined
-def matrix(record: Array, start: Indices, quantity: int, rows: int, width: int) -> Array:
+def matrix(record: Array, start: Indices, quantity: int, rows: int) -> Array:
     """Return quantity number ``quantity`` of the record as matrices (rows, columns, W)."""
     part = record[start[quantity] : start[quantity + 1]]
-    return part.reshape((rows, part.shape[0] // rows, width))
+    return part.reshape((rows, part.shape[0] // rows, part.shape[1]))
 
 
 @inner
