@@ -22,7 +22,7 @@ from cdsm.support.values import Array, frozen
 
 
 class Shapes(NamedTuple):
-    """Shapes of a URDF that a viser server draws: a function that moves them, and their joints."""
+    """Shapes of a URDF that a viser server draws: how to move them, and which joints have any."""
 
     place: Callable[[Array], None]  # moves the shapes to joint angles (nv,) [rad]
     rows: frozenset[int]  # rows in Tree of the joints whose links have shapes

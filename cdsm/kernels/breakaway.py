@@ -237,10 +237,11 @@ def _store_hole(
     slips: SlipRates,
     width: Width,
 ) -> None:
-    """Where cable c sticks in hole p, end the section there and begin the next one.
+    """Where cable c sticks in hole p, end its section there and begin the next one.
 
-    Both sections of the last hole before p are then known, so its terms go to row p of ``slips``.
-    Then p becomes the last hole. v (3, W) is the direction of the cable after p.
+    The sections on both sides of the last sticking hole before p are then known, so the terms of
+    that hole go to row p of ``slips``. Then p becomes the last one. v (3, W) is the direction of
+    the cable after p.
     """
     set_stiffness(wire, c, section, width)
     u, mu, own = section.before, holes.friction[p], holes.wrap[p]

@@ -40,8 +40,8 @@ numerator of a second difference, f(h) − 2 f(0) + f(−h), has an error of up 
 def gradients(f: Sampled, size: int, first: float, noise: Noise) -> Estimates:
     """Compute first derivatives (T, ..., n) of T functions at zero, and their error bounds (T,).
 
-    ``f`` computes the functions, ``noise`` their rounding errors; n = ``size`` is the number of
-    variables, ``first`` the largest step.
+    ``f`` computes the functions of n = ``size`` variables, and ``noise`` their rounding errors.
+    ``first`` is the largest step of the differences.
     """
     corners = np.vstack([np.eye(size), -np.eye(size)])
 

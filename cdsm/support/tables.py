@@ -29,7 +29,10 @@ _TRIED = 500  # lines that tell the delimiter; titles are fewer
 
 
 def _numbers(decimal: str, thousands: str) -> tuple[re.Pattern[str], re.Pattern[str]]:
-    """Return two patterns of numbers with the mark ``decimal``: without and with ``thousands``."""
+    """Return two patterns of a number with the decimal mark ``decimal``.
+
+    Only the second allows marks ``thousands`` between groups of three digits.
+    """
     whole = rf"(?:0|[1-9]\d{{0,2}}(?:{re.escape(thousands)}\d{{3}})*)"
     point, power = re.escape(decimal), r"(?:[eE][-+]?\d+)?"
     plain = rf"[-+]?(?:\d+(?:{point}\d*)?|{point}\d+){power}"

@@ -113,11 +113,11 @@ class RisingCurve:
 def slopes_at_points(chords: Array, rise: Array) -> Array:
     """Compute the slopes (n,) of a curve at n points from the slopes (n − 1,) of its chords.
 
-    ``rise`` (n − 1,) is Δy of each chord. The logarithm of a chord's slope is assigned to the
-    middle of its y, as in :class:`~cdsm.TabulatedElasticity`. At an inner point, the logarithm is
-    the mean of two parabolas through three chords each, limited to the range of the two
-    neighbouring chords. At an end it follows one parabola, and its change from the last chord is
-    limited.
+    ``rise`` (n − 1,) is Δy of each chord. The logarithm of the slope is interpolated over y; the
+    slope of a chord counts as that at the middle of its y, as in
+    :class:`~cdsm.TabulatedElasticity`. At an inner point, the logarithm is the mean of two
+    parabolas, each through three chords, limited to the range of the two neighbouring chords. At an
+    end it is extrapolated by one parabola, and its change from the last chord is limited.
     """
     if len(chords) == 1:
         return np.repeat(chords, 2)
