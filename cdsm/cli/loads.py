@@ -106,7 +106,9 @@ def buckle(
     write_picture(figure, tension.plot)
     answer(
         as_json,
-        lambda: {name: value for each in reversed(found) for name, value in each.to_dict().items()},
+        lambda: dict(
+            zip(("critical_tension", "critical_load"), (x.to_dict() for x in found), strict=False)
+        ),
         Conditions(pose, low),
         *found,
         warnings=[warning for each in found for warning in each.warnings],

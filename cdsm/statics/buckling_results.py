@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 import cdsm
 from cdsm.posture import Posture
 from cdsm.statics.bound_scan import Limit
-from cdsm.support.format import key, plain
-from cdsm.support.values import Array, ReadOnlyState
+from cdsm.support.result import Result, unit
+from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class CriticalTension(ReadOnlyState):
+class CriticalTension(Result):
     """Tension at which an arm buckles at one posture; made by :func:`critical_tension`.
 
     Attributes:
@@ -42,18 +42,17 @@ class CriticalTension(ReadOnlyState):
         margins: Smallest eigenvalue of K_θ at each of these bounds (n,) [N m/rad].
     """
 
-    posture: Posture
-    wrench: Array
-    minimum: float
-    mode: Array
-    tension: Array
-    stable: tuple[tuple[float, float], ...]
-    examined: tuple[float, float]
-    bounds: Array
-    margins: Array
+    _headline, _rows = "minimum", "bounds"
 
-    def __repr__(self) -> str:
-        return f"<CriticalTension: {self._verdict}>"
+    posture: Posture
+    wrench: Array = field(metadata=unit("N and N m", "component"))
+    minimum: float = field(metadata=unit("N"))
+    mode: Array = field(metadata=unit("1", "joint"))
+    tension: Array = field(metadata=unit("N", "cable"))
+    stable: tuple[tuple[float, float], ...] = field(metadata=unit("N", "range", "end"))
+    examined: tuple[float, float] = field(metadata=unit("N", "end"))
+    bounds: Array = field(metadata=unit("N", "bounds"))
+    margins: Array = field(metadata=unit("joint stiffness", "bounds"))
 
     @property
     def _verdict(self) -> str:
@@ -73,21 +72,6 @@ class CriticalTension(ReadOnlyState):
         """Plot the smallest eigenvalue of K_θ [N m/rad] against the lower bound of tension [N]."""
         return cdsm.plots.plot_critical_tension(self)
 
-    def to_dict(self) -> dict[str, object]:
-        """Return bounds, mode and margins in SI for JSON, with units in the keys; inf as None."""
-        arm = self.posture.arm
-        numbers = {
-            **self.posture._coordinates,
-            "critical_minimum_tension_N": self.minimum,
-            "stable_minimum_tension_N": self.stable,
-            "examined_minimum_tension_N": self.examined,
-            "mode": dict(zip(arm.joint_names, self.mode, strict=True)),
-            "tension_N": dict(zip(arm.cables.names, self.tension, strict=True)),
-            "minimum_tension_N": self.bounds,
-            key("margin", arm.stiffness_unit()): self.margins,
-        }
-        return plain(numbers)
-
     def __str__(self) -> str:
         verdict = self._verdict
         spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
@@ -98,7 +82,7 @@ class CriticalTension(ReadOnlyState):
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class CriticalLoad(ReadOnlyState):
+class CriticalLoad(Result):
     """Multiple of a load at which an arm fails at one posture; made by :func:`critical_load`.
 
     Attributes:
@@ -117,15 +101,17 @@ class CriticalLoad(ReadOnlyState):
         margins: Smallest eigenvalue of K_θ at each of these factors (n,) [N m/rad].
     """
 
+    _headline, _rows = "factor", "factors"
+
     posture: Posture
-    wrench: Array
-    carried: Array
-    factor: float
-    limit: Limit
-    mode: Array
-    tension: Array
-    factors: Array
-    margins: Array
+    wrench: Array = field(metadata=unit("N and N m", "component"))
+    carried: Array = field(metadata=unit("N and N m", "component"))
+    factor: float = field(metadata=unit("1"))
+    limit: Limit = field(metadata=unit("1"))
+    mode: Array = field(metadata=unit("1", "joint"))
+    tension: Array = field(metadata=unit("N", "cable"))
+    factors: Array = field(metadata=unit("1", "factors"))
+    margins: Array = field(metadata=unit("joint stiffness", "factors"))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -135,25 +121,6 @@ class CriticalLoad(ReadOnlyState):
     def plot(self) -> Figure:
         """Plot the smallest eigenvalue of K_θ [N m/rad] against the factor of the load."""
         return cdsm.plots.plot_critical_load(self)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return load, factor and mode in SI for JSON, with units in the keys; inf as None."""
-        arm = self.posture.arm
-        numbers = {
-            **self.posture._coordinates,
-            "load": self.wrench,
-            "carried": self.carried,
-            "critical_load_factor": self.factor,
-            "limit": self.limit,
-            "load_mode": dict(zip(arm.joint_names, self.mode, strict=True)),
-            "load_tension_N": dict(zip(arm.cables.names, self.tension, strict=True)),
-            "load_factors": self.factors,
-            key("load_margin", arm.stiffness_unit()): self.margins,
-        }
-        return plain(numbers)
-
-    def __repr__(self) -> str:
-        return f"<CriticalLoad factor {self.factor:.4g}, {self.limit}>"
 
     def __str__(self) -> str:
         reason = {

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple, final
 
 import numpy as np
@@ -19,9 +19,10 @@ from cdsm.arm_model import joints_to
 from cdsm.errors import InvalidInput, SingularMass
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.format import aligned, plain
+from cdsm.support.format import aligned
+from cdsm.support.result import Result, unit
 from cdsm.support.validation import instance
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
 
 if TYPE_CHECKING:
@@ -37,8 +38,8 @@ With this part they lower the frequency by 1 %.
 
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Modes(ReadOnlyState):
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Modes(Result):
     """Natural modes of an arm and the stiffness from which they follow; made by :func:`modes`.
 
     S of the nv modes vibrate. The other modes grow; a stable arm has none of them. All arrays are
@@ -55,12 +56,18 @@ class Modes(ReadOnlyState):
         growth_shapes: φ of the modes that grow (nv, n) [rad/(√kg m)].
     """
 
+    _headline = "frequencies"
+
     stiffness: Stiffness
-    mass: Array
-    frequencies: Array
-    shapes: Array
-    growth_rates: Array
-    growth_shapes: Array
+    mass: Array = field(metadata=unit("kg m²", "joint", "joint_column"))
+    frequencies: Array = field(metadata=unit("Hz", "mode"))
+    shapes: Array = field(metadata=unit("1", "joint", "mode"))
+    growth_rates: Array = field(metadata=unit("1/s", "growth"))
+    growth_shapes: Array = field(metadata=unit("1", "joint", "growth"))
+
+    @property
+    def _posture(self) -> Posture:
+        return self.stiffness.posture
 
     @property
     def is_stable(self) -> bool:
@@ -70,25 +77,6 @@ class Modes(ReadOnlyState):
     def plot(self) -> Figure:
         """Plot the arm in mm, deflected by a few modes: growing modes first, then the lowest."""
         return cdsm.plots.plot_modes(self)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return frequencies, growth rates and shapes for JSON, with units in the keys."""
-        pose = self.stiffness.posture
-        numbers = {
-            **pose._coordinates,
-            "frequencies_Hz": self.frequencies,
-            "growth_rates_per_s": self.growth_rates,
-            "joints": pose.arm.joint_names,
-            "shapes": self.shapes.T,
-            "growth_shapes": self.growth_shapes.T,
-        }
-        return plain(numbers)
-
-    def __repr__(self) -> str:
-        name = self.stiffness.posture.arm.name
-        if not self.is_stable:
-            return f"<Modes of {name}, UNSTABLE>"
-        return f"<Modes of {name}, {self.frequencies[0]:.4g} to {self.frequencies[-1]:.4g} Hz>"
 
     def __str__(self) -> str:
         found = zip(self.frequencies, self._leading(self.shapes), strict=True)

@@ -93,7 +93,7 @@ def distinct_texts(values: Sequence[float]) -> list[str]:
 def key(name: str, unit: str) -> str:
     """Return a JSON key with unit: ``margin`` in ``N m/rad`` becomes ``margin_Nm_per_rad``."""
     words = unit.replace("N m", "Nm").replace("/", " per ").split()
-    return "_".join([name, *words])
+    return "_".join([name, *(words[1:] if words[:1] == ["1"] else words)])
 
 
 class JointUnits(NamedTuple):

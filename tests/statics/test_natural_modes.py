@@ -371,6 +371,3 @@ def test_table_gives_every_frequency_in_hertz_and_the_joint_that_moves_most() ->
     for line, frequency, shape in zip(lines[1:], found.frequencies, found.shapes.T, strict=True):
         assert f"{frequency:.4g}" in line
         assert line.endswith(K.posture.arm.joint_names[int(abs(shape).argmax())])
-    assert repr(found) == (
-        f"<Modes of arm, {found.frequencies[0]:.4g} to {found.frequencies[-1]:.4g} Hz>"
-    )

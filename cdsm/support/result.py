@@ -1,0 +1,165 @@
+"""Base class of results: unit and dimensions of each number stand once, beside its field."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+import numpy as np
+
+from cdsm.support.format import JointUnits, key, plain, span
+from cdsm.support.tidy import data_frame, dataset, write_labelled
+from cdsm.support.values import ReadOnlyState
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+_T = TypeVar("_T")
+
+AXES = ("x", "y", "z")
+COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+def unit(unit: str, *dims: str) -> Mapping[str, Any]:
+    """Return the metadata of a field: ``field(metadata=unit("N", "cable"))``.
+
+    ``unit`` is an SI unit, "1" for a plain number, or "torque", "joint stiffness" or "joint" for a
+    unit that depends on whether joints turn or slide. ``dims`` name the axes of an array: "joint",
+    "cable", "axis", "component", or any other; a field that is called like its own and only
+    dimension is the coordinate of this dimension.
+    """
+    return {"unit": unit, "dims": dims}
+
+
+class _Quantity(cached_property[_T]):
+    """A cached property with the metadata of a field."""
+
+    metadata: Mapping[str, Any]
+
+
+def quantity(of: str, *dims: str) -> Callable[[Callable[[Any], _T]], cached_property[_T]]:
+    """Make a cached property that is printed and exported like a field with :func:`unit`."""
+
+    def decorate(compute: Callable[[Any], _T]) -> cached_property[_T]:
+        made = _Quantity(compute)
+        made.metadata = unit(of, *dims)
+        return made
+
+    return decorate
+
+
+class Result(ReadOnlyState):
+    """A frozen result that exports itself: what a field is, stands in its metadata.
+
+    Fields and properties without metadata are not exported. Subclasses write ``__str__`` and
+    ``plot`` by hand, nothing else. ``_posture`` is the posture whose joint coordinates come first
+    in the JSON; its arm names joints and cables.
+    """
+
+    _headline: ClassVar[str] = ""
+    """Name of the number that ``repr`` shows."""
+
+    _rows: ClassVar[str] = ""
+    """Dimension whose entries are the rows of the table; a table of one row if it is empty."""
+
+    @property
+    def _posture(self) -> Any:
+        return getattr(self, "posture", None)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return all numbers in SI for JSON, with the unit in the keys; inf and NaN are None."""
+        labels = self._labels()
+        found = dict(self._posture._coordinates) if self._posture else {}
+        for name, value, of, dims in self._quantities():
+            named = len(dims) == 1 and dims[0] in ("joint", "cable")
+            found[key(name, of)] = (
+                dict(zip(labels[dims[0]], value, strict=True)) if named else value
+            )
+        return plain(found)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return all numbers as a labelled Dataset in SI; needs xarray (MissingExtra)."""
+        variables, words = {}, {}
+        for name, value, of, dims in self._quantities():
+            array = np.asarray(value)
+            if array.dtype.kind in "USO":
+                words[name] = str(value)
+            else:
+                variables[name] = (dims, array, of)
+        return dataset(variables, self._labels(), **words)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with a unit in the name of each column; needs pandas (MissingExtra)."""
+        labels, index = self._labels(), np.arange(1)
+        columns: dict[str, Any] = {}
+        for name, value, of, dims in self._quantities():
+            suffix = "" if of == "1" else f" [{of}]"
+            if not self._rows:
+                if not dims:
+                    columns[name + suffix] = [value]
+            elif dims == (self._rows,) and name == self._rows:
+                index = np.asarray(value)
+            elif dims[:1] == (self._rows,):
+                array = np.asarray(value)
+                for place in np.ndindex(array.shape[1:]):
+                    parts = [str(labels[d][i]) for d, i in zip(dims[1:], place, strict=True)]
+                    columns[" ".join([name, *parts]) + suffix] = array[(slice(None), *place)]
+        if self._rows in labels:
+            index = np.asarray(labels[self._rows])
+        return data_frame(columns, self._rows or "result", index)
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write :meth:`to_pandas` (``.csv``) or :meth:`to_xarray` (``.nc``); return the path.
+
+        Raises:
+            InvalidInput: The path ends neither in ``.csv`` nor in ``.nc``.
+            MissingExtra: pandas, xarray or netCDF4 is not installed.
+            FileError: The file cannot be written.
+        """
+        return write_labelled(path, self.to_pandas, self.to_xarray)
+
+    def __repr__(self) -> str:
+        shown = ""
+        for name, value, of, _ in self._quantities():
+            if name == self._headline:
+                numbers = np.atleast_1d(value)
+                shown = f" {name} {span(numbers) if numbers.size else 'none'}"
+                shown += "" if of == "1" else f" {of}"
+        state = "" if getattr(self, "is_stable", True) else ", UNSTABLE"
+        return f"<{type(self).__name__}{shown}{state}>"
+
+    def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
+        """Yield name, value, unit and dimensions of each number: fields first, then properties."""
+        told: dict[str, Mapping[str, Any]]
+        told = {each.name: each.metadata for each in fields(self) if each.metadata}  # type: ignore[arg-type]
+        for kind in type(self).__mro__:
+            told |= {n: p.metadata for n, p in vars(kind).items() if isinstance(p, _Quantity)}
+        units = self._units()
+        for name, metadata in told.items():
+            of = metadata["unit"]
+            yield name, getattr(self, name), units.get(of, of), metadata["dims"]
+
+    def _units(self) -> dict[str, str]:
+        """Return the units that depend on the joints of the arm."""
+        if not self._posture:
+            return {}
+        units = JointUnits(self._posture.arm.slides)
+        return {
+            "joint": units.joined("rad", "m"),
+            "torque": units.torque(),
+            "joint stiffness": units.stiffness(),
+        }
+
+    def _labels(self) -> dict[str, Sequence[object]]:
+        """Return the names along each dimension that has names."""
+        labels: dict[str, Sequence[object]] = {"axis": AXES, "component": COMPONENTS}
+        if self._posture:
+            arm = self._posture.arm
+            labels |= {"joint": arm.joint_names, "joint_column": arm.joint_names}
+            labels["cable"] = arm.cables.names
+        return labels
