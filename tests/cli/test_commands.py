@@ -145,13 +145,6 @@ def test_straight_arm_has_null_for_what_is_infinite(geometry: Path) -> None:
     assert told["cartesian_N_per_m"] is None
 
 
-def test_table_shows_tensions_and_stiffness_with_units(geometry: Path) -> None:
-    result = call("stiffness", geometry, "--angles", "5", "--gravity", "0 0 0")
-    assert result.exit_code == 0, result.output
-    for text in ("tension [N]", "cable3_3", "stiffness [N/mm]", "stable"):
-        assert text in result.output
-
-
 def test_weigh_json_holds_the_numbers_of_the_api(geometry: Path, tmp_path: Path) -> None:
     png = tmp_path / "weigh.png"
     result = call(
@@ -168,13 +161,6 @@ def test_weigh_json_holds_the_numbers_of_the_api(geometry: Path, tmp_path: Path)
     np.testing.assert_array_equal(told["tensions_N"], test.tensions)
     assert told["stiffness_N_per_m"] == test.stiffness
     assert png.read_bytes().startswith(b"\x89PNG")
-
-
-def test_weigh_shows_every_step_and_the_cables(geometry: Path) -> None:
-    result = call("weigh", geometry, "--angles", 8, "--force", "0,0,-3", "--min-tension", 30)
-    assert result.exit_code == 0, result.output
-    for text in ("load [N]", "linear", "tip moved by", "cable3_3", "N/mm"):
-        assert text in result.output
 
 
 def test_buckle_finds_tension_and_load_of_the_api(geometry: Path, tmp_path: Path) -> None:
@@ -411,15 +397,6 @@ def test_failure_is_one_message_and_exit_code_1(
     assert "Traceback" not in result.output
 
 
-def test_names_in_messages_are_those_of_options(geometry: Path, tmp_path: Path) -> None:
-    assert "--angles: entry [0] is nan" in call("stiffness", geometry, "--angles", "nan").stderr
-    robot = tmp_path / "arm.urdf"
-    assert call("urdf", geometry, "-o", robot).exit_code == 0
-    again = call("urdf", robot, "-o", tmp_path / "b.urdf")
-    assert again.exit_code == 2
-    assert "is a URDF already" in " ".join(again.stderr.replace("│", " ").split())
-
-
 @pytest.mark.parametrize(("angles", "said"), [("ten", "ten"), ("1,2", "2 given")])
 def test_wrong_angles_are_a_usage_error(angles: str, said: str, geometry: Path) -> None:
     result = call("stiffness", geometry, "--angles", angles)
@@ -649,46 +626,6 @@ def test_warm_compiles_all_kernels_and_says_how_long_it_took() -> None:
     assert "kernels are compiled" in result.output
     kernels: tuple[Any, ...] = (evaluate_rows, search_tensions, set_breakaway)
     assert all(kernel.signatures for kernel in kernels)
-
-
-def test_first_line_says_what_was_computed_with(geometry: Path, tmp_path: Path) -> None:
-    def first(*arguments: object) -> str:
-        result = call(*arguments)
-        assert result.exit_code in (0, 3), result.output
-        lines = result.stdout.splitlines()
-        return next(line for line in lines[:2] if not line.startswith("UNSTABLE"))
-
-    usual = "with wire 1x19-1.2mm; gravity 0, 0, -9.81 m/s²; least tension 10 N; frictionless"
-    for command in (
-        ("stiffness", geometry),
-        ("check", geometry),
-        ("weigh", geometry, "--force", "0,0,-1", "--steps", 1),
-        ("plan", geometry, "--direction", "0,0,1", "--target", 9, "--angles", 3),
-        ("export", geometry, "--mjcf", tmp_path / "arm.xml"),
-        ("sweep", geometry, "--random", 1, "--out", tmp_path / "sweep.nc"),
-    ):
-        assert first(*command) == usual
-    plan = ("plan", geometry, "--direction", "z", "--target", 9, "--angles", 3, "--min-tension", 1)
-    raised = "least tension 1 N (raised to 2.2 N, where the law of a wire begins)"
-    assert first(*plan) == usual.replace("least tension 10 N", raised)
-    assert "raised" not in first(*plan, "--slack-below")
-    given = ("--gravity", "0,1,0", "--spring", 2, "--wire", 48e3, "--min-tension", 20)
-    assert first("stiffness", geometry, *given) == (
-        "with wire EA 48000 N on a spring of 2 N/mm; gravity 0, 1, 0 m/s²; least tension 20 N; "
-        "frictionless"
-    )
-    geometry.write_text(
-        'original_length = "stretched"\ngravity = [0, -2.0, 0.5]\nminimum = 12.5\n'
-        + SHORT.replace("link_mass = 0.1", "link_mass = 0.1\nlead = 0.1\nfriction = 0.1")
-        + '\n[cables.cable1_1]\nwire = {kind = "tabulated", tensions = [0.0, 400.0], '
-        "strains = [0.0, 0.01]}\n",
-        encoding="utf-8",
-    )
-    assert first("stiffness", geometry) == (
-        "with wire table, 0 to 400 N (1 of 9), 1x19-1.2mm (8 of 9); gravity 0, -2, 0.5 m/s²; least "
-        "tension 10 N (cables of their own up to 12.5 N); stretched lengths; friction of its holes "
-        "left out"
-    )
 
 
 @pytest.mark.parametrize("command", ["stiffness", "check", "buckle"])

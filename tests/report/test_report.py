@@ -617,15 +617,6 @@ def test_dict_holds_every_field() -> None:
     assert told["trustworthy"] is False  # not in balance
 
 
-def test_report_says_what_it_is_in_one_line() -> None:
-    pose = virtual()
-    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 15.0))
-    assert repr(K.report()) == "<Report on the stiffness of virtual_prototype, trustworthy>"
-    assert repr(hybrid(3).report()).endswith("NOT TO BE TRUSTED>")
-    assert str(K.report().self_check).count("agrees") == 7
-    assert K.report().warnings == K.report().faults + K.report().notes
-
-
 # --- what a stranger stumbled over --------------------------------------------------------------
 
 
@@ -664,16 +655,6 @@ def test_planned_tensions_are_not_asked_to_be_the_least() -> None:
     (_, fault) = cdsm.stiffness(pose, off).report().faults
     assert "of daqp are not optimal" in fault
     assert "stationarity" not in fault
-
-
-def test_bounds_are_called_active_as_the_tension_calls_them() -> None:
-    pose = virtual()
-    free = cdsm.distribute_tension(pose, 15.0)
-    near = cdsm.distribute_tension(pose, 15.0, free.values * (1.0 + 1e-7))
-    report = cdsm.stiffness(pose, near).report()
-    assert report.optimality is not None
-    assert report.optimality.at_maximum == near.at_maximum
-    assert report.trustworthy, report.faults
 
 
 def test_what_slides_is_told_in_metres_and_every_number_has_its_unit() -> None:
