@@ -287,7 +287,7 @@ def test_joints_without_a_column_stay_at_zero(geometry: Path, tmp_path: Path) ->
         ("stiffness", "--friction=-1"),
         ("stiffness", "--wire=-1"),
         ("stiffness", "--wire=nan"),
-        ("stiffness", "--rigidity=0"),
+        ("stiffness", "--wire=0"),
         ("sweep", "--diameter=-1"),
         ("sweep", "--breaking-load=0"),
         ("sweep", "--bend-diameter=nan"),

@@ -45,7 +45,7 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
     arm = cdsm.Manipulator(ARM.geometry, cables=cables, gravity=ARM.gravity)
     targets = [80e3, 1e7, 81e3]
     plan = cdsm.plan_path(arm, DOWN, targets, 50.0, angles=waving(3))
-    path = plan.write_csv(tmp_path / "motors.csv")
+    path = plan.write(tmp_path / "motors.csv")
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["status"] for row in rows] == ["planned", "stiffness", "planned"]
@@ -72,7 +72,7 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
     with noisy.write(path).open(encoding="utf-8", newline="") as file:
         assert next(csv.DictReader(file))["joint1_1 [rad]"] == "0.0"
     with pytest.raises(cdsm.FileError, match="does not exist"):
-        plan.write_csv(tmp_path / "absent" / "motors.csv")
+        plan.write(tmp_path / "absent" / "motors.csv")
 
 
 def test_motors_pay_out_the_unstrained_length_whatever_the_stiffness_takes_for_it() -> None:
