@@ -11,7 +11,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.inspect import TypeAliasForwardRef
 
-from docs import directives, generate
+from docs import generate
 
 
 def _mathjax() -> str:
@@ -35,7 +35,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["static", "pictures"]
+exclude_patterns = ["static", "pictures", "joss"]
 nitpicky = True
 nitpick_ignore_regex = [
     # other projects' types, whose indexes are on the network; and types of ours without a page
@@ -125,7 +125,6 @@ def _describe(app: Sphinx, page: nodes.document) -> None:
 
 def setup(app: Sphinx) -> None:
     """Write the generated pages before Sphinx looks for pages."""
-    directives.setup(app)
     app.connect("config-inited", lambda *_: generate.all_pages())
     app.connect("doctree-read", _show_as_shell)
     app.connect("doctree-read", _describe)

@@ -12,7 +12,6 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
-CONTRIBUTING = ROOT / ".github" / "CONTRIBUTING.md"
 
 
 def test_snippets_print_what_the_readme_shows() -> None:
@@ -51,77 +50,7 @@ def test_shell_commands_run_as_printed(tmp_path: Path) -> None:
     assert (tmp_path / "REPORT.html").stat().st_size > 0
 
 
-def test_readme_fits_a_page_and_links_to_what_exists() -> None:
+def test_readme_links_to_what_exists() -> None:
     text = README.read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 90
-    shown = re.findall(r'<img src="(.*?)"', text)
-    assert len(shown) == 2
-    for path in (*shown, *re.findall(r"\]\((.*?)\)", text)):
+    for path in (*re.findall(r'<img src="(.*?)"', text), *re.findall(r"\]\((.*?)\)", text)):
         assert (ROOT / path).exists(), path
-
-
-def test_a_result_is_shown_within_the_first_25_lines() -> None:
-    head = README.read_text(encoding="utf-8").splitlines()[:25]
-    assert any(line.startswith("along ") for line in head)
-
-
-def place(path: str) -> Path | None:
-    """Return the file or folder that CONTRIBUTING names; paths may leave out ``cdsm/``."""
-    return next((base / path for base in (ROOT / "cdsm", ROOT) if (base / path).exists()), None)
-
-
-def words(path: Path) -> set[str]:
-    """Return all words of a file, or of the files in a folder."""
-    files = [path] if path.is_file() else [*path.rglob("*.py"), *path.rglob("*.pyi")]
-    return {word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8"))}
-
-
-def test_files_and_names_that_contributing_mentions_exist() -> None:
-    text = re.sub(r"```.*?```", "", CONTRIBUTING.read_text(encoding="utf-8"), flags=re.DOTALL)
-    spans = {" ".join(span.split()) for span in re.findall(r"`([^`]+)`", text)}
-    paths = {span for span in spans if re.fullmatch(r"[\w.]+/[\w./]*|\w+\.(?:py|pyi|md)", span)}
-    constants = set(re.findall(r"^\| `([\w/]+)` \| `\w", text, re.MULTILINE))  # rows of tolerances
-    built = {path for path in paths if path.startswith("build/")}
-    assert len(paths) > 300
-    assert {path for path in paths - constants - built if place(path) is None} == set()
-    homes = ("cdsm", "tests", "docs", "examples", "pyproject.toml", ".ci/run")
-    known = set[str]().union(*(words(ROOT / home) for home in homes))
-    names = {name for span in spans - paths for name in re.findall(r"[A-Za-z_]\w+", span)}
-    assert len(names) > 300
-    assert names - known == set()
-
-
-def test_names_that_contributing_finds_in_a_file_are_there() -> None:
-    text = " ".join(CONTRIBUTING.read_text(encoding="utf-8").split())
-    name, path = r"`(\w+)`", r"`([\w./]+\.(?:py|pyi)|\w+/)`"
-    listed = rf"({name}(?:(?:, | and |, and ){name})*)"
-    pairs = [(file, names) for file, names, *_ in re.findall(rf"{path}: {listed}", text)]
-    pairs += [(each[-1], each[0]) for each in re.findall(rf"{listed} (?:in|of) {path}", text)]
-    assert len(pairs) > 100
-    for file, names in pairs:
-        home = place(file)
-        assert home is not None, file
-        assert set(re.findall(name, names)) <= words(home), (file, names)
-
-
-def test_tolerances_that_contributing_lists_are_those_of_the_code() -> None:
-    rows = re.findall(
-        r"^\| `([\w/]+)` \| `([\w, ]+)` \| (.*?) \|", CONTRIBUTING.read_text("utf-8"), re.M
-    )
-    assert len(rows) > 50
-    for module, name, value in rows:
-        source = (ROOT / "cdsm" / f"{module}.py").read_text(encoding="utf-8")
-        line = re.search(rf"^{name}(?:: \w+)? = (.*)", source, re.M)
-        assert line is not None, (module, name)
-        assert value in line[1], (module, name, line[1])
-    listed = {(module, name) for module, names, _ in rows for name in names.split(", ")}
-    sizes = {("interchange/mjcf", "_CABLE"), ("urdf", "CROSS_MASS"), ("urdf", "CROSS_INERTIA")}
-    small = {
-        (path.relative_to(ROOT / "cdsm").with_suffix("").as_posix(), name)
-        for path in (ROOT / "cdsm").rglob("*.py")
-        for name, value in re.findall(
-            r"^(\w+)(?:: Final)? = (\d[\d.]*e-\d+)\b", path.read_text("utf-8"), re.M
-        )
-        if float(value) < 1e-3
-    }
-    assert small - listed == sizes

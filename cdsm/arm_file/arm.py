@@ -16,7 +16,6 @@ from cdsm.arm_file.cables import (
     cable_lines,
     read_routed,
     setting_lines,
-    with_current_keys,
 )
 from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entries
 from cdsm.arm_model import GRAVITY, ArmParts
@@ -96,7 +95,7 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     data = attempt(read_toml, text)
     if data is None:
         raise FileError(path, faults[0])
-    described, rest = split_geometry(with_current_keys(data))
+    described, rest = split_geometry(data)
     keys = attempt(parse, _Keys, rest)
     geometry = robot = routed = wires = cables = tolerances = None
     if "urdf" not in rest:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
@@ -116,23 +116,12 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     text = read_text(path)
     forced = None if wire is None else as_wire(wire)
     try:
-        keys = parse(CableKeys, with_current_keys(read_toml(text)))
+        keys = parse(CableKeys, read_toml(text))
         wires = read_wires(keys, forced)
         return build_cables(read_routed(keys.cables), keys, wires, path)
     except GeometryError as error:
         faults = error.faults
     raise FileError(path, f"cannot be read as cables, {counted(faults)}")
-
-
-def with_current_keys(data: dict[str, Any]) -> dict[str, Any]:
-    """Rename the keys ``elasticities`` and ``elasticity`` of older files to ``wires``, ``wire``."""
-    if "elasticities" in data:
-        data["wires"] = data.pop("elasticities")
-    cables = data.get("cables")
-    for entry in cables if isinstance(cables, list) else ():
-        if isinstance(entry, dict) and "wire" not in entry and "elasticity" in entry:
-            entry["wire"] = entry.pop("elasticity")
-    return data
 
 
 _ANY = LinearElasticity(1.0)

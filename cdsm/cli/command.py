@@ -1,4 +1,4 @@
-"""Make typer commands of our functions: shared options, older names, errors as text or JSON."""
+"""Make typer commands of our functions: shared options, errors as text or JSON."""
 
 from __future__ import annotations
 
@@ -13,20 +13,15 @@ import typer.core
 
 from cdsm.cli.files import require_apart
 from cdsm.cli.output import misuse_reported, reported
-from cdsm.cli.words import newer
 
 
 class Command(typer.core.TyperCommand):
-    """A typer command that also accepts older names of options.
-
-    With --json, it prints errors of usage as JSON.
-    """
+    """A typer command that prints errors of usage as JSON with --json."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Replace older names of options in ``args``, then parse and check them."""
-        known = [newer(str(self.name), word) for word in args]
-        with misuse_reported("--json" in known):
-            rest = super().parse_args(ctx, known)
+        """Parse the words of ``args`` and check them."""
+        with misuse_reported("--json" in args):
+            rest = super().parse_args(ctx, args)
             require_apart(ctx)
             return rest
 

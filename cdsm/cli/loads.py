@@ -21,7 +21,7 @@ from cdsm.cli.options import (
     wrench_of,
 )
 from cdsm.cli.output import answer, write, write_picture
-from cdsm.cli.values import misuse, numbers
+from cdsm.cli.values import misuse
 
 
 def weigh(
@@ -61,12 +61,6 @@ def buckle(
     arm: ArmOptions,
     weight: WeightOptions,
     angles: Angles = "0",
-    load: Annotated[
-        str | None,
-        typer.Option(
-            help="Older name of --force, with a moment.", metavar="FX,...,MZ", hidden=True
-        ),
-    ] = None,
     min_tension: Annotated[
         float | None,
         typer.Option(help="Lower bound of all tensions under the load [N]; default 10."),
@@ -84,18 +78,16 @@ def buckle(
     --force or --mass is the load that is multiplied; --wrench is a constant load in addition. Exit
     code 0; 3 if the arm is unstable at every tension, or already without the load.
     """
-    loaded = weight.given or load is not None
     for option, value in (("--min-tension", min_tension), ("--max-tension", max_tension)):
-        if value is not None and not loaded:
+        if value is not None and not weight.given:
             raise misuse(option, "bounds the tensions under --force or --mass only.")
     pose = arm.at(angles)
     carried = wrench_of(wrench)
     tension = cdsm.critical_tension(pose, carried, solver)
     found: list[cdsm.CriticalTension | cdsm.CriticalLoad] = [tension]
     low: tuple[float, ...] = ()
-    if loaded:
-        multiplied = [0.0] * 6 if load is None else numbers("--load", load, 6, "FX,...,MZ")
-        multiplied[:3] += weight.vector(pose.arm)
+    if weight.given:
+        multiplied = [*weight.vector(pose.arm), 0.0, 0.0, 0.0]
         if not any(multiplied):
             said = "is zero, and so is any multiple of it; give a load."
             raise cdsm.InvalidInput(weight.option, said)

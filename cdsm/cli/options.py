@@ -98,9 +98,6 @@ class ArmOptions:
             "file that `cdsm fit` writes; default: those of the file.",
         ),
     ] = None
-    rigidity: Annotated[float | None, _arm_option(help="Older name of --wire EA.", hidden=True)] = (
-        None
-    )
     spring: Annotated[
         float | None, _arm_option(help="Stiffness of a spring in series with every cable [N/mm].")
     ] = None
@@ -187,18 +184,12 @@ class ArmOptions:
                 raise misuse(f"--{field.name}", f"{why}; leave it out.")
 
     def _wire(self) -> cdsm.Elasticity | None:
-        """Return the law that --wire or --rigidity gives; None if neither is given."""
+        """Return the law that --wire gives, if any."""
         from cdsm.support.validation import quantity
         from cdsm.wires.catalogue import as_wire
 
         if self.wire is None:
-            return (
-                None
-                if self.rigidity is None
-                else as_wire(quantity("--rigidity", self.rigidity, "rigidity"))
-            )
-        if self.rigidity is not None:
-            raise misuse("--rigidity", "give it or --wire, not both.")
+            return None
         try:
             rigidity = float(self.wire)
         except ValueError:

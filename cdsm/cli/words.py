@@ -1,4 +1,4 @@
-"""Replace names: arguments in messages of the library by options, older options by newer ones."""
+"""Replace arguments in messages of the library by options."""
 
 from __future__ import annotations
 
@@ -44,22 +44,9 @@ _NAMES: Final = "|".join(_OPTIONS)
 _ARGUMENT: Final = re.compile(rf"^({_NAMES})(?=: )|\b({_NAMES})=(?!\w)")
 """Pattern of an argument in a message: ``minimum=`` anywhere, or ``minimum: `` at its beginning."""
 
-OLDER: Final[dict[str, dict[str, str]]] = {
-    "urdf": {"--output": "--out"},
-    "check": {"--html": "--out"},
-    "export": {"--mjcf": "--out"},
-}
-"""Older names of the options of a command; the next release removes them."""
-
 
 def in_options(message: str) -> str:
     """Replace arguments in a message of the library by options: ``minimum`` by --min-tension."""
     for remedy, left in _PYTHON:
         message = message.replace(remedy, left)
     return _ARGUMENT.sub(lambda found: _OPTIONS[found[1] or found[2]], message)
-
-
-def newer(command: str, word: str) -> str:
-    """Return a word typed after ``command``; replace an older option name by the current one."""
-    name, equals, value = word.partition("=")
-    return OLDER.get(command, {}).get(name, name) + equals + value

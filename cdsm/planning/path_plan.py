@@ -214,10 +214,6 @@ class PathPlan(ReadOnlyState):
         """
         return write_text(path, csv_text(*path_table(self)))
 
-    def write_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write the plan with :meth:`write`; this old name is kept for one release."""
-        return self.write(path)
-
     def __repr__(self) -> str:
         return f"<PathPlan of {len(self.planned)} of {plural(len(self.target), 'sample')}>"
 

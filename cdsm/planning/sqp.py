@@ -5,8 +5,8 @@ r"""Sequential quadratic programming over the admissible tensions of a stable ar
 c are the constraints on the stiffness, τ = J_Xᵀ W − g is the torque that the cables balance. Only c
 and the last condition, reserve = λ_min − floor ≥ 0, are nonlinear. Every iterate balances the arm
 and is stable, so K_θ can be inverted there. scipy's SLSQP with the same gradients ends at the same
-tensions (tests/planning/test_sqp.py), but needs twice to a hundred times the evaluations, and with
-finite differences three times as long (tests/benchmarks/test_planning_speed.py).
+tensions, but needs twice to a hundred times the evaluations, and with finite differences three
+times as long (tests/benchmarks/test_planning_speed.py).
 
 **The quadratic program of a step.** Let d = ΔF/size (size: the largest tension), g = ∂f/∂d and
 G = ∂c/∂d. L = f + y·c − z·reserve, with the multipliers y and z of the step before. Solve

@@ -136,15 +136,6 @@ def test_bounds_of_a_cable_that_cannot_be_are_refused(low: float, high: float) -
         replace(cable, minimum=low, maximum=high)
 
 
-def test_keys_of_older_files_are_read(tmp_path: Path) -> None:
-    path = tmp_path / "cables.toml"
-    path.write_text(ONE, encoding="utf-8")
-    today = cdsm.read_cables(path)
-    older = ONE.replace("[wires.", "[elasticities.").replace("wire =", "elasticity =")
-    path.write_text(older, encoding="utf-8")
-    assert cdsm.read_cables(path) == today
-
-
 def test_wire_of_all_cables_stands_at_the_top_or_is_given(tmp_path: Path) -> None:
     path = tmp_path / "cables.toml"
     without = ONE.replace('wire = "rope"\n', "")

@@ -82,14 +82,6 @@ def test_faults_of_a_problem_are_named(tmp_path: Path, change: tuple[str, str], 
     assert "problem.toml" in output
 
 
-def test_a_problem_of_a_file_is_its_part_and_prints_in_one_line() -> None:
-    file = cdsm.read_problem(EXAMPLES / "design.toml")
-    assert repr(file) == "<ProblemFile: arm: 4 variables, 1 load, 20 generations of 24 designs>"
-    for function in (cdsm.search_designs, cdsm.refine_design):
-        with pytest.raises(cdsm.InvalidInput, match=r"a DesignProblem is needed: its \.problem"):
-            function(file)  # type: ignore[arg-type]
-
-
 def test_a_number_that_the_front_lacks_is_named_by_its_option(tmp_path: Path) -> None:
     path = str(EXAMPLES / "design.toml")
     words = ["--generations", "2", "--population", "8", "--jobs", "1", "--choose", "99"]

@@ -12,7 +12,7 @@ from tests.support.sweeps import short_arm
 
 __all__ = ["geometry"]  # a fixture
 
-ARM = ("--rigidity", 48e3, "--gravity", "0,-2,-9", "--min-tension", "20,40")
+ARM = ("--wire", 48e3, "--gravity", "0,-2,-9", "--min-tension", "20,40")
 
 
 def arm() -> cdsm.Manipulator:
@@ -47,7 +47,7 @@ def test_grid_is_what_the_api_computes(
 def test_random_postures_and_chosen_quantities_as_a_table(geometry: Path, tmp_path: Path) -> None:
     out = tmp_path / "s.csv"
     options = ("--random", 16, "--seed", 3, "--quantities", "tension, margin", "--min-tension", 9)
-    result = call("sweep", geometry, *options, "--rigidity", 48e3, "-o", out)
+    result = call("sweep", geometry, *options, "--wire", 48e3, "-o", out)
     assert result.exit_code == 0, result.output
     header, *rows = out.read_text(encoding="utf-8").splitlines()
     assert len(rows) == 16
@@ -79,7 +79,7 @@ def test_map_draws_a_sweep(tmp_path: Path) -> None:
         assert out.read_bytes().startswith(b"\x89PNG")
 
 
-SOFT = ("--rigidity", 48e3, "--spring", 0.2)
+SOFT = ("--wire", 48e3, "--spring", 0.2)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ SOFT = ("--rigidity", 48e3, "--spring", 0.2)
         ("50,100", SOFT, 3, "NONE of 2 entries is ok: 2 unstable"),
         (
             "20,20.5",
-            ("--rigidity", 48e3, "--max-tension", 21),
+            ("--wire", 48e3, "--max-tension", 21),
             3,
             "NONE of 2 entries is ok: 2 infeasible",
         ),

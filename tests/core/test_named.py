@@ -93,22 +93,6 @@ def test_shares_are_printed_by_name_and_add_up() -> None:
         _ = shares["cable9"]
 
 
-def test_shares_that_are_rounding_are_printed_as_zero() -> None:
-    geometry = cdsm.Geometry.hinged(
-        joints=2,
-        twist=np.pi / 2.0,
-        link_length=0.05,
-        base_length=0.05,
-        disk_offset=0.008,
-        hole_radius=0.015,
-        link_mass=0.02,
-    )
-    pose = cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3)).at([0.0, 0.0])
-    shares = cdsm.stiffness(pose, np.full(4, 10.0)).shares("z")
-    assert (abs(shares.passive) < 1e-20 * shares.total).any()  # the hinge about z
-    assert "e-3" not in str(shares)
-
-
 def test_shares_of_an_unstable_arm_say_so_first() -> None:
     soft = cdsm.serpentine_cables(
         POSE.arm.geometry, cdsm.LinearElasticity(1e9), series_stiffness=10.0
@@ -118,19 +102,6 @@ def test_shares_of_an_unstable_arm_say_so_first() -> None:
     assert str(shares).startswith("UNSTABLE: the arm buckles, ")
     assert repr(shares).endswith(", UNSTABLE>")
     assert shares.to_dict()["stable"] is False
-
-
-def test_columns_are_aligned_whatever_the_names() -> None:
-    cables = [
-        cdsm.Cable(f"{'a_very_long_name_of_a_' * (i == 1)}cable{i}", each.sites, each.elasticity)
-        for i, each in enumerate(POSE.arm.cables)
-    ]
-    pose = POSE.arm.with_cables(cables).at(POSE.q)
-    pull = cdsm.distribute_tension(pose, 10.0)
-    rest = cdsm.equilibrium(pose, pull)
-    for text in (str(pull), str(rest)):
-        rows = text.splitlines()[: 1 + len(cables)]
-        assert len({row.rindex(".") for row in rows[1:]}) == 1
 
 
 def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
@@ -294,25 +265,10 @@ def test_sweeps_become_tidy_tables() -> None:
     assert set(table["status"]) == {"ok"}
 
 
-def test_extras_that_are_missing_are_installed_from_a_clone() -> None:
-    assert "run pip install -e '.[sweep]' in the folder of cdsm" in str(
-        cdsm.MissingExtra("pandas", "sweep")
-    )
-
-
-def test_presets_list_what_they_offer_only() -> None:
-    assert not {"np", "math", "replace", "annotations"} & set(dir(cdsm.presets))
-    assert "virtual_prototype" in dir(cdsm.presets)
-
-
 def test_elasticities_are_read_and_written_by_methods(tmp_path: Path) -> None:
     law = cdsm.presets.STRAND_1X19
     assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
-    assert (
-        PLAN.write_csv(tmp_path / "old.csv").read_text()
-        == PLAN.write(tmp_path / "new.csv").read_text()
-    )
-    header = (tmp_path / "new.csv").read_text().splitlines()[0].split(",")
+    header = PLAN.write(tmp_path / "plan.csv").read_text().splitlines()[0].split(",")
     assert header[-6:] == [
         *("tip x [m]", "tip y [m]", "tip z [m]"),
         *("stiffness [N/m]", "target [N/m]", "reason"),

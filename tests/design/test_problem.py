@@ -548,20 +548,6 @@ def test_files_for_the_workshop(tmp_path: Path) -> None:
         assert float(row[5]) <= float(row[4]) <= float(row[6])
 
 
-def test_a_printed_table_has_designs_of_the_whole_front(monkeypatch: pytest.MonkeyPatch) -> None:
-    task = problem(
-        variables=(cdsm.Variable("link_length", 0.05, 0.1),),
-        objectives=(cdsm.Objective("mass"), cdsm.Objective("length")),
-    )
-    found = cdsm.search_designs(task, generations=2, population=16)
-    monkeypatch.setattr("cdsm.design.result._PRINTED", 3)
-    last, chosen = len(found.front) - 1, len(found.front) - 2
-    numbers = [line.split()[0] for line in found._text(chosen).splitlines()[2:]]
-    assert {"0", f"{found.compromise}*", f"{chosen}", f"{last}"} <= {*numbers}
-    assert len(numbers) < len(found.front)
-    assert f"{len(numbers)} shown" in found._text(chosen)
-
-
 def test_a_cable_is_cut_for_all_postures_within_the_joint_limits() -> None:
     arm = small_arm()
     straight = arm.cable_lengths(np.zeros(arm.nv))

@@ -264,23 +264,6 @@ def test_numbers_of_the_virtual_prototype(case: tuple[float, float]) -> None:
             np.testing.assert_allclose(found, expected, rtol=off)
 
 
-def test_prints_say_what_sticks() -> None:
-    pose, F, _ = posed("mixed", 0.1)
-    assert str(cdsm.stiffness(pose, F)).endswith("(frictionless, rigid links, tangent)")
-    stuck = cdsm.stuck_stiffness(pose, F)
-    assert str(stuck).endswith("(cables stuck, μ = 0.1, rigid links, tangent)")
-    assert stuck.friction == "stuck"
-    mixed, F, _ = posed("mixed", lambda c, i: 0.1 + 0.1 * (c % 2))
-    none = np.zeros(len(mixed.segments.wrap))
-    sliding = cdsm.sliding_stiffness(mixed, F, none)
-    assert "cables sliding, μ = 0.1 to 0.2" in str(sliding)
-    np.testing.assert_allclose(sliding.joint, cdsm.stuck_stiffness(mixed, F).joint, rtol=1e-12)
-    for K in (stuck, sliding):
-        total = sum(getattr(K.shares("z"), name).sum() for name in ("passive", "active"))
-        shares = K.shares("z")
-        assert total + shares.gravity + shares.load == pytest.approx(K.along("z"), rel=1e-10)
-
-
 def test_bad_input_is_named() -> None:
     pose, F, _ = posed("mixed", 0.1)
     none = np.zeros(len(pose.segments.wrap))

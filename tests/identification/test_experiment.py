@@ -103,17 +103,6 @@ def test_what_no_candidate_determines_is_said_before_anything_is_built() -> None
         cdsm.plan_experiment(by_product, values, wanted=["area"], **ASKED)
 
 
-def test_a_plan_prints_and_draws_itself() -> None:
-    text = str(PLAN)
-    for part in ("posture", "×", "95 %, planned", "evenly spaced", "D-optimal"):
-        assert part in text
-    left, right = PLAN.plot().axes
-    assert left.get_xlabel() == "95 % interval, ± % of the expected value"
-    assert right.get_xlabel() == "candidate"
-    ticks = right.get_xticks()
-    np.testing.assert_array_equal(ticks, np.round(ticks))
-
-
 def test_candidates_that_fail_are_left_out_with_their_reason() -> None:
     plan = cdsm.plan_experiment(hinge, TRUE, **(ASKED | {"postures": [[0.4], [3.0]]}))
     assert [label for label, _ in plan.failures] == ["posture 2, -z, 6 N", "posture 2, -z, 24 N"]

@@ -1,6 +1,5 @@
 """Loops of weight tests: friction and rigidity from loads that come and go."""
 
-import html
 import math
 import pickle
 from collections.abc import Mapping
@@ -197,22 +196,6 @@ def test_without_wrap_friction_is_not_determined_and_that_is_said() -> None:
 
 
 # --- what is shown --------------------------------------------------------------------------
-
-
-def test_result_prints_loops_and_draws_them() -> None:
-    text = str(FOUND)
-    assert "loop" in text
-    assert "[µm]" in text
-    assert "at 0.45" in text
-    assert html.unescape(FOUND._repr_html_()) == f"<pre>{text}</pre>"
-    figure = FOUND.plot()
-    left, right = figure.axes
-    told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert told == [*(loop.label for loop in FOUND.measurements), "predicted", "measured"]
-    assert left.get_xlabel() == "force [N]"
-    assert "measured)/σ" in right.get_ylabel()
-    assert FOUND.residuals.shape == FOUND.predicted.shape == (2 * len(FORCES),)
-    assert FOUND._labels[len(FORCES)] == "at -0.4 force 1"
 
 
 def test_a_loop_is_a_plain_value() -> None:

@@ -367,15 +367,6 @@ def test_no_freedom_left_leaves_scaled_intervals_without_end() -> None:
 # --- the result -----------------------------------------------------------------------------
 
 
-def test_result_prints_a_table_with_units_and_its_warnings() -> None:
-    text = str(NOISY)
-    for part in (*TRUE, "own unit", "[N/mm]", "[σ]", "posture 12", "χ² =", "rank 3 of 3"):
-        assert part in text
-    assert all(sentence in text for sentence in NOISY.warnings)
-    assert repr(NOISY).startswith("<Identification hole_radius=0.03")
-    assert "\n" not in repr(NOISY)
-
-
 def test_figure_shows_the_residuals_and_both_stiffnesses() -> None:
     figure = NOISY.plot()
     assert isinstance(figure, Figure)

@@ -1,20 +1,13 @@
 """Where compiled kernels are kept, and when they are compiled again."""
 
-import importlib
 import os
-import pkgutil
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import pytest
-from numba.core.dispatcher import Dispatcher
 
-import cdsm
-from cdsm.kernels.compiling import CacheFile
 from tests.support.patience import HANGS
 from tests.support.processes import ROOT
 
@@ -60,32 +53,6 @@ print(searched.values.tobytes().hex(), searched.status, cdsm.evaluate(
 narrow = cdsm.distribute_tensions(arm, [q, -q], 40.0, 40.0)
 print(narrow.values.tobytes().hex(), narrow.status)
 print(len(single_pose.signatures), len(single_stiffness.signatures), file=sys.stderr)
-"""
-
-
-WIDE = """
-import sys
-import numpy as np
-from cdsm.kernels.compiling import at_once
-from cdsm.kernels.readings import set_margins
-if sys.argv[1:]:
-    with at_once():
-        set_margins(np.ones((1, 2, 2, 1)), np.empty((1, 1)), None)
-set_margins(np.ones((1, 2, 2, 4000)), np.empty((1, 4000)), 4000)
-print(len(set_margins.signatures))
-"""
-
-MANY = """
-import numpy as np
-from cdsm.kernels.compiling import compiled
-
-@compiled
-def total(pair):
-    return pair[0].sum() + pair[1].sum()
-
-for count in (100, 2**15 + 1):
-    total((np.ones(count), np.ones(100)))
-    print(len(total.signatures))
 """
 
 
@@ -137,44 +104,3 @@ def test_first_calls_compile_nothing_and_give_the_same_bits(tmp_path: Path) -> N
     compiled, said = run(FIRST, "0")
     assert said.split()[-2:] == ["1", "1"]
     assert first == compiled
-
-
-def test_processes_that_compile_at_once_do_not_confuse_their_kernels(tmp_path: Path) -> None:
-    one: Any = CacheFile(str(tmp_path), "kernel", "stamp")  # type: ignore[no-untyped-call]
-    other: Any = CacheFile(str(tmp_path), "kernel", "stamp")  # type: ignore[no-untyped-call]
-    late = other._load_index()
-    one.save("posture", "code for a posture")
-    with pytest.MonkeyPatch.context() as patch:  # the other has read the index before
-        patch.setattr(other, "_load_index", lambda: late)
-        other.save("block", "code for a block")
-    one._save_data(one._data_name(1), "code for a posture")  # whoever writes last
-    assert other.load("block") == "code for a block"
-    assert one.load("posture") is None  # to be compiled again
-    one.save("posture", "anew")
-    assert (one.load("block"), other.load("posture")) == ("code for a block", "anew")
-    assert len([*tmp_path.glob("*.nbc")]) == 2  # files without a signature are gone
-
-
-def test_kernels_call_kernels_by_name() -> None:
-    """Python runs the first calls; it would call a compiled kernel if that is reached by module."""
-    for found in pkgutil.walk_packages(cdsm.__path__, "cdsm."):
-        names = vars(importlib.import_module(found.name))
-        for kernel in [each for each in names.values() if isinstance(each, Dispatcher)]:
-            used = kernel.py_func.__globals__
-            for name in kernel.py_func.__code__.co_names:
-                other = used.get(name)
-                assert not (isinstance(other, ModuleType) and other.__name__.startswith("cdsm"))
-
-
-@pytest.mark.slow
-def test_a_kernel_compiled_for_one_posture_is_not_compiled_for_the_first_blocks(
-    tmp_path: Path,
-) -> None:
-    folder = str(tmp_path)
-    assert run(WIDE, "first", NUMBA_CACHE_DIR=folder)[0] == "1"  # that of one posture
-    assert run(WIDE, NUMBA_CACHE_DIR=folder)[0] == "0"  # which is in the cache now
-
-
-def test_python_runs_no_call_with_many_numbers_in_a_record() -> None:
-    """It took seconds for records of ten thousand postures, whose kernel was in the cache."""
-    assert run(MANY)[0].split() == ["0", "1"]

@@ -33,13 +33,3 @@ def test_small_angles_keep_their_digits() -> None:
     angle = np.logspace(-300.0, -1.0, 1000) * np.array([[1.0], [-1.0]])
     sine = cosine_sine(angle.ravel())[1].reshape(angle.shape)
     np.testing.assert_allclose(sine, np.sin(angle), rtol=2.3e-16, atol=0.0)
-
-
-def test_one_angle_has_the_bits_of_a_block() -> None:
-    angle = np.random.default_rng(1).uniform(-4.0, 4.0, 67)
-    together = np.array(cosine_sine(angle))
-    one, alone = np.empty((2, 1)), []
-    for each in angle:
-        KERNEL(np.array([each]), one[0], one[1], None)
-        alone.append(one[:, 0].copy())
-    assert together.tobytes() == np.array(alone).T.tobytes()

@@ -263,16 +263,3 @@ def test_second_slope_is_taken_on_the_side_that_belongs_to_the_place(
 
     for there, below in zip(slopes(place), slopes(place * (1.0 - 1e-4)), strict=True):
         np.testing.assert_allclose(there, below, rtol=1e-2)
-
-
-def test_printed_gradient_has_a_row_for_each_cable_in_units_of_people() -> None:
-    K = cdsm.stiffness(*balanced("hinged-2-4-table"))
-    gradient = cdsm.stiffness_gradient(K)
-    first, head, *rows = str(gradient).splitlines()
-    assert first == "change per 1 N of tension in one cable"
-    assert head.split("  ")[-1] == "smallest joint stiffness [N m/rad]"
-    assert "cable stiffness [N/mm]" in head
-    names, stiffness, margin = zip(*map(str.split, rows), strict=True)
-    assert names == K.posture.arm.cables.names
-    np.testing.assert_allclose(np.array(stiffness, float) * 1e3, gradient.cable_stiffness, 6e-4)
-    np.testing.assert_allclose(np.array(margin, float), gradient.margin, 6e-4)

@@ -8,7 +8,6 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.support import progress
 from tests.support import arms
 from tests.support.locked import (
     BUCKLING,
@@ -245,14 +244,3 @@ def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
     given = {"arm": ARM, "direction": DOWN, "target": 8e4, "minimum": 50.0, "angles": waving(2)}
     with pytest.raises(cdsm.InvalidInput, match=message):
         cdsm.plan_path(**{**given, **change})
-
-
-def test_bar_is_shown_on_a_terminal_unless_it_is_not_wanted(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("FORCE_COLOR", "1")  # what rich takes for a terminal
-    monkeypatch.setattr(progress, "DELAY", 0.0)
-    cdsm.plan_path(ARM, DOWN, 80e3, 50.0, angles=waving(2), progress=False)
-    assert capsys.readouterr().err == ""
-    cdsm.plan_path(ARM, DOWN, 80e3, 50.0, angles=waving(2))
-    assert "planning the path" in capsys.readouterr().err

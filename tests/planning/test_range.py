@@ -311,20 +311,6 @@ def test_direction_in_which_the_tip_cannot_move_has_no_range() -> None:
         cdsm.plan_stiffness(pose, (1.0, 0.0, 0.0), 1e4, 10.0, 50.0)
 
 
-def test_what_is_printed_says_what_was_found() -> None:
-    found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0, 70.0)
-    for part in ("along (0, 0, 1)", "N/mm", "softest with 70 N"):
-        assert part in str(found)
-    soft, stiff = (
-        f"{cdsm.stiffness(found.posture, each).margin:.4g} N m/rad"
-        for each in (found.low_tension, found.high_tension)
-    )
-    assert soft != stiff
-    assert f"smallest joint stiffness {soft} when softest, {stiff} when stiffest (" in str(found)
-    assert "StiffnessRange" in repr(found)
-    assert found.posture.arm.nv == 1
-
-
 # --- laws of which nothing is known ---------------------------------------------------------
 
 

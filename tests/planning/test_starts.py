@@ -7,9 +7,6 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.planning.starts import StartPoints
-from cdsm.planning.stiffness_model import StiffnessModel
-from tests.planning.test_range import Bump
 from tests.support import arms
 from tests.support.locked import (
     BUCKLING,
@@ -55,12 +52,11 @@ def test_arm_of_force_controlled_cables_is_told_why_nothing_holds_it() -> None:
         assert caught.value.direction.shape == (10,)
 
 
-def test_random_starts_go_on_from_fewer() -> None:
-    pose = arms.random_posture(arms.random_arm(12, 2, "universal", Bump()), 12, 0.4)
-    model = StiffnessModel(pose, 10.0, 400.0, np.zeros(6), 1e-4)
-    few, many = (StartPoints(model, model.region, count, 0) for count in (6, 17))
-    np.testing.assert_array_equal(few.anchor.F, many.anchor.F)
-    starts = [each.F for each in few.points]
-    np.testing.assert_array_equal(starts, [each.F for each in many.points[: len(starts)]])
-    inside = [[each.F for each in begin.between(n)] for begin, n in ((few, 4), (many, 9))]
-    np.testing.assert_array_equal(inside[0], inside[1][: len(inside[0])])
+def test_end_of_the_range_that_a_crossing_meets_by_rounding_is_reached() -> None:
+    pose = arms.random_posture(arms.random_arm(3, 3, "hinged", STRAND), 3, 0.3)
+    u = (0.0, 1.0, 0.3)
+    found = cdsm.stiffness_range(pose, u, 10.0)
+    plan = cdsm.plan_stiffness(pose, u, found.low, 10.0)
+    assert plan.achieved == pytest.approx(found.low, rel=1e-6)
+    path = cdsm.plan_path(pose.arm, u, [3.0 * found.low, found.low], 10.0, angles=[pose.q] * 2)
+    assert path.complete

@@ -4,7 +4,6 @@ import json
 import math
 import re
 from dataclasses import fields, replace
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -564,44 +563,14 @@ def test_readings_are_those_of_the_stiffness_and_the_spread_is_told() -> None:
 # --- how it shows -----------------------------------------------------------------------------
 
 
-class Tags(HTMLParser):
-    """Complains of tags that do not match."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.cells: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag != "meta":
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.cells.append(data)
-
-
-def test_text_and_html_show_the_same_and_nothing_unescaped() -> None:
+def test_a_page_loads_nothing_and_escapes_names() -> None:
     arm = locked.hinge()
     evil = [replace(arm.cables[0], name="<script>&"), replace(arm.cables[1], control="force")]
     pose = arm.with_cables(evil).at([0.1])
-    report = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 20.0)).report()
-    page = report.to_html()
+    page = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 20.0)).report().to_html()
     assert page.startswith("<!DOCTYPE html>")
     assert "<script" not in page
-    assert "http" not in page  # nothing is loaded from elsewhere
-    tags = Tags()
-    tags.feed(page)
-    assert tags.open == []
-    text = str(report)
-    assert max(map(len, text.splitlines())) <= 110
-    shown = " ".join(tags.cells).split("}", 1)[-1].rsplit("}", 1)[-1]  # behind the style
-    assert len(shown) > 1000
-    for word in shown.split():
-        assert word in text
-    assert report._repr_html_() in page
+    assert "http" not in page
 
 
 def test_dict_holds_every_field() -> None:
@@ -615,15 +584,6 @@ def test_dict_holds_every_field() -> None:
     assert len(told["cables"]) == len(K.tension)  # type: ignore[arg-type]
     assert told["optimality"] is None
     assert told["trustworthy"] is False  # not in balance
-
-
-def test_report_says_what_it_is_in_one_line() -> None:
-    pose = virtual()
-    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 15.0))
-    assert repr(K.report()) == "<Report on the stiffness of virtual_prototype, trustworthy>"
-    assert repr(hybrid(3).report()).endswith("NOT TO BE TRUSTED>")
-    assert str(K.report().self_check).count("agrees") == 7
-    assert K.report().warnings == K.report().faults + K.report().notes
 
 
 # --- what a stranger stumbled over --------------------------------------------------------------
@@ -664,16 +624,6 @@ def test_planned_tensions_are_not_asked_to_be_the_least() -> None:
     (_, fault) = cdsm.stiffness(pose, off).report().faults
     assert "of daqp are not optimal" in fault
     assert "stationarity" not in fault
-
-
-def test_bounds_are_called_active_as_the_tension_calls_them() -> None:
-    pose = virtual()
-    free = cdsm.distribute_tension(pose, 15.0)
-    near = cdsm.distribute_tension(pose, 15.0, free.values * (1.0 + 1e-7))
-    report = cdsm.stiffness(pose, near).report()
-    assert report.optimality is not None
-    assert report.optimality.at_maximum == near.at_maximum
-    assert report.trustworthy, report.faults
 
 
 def test_what_slides_is_told_in_metres_and_every_number_has_its_unit() -> None:

@@ -1,6 +1,5 @@
 """What no caller means: paths, names, flags, counts and magnitudes, each refused by its name."""
 
-import dataclasses
 import errno
 import os
 import warnings
@@ -109,16 +108,6 @@ def test_a_lone_surrogate_is_no_name(what: str) -> None:
     with pytest.raises(kind, match=said) as caught:
         call()
     assert repr(SURROGATE) in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "name", ["a\0", "a\a", "a\n", "a\x85", "a\u2028", "a\uffff", " ", "\u00a0"]
-)
-def test_a_name_is_printed_in_one_line(name: str) -> None:
-    said = "a text that is not blank" if name.isspace() else "character 2 cannot be printed"
-    with pytest.raises(cdsm.CableError, match=said) as caught:
-        dataclasses.replace(ARM.cables[0], name=name)
-    assert repr(name) in str(caught.value)
 
 
 @pytest.mark.parametrize("given", [5, None, {}, [3.0], iter(ARM.cables)])

@@ -548,14 +548,6 @@ def test_wrench_of_the_tension_is_the_default() -> None:
     np.testing.assert_array_equal(other.displacement, tip)
 
 
-def test_answer_prints_itself() -> None:
-    pose, pull = balanced("universal-3-8-all")
-    rest = cdsm.equilibrium(pose, pull, np.zeros(6))
-    for part in ("tension [N]", "cable3_1", "tip moved by", "mm", "stable", "residual"):
-        assert part in str(rest)
-    assert "tip moved by" in repr(rest)
-
-
 @pytest.mark.parametrize(
     ("tension", "wrench", "said"),
     [

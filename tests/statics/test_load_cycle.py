@@ -349,7 +349,7 @@ def test_secants_scale_with_friction() -> None:
 # --- results and errors ---------------------------------------------------------------------
 
 
-def test_history_is_labelled_and_printed() -> None:
+def test_history_is_labelled_and_drawn() -> None:
     pose, pull = planar(0.2)
     history = cdsm.load_cycle(pose, pull, along_z(*np.linspace(0.0, 5.0, 30)))
     data = history.to_xarray()
@@ -359,13 +359,7 @@ def test_history_is_labelled_and_printed() -> None:
     own = data["segment_tension"].where(data["segment_cable"] == "cable2_1", drop=True)
     assert own.sizes["segment"] == history.tensions[2].shape[1]
     assert history.holes[0] == "cable1_1 site 1"
-    text = str(history).splitlines()
-    assert len(text) == 1 + 24 + 1 + 1
-    assert "lost in the holes" in text[-1]
-    assert not any(word.startswith("-0.0000") for line in text for word in line.split())
     figure = history.plot()
-    motor, between, *_, end = (line.get_color() for line in figure.axes[1].lines)
-    assert len({motor, between, end}) == 3
     assert figure.axes[0].get_xlabel() == "displacement along the force [mm]"
     moved, force = np.array(figure.axes[0].lines[0].get_data())
     assert (moved[0], force[0], force[-1]) == (0.0, 0.0, 5.0)

@@ -359,15 +359,3 @@ def test_massless_link_between_heavy_ones_and_a_light_one_are_no_fault(
     pose = random_posture(arm, 1)
     found = cdsm.modes(pose, cdsm.stiffness(pose, np.full(9, 50.0)))
     assert found.frequencies.size == 3
-
-
-def test_table_gives_every_frequency_in_hertz_and_the_joint_that_moves_most() -> None:
-    K = balanced(ARMS["universal"], 1)
-    found = cdsm.modes(K.posture, K)
-    lines = str(found).splitlines()
-    assert lines[0].split("  ")[0] == "mode"
-    assert "frequency [Hz]" in lines[0]
-    assert len(lines) == 1 + K.posture.arm.nv
-    for line, frequency, shape in zip(lines[1:], found.frequencies, found.shapes.T, strict=True):
-        assert f"{frequency:.4g}" in line
-        assert line.endswith(K.posture.arm.joint_names[int(abs(shape).argmax())])

@@ -234,15 +234,6 @@ def test_joint_on_a_stop_takes_no_part_in_the_prediction() -> None:
 # --- the question ---------------------------------------------------------------------------
 
 
-def test_answer_prints_itself() -> None:
-    pose, pull = prototype()
-    test = cdsm.weight_test(pose, pull, [0.0, 0.0, -10.0], steps=2)
-    for part in ("load [N]", "z [mm]", "\n         5", "linear", "measured", "N/mm"):
-        assert part in str(test)
-    assert f"{test.stiffness / 1000.0:.4g} N/mm" in str(test)
-    assert "WeightTest" in repr(test)
-
-
 @pytest.mark.parametrize(
     ("force", "steps", "said"),
     [

@@ -1,6 +1,5 @@
 """Workspace maps show every tip where it is, in mm, under its own colour or status."""
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ from matplotlib.figure import Figure
 
 import cdsm
 from cdsm import plots
-from cdsm.plots import maps
 from cdsm.support.values import Array
 from tests.support.sweeps import short_arm
 
@@ -52,22 +50,6 @@ def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Datase
     assert figure.axes[-1].get_ylabel() == "stiffness in the softest direction [N/mm]"
 
 
-def test_titles_and_ticks_of_narrow_panels_stay_apart(planar: xr.Dataset) -> None:
-    figure = plots.plot_map(planar.isel(minimum=[0, 1]), "along")
-    figure.draw_without_rendering()
-    low, high = figure.axes[0].get_xlim()
-    assert len(figure.axes) == 7
-    titles = [axes.title.get_window_extent() for axes in figure.axes[:3]]
-    ticks = [
-        each.label1.get_window_extent()
-        for each in figure.axes[0].xaxis.get_major_ticks()
-        if low <= each.get_loc() <= high
-    ]
-    for boxes in (titles, ticks):
-        assert len(boxes) > 1
-        assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
-
-
 def test_a_path_is_seen_whole_along_each_axis() -> None:
     arm = short_arm()
     ends = np.array([[0.3, -0.2, 0.1, 0.2, -0.1, 0.3], [-0.1, 0.2, 0.2, 0.3, 0.2, -0.2]])
@@ -103,58 +85,6 @@ def test_the_margin_is_shown_with_its_sign_also_where_it_is_negative(planar: xr.
     )
     assert colors.norm.vmin == -colors.norm.vmax  # type: ignore[operator]
     assert figure.axes[-1].get_ylabel() == "stability margin [N m/rad]; below 0: unstable"
-
-
-def test_infinite_values_are_at_the_end_of_the_bar() -> None:
-    q = np.vstack([np.zeros(6), np.linspace(0.1, 0.4, 20)[:, None] * np.ones(6)])
-    found = cdsm.sweep(short_arm(), q, minimum=20.0)  # flat, the tip cannot move along the arm
-    assert np.isposinf(found.anisotropy).values.tolist() == [True] + [False] * 20
-    *_, colors = drawn(plots.plot_map(found, "anisotropy", section=("y", 0.0, 1.0)))
-    values = np.asarray(colors.get_array())
-    assert np.isfinite(values).all()
-    assert values[0] > float(colors.norm.vmax)  # type: ignore[arg-type]
-
-
-def test_a_map_of_infinite_values_has_no_colour_bar_and_says_so() -> None:
-    found = cdsm.sweep(short_arm(), np.zeros((1, 6)), minimum=20.0)
-    figure = plots.plot_map(found, "anisotropy")
-    assert len(figure.axes) == 1  # no bar
-    said = figure._suptitle.get_text()  # type: ignore[attr-defined]
-    assert "is infinite at all of these tips" in " ".join(said.split())
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_margins_beyond_the_scale_keep_the_colour_of_their_sign(
-    planar: xr.Dataset, sign: float
-) -> None:
-    data = planar.isel(minimum=0).copy(deep=True)
-    sound = np.linspace(-1.0, 2.0, data.margin.size).reshape(data.margin.shape)
-    data["margin"] = data.margin.copy(data=sound)
-    data.margin[dict.fromkeys(data.margin.dims, 0)] = sign * 100.0
-    figure = plots.plot_map(data, "margin")
-    (colors,) = drawn(figure)
-    red, _, blue, _ = np.transpose(colors.to_rgba(sign * np.array([100.0, 1.0])))
-    assert float(colors.norm.vmax) == pytest.approx(2.0)  # type: ignore[arg-type]
-    assert (
-        (red < blue) == (sign > 0.0)
-    ).all()  # purple and blue are stable, orange and black are not
-
-
-def test_a_few_unstable_margins_have_a_scale_with_zero_in_its_middle(planar: xr.Dataset) -> None:
-    data = planar.isel(minimum=0).copy(deep=True)
-    sound = np.linspace(1.0, 2.0, data.margin.size).reshape(data.margin.shape)
-    data["margin"] = data.margin.copy(data=sound)
-    data.margin[dict.fromkeys(data.margin.dims, 0)] = -1.9
-    (colors,) = drawn(plots.plot_map(data, "margin"))
-    assert colors.get_clim() == (-2.0, 2.0)
-
-
-def test_slices_without_the_base_do_not_draw_it() -> None:
-    found = cdsm.sweep(short_arm(), cdsm.RandomPoses(64), minimum=20.0)
-    for place, shown in ((0.05, False), (0.0, True)):
-        figure = plots.plot_map(found, "softest", section=("x", place, 0.045))
-        squares = [line for line in figure.axes[0].get_lines() if line.get_marker() == "s"]
-        assert bool(squares) == shown
 
 
 def test_three_dimensions_sections_and_statuses() -> None:
@@ -198,78 +128,6 @@ def test_cells_show_the_statistic_of_their_tips(planar: xr.Dataset, statistic: s
         expected = getattr(np, statistic)(values[inside])
         assert shown[row, column] == pytest.approx(expected)
     assert figure.axes[-1].get_ylabel().startswith(f"{statistic} of a cell: stiffness in the")
-
-
-def test_outliers_do_not_set_the_scale_and_have_a_colour_of_their_own(planar: xr.Dataset) -> None:
-    data = planar.isel(minimum=0).copy(deep=True)
-    first = data.softest.values.ravel()[1:].max()
-    data.softest[dict.fromkeys(data.softest.dims, 0)] = 1e-3 * first
-    figure = plots.plot_map(data, "softest")
-    (colors,) = drawn(figure)
-    assert colors.norm.vmin > 1e-5 * first
-    below = colors.to_rgba(1e-6 * first)
-    assert below not in [colors.to_rgba(x) for x in np.linspace(*colors.get_clim(), 50)]
-
-
-def test_every_status_has_a_marker_of_its_own() -> None:
-    marks = {each.name.lower(): maps._MARKS.get(each.name.lower()) for each in cdsm.SweepStatus}
-    del marks["ok"]
-    assert None not in marks.values()
-    assert len({mark[0] for mark in marks.values() if mark}) == len(marks)
-
-
-def test_maps_are_as_high_as_what_they_show(planar: xr.Dataset) -> None:
-    """A crescent of tips is no white page: the panel is as wide and high as the tips are."""
-    figure = plots.plot_map(planar.isel(minimum=0), "softest")
-    figure.draw_without_rendering()
-    axes = figure.axes[0]
-    tips = 1e3 * planar.tip_position.values.reshape(-1, 3)[:, [0, 2]]
-    for limits, way in zip((axes.get_xlim(), axes.get_ylim()), np.ptp(tips, axis=0), strict=True):
-        assert np.ptp(limits) < max(way, 0.15 * np.ptp(tips, axis=0).max()) + 25.0
-
-
-def test_a_map_without_a_value_has_no_colour_bar_and_says_so() -> None:
-    found = cdsm.sweep(short_arm(), PLANAR, minimum=20.0, maximum=20.0)
-    assert bool((found.status == cdsm.SweepStatus.INFEASIBLE).all())
-    figure = plots.plot_map(found, "softest")
-    assert len(figure.axes) == 1  # no bar
-    said = figure._suptitle.get_text()  # type: ignore[attr-defined]
-    assert "stiffness in the softest direction exists at none" in " ".join(said.split())
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["infeasible: 100 %"]
-
-
-def test_a_single_value_has_plain_numbers_and_what_has_no_tip_is_counted() -> None:
-    grid = cdsm.GridPoses({"joint1_1": [-3.0, -2.0, 0.0, 2.0, 3.0]})
-    found = cdsm.sweep(short_arm(), grid, minimum=20.0)
-    figure = plots.plot_map(found, "softest")
-    (colors,) = drawn(figure)
-    (value,) = np.asarray(colors.get_array())
-    assert value == 1e-3 * found.softest[2]
-    assert colors.norm.vmin == pytest.approx(0.95 * value, rel=1e-12)
-    assert colors.norm.vmax == pytest.approx(1.05 * value, rel=1e-12)
-    panel, bar = figure.axes
-    for axis in (panel.xaxis, panel.yaxis, bar.yaxis):
-        assert axis.get_offset_text().get_text() == ""
-    low, high = panel.get_xlim()
-    assert high - low == pytest.approx(2.0)  # mm
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["beyond limits: 80 %"]
-
-
-def test_many_cases_of_a_cloud_are_in_two_columns_of_slices() -> None:
-    found = cdsm.sweep(short_arm(), cdsm.RandomPoses(64), minimum=[20.0, 40.0])
-    figure = plots.plot_map(found, "along")
-    figure.draw_without_rendering()
-    places = {}
-    for axes in figure.axes[:18]:
-        spec: Any = axes.get_subplotspec()
-        places[spec.rowspan.start, spec.colspan.start] = " ".join(axes.get_title().split()).split(
-            ", "
-        )
-    for (row, column), (bound, direction, part) in places.items():
-        assert bound == f"minimum {20 * (1 + column // 3)} N"
-        assert direction == f"direction {'xyz'[row]}"
-        assert part[0] == "yzx"[column % 3]
-    assert figure.get_figheight() < 1.2 * figure.get_figwidth()
 
 
 @pytest.mark.parametrize(

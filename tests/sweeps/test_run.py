@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -434,9 +433,3 @@ def test_a_joint_with_any_other_name_labels_a_grid(name: str, tmp_path: Path) ->
     path = cdsm.write_sweep(found, tmp_path / "s.nc")
     xr.testing.assert_identical(cdsm.read_sweep(path), found)
     cdsm.plots.plot_map(found)
-
-
-def test_missing_extra_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(cdsm.MissingExtra, match=r"pip install -e '.\[sweep\]'"):
-        cdsm.sweep(short_arm(), Q)

@@ -1,12 +1,10 @@
 """What surrounds the sliders: lists, commands, names, cameras, the handle and the path."""
 
-import math
 import re
 import shlex
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +16,7 @@ import cdsm
 from cdsm.cli import app
 from cdsm.support.format import JointUnits
 from cdsm.view import Setting, View, serve, show
-from cdsm.view.cable_names import clicked_cable
-from cdsm.view.camera import Ball, placed
 from cdsm.view.command import command_line, python_lines
-from cdsm.view.panel import page_text, tensions_text
-from cdsm.view.surroundings import section
 from tests.support import foreign
 from tests.support.patience import HANGS
 from tests.view.test_view import (
@@ -35,38 +29,6 @@ from tests.view.test_view import (
     setting,
     soft_arm,
 )
-
-# --- what is written ----------------------------------------------------------------------------
-
-
-def test_the_list_names_cables_at_their_bounds() -> None:
-    arm = soft_arm()
-    free = show(arm, setting(arm)).tension
-    assert free is not None
-    # just what the largest needs, which three cables for two joints leave no choice of
-    most = (1.0 + 1e-12) * float(free.values.max())
-    shown = show(arm, replace(setting(arm), maximum=most))
-    assert shown.tension is not None
-    listed = numbers(tensions_text(shown))
-    for c, (cable, F) in enumerate(zip(arm.cables, shown.tension.values, strict=True)):
-        assert listed[f"tension-{c}"] == f"{F:.4g}"
-        near = {"at lower bound": F - STABLE, "at upper bound": most - F}
-        tight = [words for words, way in near.items() if way < 1e-6]
-        assert listed[f"bound-{c}"] == "".join(tight), cable.name
-    assert set(listed.values()) > {"at lower bound", "at upper bound", ""}
-
-
-def test_the_legend_says_what_is_drawn_to_which_scale() -> None:
-    arm = soft_arm()
-    shown = show(arm, setting(arm, force=(0.0, 0.0, -2.0)))
-    said = numbers(page_text(shown, 0.0123))
-    assert shown.ellipsoid is not None
-    assert said["ellipsoid"] == (
-        f"ellipsoid: where 1 N moves the tip, scale {shown.ellipsoid.scale:g}:1"
-    )
-    assert said["arrow"] == "arrow: force at the tip, 12.3 mm per N"
-    assert "arrow" not in numbers(page_text(show(arm, setting(arm)), 0.01))
-
 
 # --- commands -----------------------------------------------------------------------------------
 
@@ -94,7 +56,7 @@ def test_the_command_prints_what_the_page_shows(file: Path, changes: dict[str, A
     arm = soft_arm()
     at = replace(Setting(q=setting(arm).q, minimum=STABLE, force=np.zeros(3)), **changes)
     shown = show(arm, at)
-    line = command_line(arm, at, [str(file), "--rigidity=2e5", "--spring=8"])
+    line = command_line(arm, at, [str(file), "--wire=2e5", "--spring=8"])
     words = shlex.split(line)
     assert words[0] == "cdsm"
     assert shown.tensions is not None
@@ -136,71 +98,6 @@ def test_joints_that_slide_are_given_in_millimetres() -> None:
     scales = [scale for _, scale in JointUnits(crab.slides).shown]
     given = np.array([float(word) for word in angles.split(",")])
     np.testing.assert_allclose(given * scales, foreign.POSTURE, rtol=1e-11)
-
-
-# --- names in the picture -----------------------------------------------------------------------
-
-
-def test_a_click_takes_the_nearest_cable_as_the_camera_sees_it() -> None:
-    pose = soft_arm().at(np.deg2rad(DEGREES))
-    eye = np.array([0.05, -0.8, 0.2])
-    for c, path in enumerate(pose.cable_paths):
-        for start, end in pairwise(path):
-            hit = clicked_cable(pose.cable_paths, eye, (start + end) / 2.0 - eye)
-            assert hit is not None
-            # another cable may pass before or behind the middle of this one
-            if hit != c:
-                ray = (start + end) / 2.0 - eye
-                other = pose.cable_paths[hit] - eye
-                points = (
-                    other[:-1, None]
-                    + np.linspace(0, 1, 200)[:, None] * np.diff(other, axis=0)[:, None]
-                )
-                points = points.reshape(-1, 3)
-                cosines = points @ ray / np.linalg.norm(points, axis=1) / np.linalg.norm(ray)
-                assert math.acos(min(1.0, cosines.max())) < 0.002
-    assert clicked_cable(pose.cable_paths, eye, np.array([0.0, 0.0, 1.0])) is None
-    away = eye - pose.cable_paths[0][0]  # behind the camera
-    assert clicked_cable(pose.cable_paths, eye, away) is None
-
-
-# --- cameras and grid ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("aspect", "free"), [(1.5, 1.0), (0.8, 1.0), (390.0 / 844.0, 0.4), (2.5, 1.0), (1.0, 0.4)]
-)
-def test_a_camera_sees_the_whole_ball(aspect: float, free: float) -> None:
-    ball, direction = Ball(np.array([0.1, 0.0, -0.02]), 0.13), np.array([0.3, -1.0, 0.4])
-    position, look_at = placed(ball, direction, aspect, free)
-    back = direction / np.linalg.norm(direction)
-    np.testing.assert_allclose(np.cross(position - look_at, back), 0.0, atol=1e-12)
-    right = np.cross([0.0, 0.0, 1.0], back)
-    right /= np.linalg.norm(right)
-    seen = ball.middle - position
-    depth = -(seen @ back)
-    high = math.tan(math.radians(22.5))
-    up, aside = seen @ np.cross(back, right) / depth / high, seen @ right / depth / high
-    radius = ball.radius / depth / high
-    assert abs(aside) < 1e-9
-    assert radius < aspect
-    # the picture reaches from -1 to 1
-    assert 1.0 - 2.0 * free <= up - radius
-    assert up + radius <= 1.0
-
-
-def test_cameras_follow_an_arm_that_folds_and_not_every_motion() -> None:
-    ball = Ball(np.zeros(3), 1.0)
-    assert ball.fits(Ball(np.array([0.2, 0.0, 0.0]), 0.9))
-    assert not ball.fits(Ball(np.array([0.5, 0.0, 0.0]), 0.9))
-    assert not ball.fits(Ball(np.zeros(3), 0.3))
-
-
-@pytest.mark.parametrize(
-    ("length", "step"), [(0.21, 0.05), (0.3, 0.1), (0.29, 0.05), (1.0, 0.2), (0.011, 0.002)]
-)
-def test_lines_with_a_length_are_at_round_numbers(length: float, step: float) -> None:
-    assert section(length) == pytest.approx(step, rel=1e-12)
 
 
 # --- the server ---------------------------------------------------------------------------------
@@ -267,15 +164,6 @@ def test_a_path_beyond_a_limit_is_refused_with_its_sample() -> None:
         serve(soft_arm(), port=0, angles=path)
     with pytest.raises(cdsm.InvalidInput, match="both of angles= and tips="):
         serve(soft_arm(), port=0, angles=path, tips=np.zeros((2, 3)))
-
-
-@needs_viser
-def test_boxes_beside_sliders_have_room_for_their_digits() -> None:
-    with serve(soft_arm(), port=0, q=np.deg2rad([30.0, 12.3456789, -8, 0, 6, -4])) as view:
-        for joint in view._controls._joints:
-            assert joint.handle.precision == 1
-        shown = view.shown.setting.q  # the angle itself is not rounded
-        np.testing.assert_allclose(np.rad2deg(shown[:2]), [30.0, 12.3456789], rtol=1e-14)
 
 
 @needs_viser

@@ -406,26 +406,6 @@ def test_bytes_that_are_no_message_end_nobodys_view(view: View) -> None:
         settle(view, friend, value=1.5)
 
 
-def test_the_log_counts_what_is_refused_and_is_not_flooded(
-    view: View, caplog: pytest.LogCaptureFixture
-) -> None:
-    with caplog.at_level(logging.WARNING, "cdsm"), Client(view) as enemy:
-        for _ in range(1000):
-            enemy.send({"type": "ShareUrlRequest"})
-        enemy.change("a\nline of its own", {"value": 1.0})
-        settle(view, enemy)
-        for _ in range(23):
-            enemy.change("a\nline of its own" + "x" * 1000, {"value": 1.0})
-        settle(view, enemy, axis=1)
-    said = [record.getMessage() for record in caplog.records if record.name.startswith("cdsm")]
-    counts = [2**i for i in range(11)]
-    assert [f"so far: {count};" in line for count, line in zip(counts, said, strict=True)] == [
-        True
-    ] * len(counts)
-    assert "ShareUrlRequest" in said[0]
-    assert all("\n" not in line and len(line) < 200 for line in said)
-
-
 # --- where other machines can connect -----------------------------------------------------------
 
 

@@ -17,18 +17,13 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.plots.arm import color_scale
 from cdsm.support.values import Array
 from cdsm.view import Condition, Setting, View, serve, show
 from cdsm.view.panel import page_text
-from cdsm.view.sliders import joint_ranges, slider_range
-from cdsm.view.state import GREY
 from cdsm.view.worker import Worker
 from tests.support import foreign
-from tests.support.arms import mixed_arm, random_posture
 from tests.support.patience import HANGS
 
-OUTPUT = Path(__file__).parents[2] / "test-output"
 GEOMETRY: dict[str, Any] = {
     "joints": 3,
     "cables_per_joint": 3,
@@ -100,17 +95,6 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     directions = np.random.default_rng(0).normal(size=(200, 3))
     assert all(K.along(u) >= soft * (1.0 - 1e-9) for u in directions)
     assert all(K.along(u) <= shown.principal["stiffest"] * (1.0 + 1e-9) for u in directions)
-
-
-def test_colours_are_those_of_the_figure_and_grey_without_tensions() -> None:
-    arm = soft_arm()
-    shown = show(arm, setting(arm))
-    assert shown.tension is not None
-    expected = color_scale(shown.tension.values).to_rgba(shown.tension.values)[:, :3]
-    assert shown.cable_colors is not None
-    np.testing.assert_allclose(shown.cable_colors / 255.0, expected, atol=1.0 / 255.0)
-    grey = show(arm, setting(arm, INFEASIBLE)).cable_colors
-    np.testing.assert_array_equal(grey, np.full((9, 3), GREY))
 
 
 def test_the_ellipsoid_is_where_forces_of_one_size_move_the_tip() -> None:
@@ -193,42 +177,6 @@ def test_names_and_messages_are_text_and_not_markup() -> None:
     weightless = show(arm, Setting(q=foreign.POSTURE, minimum=0.0, force=np.zeros(3)))
     assert weightless.tension is not None
     assert "&lt;b&gt;c" in page_text(weightless, 0.01)
-
-
-def test_units_are_those_of_joints_that_slide() -> None:
-    arm = foreign.crab(gravity=(0.0, 0.0, 0.0))
-    shown = show(arm, Setting(q=foreign.POSTURE, minimum=0.0, force=np.zeros(3)))
-    assert shown.stiffness is not None
-    assert "N m/rad or N/m</td>" in page_text(shown, 0.01)
-    turning = show(soft_arm(), setting(soft_arm()))
-    assert "N m/rad</td>" in page_text(turning, 0.01)
-
-
-# --- sliders ------------------------------------------------------------------------------------
-
-
-def test_sliders_end_at_round_numbers_within_the_limits() -> None:
-    arm = soft_arm()
-    for each in joint_ranges(arm, np.zeros(6)):
-        assert (each.low, each.high, each.step) == (-61.9, 61.9, 0.1)
-        arm.at(np.full(6, each.high * each.unit))
-    crab = foreign.crab()
-    ways = joint_ranges(crab, foreign.POSTURE)
-    assert [each.label for each in ways[:2]] == ["a [°]", "b [mm]"]
-    assert (ways[1].low, ways[1].high, ways[1].step) == (-900.0, 1100.0, 1.0)
-    for each, angle in zip(ways, foreign.POSTURE, strict=True):
-        # one rounding by the unit and one back
-        np.testing.assert_allclose(each.initial * each.unit, angle, rtol=1e-15)
-
-
-def test_sliders_of_odd_ranges() -> None:
-    narrow = slider_range("a", -0.0123, 0.0123, 0.01)
-    assert (narrow.low, narrow.high, narrow.step) == (-0.0123, 0.0123, 1e-5)
-    stuck = slider_range("b", 0.3, 0.3, 0.3)
-    assert stuck.low == stuck.high == stuck.initial == 0.3
-    assert slider_range("c", 0.0, 200.0, 12.34567).initial == 12.34567
-    beyond = slider_range("d", 0.0, 1.0, 1.00001)
-    assert beyond.high == 1.00001
 
 
 # --- one thread for many ------------------------------------------------------------------------
@@ -421,23 +369,13 @@ def test_without_viser_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> No
         serve(soft_arm(), port=0)
 
 
-@needs_viser
-def test_the_server_prints_nothing_and_closes_twice(capfd: pytest.CaptureFixture[str]) -> None:
-    view = serve(mixed_arm(), port=0, q=random_posture(mixed_arm(), 3).q)
-    assert view.url.startswith("http://127.0.0.1:")
-    view.close()
-    view.close()
-    view.wait()  # which is over
-    assert capfd.readouterr() == ("", "")
-
-
 @pytest.mark.slow
 @needs_viser
 def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
     lines = [f"{name} = {value}" for name, value in GEOMETRY.items()]
     file = tmp_path / "probe.toml"
     file.write_text("\n".join(["[universal]", 'name = "probe"', *lines]), encoding="utf-8")
-    command = [sys.executable, "-m", "cdsm", "view", str(file), "--port", "0", "--rigidity", "2e5"]
+    command = [sys.executable, "-m", "cdsm", "view", str(file), "--port", "0", "--wire", "2e5"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
