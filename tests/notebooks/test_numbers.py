@@ -94,9 +94,6 @@ def weights_and_buckling(nb: Shown) -> None:
     mean = (sum(tangents) - (tangents[0] + tangents[-1]) / 2.0) / len(nb.hung.loaded)
     assert abs(mean * nb.hung.stiffness - 1.0) < 1e-3
     assert nb.stiffens_from == {0.1: 9.25, 0.25: 22.75, 0.33: 29.75}
-    assert all(rest.stable for rest in nb.buckled.rests)
-    moved = np.linalg.norm(nb.buckled.displacements, axis=1)
-    assert moved[nb.buckled.bounds < nb.critical.minimum].max() < 0.01 < moved[-1]
     # at the end ω² falls in proportion to what is left: four times as near, half as fast
     lowest = [nb.lowest_frequency((1 - part) * nb.critical.minimum) for part in (4e-3, 1e-3)]
     assert abs(lowest[0] / lowest[1] - 2.0) < 0.02

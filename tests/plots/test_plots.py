@@ -506,24 +506,3 @@ def test_ranges_of_many_directions_are_a_polar_diagram() -> None:
     tilted = cdsm.stiffness_range(pose, [0.5, 0.5, 0.5], 10.0, 100.0, starts=2)
     with pytest.raises(cdsm.InvalidInput, match="no plane of two base axes"):
         plots.plot_stiffness_ranges({"a": [tilted]})
-
-
-def test_bifurcation_is_where_buckling_was_found() -> None:
-    geometry = cdsm.presets.experimental_prototype_geometry()
-    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e9), series_stiffness=1890.0)
-    pose = cdsm.Manipulator(geometry, cables=cables, gravity=(0, 0, 0)).at(np.zeros(3))
-    critical = cdsm.critical_tension(pose)
-    found = cdsm.bifurcation(critical, bounds=critical.minimum * np.array([0.9, 1.0 - 1e-3, 1.2]))
-    moved = np.linalg.norm(found.displacements, axis=1)
-    # linear below: 1 mN over the stiffness along the push
-    pull = cdsm.distribute_tension(pose, 0.9 * critical.minimum)
-    along = cdsm.stiffness(pose, pull).along(found.push[:3])
-    assert moved[0] == pytest.approx(1e-3 / along, rel=0.05)
-    assert moved[2] > 0.01 > 20.0 * moved[0]
-    assert len(found.to_pandas()) == 3
-    assert found.to_dict()["critical_minimum_tension_N"] == critical.minimum
-    (axes,) = found.plot().axes
-    np.testing.assert_allclose(_shown(axes.get_lines()[0])[1], 1e3 * moved)
-    stiff = cdsm.presets.virtual_prototype().at(np.full(10, 0.1))
-    with pytest.raises(cdsm.InvalidInput, match="an arm that buckles is needed"):
-        cdsm.bifurcation(cdsm.critical_tension(stiff))

@@ -195,7 +195,6 @@ VALUES: dict[str, Any] = {
     "Tolerances": cdsm.Tolerances(rigidity=0.05, lead=cdsm.Tolerance(1e-3, correlation=np.eye(9))),
     "Cables": POSE.arm.cables,
     "Remedy": UNSTABLE.remedies[0],
-    "Bifurcation": cdsm.bifurcation(cdsm.critical_tension(SOFT), bounds=[10.0, 11.0]),
     "TensileFit": FIT,
     "TensileTest": FIT.test,
     "Measurement": MEASURED[0],
