@@ -19,8 +19,6 @@ from cdsm.control.mujoco_plant import MuJoCoPlant as MuJoCoPlant
 from cdsm.control.plant import SlowPlant as SlowPlant
 from cdsm.control.run import TrackingRun as TrackingRun
 from cdsm.control.sensors import Sensors as Sensors
-from cdsm.control.tip_force import TipForce as TipForce
-from cdsm.control.tip_force import tip_force as tip_force
 from cdsm.control.track import track as track
 from cdsm.design.evaluation import Designs as Designs
 from cdsm.design.evaluation import evaluate_designs as evaluate_designs

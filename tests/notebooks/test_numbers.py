@@ -207,7 +207,7 @@ def is_it_true(nb: Shown) -> None:
 def closed_loop(nb: Shown) -> None:
     assert nb.plan.complete
     assert all(run.outcome == "completed" for run in nb.runs.values())
-    worst = {law: abs(reading / nb.wanted - 1.0).max() for law, reading in nb.readings.items()}
+    worst = {law: abs(run.stiffness_error).max() for law, run in nb.runs.items()}
     assert worst["stiffness"] < 0.05
     assert abs(worst["feedforward"] - 0.79) < 0.02
     assert abs(worst["tension"] - 0.10) < 0.03
@@ -218,8 +218,6 @@ def closed_loop(nb: Shown) -> None:
         assert (tried.commanded_tension <= 250.0).all()
     assert nb.stiff.proved.sum() == nb.stiff.banded.sum() == 9
     assert nb.runs["feedforward"].proved.sum() < 9
-    assert 0.05 < np.nanmax(abs(nb.stiff.felt / nb.stiff.stiffness - 1.0)) < 0.2
-    assert nb.felt["no friction"] < 4.0
     assert abs(nb.stiff.rigidity[-1] - 0.9) < 1e-3
     assert abs(nb.force[2] + 0.2 * 9.81) < 0.2
     assert nb.stiff.tip_error.max() < 1e-3 < nb.runs["tension"].tip_error.max()
