@@ -96,7 +96,6 @@ from cdsm.measures.wire_use import WireUse as WireUse
 from cdsm.measures.wire_use import wire_use as wire_use
 from cdsm.planning.gradient import StiffnessGradient as StiffnessGradient
 from cdsm.planning.gradient import stiffness_gradient as stiffness_gradient
-from cdsm.planning.half_way import HalfWay as HalfWay
 from cdsm.planning.path import plan_path as plan_path
 from cdsm.planning.path_plan import InfeasibleSample as InfeasibleSample
 from cdsm.planning.path_plan import PathPlan as PathPlan

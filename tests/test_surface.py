@@ -265,9 +265,6 @@ RESULTS: dict[str, Any] = {
         200.0,
         angles=[POSE.q, 9.0 * POSE.q],
     ),
-    "HalfWay": cdsm.plan_path(
-        POSE.arm, (0.0, 0.3, 1.0), K.along((0.0, 0.3, 1.0)), 10.0, 200.0, angles=[POSE.q] * 2
-    ).between[0],
     "Saturation": cdsm.saturation(POSE, (0.0, 0.3, 1.0), 10.0, 200.0),
     "Uncertainty": cdsm.uncertainty(POSE, PULL, TOLERANCES, direction=(0.0, 0.3, 1.0)),
     "MonteCarlo": cdsm.monte_carlo(

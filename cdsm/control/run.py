@@ -116,7 +116,7 @@ class TrackingRun(ReadOnlyState):
     @property
     def directions(self) -> Array:
         """Wanted directions u (D, 3), base axes."""
-        return self.plan.direction.reshape(-1, 3)  # type: ignore[union-attr]
+        return self.plan.direction.reshape(-1, 3)
 
     @cached_property
     def tip_error(self) -> Array:

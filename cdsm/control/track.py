@@ -85,8 +85,8 @@ def track(
         seed: Seed of the noise; the same seed gives the same run, bit for bit.
 
     Raises:
-        InvalidInput: The plan is not complete, or is for ``cartesian`` instead of directions; or
-            another argument is invalid; or a law returns no :class:`Command` within the bounds.
+        InvalidInput: The plan is not complete; or another argument is invalid; or a law returns no
+            :class:`Command` within the bounds.
         UnknownName: There is no such law or cable.
     """
     arm = checked_plan(instance("plan", plan, PathPlan))

