@@ -45,7 +45,7 @@ def along_constraints(model: StiffnessModel, directions: Array, targets: Array) 
 
 
 def achieved(K: Stiffness, directions: Array) -> Array:
-    """Return ``K.along(u)`` [N/m] of each direction u: () for ``directions`` (3,), (n,) for (n, 3)."""
+    """Return ``K.along(u)`` [N/m] of each of the ``directions`` (3,) or (n, 3): () or (n,)."""
     along = [K.along(u) for u in directions.reshape(-1, 3)]
     return frozen(np.array(along).reshape(directions.shape[:-1]))
 

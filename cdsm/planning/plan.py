@@ -139,8 +139,8 @@ def plan_stiffness(
     The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
     position-controlled cables, and the limit of the smallest eigenvalue λ_min of K_θ (symmetric
     part) that follows from ``margin``. The target of one direction is hit within 1e-6 of its value;
-    otherwise an error is raised. The targets of several directions are hit if possible. If not, the tensions have the least sum of squared relative misses that was found, and
-    ``reached`` is False.
+    otherwise an error is raised. The targets of several directions are hit if possible. If not, the
+    tensions have the least sum of squared relative misses that was found, and ``reached`` is False.
 
     The searches are local. With the laws of this library they usually end at the same effort ‖F‖.
     With one user-defined law, the effort found was 3.6 % above the least. If ``spread`` is above
