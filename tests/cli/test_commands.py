@@ -16,7 +16,6 @@ from typer.testing import CliRunner, Result
 import cdsm
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.cli import app, options
-from cdsm.kernels.breakaway import set_breakaway
 from cdsm.kernels.distribution import search_tensions
 from cdsm.tension import DEFAULT_SOLVER
 from tests.interchange.test_caspr import cable, folder, link
@@ -641,7 +640,7 @@ def test_warm_compiles_all_kernels_and_says_how_long_it_took() -> None:
     result = call("warm")
     assert result.exit_code == 0, result.output
     assert "kernels are compiled" in result.output
-    kernels: tuple[Any, ...] = (evaluate_rows, search_tensions, set_breakaway)
+    kernels: tuple[Any, ...] = (evaluate_rows, search_tensions)
     assert all(kernel.signatures for kernel in kernels)
 
 

@@ -159,7 +159,7 @@ def test_sliding_stiffness_is_the_derivative_of_the_torque(name: str, control: s
 @pytest.mark.slow
 def test_stuck_arms_are_never_softer() -> None:
     for seed in range(200):
-        assert order.least(seed, postures=5) >= -order.ROUNDING, seed
+        assert order.least(seed) >= -order.ROUNDING, seed
 
 
 @pytest.mark.long
@@ -213,10 +213,6 @@ def test_law_of_a_cable_without_friction_is_not_asked_where_its_motor_holds_the_
         load = cdsm.breakaway(pose, F, "z").load
         band = cdsm.rest_band(pose, F, "z").first_order
         found.append([load, band, *cdsm.stuck_stiffness(pose, F).joint.ravel()])
-        batch = cdsm.evaluate(mixed, pose.q[None], F[None], outputs=("stuck_joint",))[
-            "stuck_joint"
-        ][0]
-        np.testing.assert_allclose(batch.ravel(), found[-1][2:], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-9)
     # with friction beyond the motor, segments of this cable are springs, and its law is asked
     rough_arm = arm.with_cables([replace(first, control="force"), *others])

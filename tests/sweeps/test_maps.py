@@ -108,8 +108,8 @@ def test_the_margin_is_shown_with_its_sign_also_where_it_is_negative(planar: xr.
 def test_infinite_values_are_at_the_end_of_the_bar() -> None:
     q = np.vstack([np.zeros(6), np.linspace(0.1, 0.4, 20)[:, None] * np.ones(6)])
     found = cdsm.sweep(short_arm(), q, minimum=20.0)  # flat, the tip cannot move along the arm
-    assert np.isposinf(found.anisotropy).values.tolist() == [True] + [False] * 20
-    *_, colors = drawn(plots.plot_map(found, "anisotropy", section=("y", 0.0, 1.0)))
+    assert np.isposinf(found.stiffest).values.tolist() == [True] + [False] * 20
+    *_, colors = drawn(plots.plot_map(found, "stiffest", section=("y", 0.0, 1.0)))
     values = np.asarray(colors.get_array())
     assert np.isfinite(values).all()
     assert values[0] > float(colors.norm.vmax)  # type: ignore[arg-type]
@@ -117,7 +117,7 @@ def test_infinite_values_are_at_the_end_of_the_bar() -> None:
 
 def test_a_map_of_infinite_values_has_no_colour_bar_and_says_so() -> None:
     found = cdsm.sweep(short_arm(), np.zeros((1, 6)), minimum=20.0)
-    figure = plots.plot_map(found, "anisotropy")
+    figure = plots.plot_map(found, "stiffest")
     assert len(figure.axes) == 1  # no bar
     said = figure._suptitle.get_text()  # type: ignore[attr-defined]
     assert "is infinite at all of these tips" in " ".join(said.split())
