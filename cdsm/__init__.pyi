@@ -60,7 +60,6 @@ from cdsm.friction.band import RestBand as RestBand
 from cdsm.friction.band import rest_band as rest_band
 from cdsm.friction.breakaway import Breakaway as Breakaway
 from cdsm.friction.breakaway import breakaway as breakaway
-from cdsm.friction.stuck import sliding_stiffness as sliding_stiffness
 from cdsm.friction.stuck import stuck_stiffness as stuck_stiffness
 from cdsm.geometry import CableRoute as CableRoute
 from cdsm.geometry import Geometry as Geometry

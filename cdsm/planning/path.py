@@ -117,7 +117,6 @@ def plan_path(
     flag("progress", progress)
 
     near = guess
-    models: list[StiffnessModel] = []
     infeasible: list[InfeasibleSample | None] = []
     for i in track(range(size), "planning the path", wanted=progress):
         try:
@@ -129,7 +128,6 @@ def plan_path(
                     continue
                 q = near = solved.angles
             model = StiffnessModel(arm.at(q), minimum, maximum, loads[i], margin)
-            models.append(model)
             constraints = target_constraints(model, directions, targets[i])
             sample = Sample(i, model, constraints, model.region.least.values)
             infeasible.append(follower.add(sample))
@@ -151,7 +149,6 @@ def plan_path(
         achieved=frozen(values.reshape(-1, *tail)),
         stiffness=tuple(found),
         infeasible=tuple(each for each in infeasible if each is not None),
-        iterations=sum(model.iterations for model in models),
     )
 
 

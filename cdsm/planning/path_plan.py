@@ -70,7 +70,6 @@ class PathPlan(ReadOnlyState):
         achieved: ``stiffness.along``, (P,) or (P, n) [N/m].
         stiffness: K_θ at each planned sample, with its posture and wrench.
         infeasible: The samples that are not planned, each with its reason.
-        iterations: Iterations of all searches.
     """
 
     arm: Manipulator
@@ -83,7 +82,6 @@ class PathPlan(ReadOnlyState):
     achieved: Array
     stiffness: tuple[Stiffness, ...]
     infeasible: tuple[InfeasibleSample, ...]
-    iterations: int
 
     @property
     def complete(self) -> bool:
@@ -154,7 +152,6 @@ class PathPlan(ReadOnlyState):
                 {"index": sample.index, "status": sample.status, "reason": sample.reason}
                 for sample in self.infeasible
             ],
-            "iterations": self.iterations,
         }
         return plain(numbers)
 

@@ -25,7 +25,7 @@ from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.format import MODEL, coordinates, key, plain
 from cdsm.support.progress import progress_allowed
 from cdsm.support.validation import NO_WRENCH
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
@@ -45,12 +45,6 @@ class StiffnessPlan(ReadOnlyState):
         direction: Unit directions u in base axes, (3,) or (n, 3).
         target: The target [N/m]: a number, or one per direction (n,).
         achieved: ``stiffness.along`` () or (n,) [N/m].
-        floor: Limit of the smallest eigenvalue of K_θ; below it an arm counts as unstable
-            [N m/rad].
-        efforts: ‖F‖ (S,) [N] at the end of each search that hit the target, ascending. The first
-            belongs to ``tension``.
-        iterations: Iterations of all searches.
-        evaluations: Number of evaluations of K_θ.
     """
 
     tension: Tension
@@ -58,10 +52,6 @@ class StiffnessPlan(ReadOnlyState):
     direction: Array
     target: float | Array
     achieved: float | Array
-    floor: float
-    efforts: Array
-    iterations: int
-    evaluations: int
 
     @property
     def misfit(self) -> float:
@@ -75,11 +65,6 @@ class StiffnessPlan(ReadOnlyState):
         It is always True for one direction: otherwise :func:`plan_stiffness` raises an error.
         """
         return self.misfit <= REACHED
-
-    @property
-    def spread(self) -> float:
-        """(Largest − least)/least of ``efforts`` [-]; 0 if all searches end at the same ‖F‖."""
-        return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
 
     def plot(self, attainable: StiffnessRange | None = None) -> Figure:
         """Plot the planned tensions [N] of each cable.
@@ -101,8 +86,6 @@ class StiffnessPlan(ReadOnlyState):
             "cable_length_m": dict(zip(self.tension, pose.cable_lengths, strict=True)),
             **pose._coordinates,
             key("margin", pose.arm.stiffness_unit()): self.stiffness.margin,
-            "efforts_N": self.efforts,
-            "iterations": self.iterations,
         }
         return plain(numbers)
 
@@ -142,10 +125,8 @@ def plan_stiffness(
     otherwise an error is raised. The targets of several directions are hit if possible. If not, the
     tensions have the least sum of squared relative misses that was found, and ``reached`` is False.
 
-    The searches are local. With the laws of this library they usually end at the same effort ‖F‖.
-    With one user-defined law, the effort found was 3.6 % above the least. If ``spread`` is above
-    zero, the searches ended at different efforts, and more ``starts`` help. A ``spread`` of zero
-    does not prove that the least effort was found.
+    The searches are local. With the laws of this library they usually end at the least effort ‖F‖.
+    With one user-defined law, the effort found was 3.6 % above the least; more ``starts`` help.
 
     Args:
         pose: The posture.
@@ -189,8 +170,4 @@ def plan_stiffness(
         direction=directions,
         target=float(targets) if targets.ndim == 0 else targets,
         achieved=float(value) if value.ndim == 0 else value,
-        floor=model.floor,
-        efforts=frozen(np.array(planner.efforts)),
-        iterations=model.iterations,
-        evaluations=model.evaluations,
     )

@@ -35,13 +35,7 @@ def test_samples_have_the_efforts_of_plans_from_scratch(law: cdsm.Elasticity) ->
     for i in range(0, 24, 2):
         alone = cdsm.plan_stiffness(arm.at(q[i]), DOWN, targets[i], 40.0, 400.0)
         effort = np.linalg.norm(plan.tensions[i])
-        assert effort == pytest.approx(alone.efforts[0], rel=1e-7)
-
-
-def test_few_steps_are_enough_from_the_sample_before() -> None:
-    plan = cdsm.plan_path(ARM, DOWN, 80e3, 50.0, angles=waving(100))
-    assert plan.complete
-    assert plan.iterations < 8 * 100
+        assert effort == pytest.approx(np.linalg.norm(alone.tension.values), rel=1e-7)
 
 
 def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:

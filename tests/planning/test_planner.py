@@ -2,11 +2,9 @@
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 import cdsm
-from cdsm import presets
 from cdsm.planning import planner
 from cdsm.planning.planner import Planner
 from cdsm.planning.range import range_ends
@@ -14,25 +12,6 @@ from tests.planning.test_plan import posture
 from tests.support import arms
 from tests.support.locked import STRAND
 from tests.support.paths import DOWN
-
-
-def test_efforts_of_all_starts_are_told() -> None:
-    pose, low, high = posture("universal-5-strand")
-    found = cdsm.stiffness_range(pose, DOWN, low, high, starts=6)
-    plan = cdsm.plan_stiffness(pose, DOWN, 0.5 * (found.low + found.high), low, high, starts=5)
-    assert plan.efforts.size == 5
-    assert plan.efforts[0] == pytest.approx(np.linalg.norm(plan.tension.values), rel=1e-12)
-    assert plan.spread == pytest.approx(0.0, abs=1e-9)
-
-
-def test_few_evaluations_are_enough_at_five_joints() -> None:
-    arm = presets.virtual_prototype()
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    for target in (60e3, 80e3, 100e3, 120e3):
-        plan = cdsm.plan_stiffness(pose, DOWN, target, 50.0)
-        # 24 of them find out where to begin
-        assert plan.evaluations < 120
-        assert plan.iterations < 60
 
 
 def test_end_of_the_range_that_a_crossing_meets_by_rounding_is_reached() -> None:
