@@ -400,7 +400,7 @@ def test_a_path_is_played_in_the_browser(browser: Any) -> None:
 
 @needs_viser
 def test_the_motion_of_a_closed_loop_is_played(browser: Any, tmp_path: Path) -> None:
-    """What `cdsm track --animate RUN.csv` writes, as `cdsm view --path RUN.csv` reads it."""
+    """What a run writes as RUN.csv, as `cdsm view --path RUN.csv` reads it."""
     run = cdsm.track(small_path(), steps=2, minimum=10.0, maximum=250.0)
     motion = read_path(run.write(tmp_path / "run.csv"), run.plan.arm).angles
     with serve(run.plan.arm, port=0, minimum=10.0, angles=motion) as view:
