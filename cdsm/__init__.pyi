@@ -19,8 +19,6 @@ from cdsm.control.mujoco_plant import MuJoCoPlant as MuJoCoPlant
 from cdsm.control.plant import SlowPlant as SlowPlant
 from cdsm.control.run import TrackingRun as TrackingRun
 from cdsm.control.sensors import Sensors as Sensors
-from cdsm.control.tip_force import TipForce as TipForce
-from cdsm.control.tip_force import tip_force as tip_force
 from cdsm.control.track import track as track
 from cdsm.design.evaluation import Designs as Designs
 from cdsm.design.evaluation import evaluate_designs as evaluate_designs
@@ -62,7 +60,6 @@ from cdsm.friction.band import RestBand as RestBand
 from cdsm.friction.band import rest_band as rest_band
 from cdsm.friction.breakaway import Breakaway as Breakaway
 from cdsm.friction.breakaway import breakaway as breakaway
-from cdsm.friction.stuck import sliding_stiffness as sliding_stiffness
 from cdsm.friction.stuck import stuck_stiffness as stuck_stiffness
 from cdsm.geometry import CableRoute as CableRoute
 from cdsm.geometry import Geometry as Geometry
@@ -98,7 +95,6 @@ from cdsm.measures.wire_use import WireUse as WireUse
 from cdsm.measures.wire_use import wire_use as wire_use
 from cdsm.planning.gradient import StiffnessGradient as StiffnessGradient
 from cdsm.planning.gradient import stiffness_gradient as stiffness_gradient
-from cdsm.planning.half_way import HalfWay as HalfWay
 from cdsm.planning.path import plan_path as plan_path
 from cdsm.planning.path_plan import InfeasibleSample as InfeasibleSample
 from cdsm.planning.path_plan import PathPlan as PathPlan
@@ -112,8 +108,6 @@ from cdsm.posture import MomentArms as MomentArms
 from cdsm.posture import Posture as Posture
 from cdsm.report import Report as Report
 from cdsm.report import SelfCheck as SelfCheck
-from cdsm.statics.bifurcation import Bifurcation as Bifurcation
-from cdsm.statics.bifurcation import bifurcation as bifurcation
 from cdsm.statics.buckling import critical_load as critical_load
 from cdsm.statics.buckling import critical_tension as critical_tension
 from cdsm.statics.buckling_results import CriticalLoad as CriticalLoad

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -22,7 +21,6 @@ from cdsm.errors import CableError, UnknownName
 from cdsm.geometry import Geometry
 from cdsm.kernels import segments
 from cdsm.kernels.serpentine_guess import find_blocks
-from cdsm.kernels.stuck import Holes
 from cdsm.kernels.tree import Indices, Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
@@ -121,40 +119,6 @@ class ArmModel:
         segment, joint = self.routing.segment, self.routing.joint
         over = np.repeat(np.arange(len(segment) - 1), np.diff(segment[:, 3]))
         return frozen(segment[:-1, 1].copy()), frozen(segment[:-1, 2].copy()), frozen(over), joint
-
-    @cached_property
-    def wire_laws(self) -> CableLaws:
-        """Elasticities of the cables, where cables with friction count as position-controlled.
-
-        A motor that controls force does not control the tension beyond a hole in which its cable
-        sticks.
-        """
-        forced = {c for c, cable in enumerate(self._cables) if cable.control == "force"}
-        if not any(any(self._cables[c].friction) for c in forced):
-            return self.laws
-        cables = [
-            replace(cable, control="position") if any(cable.friction) else cable
-            for cable in self._cables
-        ]
-        return CableLaws(tuple(cables), self._original_length)
-
-    @cached_property
-    def holes(self) -> Holes:
-        """Holes and leads of the cables as arrays, for the kernels of batches with friction."""
-        cables = self._cables
-        first = np.cumsum([0, *(len(cable.sites) for cable in cables)])
-        sites = [site for cable in cables for site in cable.sites]
-        links = [cable.sites[0].link for cable in cables]
-        return Holes(
-            first=frozen(first.astype(np.intp)),
-            friction=frozen(np.array([site.friction for site in sites])),
-            wrap=frozen(np.array([site.wrap for site in sites])),
-            lead=frozen(np.array([cable.lead for cable in cables])),
-            axis=frozen(np.array([self.body.locate(link)[1][:, 0] for link in links])),
-            locked=frozen(np.array([float(cable.control == "position") for cable in cables])),
-            series=self.laws.series,
-            rest=self.laws.rest,
-        )
 
     def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
         """Return for each joint angle of q (nv,) [rad] whether it is beyond its limits (nv,)."""

@@ -7,7 +7,6 @@ from typing import NamedTuple
 from cdsm.batch.layout import Flags
 from cdsm.kernels.bodies import Masses
 from cdsm.kernels.serpentine_guess import Blocks
-from cdsm.kernels.stuck import Holes
 from cdsm.kernels.tree import Indices, Routing, Tree
 from cdsm.kernels.wires import Wires
 from cdsm.support.values import Array, frozen
@@ -24,8 +23,8 @@ class Arm(NamedTuple):
     blocks: Blocks  # joints and cables in the order in which tensions are guessed
     smallest_arm: float  # moment arms below this are rounding errors, and count as 0 [m]
     laws: Wires  # laws of the cables; EA is 0 where the motor controls the force
-    wires: Wires  # laws for cables that stick: EA also where the motor controls the force
-    holes: Holes  # holes, leads and series springs of the cables
+    series: Array  # 1/k_series of each cable (C,) [m/N]
+    rest: Array  # tension at which the series spring of each cable is unstrained (C,) [N]
 
 
 class Rows(NamedTuple):
@@ -40,7 +39,6 @@ class Rows(NamedTuple):
     low: Array  # lower bounds (b, C) [N] of distributed tensions
     high: Array  # upper bounds (b, C) [N]
     rigidity: Array  # EA (1 + ε) (b, C) [N], −1 outside the domain; none if kernels know all laws
-    wire: Array  # as ``rigidity``, but of the laws ``Arm.wires``
 
     def take(self, rows: slice | Indices) -> Rows:
         """Return the inputs of some ``rows``; an array with one row for all stays as it is."""
@@ -53,8 +51,6 @@ class Asked(NamedTuple):
     start: Indices  # index in the record at which each quantity begins
     stored: Flags  # whether the kernel copies each quantity to its output
     last: int  # largest number of a quantity that is needed
-    slides: bool  # whether the passive stiffness of cables that slide freely is needed
-    sticks: bool  # whether the passive stiffness of cables that stick is needed
 
 
 class Kept(NamedTuple):
@@ -66,8 +62,6 @@ class Kept(NamedTuple):
     joint: Array  # K_θ (B, nv, nv, W)
     parts: Array  # sum of the magnitudes of the four terms of K_θ (B, nv, nv, W)
     jacobian: Array  # J_X (B, 6, nv, W), zero before the kernel fills it
-    stuck: Array  # K_θ while the cables stick (B, nv, nv, W)
-    stuck_parts: Array  # the same sum while the cables stick (B, nv, nv, W)
 
     def first(self, blocks: int) -> Kept:
         """Return the same arrays for the first ``blocks`` blocks only."""

@@ -57,8 +57,7 @@ class Batch(ReadOnlyState, Named):
         wrench: W (6,) for all postures, or (B, 6): force [N], then moment [N m].
         minimum: Lower bounds (C,) for all postures or (B, C) [N]; None if F was not distributed.
         maximum: Upper bounds (C,) for all postures or (B, C) [N], or None.
-        direction: Unit direction (3,) of ``along``, ``stuck_along`` and ``breakaway``, or several
-            (D, 3); or None.
+        direction: Unit direction (3,) of ``along``, or several (D, 3); or None.
         status: :class:`Status` of each posture (B,).
         outputs: Names of the requested quantities.
         values: The requested quantities, (B, …) each, in the order of ``outputs``, in SI units such
@@ -149,12 +148,9 @@ def evaluate(
             ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``. Of a stiffness:
             ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
             ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
-            ``"along"``, ``"pseudoinverse"``. Of an arm whose cables stick in their holes
-            (:func:`~cdsm.stuck_stiffness`): ``"stuck_joint"``, ``"stuck_along"``,
-            ``"stuck_compliance"``, and ``"breakaway"`` [N], the load at which the first cable
-            slides, to first order (:attr:`Breakaway.first_order`). The tensions: ``"tension"``.
-        direction: u of ``"along"``, ``"stuck_along"`` and ``"breakaway"``: an axis such as ``"z"``,
-            or (3,), any length. For several directions (D, 3) these outputs are (B, D).
+            ``"along"``, ``"pseudoinverse"``. The tensions: ``"tension"``.
+        direction: u of ``"along"``: an axis such as ``"z"``, or (3,), any length. For several
+            directions (D, 3) the output is (B, D).
         minimum: Lower bounds [N] of the tensions, as for :func:`distribute_tensions`; tensions are
             then distributed first.
         maximum: Upper bounds [N] of these tensions; no bounds if not given.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import chain, pairwise
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import checked_threads, kernel_arm, run_slices
 from cdsm.batch.layout import OK, POSTPONED, QUANTITIES, UNDECIDED, Codes
 from cdsm.batch.rigidities import rigidities
-from cdsm.batch.stuck_readings import STUCK, WITHOUT_FRICTION, read_stuck
 from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.compiling import FULL, WIDTH, is_new
 from cdsm.kernels.distribution import search_tensions
@@ -73,7 +72,7 @@ class Evaluator:
         self._arm, nv, cables = arm, arm.nv, len(arm.cables)
         self._nothing = nothing = frozen(np.empty((0, cables)))
         low, high = bounds or (nothing, nothing)
-        given = q, wrench, nothing if tension is None else tension, low, high, nothing, nothing
+        given = q, wrench, nothing if tension is None else tension, low, high, nothing
         self._rows = Rows(*(frozen(np.ascontiguousarray(np.atleast_2d(each))) for each in given))
         self._directions = frozen(
             np.zeros((0, 3)) if direction is None else direction.reshape(-1, 3)
@@ -82,12 +81,7 @@ class Evaluator:
         count = len(self._directions)
         shapes = layout.shapes(nv, cables, count)
         self._start = layout.starts(shapes)
-        same = {} if arm.has_friction else WITHOUT_FRICTION
-        numbers = {QUANTITIES.index(same.get(name, name)) for name in names}
-        self._sticks = arm.has_friction and not numbers.isdisjoint(STUCK)
-        if layout.BREAKAWAY in numbers:
-            numbers.add(layout.TENSION)
-        self._wanted = np.array(sorted(numbers), dtype=np.intp)
+        self._wanted = np.array(sorted(map(QUANTITIES.index, names)), dtype=np.intp)
         ends = [0, *np.cumsum(np.diff(self._start)[self._wanted]).tolist()]
         self._place = {
             QUANTITIES[number]: slice(*place)
@@ -95,8 +89,7 @@ class Evaluator:
         }
         # whether the kernel needs rigidities that only Python computes
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
-        laws = arm._model.wire_laws if self._sticks else arm._model.laws
-        self._asks = needs_springs and bool(laws.without_kernel)
+        self._asks = needs_springs and bool(arm._model.laws.without_kernel)
         record = int(self._start[-1])
         width = WIDTH // (2 if record < _LONG else 4)
         self._block = FULL if record < _SHORT else max(1, min(width, len(q)))
@@ -108,8 +101,7 @@ class Evaluator:
         # one row for each posture, which the kernel fills; the outputs are views of it
         self._out = np.empty((len(q), ends[-1]))
         self.values = [
-            self._out[:, self._place[same.get(name, name)]].reshape(len(q), *shapes[name])
-            for name in names
+            self._out[:, self._place[name]].reshape(len(q), *shapes[name]) for name in names
         ]
 
     def run(self, status: Codes, threads: int | None) -> None:
@@ -180,25 +172,17 @@ class Evaluator:
         gets the moment arms and torques of UNDECIDED postures, and tensions of POSTPONED ones.
         """
         balance = balance or self._empty_balance(0)
-        read, (nv, width) = wanted > layout.STUCK_JOINT, (self._arm.nv, self._block)
-        stuck = np.array([number in STUCK for number in wanted.tolist()], dtype=np.bool_)
+        derived, (nv, width) = wanted > layout.JOINT, (self._arm.nv, self._block)
         blocks = -(-len(found) // width)
-        if read.any():  # keep K_θ of few blocks, for the cache, but not too few: calls take time
+        if derived.any():  # K_θ of few blocks, for the cache, but not too few: calls take time
             blocks = min(blocks, max(_FEWEST, _CACHE // (2 * width * nv**2)))
-        slides, free, held = (
-            bool((~stuck & (wanted > layout.LOAD)).any()),
-            blocks * bool((read & ~stuck).any()),
-            blocks * bool((read & stuck).any()),
-        )
-        K, parts = np.empty((2, free, nv, nv, width))
-        stuck_K, stuck_parts = np.empty((2, held, nv, nv, width))
-        JX = np.zeros((max(free, held), 6, nv, width))
-        empty = Kept(K, parts, JX, stuck_K, stuck_parts)
-        names = [[QUANTITIES[number] for number in wanted[read & kind]] for kind in (~stuck, stuck)]
+        held = blocks * bool(derived.any())
+        K, parts = np.empty((2, held, nv, nv, width))
+        empty = Kept(K, parts, np.zeros((held, 6, nv, width)))
+        names = [QUANTITIES[number] for number in wanted[derived]]
         stored = np.zeros(len(QUANTITIES), dtype=np.bool_)
-        stored[wanted[~read]] = True
-        last = int(wanted[-1]) if wanted.size else 0
-        asked = Asked(self._start, stored, last, slides, self._sticks)
+        stored[wanted[~derived]] = True
+        asked = Asked(self._start, stored, int(wanted[-1]) if wanted.size else 0)
         for first in range(0, len(found), blocks * width):
             part = slice(first, first + blocks * width)
             states, values = found[part], out[part]
@@ -206,10 +190,10 @@ class Evaluator:
             kept = empty.first(-(-len(states) // width))
             left = Balance(*(each[part] for each in balance))
             evaluate_rows(self._kernel_arm, some, asked, width, kept, left, values, states)
-            if read.any() and (states == OK).any():
-                self._read(kept, some, names, states, values)
+            if names and (states == OK).any():
+                self._read(kept, names, states, values)
             else:
-                for name in chain(*names):
+                for name in names:
                     values[:, self._place[name]] = math.nan
 
     def _with_rigidities(self, rows: Rows, found: Codes) -> Rows:
@@ -220,50 +204,27 @@ class Evaluator:
         """
         if not (self._asks and len(rows.tension)):
             return rows
-        model, usable = self._arm._model, found == OK
+        laws, usable = self._arm._model.laws, found == OK
         if len(rows.tension) < len(found):  # one row for all postures
             usable = usable.any(keepdims=True)
-        rigidity = wire = rigidities(model.laws, rows.tension, usable)
-        if self._sticks and model.wire_laws is not model.laws:
-            wire = rigidities(model.wire_laws, rows.tension, usable)
-        return rows._replace(rigidity=rigidity, wire=wire)
+        return rows._replace(rigidity=rigidities(laws, rows.tension, usable))
 
-    def _read(
-        self,
-        kept: Kept,
-        rows: Rows,
-        names: list[list[str]],
-        found: Codes,
-        out: Array,
-    ) -> None:
-        """Compute readings from the arrays ``kept``; fill ``out`` and update the status ``found``.
-
-        ``names`` has two lists of readings: those of the arm without friction, and those of the arm
-        whose cables stick.
-        """
+    def _read(self, kept: Kept, names: list[str], found: Codes, out: Array) -> None:
+        """Compute the readings ``names`` from the arrays ``kept``; fill ``out`` and ``found``."""
         status = np.full(len(kept.jacobian) * self._block, UNREAD)
         status[: found.size][found == OK] = READ
-        for kind, quantities in enumerate(names):
-            if not quantities:
-                continue
-            own = status.copy()
-            blocks = own.reshape(-1, self._block)
-            if kind:
-                F = out[:, self._place.get("tension", slice(0))]
-                arm, u = self._kernel_arm, self._directions
-                values = read_stuck(arm, rows, F, kept, u, quantities, blocks, self._block)
-            else:
-                values = read(*kept[:3], self._directions, quantities, blocks, self._block)
-            state = own[: found.size]
-            unread, singular = state == UNREAD, state == SINGULAR
-            for name in quantities:
-                value = np.moveaxis(values[name], -1, 1)
-                out[:, self._place[name]] = value.reshape(own.size, -1)[: found.size]
-                lost = unread | singular if name in _INVERSE else unread
-                if lost.any():
-                    out[lost, self._place[name]] = math.nan
-            found[singular] = Status.SINGULAR
-            found[state == IMMOBILE] = Status.IMMOBILE
+        blocks = status.reshape(-1, self._block)
+        values = read(*kept, self._directions, names, blocks, self._block)
+        state = status[: found.size]
+        unread, singular = state == UNREAD, state == SINGULAR
+        for name in names:
+            value = np.moveaxis(values[name], -1, 1)
+            out[:, self._place[name]] = value.reshape(status.size, -1)[: found.size]
+            lost = unread | singular if name in _INVERSE else unread
+            if lost.any():
+                out[lost, self._place[name]] = math.nan
+        found[singular] = Status.SINGULAR
+        found[state == IMMOBILE] = Status.IMMOBILE
 
     def _empty_balance(self, rows: int) -> Balance:
         nv, cables = self._arm.nv, len(self._arm.cables)

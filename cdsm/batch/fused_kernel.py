@@ -27,7 +27,6 @@ from cdsm.batch.layout import (
     PASSIVE,
     POSTPONED,
     RESIDUAL,
-    STUCK_JOINT,
     TENSION,
     TIP,
     UNDECIDED,
@@ -51,7 +50,6 @@ from cdsm.kernels.stiffness import (
     set_load_stiffness,
     sum_terms,
 )
-from cdsm.kernels.stuck import add_stuck_stiffness, sticking_scratch
 from cdsm.kernels.tension import Balance, certificate, set_infeasible
 from cdsm.kernels.tree import Indices, empty_frames, forward_kinematics
 from cdsm.kernels.wires import set_rigidity, wire_scratch
@@ -86,8 +84,8 @@ def evaluate_rows(
             the block. Quantities that depend on tensions are then computed later, together with
             other such postures.
     """
-    tree, routing, masses, holes, blocks = arm.tree, arm.routing, arm.masses, arm.holes, arm.blocks
-    start, stored, joint, stuck = asked.start, asked.stored, kept.joint, kept.stuck
+    tree, routing, masses, blocks = arm.tree, arm.routing, arm.masses, arm.blocks
+    start, stored, joint = asked.start, asked.stored, kept.joint
     rows, nv, cables, bodies = (
         given.q.shape[0],
         given.q.shape[1],
@@ -110,13 +108,11 @@ def evaluate_rows(
     k = vector(record, start, CABLE_STIFFNESS)
     passive = matrix(record, start, PASSIVE, nv)
     K = matrix(record, start, JOINT, nv)
-    stuck_K = matrix(record, start, STUCK_JOINT, nv)
 
     # scratch, used again for every block
     angles, loads = np.empty((nv, width)), np.empty((6, width))
     stretched, least = np.empty((cables, width)), np.empty((cables, width))
-    most, springs = np.empty((cables, width)), np.empty((nv, nv, width))
-    none = np.empty((0, nv, width))
+    most, none = np.empty((cables, width)), np.empty((0, nv, width))
     frames, segments = empty_frames(tree, routing, width), segment_scratch(nv, width)
     rotation, carried = np.empty((bodies, 3, 3, width)), np.empty((bodies, 7, width))
     guess, check = empty_guess(blocks, nv, cables, width), certificate(nv, cables, width)
@@ -124,8 +120,7 @@ def evaluate_rows(
     zero = np.zeros((cables, width))
     six, shortest = np.empty((6, width)), np.empty(width)
     code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
-    wiring, own_wiring = wire_scratch(arm.laws, width), wire_scratch(arm.wires, width)
-    sticking, slot = sticking_scratch(nv, width), np.zeros(cables, dtype=np.intp)
+    wiring, slot = wire_scratch(arm.laws, width), np.zeros(cables, dtype=np.intp)
 
     for first in range(0, rows, width):
         block = first // width
@@ -206,34 +201,16 @@ def evaluate_rows(
             if not given.rigidity.shape[0]:
                 set_rigidity(arm.laws, F, stretched, wiring, width)
             _note_outside(code, stretched, width)
-            set_cable_stiffness(L, F, stretched, holes.series, holes.rest, k, width)
-            if asked.slides:
-                clear(passive, width)
-                add_passive_stiffness(J, k, passive, six, width)
-                if stored[PASSIVE]:
-                    mirror(passive, width)
-                own_K, sizes = (joint[block], kept.parts[block]) if joint.shape[0] else (K, none)
-                sum_terms(active, passive, gravity, load, own_K, sizes, width)
-                if joint.shape[0] and stored[JOINT]:
-                    copy(own_K, K, width)
+            set_cable_stiffness(L, F, stretched, arm.series, arm.rest, k, width)
+            clear(passive, width)
+            add_passive_stiffness(J, k, passive, six, width)
+            if stored[PASSIVE]:
+                mirror(passive, width)
+            own_K, sizes = (joint[block], kept.parts[block]) if joint.shape[0] else (K, none)
+            sum_terms(active, passive, gravity, load, own_K, sizes, width)
+            if joint.shape[0] and stored[JOINT]:
+                copy(own_K, K, width)
             _note(code, JOINT, known, width)
-            if asked.sticks:
-                fetch(given.wire, first, stretched, width)
-                if not given.wire.shape[0]:
-                    set_rigidity(arm.wires, F, stretched, own_wiring, width)
-                _note_outside(code, stretched, width)
-                clear(springs, width)
-                add_stuck_stiffness(
-                    routing, holes, frames, rotation, F, stretched, segments, sticking, springs,
-                    width,
-                )  # fmt: skip
-                own_K, sizes = (
-                    (stuck[block], kept.stuck_parts[block]) if stuck.shape[0] else (stuck_K, none)
-                )
-                sum_terms(active, springs, gravity, load, own_K, sizes, width)
-                if stuck.shape[0] and stored[STUCK_JOINT]:
-                    copy(own_K, stuck_K, width)
-                _note(code, STUCK_JOINT, known, width)
         store(record, start, stored, code, known, first, out, status)
 
 

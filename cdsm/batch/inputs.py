@@ -33,8 +33,8 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
         blocks=model.blocks,
         smallest_arm=NO_ARM * arm.length,
         laws=model.laws.wires,
-        wires=model.wire_laws.wires,
-        holes=model.holes,
+        series=model.laws.series,
+        rest=model.laws.rest,
     )
 
 

@@ -47,17 +47,12 @@ DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     "cable_stiffness": (("cable",), "N/m"),
     "passive": (JOINTS, "stiffness"),
     "joint": (JOINTS, "stiffness"),
-    "stuck_joint": (JOINTS, "stiffness"),
     # these also need a regular K_θ
     "margin": ((), "stiffness"),
     "pseudoinverse": (AXES, "N/m"),
     "along": (("direction",), "N/m"),
     "compliance": (MOTIONS, "1"),
     "cartesian": (AXES, "N/m"),
-    # these need a regular K_θ of the stuck arm
-    "stuck_along": (("direction",), "N/m"),
-    "stuck_compliance": (MOTIONS, "1"),
-    "breakaway": (("direction",), "N"),
 }
 """Dimensions and unit of each quantity, in the order in which a record contains them.
 
@@ -69,9 +64,8 @@ prismatic joints.
 QUANTITIES: Final = tuple(DIMENSIONS)
 
 TIP, JACOBIAN, CABLE_LENGTHS, LENGTH_JACOBIAN, GRAVITY_TORQUE, GRAVITY = range(6)
-TENSION, RESIDUAL, ACTIVE, LOAD, CABLE_STIFFNESS, PASSIVE, JOINT, STUCK_JOINT = range(6, 14)
-MARGIN, PSEUDOINVERSE, ALONG, COMPLIANCE, CARTESIAN = range(14, 19)
-STUCK_ALONG, STUCK_COMPLIANCE, BREAKAWAY = range(19, 22)
+TENSION, RESIDUAL, ACTIVE, LOAD, CABLE_STIFFNESS, PASSIVE, JOINT = range(6, 13)
+MARGIN, PSEUDOINVERSE, ALONG, COMPLIANCE, CARTESIAN = range(13, 18)
 
 DIRECTIONAL: Final = tuple(name for name, (dims, _) in DIMENSIONS.items() if "direction" in dims)
 """Quantities that have a value for each direction."""

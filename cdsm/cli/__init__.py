@@ -23,7 +23,6 @@ from cdsm.cli.output import debug_wanted
 from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
 from cdsm.cli.sweep import map_sweep, sweep
-from cdsm.cli.track import track
 from cdsm.cli.view import view
 from cdsm.cli.warm import warm
 from cdsm.cli.wire import fit
@@ -74,7 +73,7 @@ def main(
 
 _ALL = (
     *(new, urdf, stiffness, check, weigh, cycle, buckle, plan, sweep, map_sweep),
-    *(design, track, view, fit, identify, export, reproduce, warm),
+    *(design, view, fit, identify, export, reproduce, warm),
 )
 for command in _ALL:
     name = "map" if command is map_sweep else command.__name__

@@ -69,7 +69,6 @@ def buckle(
         float | None, typer.Option(help="Upper bound of all tensions under the load [N].")
     ] = None,
     wrench: options.Wrench = None,
-    solver: options.Solver = options.DEFAULT_SOLVER,
     figure: Picture = None,
     as_json: AsJson = False,
 ) -> None:
@@ -83,7 +82,7 @@ def buckle(
             raise misuse(option, "bounds the tensions under --force or --mass only.")
     pose = arm.at(angles)
     carried = wrench_of(wrench)
-    tension = cdsm.critical_tension(pose, carried, solver)
+    tension = cdsm.critical_tension(pose, carried)
     found: list[cdsm.CriticalTension | cdsm.CriticalLoad] = [tension]
     low: tuple[float, ...] = ()
     if weight.given:
@@ -94,7 +93,7 @@ def buckle(
         least = 10.0 if min_tension is None else min_tension
         most = math.inf if max_tension is None else max_tension
         low = (least,)
-        found.append(cdsm.critical_load(pose, multiplied, least, most, solver, carried=carried))
+        found.append(cdsm.critical_load(pose, multiplied, least, most, carried=carried))
     write_picture(figure, tension.plot)
     answer(
         as_json,

@@ -171,7 +171,7 @@ def map_sweep(
     quantity: Annotated[
         str,
         typer.Option(
-            help="Quantity to show: softest, stiffest, anisotropy, margin, along, or another.",
+            help="Quantity to show: softest, stiffest, isotropy, margin, along, or another.",
             autocompletion=_quantities,
         ),
     ] = "softest",

@@ -30,7 +30,6 @@ def warm(as_json: AsJson = False) -> None:
         q, F = pose.q[None], tension.values
         for directions in (up, [up] * 999):  # so many numbers for a posture as if the arm were long
             cdsm.evaluate(arm, q, minimum=40.0, direction=directions, outputs=readings)
-            cdsm.evaluate(rough.arm, q, F, direction=directions, outputs=("breakaway",))
         cdsm.distribute_tensions(arm, q, 40.0, 60.0)  # runs the search for tensions
         cdsm.load_cycle(rough, F, np.zeros((1, 6)))
     seconds = time.perf_counter() - start

@@ -7,10 +7,9 @@ from typing import Final
 
 # fmt: off
 _ALIKE: Final = (
-    "bands", "bend_diameter", "bins", "breaking_load", "count", "damping", "damping_ratio", "delay",
-    "diameter", "direction", "encoder", "felt", "force", "force_std", "gauge_length", "gravity",
-    "host", "largest_force", "largest_tension", "payload", "payload_from", "period", "port", "rate",
-    "section", "seed", "skip", "solver", "steps", "target", "tension_bias", "tension_noise",
+    "bend_diameter", "bins", "breaking_load", "count", "damping", "damping_ratio", "diameter",
+    "direction", "force", "force_std", "gauge_length", "gravity", "host", "largest_force",
+    "largest_tension", "port", "rate", "section", "seed", "skip", "solver", "steps", "target",
     "tension_std", "wire", "wrench",
 )
 # fmt: on
@@ -30,7 +29,6 @@ _PYTHON: Final = (
     (", or, in Python, pass check_limits=False to compute beyond them.", "."),
     ("Raise starts=, ask", "Ask"),
     ("expected value. Give a small one.", "expected value. Give a small one: --friction 0.05."),
-    ("give arm.with_friction(0.0).", "give --true-friction 0."),
     ("by its slack_below()", "with --slack-below"),
     ("slack_below()", "--slack-below"),
     ("leave one, or use search_designs.", "leave one, or leave out --refine."),

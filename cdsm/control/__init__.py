@@ -16,13 +16,11 @@ from cdsm.control.plant import SlowPlant
 from cdsm.control.run import TrackingRun
 from cdsm.control.sensors import Sensors
 from cdsm.control.stiffness_loop import with_rigidity
-from cdsm.control.tip_force import TipForce, tip_force
 from cdsm.control.track import track
 
 # fmt: off
 __all__ = [
     "Command", "Law", "Moment", "MuJoCoPlant", "Reading", "Reference", "Sensors", "SlowPlant",
-    "TipForce", "TrackingRun", "feedforward", "limited", "mixed", "tension_control", "tip_force",
-    "track", "with_rigidity",
+    "TrackingRun", "feedforward", "limited", "mixed", "tension_control", "track", "with_rigidity",
 ]
 # fmt: on

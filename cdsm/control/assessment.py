@@ -1,10 +1,9 @@
-"""True stiffness of a plant in a given state, the band of its tip, and a test with a hung weight.
+"""True stiffness of a plant in a given state, and the band of its tip.
 
 With friction, the measured stiffness depends on the size and on the history of the load. Here the
 true stiffness of a state is the frictionless K_θ at the equilibrium that the arm would have without
-friction, with the same wire in every cable and the same load. A weight hung on the arm measures
-this stiffness if the load is shaken before and after (:func:`hung_weight`). Without shaking, small
-weights measure the stuck arm, which is several times stiffer.
+friction, with the same wire in every cable and the same load. Small weights measure the stuck arm,
+which is several times stiffer.
 
 The band is the interval around this equilibrium in which friction can let the tip rest, whatever
 loads came before. Linear programs prove it (:func:`cdsm.friction.band.rest_band`); if they cannot,
@@ -14,27 +13,18 @@ the band is NaN.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from cdsm.control.plant import PlantState, SlowPlant, SlowState
+from cdsm.control.plant import PlantState
 from cdsm.errors import CdsmError, SingularStiffness
 from cdsm.friction.band import rest_band
-from cdsm.friction.breakaway import breakaway
 from cdsm.statics.locked_motors import LoadedArm, lengths_with
 from cdsm.statics.rest_search import no_rest
-from cdsm.statics.slow_loading import Load
 from cdsm.statics.trust_region import find_rest
-from cdsm.statics.weight_friction import fading
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
-
-_CYCLES: Final = 4
-"""Number of cycles in which the shaking of a hung weight fades out."""
-
-_SHAKEN: Final = 3.0  # amplitude of the shaking over the breakaway load; with it all cables slide
-_DISPLACED: Final = 1e-3  # displacement that the weight causes, over the length of the arm
 
 
 class Assessment(NamedTuple):
@@ -94,31 +84,3 @@ def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
         raise no_rest(pose, search, 0.0)
     loaded.require_domains(K.tension)
     return K
-
-
-def hung_weight(plant: SlowPlant, state: SlowState, u: Array) -> float:
-    """Hang a weight on a plant with its motors stopped; return the stiffness [N/m] along u (3,).
-
-    ``state`` is the state of the plant before the weight is hung.
-
-    If the arm has friction, the load is shaken along u, first without the weight and then with it.
-    The first amplitude is three times the breakaway load, at which the first cable slides; the
-    shaking fades in four cycles. The weight moves the tip by about 0.1 % of the arm's length. The
-    result is NaN if no equilibrium is found on the way or the arm is about to buckle, and inf if
-    the tip cannot move along u.
-    """
-    arm, load, tips = plant.arm, state.state.load, []
-    try:
-        near = frictionless_stiffness(state, load.wrench)
-        weight = near.along(u) * _DISPLACED * arm.length
-        if not math.isfinite(weight):
-            return math.inf
-        swing = _SHAKEN * breakaway(near.posture, near.tension, u, near.wrench).load
-        for hung in (0.0, weight):
-            for force in (*(hung + fading(swing, _CYCLES) if arm.has_friction else ()), hung):
-                wrench = load.wrench + np.append(force * u, np.zeros(3))
-                state = plant.load(state, Load(wrench, load.holding, load.motors))
-            tips.append(state.pose.tip[:3, 3])
-    except CdsmError:
-        return math.nan
-    return weight / float(u @ (tips[1] - tips[0]))

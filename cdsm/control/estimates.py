@@ -109,17 +109,6 @@ class Observer:
         pose = pose if (inside == q).all() else self.arm.at(inside)
         return self._after_sliding(before, pose, F, x, variance)
 
-    def gain(self, estimate: Estimate, reading: Reading) -> Array:
-        """Compute κ = −∂F/∂l_0 (C,) [N/m], the rise of each tension per length of wire taken in.
-
-        The derivative is taken at the estimated posture, at constant cable lengths and at the
-        tensions of ``reading``. κ is 0 for force-controlled cables.
-        """
-        F = np.clip(reading.tension, *self._domains)
-        stretch = 1.0 + estimate.softness * self._mean_strain(estimate.pose, estimate.shares, F)
-        soft = self._compliance(reading.wire, F, estimate.softness)
-        return np.where(self.arm.cables.position_controlled, stretch / soft, 0.0)
-
     def _after_sliding(
         self, before: Estimate, pose: Posture, F: Array, softness: float, variance: float
     ) -> Estimate:

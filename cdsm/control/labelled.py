@@ -51,7 +51,6 @@ def labelled(run: TrackingRun) -> xarray.Dataset:
         "tension": (of_cable, run.tension, "N"),
         "saturated": (of_cable, run.saturated, "1"),
         "out_of_reach": (("time",), run.short, "1"),
-        "felt_stiffness": (("time", "direction"), run.felt, "N/m"),
         "band_sought": (("time",), run.banded, "1"),
         "band_proved": (("time",), run.proved, "1"),
         "band": (("time", "end"), run.band, "m"),
@@ -85,8 +84,6 @@ def table(run: TrackingRun) -> pandas.DataFrame:
 def numbers(run: TrackingRun) -> dict[str, Any]:
     """Return the numbers of the run's printed table, in SI with units in the keys."""
     off = abs(run.stiffness_error)
-    felt = abs(run.felt / run.stiffness - 1.0)
-    felt = felt[np.isfinite(felt).all(axis=1)].max(axis=1)
     known = off[np.isfinite(off).all(axis=1)]
     return {
         "law": run.law,
@@ -107,9 +104,6 @@ def numbers(run: TrackingRun) -> dict[str, Any]:
         "steps_with_band": len(run.inside),
         "steps_without_proof": np.count_nonzero(run.banded) - len(run.inside),
         "share_inside_band": _mean(run.inside.astype(float)),
-        "steps_felt": len(felt),
-        "felt_error_mean": _mean(felt),
-        "felt_error_largest": float(felt.max(initial=0.0)) if felt.size else math.nan,
         "estimated_rigidity": float(run.rigidity[-1]) if len(run.rigidity) else math.nan,
     }
 
@@ -120,7 +114,7 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
     low, high = n["least_tension_N"], n["largest_tension_N"]
     lacking = int(np.isnan(run.margin).sum())
     unknown = f" (none known at {plural(lacking, 'step')})" if lacking else ""
-    lines = [
+    return [
         ("tip error, mean and largest", f"{1e3 * n['tip_error_mean_m']:.3g}, "
          f"{1e3 * n['tip_error_largest_m']:.3g} mm"),
         ("frictionless stiffness error, mean and largest",
@@ -134,12 +128,6 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
         ("rigidity of the wires, as estimated", f"{100.0 * n['estimated_rigidity']:.4g} %"),
         ("inside the proved band", _inside(run)),
     ]  # fmt: skip
-    if n["steps_felt"]:
-        felt = f"{100.0 * n['felt_error_mean']:.3g}, {100.0 * n['felt_error_largest']:.3g} % off"
-        lines.append(
-            ("stiffness felt by the motors", f"{felt} at {plural(n['steps_felt'], 'step')}")
-        )
-    return lines
 
 
 def _names_or_count(names: tuple[str, ...], count: int) -> str:

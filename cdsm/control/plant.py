@@ -112,14 +112,8 @@ class SlowPlant:
         loading = state.loading
         taken_in = state.reference_wire - command.wire
         motors = np.where(loading.forced, command.tension, taken_in)
-        return self.load(state, Load(wrench, np.zeros(self.arm.nv), motors))
-
-    def load(self, state: SlowState, load: Load) -> SlowState:
-        """Return the state that follows ``state`` when the load and the motors change to ``load``.
-
-        The change is slow. ``load`` contains the wrench and the motor commands.
-        """
-        return state._replace(state=state.loading.carry(state.state, load, "the step")[0])
+        load = Load(wrench, np.zeros(self.arm.nv), motors)
+        return state._replace(state=loading.carry(state.state, load, "the step")[0])
 
 
 def require_unstrained(name: str, arm: Manipulator) -> None:

@@ -13,15 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.control.assessment import hung_weight
 from cdsm.control.labelled import labelled, numbers, rows, table
-from cdsm.control.plant import SlowPlant
-from cdsm.errors import InvalidInput
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support.files import as_path
 from cdsm.support.format import aligned, plain, plural
 from cdsm.support.tidy import write_labelled
-from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
@@ -43,10 +39,8 @@ class TrackingRun(ReadOnlyState):
 
     There are n steps, C cables and D wanted directions. With friction, the true stiffness of a
     state is the frictionless stiffness at the equilibrium that the arm would have without friction,
-    with the same wire and load. It is NaN if there is no such equilibrium. :meth:`hung_weight`
-    measures this stiffness: it shakes the load, which ends the effect of friction. The band is the
-    interval around this equilibrium in which friction can let the tip rest, whatever loads came
-    before.
+    with the same wire and load. It is NaN if there is no such equilibrium. The band is the interval
+    around this equilibrium in which friction can let the tip rest, whatever loads came before.
 
     Attributes:
         plan: The plan that was followed.
@@ -68,8 +62,6 @@ class TrackingRun(ReadOnlyState):
             bounds (n, C).
         stiffness: True stiffness along each direction (n, D) [N/m].
         margin: Smallest eigenvalue of the true K_θ (n,) [N m/rad].
-        felt: Stiffness measured with the motors along each direction (n, D) [N/m]; NaN at steps
-            without such a measurement, or if it failed.
         banded: Whether a band was computed (n,).
         band: Proved bounds of ``displacement`` (n, 2) [m]; NaN where none were computed or proved.
         displacement: Displacement of the tip from the equilibrium without friction along the first
@@ -84,7 +76,7 @@ class TrackingRun(ReadOnlyState):
             plant diverged; ``"no rest"``: the arm buckled; ``"wire"``: a tension left the domain of
             its law.
         reason: What stopped the loop, in words; or empty.
-        states: State of the plant after each step; :meth:`hung_weight` starts from one of them.
+        states: State of the plant after each step.
     """
 
     plan: PathPlan
@@ -104,7 +96,6 @@ class TrackingRun(ReadOnlyState):
     saturated: NDArray[np.bool_]
     stiffness: Array
     margin: Array
-    felt: Array
     banded: NDArray[np.bool_]
     band: Array
     displacement: Array
@@ -125,7 +116,7 @@ class TrackingRun(ReadOnlyState):
     @property
     def directions(self) -> Array:
         """Wanted directions u (D, 3), base axes."""
-        return self.plan.direction.reshape(-1, 3)  # type: ignore[union-attr]
+        return self.plan.direction.reshape(-1, 3)
 
     @cached_property
     def tip_error(self) -> Array:
@@ -149,28 +140,6 @@ class TrackingRun(ReadOnlyState):
         low, high = self.band[self.proved].T
         moved = self.displacement[self.proved]
         return frozen(np.asarray((low - _ROUNDING <= moved) & (moved <= high + _ROUNDING)))
-
-    def hung_weight(self, step: int, direction: int = 0) -> float:
-        """Hang a weight on the true arm as it was after a step; return the stiffness [N/m].
-
-        The motors stand still. The load is shaken with fading amplitude before and after the weight
-        is hung, so that friction hardly affects the result. The result is NaN if no equilibrium is
-        found or the arm is about to buckle, and inf if the tip cannot move along the direction.
-
-        Args:
-            step: Number of the step; negative numbers count from the last.
-            direction: Number of the direction among :attr:`directions`, from 0.
-
-        Raises:
-            InvalidInput: There is no such step or direction, or the plant is not a
-                :class:`SlowPlant`.
-        """
-        count, D = len(self.time), len(self.directions)
-        k = whole_number("step", step, -count, count - 1) % count
-        u = self.directions[whole_number("direction", direction, 0, D - 1)]
-        if not isinstance(self.plant, SlowPlant):
-            raise InvalidInput("plant", f"{self.plant!r} cannot be loaded further; use SlowPlant.")
-        return hung_weight(self.plant, self.states[k], u)  # type: ignore[arg-type]
 
     @property
     def warnings(self) -> tuple[str, ...]:

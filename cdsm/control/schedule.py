@@ -43,7 +43,7 @@ class Schedule(NamedTuple):
         k = np.array([K.cable_stiffness for K in plan.stiffness])
         angles = along(plan.angles)
         parts = angles, along(plan.tensions), along(wire), along(k)
-        directions = np.asarray(plan.direction).reshape(-1, 3)
+        directions = plan.direction.reshape(-1, 3)
         return cls(
             references=tuple(Reference(*each) for each in zip(*parts, strict=True)),
             directions=directions,
@@ -55,8 +55,6 @@ class Schedule(NamedTuple):
 
 def checked_plan(plan: PathPlan) -> Manipulator:
     """Check that all samples are planned, for stiffness along directions; return the arm."""
-    if plan.direction is None:
-        raise InvalidInput("plan", "is one of cartesian; plan a stiffness along directions.")
     if not plan.complete:
         first = plan.infeasible[0]
         raise InvalidInput(

@@ -13,7 +13,7 @@ from cdsm.errors import InvalidInput
 from cdsm.support.validation import quantity, scalar, whole_number
 
 LARGEST_NOISE: Final = 4.0
-"""Number of standard deviations at which noise is cut off, so that bounds can be proved."""
+"""Number of standard deviations at which noise is cut off."""
 
 
 @final
@@ -64,8 +64,3 @@ class Sensors:
             wire = self.encoder * np.round(wire / self.encoder)
         draws = np.clip(random.standard_normal(wire.size), -LARGEST_NOISE, LARGEST_NOISE)
         return Reading(wire, now.tension + self.tension_bias + self.tension_noise * draws)
-
-    @property
-    def tension_error(self) -> float:
-        """Largest error of a load cell [N]."""
-        return abs(self.tension_bias) + LARGEST_NOISE * self.tension_noise

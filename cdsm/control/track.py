@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from cdsm.control.assessment import Assessment, assess
 from cdsm.control.estimates import Estimate, Observer
-from cdsm.control.felt import felt_stiffness
 from cdsm.control.laws import LAWS, Command, Law, Moment, Reading, Reference, checked_command
 from cdsm.control.plant import Plant, PlantState, SlowPlant, require_unstrained
 from cdsm.control.run import Outcome, TrackingRun
@@ -49,7 +48,6 @@ def track(
     replan: bool | None = None,
     tension_controlled: Sequence[str] | None = None,
     bands: int = 1,
-    felt: int = 0,
     seed: int = 0,
 ) -> TrackingRun:
     """Follow a planned path in closed loop, with a plant that may differ from the plan's arm.
@@ -84,14 +82,11 @@ def track(
             cables, chosen so that the lengths of the others determine the posture best.
         bands: A proved band is computed every ``bands`` steps, which takes about 20 ms; 0: never.
             An arm without friction has no band.
-        felt: The stiffness is measured with the motors every ``felt`` steps
-            (:mod:`cdsm.control.felt`); 0: never. The measurement moves a copy of the plant, so it
-            does not change the run.
         seed: Seed of the noise; the same seed gives the same run, bit for bit.
 
     Raises:
-        InvalidInput: The plan is not complete, or is for ``cartesian`` instead of directions; or
-            another argument is invalid; or a law returns no :class:`Command` within the bounds.
+        InvalidInput: The plan is not complete; or another argument is invalid; or a law returns no
+            :class:`Command` within the bounds.
         UnknownName: There is no such law or cable.
     """
     arm = checked_plan(instance("plan", plan, PathPlan))
@@ -120,8 +115,7 @@ def track(
         outer = StiffnessLoop(arm, schedule.directions, low, high, limit)
     forced = choose_cables(plan, tension_controlled)
     random = np.random.default_rng(whole_number("seed", seed, 0))
-    every, feels = whole_number("bands", bands, 0), whole_number("felt", felt, 0)
-    apart = random.spawn(1)[0]  # the noise of the run does not depend on what is felt
+    every = whole_number("bands", bands, 0)
     observer = Observer(arm, sensors)
 
     reference = schedule.references[0]
@@ -153,13 +147,7 @@ def track(
         truth.append(state.true)
         banded = every > 0 and k % every == 0 and plant.arm.has_friction
         judged = assess(state, wrenches[k], schedule.directions, banded=banded)
-        found = [
-            felt_stiffness(plant, state, wrenches[k], observer, estimate, (low, high), u, apart)
-            for u in (schedule.directions if feels and k % feels == 0 else ())
-        ]
-        records.append(
-            _Step(wanted, short, reading, estimate, command, state, judged, banded, found)
-        )
+        records.append(_Step(wanted, short, reading, estimate, command, state, judged, banded))
         if refusal:
             refused[k] = refusal
         before, last, wire = wanted, reading, command.wire
@@ -202,7 +190,6 @@ class _Step(NamedTuple):
     state: PlantState
     judged: Assessment
     banded: bool
-    felt: list[float]
 
 
 def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[str, Any]:
@@ -231,7 +218,6 @@ def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[
         ),
         "stiffness": rows([record.judged.stiffness for record in records], len(u)),
         "margin": rows([record.judged.margin for record in records]),
-        "felt": rows([record.felt or [math.nan] * len(u) for record in records], len(u)),
         "short": frozen(np.array([record.short for record in records], dtype=np.bool_)),
         "banded": frozen(np.array([record.banded for record in records], dtype=np.bool_)),
         "band": rows([record.judged.band for record in records], 2),

@@ -25,21 +25,20 @@ def principal_stiffness(compliance: Array) -> dict[str, Array]:
     Returns:
         Values by name. ``softest`` and ``stiffest`` [N/m] are the smallest and the largest
         stiffness, inf where the tip cannot move in that direction; ``softest_direction`` and
-        ``stiffest_direction`` are (..., 3). ``anisotropy`` is stiffest/softest, or 1 if the tip
-        cannot move at all; ``isotropy`` is its inverse.
+        ``stiffest_direction`` are (..., 3). ``isotropy`` is softest/stiffest, or 1 if the tip
+        cannot move at all.
     """
     values, vectors = np.linalg.eigh((compliance + compliance.swapaxes(-1, -2)) / 2.0)
     most = values[..., 2]
     softest, stiffest = np.full_like(most, np.inf), np.full_like(most, np.inf)
     np.divide(1.0, most, out=softest, where=most > 0.0)
     np.divide(1.0, values[..., 0], out=stiffest, where=values[..., 0] > RIGID * most)
-    anisotropy = np.ones_like(most)  # value for a tip that cannot move at all
-    np.divide(stiffest, softest, out=anisotropy, where=most > 0.0)
+    isotropy = np.ones_like(most)  # value for a tip that cannot move at all
+    np.divide(softest, stiffest, out=isotropy, where=most > 0.0)
     return {
         "softest": softest,
         "stiffest": stiffest,
-        "anisotropy": anisotropy,
-        "isotropy": 1.0 / anisotropy,
+        "isotropy": isotropy,
         "softest_direction": _positive(vectors[..., 2]),
         "stiffest_direction": _positive(vectors[..., 0]),
     }

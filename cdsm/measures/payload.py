@@ -1,35 +1,25 @@
-"""Payload: the largest force at the tip under which an arm is balanced and stable."""
+"""Payload: the largest force at the tip that tensions balance and a deflection allows."""
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
-from typing import Final, Literal, final
+from typing import Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.batch import evaluate
 from cdsm.measures.forces import ForcePolytope, force_polytope
 from cdsm.measures.program import Loads
 from cdsm.posture import Posture
-from cdsm.statics.buckling import critical_load
-from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.stiffness_matrix import stiffness
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates, plain
-from cdsm.support.status import Status
 from cdsm.support.validation import NO_WRENCH, instance, quantity, wrench_vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import bounds_at, distribute_tension
 
-PayloadLimit = Literal["tension", "deflection", "stability", "elasticity", "none"]
-
-_AROUND: Final = np.array([u for u in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(u)])
-"""Directions (26, 3) that are tested for buckling in the search for the worst direction."""
-
-_STEPS: Final = np.arange(1, 17) / 16.0
-"""Forces that are tested for buckling in each direction, over the one that other limits allow."""
+PayloadLimit = Literal["tension", "deflection", "none"]
 
 
 @final
@@ -44,8 +34,8 @@ class Payload(ReadOnlyState):
         force: The largest force [N]: the smallest of ``limits``.
         limit: Which limit gives ``force``, a key of ``limits``; ``"none"`` if the force is inf.
         limits: Largest force [N] that each limit alone allows: ``"tension"`` (the bounds of the
-            tensions), ``"deflection"``, ``"stability"`` (the arm buckles), ``"elasticity"`` (a
-            tension leaves the domain of its law); inf for a limit that does not restrict it.
+            tensions) and ``"deflection"`` (0 if the arm is unstable without the force); inf for a
+            limit that does not restrict it.
     """
 
     posture: Posture
@@ -90,13 +80,11 @@ def payload(
 
         max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum.
 
-    Further conditions: f |C_vv u| ≤ ``deflection``, and K_θ is positive definite under all loads up
-    to f u. C_vv is the compliance without the force, since the motors are locked before the force
-    acts. K_θ is computed with the least tensions under each load.
+    The deflection f |C_vv u| is at most ``deflection``. C_vv is the compliance without the force,
+    under the least tensions. :func:`critical_load` gives the force at which the arm buckles.
 
     The worst direction has the smallest f. It is the normal of the nearest facet of the
-    :func:`force_polytope`, or the softest direction of C_vv. 26 more directions are then searched
-    for smaller loads that buckle the arm, with 16 loads in each.
+    :func:`force_polytope`, or the softest direction of C_vv.
 
     Args:
         pose: The posture, which stays fixed.
@@ -132,10 +120,8 @@ def payload(
             "tension": largest_force(Loads.of(pose, low, high, W, u[:, None])),
             "deflection": _ratio(allowed, float(np.linalg.norm(compliance @ u))),
         }
-    known = min(limits.values())
-    u, failing, kind = _until_unstable(K, u, known, low, high, worst=direction is None)
-    limits["stability"] = failing if kind == "buckling" else math.inf
-    limits["elasticity"] = failing if kind == "elasticity" else math.inf
+    if not K.is_stable:
+        limits["deflection"] = 0.0
     reason = min(limits, key=lambda name: limits[name])
     force = max(limits[reason], 0.0)
     return Payload(
@@ -178,39 +164,3 @@ def _worst(
 
 def _ratio(allowed: float, compliance: float) -> float:
     return allowed / compliance if compliance > 0.0 and math.isfinite(allowed) else math.inf
-
-
-def _until_unstable(
-    K: Stiffness, u: Array, most: float, low: Array, high: Array, *, worst: bool
-) -> tuple[Array, float, str]:
-    """Find the smallest load along u at which an arm fails; return direction, force [N] and reason.
-
-    The reason is ``"buckling"`` (K_θ is not positive definite) or ``"elasticity"`` (one of the
-    least tensions leaves the domain of its law). If neither happens up to ``most`` [N], the reason
-    is ``"none"`` and the force inf. If ``worst``, u and 26 other directions are examined, and the
-    one with the smallest load is returned. ``low`` and ``high`` (C,) [N] are the bounds of tension.
-    """
-    if not K.is_stable:
-        return u, 0.0, "buckling"
-    pose, W = K.posture, K.wrench
-    if most <= 0.0:
-        return u, math.inf, "none"
-    directions = np.vstack([u, _AROUND]) if worst else u[None]
-    directions = directions / np.linalg.norm(directions, axis=1)[:, None]
-    failing = [*range(len(directions))]
-    if math.isfinite(most):  # most directions hold: look only where a load fails
-        loads = most * (directions[:, None] * _STEPS[:, None]).reshape(-1, 3)
-        wrenches = W + np.hstack([loads, np.zeros_like(loads)])
-        q = np.repeat(pose.q[None], len(loads), axis=0)
-        found = evaluate(
-            pose.arm, q, None, wrenches, ("margin",), minimum=low, maximum=high, check_limits=False
-        )
-        fails = (found["margin"] <= 0.0) | (found.status == Status.OUTSIDE_ELASTICITY)
-        failing = np.flatnonzero(fails.reshape(len(directions), -1).any(axis=1)).tolist()
-    worst_found = u, math.inf, "none"
-    for i in failing:
-        load = np.concatenate([directions[i], np.zeros(3)])
-        critical = critical_load(pose, load, low, high, carried=W)
-        if critical.limit in ("buckling", "elasticity") and critical.factor < worst_found[1]:
-            worst_found = directions[i], critical.factor, critical.limit
-    return worst_found

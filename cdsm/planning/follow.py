@@ -18,8 +18,6 @@ _MISSED = (
     "plan_stiffness finds what comes nearest to them at one posture."
 )
 
-_BACK = 50  # largest number of earlier samples that are planned again for a later sample
-
 
 @dataclass(frozen=True, eq=False)
 class Sample:
@@ -44,10 +42,9 @@ class Follower:
         """Plan the next sample; return None if this succeeds, else the sample with the reason.
 
         The tensions are the least ones that hit the target and that the rate allows: each differs
-        from the tension of the last planned sample by at most ``rate`` per step. If only other
-        tensions hit the target, earlier samples are planned again, so that the rate then allows
-        these tensions. Raises UnreachableStiffness or SingularStiffness if no tensions hit the
-        target, even with an unlimited rate.
+        from the tension of the last planned sample by at most ``rate`` per step. Raises
+        UnreachableStiffness or SingularStiffness if no tensions hit the target, even with an
+        unlimited rate.
         """
         region = sample.model.region
         last = self.planned[-1] if self.planned else None
@@ -62,7 +59,7 @@ class Follower:
                 goal = self._search(sample, region, found.F, centre=last.F) or found
                 found = self._search(sample, near, goal.F)
                 if found is None:
-                    return None if self._replan_towards(goal) else self._too_fast(last, goal)
+                    return self._too_fast(last, goal)
         self.planned.append(found)
         return None
 
@@ -100,28 +97,6 @@ class Follower:
         if found is None:
             return None
         return replace(sample, F=sample.model.region.tension(found.evaluation.F).values)
-
-    def _replan_towards(self, goal: Sample) -> bool:
-        """Plan the last samples again so that the rate allows ``goal``; return whether it succeeds.
-
-        The loop goes backwards from the last planned sample. Each sample gets tensions from which
-        the rate allows those of the next sample. Of these tensions, it gets those nearest to the
-        tensions of the sample before. The loop ends when the rate also allows the change from the
-        sample before. At most 50 samples are planned again.
-        """
-        later = [goal]
-        for k in reversed(range(max(len(self.planned) - _BACK, 0), len(self.planned))):
-            sample, before = self.planned[k], self.planned[k - 1] if k else None
-            region = self._near(sample.model.region, sample, later[-1])
-            joined = self._search(sample, self._near(region, sample, before), sample.F)
-            if joined is not None:
-                self.planned[k:] = [joined, *reversed(later)]
-                return True
-            nearer = before and self._search(sample, region, sample.F, centre=before.F)
-            if nearer is None:
-                return False
-            later.append(nearer)
-        return False
 
     def _too_fast(self, last: Sample, goal: Sample) -> InfeasibleSample:
         change, allowed = abs(goal.F - last.F), self.rate * (goal.index - last.index)

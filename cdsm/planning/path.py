@@ -43,7 +43,7 @@ _STATUS: Final[dict[type[CdsmError], Status]] = {
 
 def plan_path(
     arm: Manipulator,
-    direction: Direction | Sequence[Direction] | None,
+    direction: Direction | Sequence[Direction],
     target: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
@@ -65,21 +65,20 @@ def plan_path(
     sample does not stop the path: ``infeasible`` of the result lists it with its reason.
 
     Between two planned samples that are k samples apart, no tension changes by more than k·rate.
-    If no tensions within this limit hit the target although others do, up to 50 earlier samples are
-    planned again, backwards, so that they still hit their targets and lead to this sample. If this
-    fails, the sample has the status ``"rate"``, and the next sample may change the tensions by one
-    rate more. So after a jump of the target, samples have this status until the rate allows the new
-    tensions. If the arm must follow meanwhile, give a ramp instead of a jump.
+    If no tensions within this limit hit the target although others do, the sample has the status
+    ``"rate"``, and the next sample may change the tensions by one rate more. So after a jump of the
+    target, samples have this status until the rate allows the new tensions. If the arm must follow
+    meanwhile, give a ramp instead of a jump.
 
-    The plan hits the targets at the samples. ``between`` of the result gives the stiffness half-way
-    between two samples. Its misfit is of second order in the step between samples.
+    The plan hits the targets at the samples. Between samples the error of the stiffness is of
+    second order in the step.
 
     Args:
         arm: The arm.
         direction: u: an axis such as ``"z"``, or (3,) in base axes, any length; several directions
-            (n, 3), which are hit together; or None for ``cartesian``.
+            (n, 3), which are hit together.
         target: The stiffness [N/m], one for all samples or one per sample: () or (S,) along u, (n,)
-            or (S, n) along several directions, (3, 3) or (S, 3, 3) for ``cartesian``.
+            or (S, n) along several directions.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W at ``tool0`` in base axes, (6,) or one per sample (S, 6): force [N], then moment
@@ -106,10 +105,10 @@ def plan_path(
     if tips is None and guess is not None:
         raise InvalidInput("guess", "given with angles=, which need none; drop it, or give tips=.")
     size = len(path)
-    directions = None if direction is None else unit_directions("direction", direction)
-    tail = (3, 3) if directions is None else directions.shape[:-1]
+    directions = unit_directions("direction", direction)
+    tail = directions.shape[:-1]
     targets = _per_sample("target", target, tail, size)
-    check_positive(directions, targets)
+    check_positive(targets)
     loads = _per_sample("wrench", wrench, (6,), size)
     limit = checked_rate(arm, rate)
     checked_bounds(arm, minimum, maximum)  # check now, not at the first feasible posture
@@ -118,7 +117,6 @@ def plan_path(
     flag("progress", progress)
 
     near = guess
-    models: list[StiffnessModel] = []
     infeasible: list[InfeasibleSample | None] = []
     for i in track(range(size), "planning the path", wanted=progress):
         try:
@@ -130,7 +128,6 @@ def plan_path(
                     continue
                 q = near = solved.angles
             model = StiffnessModel(arm.at(q), minimum, maximum, loads[i], margin)
-            models.append(model)
             constraints = target_constraints(model, directions, targets[i])
             sample = Sample(i, model, constraints, model.region.least.values)
             infeasible.append(follower.add(sample))
@@ -152,7 +149,6 @@ def plan_path(
         achieved=frozen(values.reshape(-1, *tail)),
         stiffness=tuple(found),
         infeasible=tuple(each for each in infeasible if each is not None),
-        iterations=sum(model.iterations for model in models),
     )
 
 

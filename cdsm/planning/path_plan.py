@@ -15,12 +15,10 @@ import cdsm
 from cdsm.cable_laws import CableLaws
 from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
-from cdsm.planning.half_way import HalfWay, half_way
 from cdsm.planning.path_table import path_table
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, plain, plural
-from cdsm.support.progress import track
 from cdsm.support.tables import csv_text
 from cdsm.support.tidy import data_frame
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -63,20 +61,19 @@ class PathPlan(ReadOnlyState):
 
     Attributes:
         arm: The arm.
-        direction: Unit directions u in base axes, (3,) or (n, 3); None for ``cartesian``.
-        target: The target at every sample [N/m]: (S,), one per direction (S, n), or (S, 3, 3).
+        direction: Unit directions u in base axes, (3,) or (n, 3).
+        target: The target at every sample [N/m]: (S,), or one per direction (S, n).
         rate: Largest change of a tension per step (C,) [N]; may be inf.
         planned: Numbers of the planned samples, from 0.
         angles: Joint angles (P, nv) [rad]; [m] for prismatic joints.
         tensions: F (P, C) [N].
-        achieved: ``stiffness.along`` or ``stiffness.cartesian``, (P,), (P, n) or (P, 3, 3) [N/m].
+        achieved: ``stiffness.along``, (P,) or (P, n) [N/m].
         stiffness: K_θ at each planned sample, with its posture and wrench.
         infeasible: The samples that are not planned, each with its reason.
-        iterations: Iterations of all searches.
     """
 
     arm: Manipulator
-    direction: Array | None
+    direction: Array
     target: Array
     rate: Array
     planned: tuple[int, ...]
@@ -85,7 +82,6 @@ class PathPlan(ReadOnlyState):
     achieved: Array
     stiffness: tuple[Stiffness, ...]
     infeasible: tuple[InfeasibleSample, ...]
-    iterations: int
 
     @property
     def complete(self) -> bool:
@@ -122,27 +118,6 @@ class PathPlan(ReadOnlyState):
         rows = np.array([motors.original_lengths(L, F) for L, F in pairs])
         return frozen(rows.reshape(self.tensions.shape)[:, self.arm.cables.position_controlled])
 
-    @cached_property
-    def between(self) -> tuple[HalfWay, ...]:
-        """Equilibrium half-way between each pair of neighbouring samples that are both planned.
-
-        The motors are assumed to move at constant speed. With half the step between samples, the
-        misfit falls to a quarter. The first use takes a few milliseconds per pair.
-        """
-        pairs = list(zip(self.planned, self.planned[1:], strict=False))
-        l_0, targets = self.unstrained_lengths, self.target
-        return tuple(
-            half_way(
-                i,
-                (self.stiffness[k], self.stiffness[k + 1]),
-                (l_0[k] + l_0[k + 1]) / 2.0,
-                frozen(np.asarray((targets[i] + targets[j]) / 2.0)),
-                self.direction,
-            )
-            for k, (i, j) in enumerate(track(pairs, "looking half-way between the samples"))
-            if j == i + 1
-        )
-
     @property
     def tips(self) -> Array:
         """Tip positions (P, 3) [m]."""
@@ -155,7 +130,7 @@ class PathPlan(ReadOnlyState):
             animate: A ``.gif`` to write too, in which the arm follows the path.
 
         Raises:
-            InvalidInput: The plan is for ``cartesian``, or no sample to animate is planned.
+            InvalidInput: No sample to animate is planned.
             FileError: The animation cannot be written.
         """
         if animate is not None:
@@ -173,21 +148,10 @@ class PathPlan(ReadOnlyState):
             "tip_position_m": self.tips,
             "tensions_N": self.tensions,
             "cable_lengths_m": self.cable_lengths,
-            "half_way": [
-                {
-                    "after": between.index,
-                    "target_N_per_m": between.target,
-                    "achieved_N_per_m": between.achieved,
-                    "misfit": between.misfit,
-                    "reason": between.reason,
-                }
-                for between in self.between
-            ],
             "infeasible": [
                 {"index": sample.index, "status": sample.status, "reason": sample.reason}
                 for sample in self.infeasible
             ],
-            "iterations": self.iterations,
         }
         return plain(numbers)
 
@@ -224,18 +188,6 @@ class PathPlan(ReadOnlyState):
             lines[0] += f", with {F.min():.4g} to {F.max():.4g} N"
         if len(self.planned) > 1:
             lines[0] += f", which change by up to {self.steps.max():.4g} N per step"
-        resting = [each for each in self.between if each.stiffness is not None]
-        if resting:
-            worst = max(resting, key=lambda each: each.misfit)
-            lines.append(
-                f"half-way between samples the stiffness is up to {100.0 * worst.misfit:.2g} % off "
-                f"(samples {worst.index} and {worst.index + 1})"
-            )
-        lines += [
-            f"half-way between samples {each.index} and {each.index + 1}: {each.reason}"
-            for each in self.between
-            if each.stiffness is None
-        ]
         # consecutive samples with one status are one line
         numbered = enumerate(self.infeasible)
         for _, group in groupby(numbered, lambda pair: (pair[1].index - pair[0], pair[1].status)):

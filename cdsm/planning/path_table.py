@@ -16,7 +16,7 @@ def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
     """Return the header and a row for each sample of ``plan``, in SI. Unknown values are empty."""
     arm, names, locked = plan.arm, plan.arm.cables.names, plan.arm.cables.position_controlled
     targets = plan.target.reshape(len(plan.target), -1)
-    numbered = _numbered(plan, targets.shape[1])
+    numbered = _numbered(targets.shape[1])
     columns = [
         *(f"{name} [{unit}]" for name, unit in zip(arm.joint_names, arm.joint_units, strict=True)),
         *(f"{name} tension [N]" for name in names),
@@ -43,12 +43,9 @@ def path_table(plan: PathPlan) -> tuple[list[str], list[list[Any]]]:
     return ["sample", "status", *columns, *wanted, "reason"], rows
 
 
-def _numbered(plan: PathPlan, count: int) -> list[str]:
-    """Return the suffixes of the columns "stiffness" and "target", such as "stiffness xy".
+def _numbered(count: int) -> list[str]:
+    """Return the suffixes of the columns "stiffness" and "target", such as "stiffness 2".
 
-    They are xx, xy, … zz for a plan of ``cartesian``; 1, 2, … for a plan of several directions,
-    ``count`` in all; and empty for one direction.
+    They are 1, 2, … for a plan of several directions, ``count`` in all; and empty for one.
     """
-    if plan.direction is None:
-        return [f" {a}{b}" for a in "xyz" for b in "xyz"]
     return [""] if count == 1 else [f" {k}" for k in range(1, count + 1)]

@@ -14,7 +14,6 @@ from cdsm.planning.objectives import (
     achieved,
     checked_starts,
     checked_targets,
-    misfit,
     target_constraints,
 )
 from cdsm.planning.planner import REACHED, Planner
@@ -26,7 +25,7 @@ from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.format import MODEL, coordinates, key, plain
 from cdsm.support.progress import progress_allowed
 from cdsm.support.validation import NO_WRENCH
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
@@ -43,34 +42,21 @@ class StiffnessPlan(ReadOnlyState):
     Attributes:
         tension: The planned tensions: of those equally near to the target, the ones of least ‖F‖.
         stiffness: K_θ under these tensions.
-        direction: Unit directions u in base axes, (3,) or (n, 3); None for ``cartesian``.
-        target: The target [N/m]: a number, one per direction (n,), or (3, 3).
-        achieved: ``stiffness.along`` () or (n,), or ``stiffness.cartesian`` (3, 3) [N/m].
-        floor: Limit of the smallest eigenvalue of K_θ; below it an arm counts as unstable
-            [N m/rad].
-        efforts: ‖F‖ (S,) [N] at the end of each search that hit the target, ascending. The first
-            belongs to ``tension``.
-        iterations: Iterations of all searches.
-        evaluations: Number of evaluations of K_θ.
+        direction: Unit directions u in base axes, (3,) or (n, 3).
+        target: The target [N/m]: a number, or one per direction (n,).
+        achieved: ``stiffness.along`` () or (n,) [N/m].
     """
 
     tension: Tension
     stiffness: Stiffness
-    direction: Array | None
+    direction: Array
     target: float | Array
     achieved: float | Array
-    floor: float
-    efforts: Array
-    iterations: int
-    evaluations: int
 
     @property
     def misfit(self) -> float:
-        """‖achieved/target − 1‖ [-], or ‖achieved − target‖/‖target‖ for ``cartesian``.
-
-        If the wrench has a moment, ``cartesian`` is not symmetric; its symmetric part is compared.
-        """
-        return misfit(np.asarray(self.achieved), np.asarray(self.target), self.direction)
+        """‖achieved/target − 1‖ [-]."""
+        return float(np.linalg.norm(np.divide(self.achieved, self.target) - 1.0))
 
     @property
     def reached(self) -> bool:
@@ -79,11 +65,6 @@ class StiffnessPlan(ReadOnlyState):
         It is always True for one direction: otherwise :func:`plan_stiffness` raises an error.
         """
         return self.misfit <= REACHED
-
-    @property
-    def spread(self) -> float:
-        """(Largest − least)/least of ``efforts`` [-]; 0 if all searches end at the same ‖F‖."""
-        return float(self.efforts[-1] / self.efforts[0] - 1.0) if self.efforts.size else 0.0
 
     def plot(self, attainable: StiffnessRange | None = None) -> Figure:
         """Plot the planned tensions [N] of each cable.
@@ -105,8 +86,6 @@ class StiffnessPlan(ReadOnlyState):
             "cable_length_m": dict(zip(self.tension, pose.cable_lengths, strict=True)),
             **pose._coordinates,
             key("margin", pose.arm.stiffness_unit()): self.stiffness.margin,
-            "efforts_N": self.efforts,
-            "iterations": self.iterations,
         }
         return plain(numbers)
 
@@ -116,22 +95,18 @@ class StiffnessPlan(ReadOnlyState):
         return f"<StiffnessPlan {F.min():.4g} to {F.max():.4g} N{state}>"
 
     def __str__(self) -> str:
-        rows = [str(self.tension)]
-        if self.direction is None:
-            rows.append(f"cartesian stiffness within {self.misfit:.2g} of the target")
-        else:
-            pairs = np.reshape([self.achieved, self.target], (2, -1)).T / 1000.0
-            rows += [
-                f"along {coordinates(u)}: {value:.4g} N/mm ({wanted:.4g} N/mm wanted)"
-                for u, (value, wanted) in zip(self.direction.reshape(-1, 3), pairs, strict=True)
-            ]
+        pairs = np.reshape([self.achieved, self.target], (2, -1)).T / 1000.0
+        rows = [
+            f"along {coordinates(u)}: {value:.4g} N/mm ({wanted:.4g} N/mm wanted)"
+            for u, (value, wanted) in zip(self.direction.reshape(-1, 3), pairs, strict=True)
+        ]
         margin = f"{self.stiffness.margin:.4g} {self.tension.posture.arm.stiffness_unit()}"
-        return "\n".join([*rows, f"smallest joint stiffness {margin} ({MODEL})"])
+        return "\n".join([str(self.tension), *rows, f"smallest joint stiffness {margin} ({MODEL})"])
 
 
 def plan_stiffness(
     pose: Posture,
-    direction: Direction | Sequence[Direction] | None,
+    direction: Direction | Sequence[Direction],
     target: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = np.inf,
@@ -147,20 +122,17 @@ def plan_stiffness(
     The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
     position-controlled cables, and the limit of the smallest eigenvalue λ_min of K_θ (symmetric
     part) that follows from ``margin``. The target of one direction is hit within 1e-6 of its value;
-    otherwise an error is raised. The targets of several directions or of ``cartesian`` are hit if
-    possible. If not, the tensions have the least sum of squared relative misses that was found, and
-    ``reached`` is False.
+    otherwise an error is raised. The targets of several directions are hit if possible. If not, the
+    tensions have the least sum of squared relative misses that was found, and ``reached`` is False.
 
-    The searches are local. With the laws of this library they usually end at the same effort ‖F‖.
-    With one user-defined law, the effort found was 3.6 % above the least. If ``spread`` is above
-    zero, the searches ended at different efforts, and more ``starts`` help. A ``spread`` of zero
-    does not prove that the least effort was found.
+    The searches are local. With the laws of this library they usually end at the least effort ‖F‖.
+    With one user-defined law, the effort found was 3.6 % above the least; more ``starts`` help.
 
     Args:
         pose: The posture.
-        direction: u: an axis such as ``"z"``, or (3,) in base axes, any length; several directions
-            (n, 3); or None for ``cartesian``.
-        target: The stiffness [N/m] along u; one per direction (n,); or (3, 3).
+        direction: u: an axis such as ``"z"``, or (3,) in base axes, any length; or several
+            directions (n, 3).
+        target: The stiffness [N/m] along u, or one per direction (n,).
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,). With inf, only the domain
             of the elasticity and buckling limit the tensions.
@@ -184,7 +156,7 @@ def plan_stiffness(
     """
     model = StiffnessModel(pose, minimum, maximum, wrench, margin)
     number, seed = checked_starts(starts, seed)
-    directions = None if direction is None else unit_directions("direction", direction)
+    directions = unit_directions("direction", direction)
     targets = checked_targets(directions, target)
     planner = Planner(model, target_constraints(model, directions, targets), number, seed)
     with progress_allowed(progress):
@@ -198,8 +170,4 @@ def plan_stiffness(
         direction=directions,
         target=float(targets) if targets.ndim == 0 else targets,
         achieved=float(value) if value.ndim == 0 else value,
-        floor=model.floor,
-        efforts=frozen(np.array(planner.efforts)),
-        iterations=model.iterations,
-        evaluations=model.evaluations,
     )

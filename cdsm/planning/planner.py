@@ -38,8 +38,7 @@ class Planner:
     """Search, from several starts, for the tensions F of least ‖F‖ with constraints c(F) = 0.
 
     A result is a point: :class:`ConstraintValues`, with the tensions in ``evaluation.F``. c are the
-    relative misses of the targets. ``efforts`` are ‖F‖ [N] at the end of each search that hit the
-    target, ascending.
+    relative misses of the targets.
     """
 
     def __init__(
@@ -51,7 +50,6 @@ class Planner:
         self.model, self.constraints, self.starts, self.seed = model, constraints, starts, seed
         self.begin = StartPoints(model, bounded, 0, seed)
         self.program = Program(region, self.begin.anchor, constraints, EFFORT, region.scale)
-        self.efforts: list[float] = []
         self._ends: list[ConstraintValues] = []
 
     def least(self) -> ConstraintValues | None:
@@ -130,11 +128,7 @@ class Planner:
         found = [
             self._search(program, point) for point in track(begin, "searching the least tensions")
         ]
-        hits = sorted((each for each in found if program.met(each)), key=_effort)
-        if not hits:
-            return None
-        self.efforts = [_effort(each) for each in hits]
-        return hits[0]
+        return min((each for each in found if program.met(each)), key=_effort, default=None)
 
     def _nearly_hit(self, seen: list[ConstraintValues]) -> ConstraintValues | None:
         """Return the point of ``seen`` nearest to a single target; None if the miss exceeds 1e-6.
@@ -145,9 +139,7 @@ class Planner:
         if least > REACHED:
             return None
         hits = [place for place in seen if abs(place.values[0]) <= max(least, _AS_NEAR)]
-        best = min(hits, key=_effort)
-        self.efforts = [_effort(best)]
-        return best
+        return min(hits, key=_effort)
 
     def _starts(self) -> Iterator[Evaluation]:
         """Yield up to ``starts`` stable points from which searches begin.

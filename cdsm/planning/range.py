@@ -24,7 +24,7 @@ from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import MODEL, coordinates, plain, span
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.validation import NO_WRENCH
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tension import Tension
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
 
@@ -57,11 +57,6 @@ class StiffnessRange(ReadOnlyState):
         low_tension: Tensions that give ``low``.
         high_tension: Tensions that give ``high``.
         floor: Smallest eigenvalue of K_θ at which an arm still counts as stable [N m/rad].
-        low_found: Stiffness at the end of each search for ``low``, ascending (S,) [N/m]. It shows
-            how many of the starts found ``low``.
-        high_found: Stiffness at the end of each search for ``high``, descending (S,) [N/m].
-        iterations: Iterations of all searches.
-        evaluations: Number of evaluations of K_θ.
     """
 
     direction: Array
@@ -70,10 +65,6 @@ class StiffnessRange(ReadOnlyState):
     low_tension: Tension
     high_tension: Tension
     floor: float
-    low_found: Array
-    high_found: Array
-    iterations: int
-    evaluations: int
 
     @property
     def posture(self) -> Posture:
@@ -134,9 +125,9 @@ def stiffness_range(
     The constraints on F are those of :func:`~cdsm.plan_stiffness`. With a rigidity that is constant
     or levels off, ``along`` is a concave function of F: it has one maximum, and many minima in the
     corners of the set of admissible tensions. So the search for ``low`` needs many starts. With
-    other laws the search for ``high`` needs them too. ``high_found`` shows how often ``high`` was
-    found. A larger number of ``starts`` adds starting tensions and keeps the others. If tension can
-    buckle the arm, the arm is softest just before it buckles, and ``low`` depends on ``margin``.
+    other laws the search for ``high`` needs them too. A larger number of ``starts`` adds starting
+    tensions and keeps the others. If tension can buckle the arm, the arm is softest just before it
+    buckles, and ``low`` depends on ``margin``.
 
     From the softest corner found, the tension of one cable after the other is moved to its other
     bound, until no softer corner is found. This does not prove that ``low`` is the smallest. With
@@ -184,10 +175,6 @@ def stiffness_range(
         low_tension=low.tension,
         high_tension=high.tension,
         floor=model.floor,
-        low_found=low.values,
-        high_found=high.values,
-        iterations=model.iterations,
-        evaluations=model.evaluations,
     )
 
 
@@ -197,7 +184,6 @@ class RangeEnd(NamedTuple):
     evaluation: Evaluation  # at the end of the best search
     tension: Tension  # there, with exact balance
     value: float  # stiffness [N/m]; next to buckling the less accurate value of the search
-    values: Array  # stiffness at the end of each search (S,) [N/m], the best first
     open: bool = False  # whether larger tensions, which no bound excludes, would lead further
 
 
@@ -259,14 +245,13 @@ def _bounded_ends(
         lowest = searched("softest", LOWEST, beside, lowest)
 
     def end(found: list[ConstraintValues]) -> RangeEnd:
-        values = unit * np.array([each.values[0] for each in found])
         evaluation = found[0].evaluation
         tension = region.tension(evaluation.F)
         try:
             value = stiffness(model.pose, tension).along(u)
         except SingularStiffness:  # next to buckling K_θ has no accurate inverse
-            value = float(values[0])
-        return RangeEnd(evaluation, tension, value, frozen(values))
+            value = unit * float(found[0].values[0])
+        return RangeEnd(evaluation, tension, value)
 
     return end(lowest), end(highest)
 

@@ -148,7 +148,6 @@ def _search(program: Program, start: Evaluation, *, in_piece: bool) -> Constrain
     for _ in range(_ITERATIONS):
         if radius < _SMALLEST_RADIUS:
             break
-        start.model.iterations += 1
         low, high = region.piece(iterate.evaluation.F)
         bounds = (low, high) if in_piece else (region.low, region.high)
         local = _LocalModel(program, iterate, step, bounds, radius)

@@ -65,7 +65,6 @@ class StiffnessModel:
         self.pose = instance("pose", pose, Posture)
         self.region = region = admissible(pose, minimum, maximum, wrench)
         part = checked_margin(margin)
-        self.evaluations = self.iterations = 0
         self.unit = unit = JointUnits(pose.arm.slides).levers(pose.arm.length)
         squared = np.outer(unit, unit)
         self.jacobian = pose.jacobian * unit
@@ -80,7 +79,6 @@ class StiffnessModel:
 
     def at(self, F: Array) -> Evaluation:
         """Evaluate K_θ under admissible tensions F (C,) [N]."""
-        self.evaluations += 1
         # rounding between two admissible points can leave the bounds and the domain of a law
         return Evaluation(self, np.minimum(np.maximum(F, self.region.low), self.region.high))
 

@@ -31,7 +31,7 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.validation import NO_WRENCH, bound, instance, scalar
 from cdsm.support.values import Array, frozen
-from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
+from cdsm.tension import Tension, distribute_tension
 
 _JUST = 1e-9  # relative distance from a bound to a point just beside it
 _INSET = 1e-6  # distance of the curve from an end without a slope, over the length of the curve
@@ -45,7 +45,6 @@ def saturation(
     wrench: ArrayLike = NO_WRENCH,
     *,
     fraction: float = 0.1,
-    solver: str = DEFAULT_SOLVER,
 ) -> Saturation:
     """Find the lower bound of tension above which more tension hardly stiffens an arm.
 
@@ -66,7 +65,6 @@ def saturation(
         maximum: Upper bound of the tensions [N], for all cables or (C,); inf for no bound.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         fraction: Part of the largest slope, from 0 to below 1 [-].
-        solver: ``"daqp"``, ``"osqp"``, or another solver that qpsolvers finds installed.
 
     Raises:
         InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero;
@@ -84,9 +82,9 @@ def saturation(
 
     @cache
     def at(lower: float) -> Stiffness:
-        return stiffness(pose, distribute_tension(pose, lower, ceiling, wrench, solver))
+        return stiffness(pose, distribute_tension(pose, lower, ceiling, wrench))
 
-    distribute_tension(pose, start, ceiling, wrench, solver)  # raises if minimum exceeds maximum
+    distribute_tension(pose, start, ceiling, wrench)  # raises if minimum exceeds maximum
     lowest, highest = tension_domain(arm)
     low = max(start, lowest)
     at(low)._require_mobile(u)

@@ -16,7 +16,6 @@ from cdsm.plots.by_cable import (
 from cdsm.plots.designs import plot_designs
 from cdsm.plots.forces import plot_force_polytope
 from cdsm.plots.loads import (
-    plot_bifurcation,
     plot_critical_load,
     plot_critical_tension,
     plot_load_history,
@@ -32,7 +31,7 @@ from cdsm.plots.wires import plot_cables, plot_elasticity
 
 # fmt: off
 __all__ = [
-    "plot_arm", "plot_bifurcation", "plot_cables", "plot_critical_load", "plot_critical_tension",
+    "plot_arm", "plot_cables", "plot_critical_load", "plot_critical_tension",
     "plot_designs", "plot_elasticity", "plot_force_polytope", "plot_load_history", "plot_map",
     "plot_modes", "plot_monte_carlo", "plot_paper", "plot_path", "plot_path_plan",
     "plot_saturation", "plot_shares", "plot_stiffness_plan", "plot_stiffness_range",

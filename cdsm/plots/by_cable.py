@@ -87,7 +87,7 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None =
         return _plot_tensions([(F, f"planned{misses}", "o")], f"{F.posture.arm.name}: plan")
     expect("attainable", attainable, "StiffnessRange")
     same = F.posture._equals(attainable.posture)
-    u = np.zeros(3) if plan.direction is None else plan.direction
+    u = plan.direction
     if not same or u.shape != (3,) or abs(u - attainable.direction).max() > _SAME:
         raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
     planned = F, f"planned: {N_PER_MM * float(plan.achieved):.4g} N/mm", "o"

@@ -31,7 +31,6 @@ from cdsm.support.format import plural
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cdsm.statics.bifurcation import Bifurcation
     from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
     from cdsm.statics.load_history import LoadHistory
     from cdsm.statics.weight_test import WeightTest
@@ -131,33 +130,6 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
     axes.set(xlabel="factor of the load", ylabel=f"smallest joint stiffness [{unit}]")
     load = " ".join(f"{x:.3g}" for x in critical.wrench[:3])
     caption(axes, f"{critical.posture.arm.name}: load ({load}) N")
-    return figure
-
-
-def plot_bifurcation(found: Bifurcation) -> Figure:
-    """Plot the tip displacement [mm] under a small push against the lower bound of all tensions.
-
-    The displacement grows near the bound at which the arm buckles; a dashed line marks that bound.
-
-    Raises InvalidInput if ``found`` is not a result of :func:`~cdsm.bifurcation`.
-    """
-    expect("found", found, "Bifurcation")
-    figure, ((axes,),) = panels(ONE_COLUMN, 2.4, 1)
-    push = np.linalg.norm(found.push[:3])
-    axes.plot(
-        found.bounds,
-        MM * np.linalg.norm(found.displacements, axis=1),
-        "o-",
-        color=BLUE,
-        markersize=3,
-        label=f"pushed aside by {push:.3g} N",
-    )
-    critical = found.critical.minimum
-    axes.axvline(critical, color=VERMILLION, linestyle="--", label=f"buckles at {critical:.4g} N")
-    axes.set(xlabel="lower bound of tension [N]", ylabel="displacement of the tip [mm]")
-    caption(axes, found.critical.posture.arm.name)
-    axes.set_ylim(bottom=0.0)
-    legend(axes)
     return figure
 
 

@@ -105,7 +105,7 @@ def cases_of(
         raise InvalidInput(
             "quantity",
             f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
-            "such as softest, stiffest, anisotropy, margin or along.",
+            "such as softest, stiffest, isotropy, margin or along.",
         )
     cases = [dim for dim in dims if dim not in poses]
     sizes = [dataset.sizes[dim] for dim in cases]

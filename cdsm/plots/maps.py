@@ -104,8 +104,7 @@ def plot_map(
         dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
             ``sel`` if it has more than 9 panels.
         quantity: Quantity with one number per entry: ``"softest"``, ``"stiffest"``,
-            ``"anisotropy"``, ``"margin"``; ``"along"``, ``"stuck_along"``, ``"breakaway"`` (a panel
-            for each direction).
+            ``"isotropy"``, ``"margin"``; or ``"along"`` (a panel for each direction).
         section: Axis, position and half thickness [m] of a slab. Only tips inside it are shown.
         statistic: ``"median"``, ``"min"`` or ``"max"`` of the postures in a cell; None: dots where
             the tips are in a plane or a section, else the median.

@@ -138,12 +138,9 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     """Plot wanted and planned stiffness, and tensions, against the samples of a path.
 
     Infeasible samples are shaded. The legend names up to 24 cables; a colour bar numbers more.
-    Raises InvalidInput if ``plan`` is not a result of :func:`~cdsm.plan_path`, or if its target is
-    a Cartesian stiffness matrix instead of a stiffness along directions.
+    Raises InvalidInput if ``plan`` is not a result of :func:`~cdsm.plan_path`.
     """
     expect("plan", plan, "PathPlan")
-    if plan.direction is None:
-        raise InvalidInput("plan", "is one of cartesian; only stiffness along directions is drawn.")
     figure, ((above,), (below,)) = panels(TWO_COLUMNS, 4.6, 1, rows=2, sharex=True)
     size = len(plan.target)
     wanted = N_PER_MM * plan.target.reshape(size, -1)

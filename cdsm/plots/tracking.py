@@ -48,17 +48,14 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     error.plot(t, MM * run.tip_error, color=BLUE)
     error.set(ylabel="tip error [mm]")
     error.set_ylim(bottom=0.0)
-    each = zip(run.directions, COLORS, run.target.T, run.stiffness.T, run.felt.T, strict=False)
-    for u, color, wanted, found, felt in each:
+    each = zip(run.directions, COLORS, run.target.T, run.stiffness.T, strict=False)
+    for u, color, wanted, found in each:
         name = direction_name(u)
         stiffness.plot(t, N_PER_MM * wanted, "--", color=color, linewidth=0.9, label="_")
         stiffness.plot(t, N_PER_MM * found, color=color, label=f"along {name}; dashed: wanted")
-        if np.isfinite(felt).any():
-            stiffness.plot(t, N_PER_MM * felt, "o", color=color, markersize=3, label="felt")
     stiffness.set(ylabel="frictionless\nstiffness [N/mm]")
-    ratio = np.concatenate([run.stiffness, run.felt]) / np.tile(run.target, (2, 1))
-    if np.nanmin(ratio, initial=1.0) < _HALF:  # else a few percent would not be seen
-        from_zero(stiffness, *(N_PER_MM * each for each in (run.target, run.stiffness, run.felt)))
+    if np.nanmin(run.stiffness / run.target, initial=1.0) < _HALF:  # else no percent is seen
+        from_zero(stiffness, N_PER_MM * run.target, N_PER_MM * run.stiffness)
     low, high = MM * run.band.T
     at = run.banded  # steps with a computed band; the area has a gap where it was not proved
     if np.isfinite(low[at]).any():

@@ -31,7 +31,7 @@ from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.validation import NO_WRENCH, bound, instance, wrench_vector
 from cdsm.support.values import Array, frozen
-from cdsm.tension import DEFAULT_SOLVER, distribute_tension
+from cdsm.tension import distribute_tension
 
 _LARGEST_FACTOR: Final = 1e6
 """The search for a critical load doubles the load factor while it is below this number.
@@ -43,9 +43,7 @@ factor is infinite.
 _SHOWN: Final = 10.0  # largest load factor of the curve if the critical factor is infinite
 
 
-def critical_tension(
-    pose: Posture, wrench: ArrayLike = NO_WRENCH, solver: str = DEFAULT_SOLVER
-) -> CriticalTension:
+def critical_tension(pose: Posture, wrench: ArrayLike = NO_WRENCH) -> CriticalTension:
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
     F_min is the lower bound of all cables. :func:`~cdsm.distribute_tension` computes the tensions,
@@ -54,7 +52,6 @@ def critical_tension(
     Args:
         pose: The posture, which stays fixed.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        solver: As for :func:`~cdsm.distribute_tension`.
 
     Raises:
         InvalidInput: ``wrench`` has the wrong shape or is not finite.
@@ -65,7 +62,7 @@ def critical_tension(
     W = wrench_vector("wrench", wrench)
 
     def at(minimum: float) -> Stiffness:
-        return stiffness(pose, distribute_tension(pose, minimum, wrench=W, solver=solver))
+        return stiffness(pose, distribute_tension(pose, minimum, wrench=W))
 
     low, highest = tension_domain(arm)
     at(low)  # raises the reason if no tensions balance the arm
@@ -97,7 +94,6 @@ def critical_load(
     wrench: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
-    solver: str = DEFAULT_SOLVER,
     *,
     carried: ArrayLike = NO_WRENCH,
 ) -> CriticalLoad:
@@ -108,7 +104,6 @@ def critical_load(
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; not zero.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,).
-        solver: As for :func:`~cdsm.distribute_tension`.
         carried: Constant wrench (6,) at ``tool0`` that always acts, such as the weight of a tool.
 
     Raises:
@@ -125,7 +120,7 @@ def critical_load(
 
     @cache
     def at(factor: float) -> Stiffness:
-        return stiffness(pose, distribute_tension(pose, low, high, always + factor * W, solver))
+        return stiffness(pose, distribute_tension(pose, low, high, always + factor * W))
 
     factor, limit = 0.0, failure_at(at, 0.0)
     at(factor)  # raises the reason if no tensions balance the arm

@@ -14,7 +14,6 @@ import cdsm
 from cdsm.cable import Cable
 from cdsm.errors import SingularStiffness
 from cdsm.posture import Posture
-from cdsm.statics.locked_motors import rounding
 from cdsm.statics.trust_region import FLAT
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.directions import unit_direction
@@ -48,8 +47,6 @@ class Equilibrium(ReadOnlyState):
         reaction: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit, negative
             at an upper limit, zero elsewhere.
         residual: Residual torque J_Lᵀ F + g − J_Xᵀ W − reaction (nv,) [N m].
-        history: Largest residual [N m] at every accepted iterate of the last load step.
-        iterations: Number of iterations over all load steps.
     """
 
     reference: Posture
@@ -58,8 +55,6 @@ class Equilibrium(ReadOnlyState):
     stiffness: Stiffness
     reaction: Array
     residual: Array
-    history: tuple[float, ...]
-    iterations: int
 
     @property
     def pose(self) -> Posture:
@@ -75,11 +70,6 @@ class Equilibrium(ReadOnlyState):
     def displacement(self) -> Array:
         """Displacement of the tip from the reference (3,) [m]."""
         return frozen(self.pose.tip[:3, 3] - self.reference.tip[:3, 3])
-
-    @property
-    def converged(self) -> bool:
-        """Whether the residual is only rounding; :func:`equilibrium` raises an error if not."""
-        return bool((abs(self.residual) <= rounding(self.stiffness)).all())
 
     @property
     def stable(self) -> bool:

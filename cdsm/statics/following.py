@@ -72,7 +72,7 @@ def follow(before: Equilibrium, wrench: Array, start: Array | None = None) -> Eq
     search = find_rest(loaded, iterate)
     if not (search.converged and search.convex and _is_stable_between(loaded, iterate, search)):
         return None
-    return settled(loaded, search, search.iterations)
+    return settled(loaded, search)
 
 
 def _is_stable_between(loaded: LoadedArm, start: Iterate, search: RestSearch[Iterate]) -> bool:

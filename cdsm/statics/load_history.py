@@ -29,17 +29,6 @@ if TYPE_CHECKING:
 _SHOWN = 24
 """Largest number of loads that ``print`` shows; of more loads it shows the first and last ones."""
 
-_SNAP = 0.05
-"""An arm snaps through in a step if the unaccounted energy is above this part of the turnover.
-
-The turnover is the largest sum |work| + |stored| + dissipated of all steps. Without a snap-through
-even the coarsest ``accuracy``, 10 % of the work, leaves less: the sum counts the work and also the
-energy that it becomes.
-"""
-
-_KNOWN = 0.01
-"""``print`` states the error of the energy balance if it is above this part of the loss."""
-
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,9 +55,8 @@ class LoadHistory(ReadOnlyState):
             hole has no friction.
         reaction: Torque of the stops on the joints at each load (n, nv) [N m].
         load_work: Work of the load during the step to each load (n,) [J].
-        motor_work: Work of the motors during the same step (n,) [J].
-        stored: Change of the energy of cables, springs and weights in the same step (n,) [J].
         dissipated: Work lost to friction in the same step (n,) [J]; never negative.
+        snaps: Whether the arm snaps through in the step to each load (n,).
     """
 
     reference: Posture
@@ -83,37 +71,21 @@ class LoadHistory(ReadOnlyState):
     sliding: NDArray[np.int8]
     reaction: Array
     load_work: Array
-    motor_work: Array
-    stored: Array
     dissipated: Array
+    snaps: NDArray[np.bool_]
 
     @cached_property
     def displacement(self) -> Array:
         """Displacement of the tip from the reference at each load (n, 3) [m]."""
         return frozen(self.tip - self.reference.tip[:3, 3])
 
-    @cached_property
-    def unaccounted(self) -> Array:
-        """Work minus stored and dissipated energy in the step to each load (n,) [J].
-
-        This is the error of the integration. If the arm snaps through, it is the kinetic energy.
-        """
-        work = self.load_work + self.motor_work
-        return frozen(work - self.stored - self.dissipated)
-
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences with the loads at which the arm snaps through, and its kinetic energy [mJ].
+        """Sentences with the loads at which the arm snaps through; empty if it never does.
 
-        At these loads ``unaccounted`` exceeds 5 % of the largest sum of work, stored and dissipated
-        energy of a step. All later states can depend on the sub-steps. Empty if the arm never snaps
-        through.
+        All states after a snap-through can depend on the sub-steps.
         """
-        turned = abs(self.load_work) + abs(self.motor_work) + abs(self.stored) + self.dissipated
-        return tuple(
-            f"SNAPS THROUGH at load {k + 1}: {1000.0 * self.unaccounted[k]:.4g} mJ set it in motion"
-            for k in np.flatnonzero(self.unaccounted > _SNAP * turned.max()).tolist()
-        )
+        return tuple(f"SNAPS THROUGH at load {k + 1}" for k in np.flatnonzero(self.snaps).tolist())
 
     @cached_property
     def tensions(self) -> tuple[Array, ...]:
@@ -179,9 +151,8 @@ class LoadHistory(ReadOnlyState):
             "sliding": (("load", "hole"), self.sliding, "1"),
             "stop_torque": (("load", "joint"), self.reaction, "N m, or N where a joint slides"),
             "load_work": (("load",), self.load_work, "J"),
-            "motor_work": (("load",), self.motor_work, "J"),
-            "stored": (("load",), self.stored, "J"),
             "dissipated": (("load",), self.dissipated, "J"),
+            "snaps": (("load",), self.snaps, "1"),
         }
         title = f"slow loading of {arm.name}, with friction in the holes"
         return dataset(variables, labels, title=title).assign_coords(of_holes)
@@ -195,8 +166,6 @@ class LoadHistory(ReadOnlyState):
             **{f"displacement {axis} [m]": part for axis, part in zip("xyz", moved, strict=True)},
             "sliding holes": np.count_nonzero(self.sliding, axis=1),
             "load work [J]": self.load_work,
-            "motor work [J]": self.motor_work,
-            "stored [J]": self.stored,
             "dissipated [J]": self.dissipated,
         }
         for cable, T in zip(self.reference.arm.cables.names, self.tensions, strict=True):
@@ -211,10 +180,7 @@ class LoadHistory(ReadOnlyState):
             "holes": self.holes,
             "sliding": self.sliding,
             "load_work_J": self.load_work,
-            "motor_work_J": self.motor_work,
-            "stored_J": self.stored,
             "dissipated_J": self.dissipated,
-            "unaccounted_J": self.unaccounted,
         }
         return plain(numbers)
 
@@ -244,8 +210,7 @@ class LoadHistory(ReadOnlyState):
             f"{'load':>5}{'force [N]':>35}{'tip moved by [mm]':>30}"
             f"{'sliding':>9}{'work [mJ]':>12}{'lost [mJ]':>12}"
         ]
-        work = self.load_work + self.motor_work
-        moves, works = without_rounding(self.displacement), without_rounding(work)
+        moves, works = without_rounding(self.displacement), without_rounding(self.load_work)
         for k in range(count):
             if count > _SHOWN and _SHOWN // 2 <= k < count - _SHOWN // 2:
                 if k == _SHOWN // 2:
@@ -257,15 +222,8 @@ class LoadHistory(ReadOnlyState):
                 f"{k + 1:>5}  {force}{moved}{np.count_nonzero(self.sliding[k]):>9}"
                 f"{1000.0 * works[k]:>12.4g}{1000.0 * self.dissipated[k]:>12.4g}"
             )
-        lost, missed = self.dissipated.sum(), abs(self.unaccounted).sum()
-        rows.append(
-            f"{self.sliding.shape[1]} holes; in all {1000.0 * work.sum():.4g} mJ of work, "
-            f"{1000.0 * lost:.4g} mJ of it lost in the holes"
-        )
-        if missed > _KNOWN * lost and not self.warnings:
-            rows.append(
-                f"(both known to about {1000.0 * missed:.2g} mJ only: lower accuracy= for more)"
-            )
+        lost = 1000.0 * self.dissipated.sum()
+        rows.append(f"{self.sliding.shape[1]} holes; in all {lost:.4g} mJ lost in the holes")
         return "\n".join(rows)
 
     def _index(self, load: int) -> int:

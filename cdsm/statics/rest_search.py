@@ -62,13 +62,12 @@ def equilibrium(
     loaded = LoadedArm(pose, reference.tension, W)
     start = loaded.at(pose, reference.tension)
     # try the whole load first; in a smaller step a torque holds part of the load back
-    imbalance, reached, step, iterations = start.torque, 0.0, 1.0, 0
+    imbalance, reached, step = start.torque, 0.0, 1.0
     while True:
         goal = min(1.0, reached + step)
         search = find_rest(loaded, start, (1.0 - goal) * imbalance)
-        iterations += search.iterations
         if search.converged and goal == 1.0:
-            return settled(loaded, search, iterations)
+            return settled(loaded, search)
         if search.converged:
             start, reached, step = search.state, goal, 2.0 * step
         elif step > _SMALLEST_STEP:
@@ -93,11 +92,10 @@ def require_between_stops(pose: Posture) -> None:
         )
 
 
-def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> Equilibrium:
+def settled(loaded: LoadedArm, search: RestSearch[Iterate]) -> Equilibrium:
     """Return the result of a converged ``search`` as an :class:`~cdsm.Equilibrium`.
 
-    ``iterations`` is the number to store in it. Raises ElasticityRangeError if a tension is outside
-    the domain of its law.
+    Raises ElasticityRangeError if a tension is outside the domain of its law.
     """
     K = search.state.K
     loaded.require_domains(K.tension)
@@ -109,8 +107,6 @@ def settled(loaded: LoadedArm, search: RestSearch[Iterate], iterations: int) -> 
         stiffness=K,
         reaction=frozen(reaction),
         residual=frozen(K.residual - reaction),
-        history=search.history,
-        iterations=iterations,
     )
 
 

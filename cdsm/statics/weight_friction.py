@@ -11,30 +11,19 @@ import numpy as np
 
 from cdsm.errors import CdsmError
 from cdsm.friction.breakaway import Breakaway
-from cdsm.statics.load_cycle import load_cycle, slow_loading
+from cdsm.statics.load_cycle import slow_loading
 from cdsm.statics.load_history import LoadHistory
 from cdsm.statics.slow_loading import Load, State
 from cdsm.support.format import plural
-from cdsm.support.values import Array, ReadOnlyState
+from cdsm.support.values import ReadOnlyState
 
 SLIDING = 1.25
 """The arm slides where its tangent stiffness is at most this times the frictionless one."""
-
-_SETTLED, _MOST_CYCLES = 0.01, 64
-"""Dither has converged if doubling its cycles changes the stiffness by at most the first number,
-relative to the stiffness. The second is the largest number of cycles that is tried."""
 
 _GROWTH, _MOST = 1.25, 100.0
 """Ratio of each trial load to the one before; ratio of the largest one to the breakaway load."""
 
 _HALVINGS = 6  # number of bisections of the load from which the arm slides; they reach 0.4 %
-
-
-def fading(size: float, cycles: int) -> Array:
-    """Return loads (2 cycles,) [N] of alternating sign, whose size falls linearly from ``size``."""
-    loads = size * (1.0 - np.arange(2 * cycles) / (2.0 * cycles))
-    loads[1::2] *= -1.0
-    return loads
 
 
 @final
@@ -66,7 +55,9 @@ class WeightFriction(ReadOnlyState):
     @property
     def secant(self) -> float:
         """Weight divided by tip displacement along it, with friction [N/m]; inf without motion."""
-        return self._secant(self.history.tip)
+        tip, u = self.history.tip, self.breakaway.direction
+        moved = float((tip[-1] - tip[0]) @ u)
+        return self.weight / moved if moved else math.inf
 
     @cached_property
     def sliding_load(self) -> float:
@@ -113,67 +104,10 @@ class WeightFriction(ReadOnlyState):
         return high
 
     @property
-    def dithered(self) -> float:
-        """Weight divided by displacement [N/m] after dither, a load of alternating sign that fades.
-
-        The amplitude falls linearly from :attr:`sliding_load` to zero in :attr:`dither_cycles`
-        cycles. The value is NaN if the arm does not slide, if no equilibrium is found on the way,
-        or if 64 cycles are too few.
-        """
-        return self._dither[1]
-
-    @property
-    def dither_cycles(self) -> int:
-        """Number of cycles of the dither; twice as many change :attr:`dithered` by at most 1 %.
-
-        :attr:`dithered` is then near :attr:`frictionless_secant`, but not equal, since dither along
-        the load does not move all cables. The number is 0 without friction, or if :attr:`dithered`
-        is NaN.
-        """
-        return self._dither[0]
-
-    @cached_property
-    def _dither(self) -> tuple[int, float]:
-        """Number of dither cycles, found by search, and the stiffness [N/m] after them."""
-        size = self.sliding_load
-        if not 0.0 < size < math.inf:
-            return 0, self.secant if size == 0.0 else math.nan
-        before, cycles = math.inf, 1
-        try:
-            while cycles <= _MOST_CYCLES:
-                after = self._dithered_stiffness(size, cycles)
-                if abs(after - before) <= _SETTLED * after:
-                    return cycles // 2, before
-                before, cycles = after, 2 * cycles
-        except CdsmError:
-            pass
-        return 0, math.nan
-
-    def _dithered_stiffness(self, size: float, cycles: int) -> float:
-        """Compute weight/displacement [N/m] after ``cycles`` dither cycles.
-
-        Their amplitude falls from ``size`` [N] to zero.
-        """
-        history, u = self.history, np.append(self.breakaway.direction, np.zeros(3))
-        last, added = history.wrenches[-1], fading(size, cycles)[:, None] * u
-        path = np.vstack([history.wrenches, last + added, last])
-        pose, F = history.reference, history.reference_tension
-        return self._secant(load_cycle(pose, F, path, accuracy=1e-2).tip)
-
-    @property
-    def _deviation(self) -> float:
-        """Error of :attr:`dithered` relative to :attr:`frictionless_secant` [%]."""
-        return 100.0 * (self.dithered / self.frictionless_secant - 1.0)
-
-    @property
     def weight(self) -> float:
         """The weight [N]."""
         wrenches = self.history.wrenches
         return float(np.linalg.norm((wrenches[-1] - wrenches[0])[:3]))
-
-    def _secant(self, tip: Array) -> float:
-        moved = float((tip[-1] - tip[0]) @ self.breakaway.direction)
-        return self.weight / moved if moved else math.inf
 
     def to_dict(self) -> dict[str, object]:
         """Return the loads and stiffnesses in SI, with units in the keys."""
@@ -186,9 +120,6 @@ class WeightFriction(ReadOnlyState):
             "secant_stiffness_N_per_m": self.secant,
             "sliding_holes": self.sliding_holes,
             "holes": self.history.sliding.shape[1],
-            "dither_N": self.sliding_load,
-            "dither_cycles": self.dither_cycles,
-            "dithered_stiffness_N_per_m": self.dithered,
         }
 
     @property
@@ -214,14 +145,10 @@ class WeightFriction(ReadOnlyState):
             f"this weight, {self.weight:.4g} N, measures {self.secant / 1000.0:.4g} N/mm; "
             f"{self.sliding_holes} of {plural(self.history.sliding.shape[1], 'hole')} slide"
         )
-        if math.isfinite(self.dithered):
+        if math.isfinite(self.sliding_load):
             rows.append(
                 f"so take the difference of two weights above {self.sliding_load:.3g} N, and "
-                "compare it with theirs without friction; or shake "
-                f"the load by ±{self.sliding_load:.3g} N, fading in "
-                f"{plural(self.dither_cycles, 'cycle')}: then this weight measures "
-                f"{self.dithered / 1000.0:.4g} N/mm, {self._deviation:+.0f} % off the frictionless "
-                f"{self.frictionless_secant / 1000.0:.4g} N/mm of the same weight; twice the "
-                "cycles change it by at most 1 %"
+                "compare it with theirs without friction; this weight alone would measure "
+                f"{self.frictionless_secant / 1000.0:.4g} N/mm without friction"
             )
         return "\n".join(rows)

@@ -25,11 +25,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.kernels.breakaway import ROUNDING
 from cdsm.kernels.chain_problem import chain_tangent
 from cdsm.kernels.chains import STRAIGHT
 from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
+
+ROUNDING = 1e-12
+"""A hole never slides if its |x_i| − y_i is below this fraction of the largest |x_i|."""
 
 SLACK = 1e-100
 """Tension [N] that replaces zero, since the kernel takes logarithms."""

@@ -47,7 +47,6 @@ _BATCH_NAMES = {
     "load_stiffness": "load",
     "joint_stiffness": "joint",
     "translational_compliance": "compliance",
-    "stuck_joint_stiffness": "stuck_joint",
 }
 """Names of quantities in a batch, where the name in a sweep is different."""
 

@@ -85,21 +85,8 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "pseudoinverse": Quantity(
         "the paper's Cartesian stiffness, J+^T K J+", "N m-1", "matrix", _AXES
     ),
-    "stuck_joint_stiffness": Quantity(
-        "joint stiffness K while all cables stick in their holes", "N m rad-1", "joint", _JOINTS
-    ),
-    "stuck_along": Quantity(
-        "stiffness in a direction while all cables stick", "N m-1", "tip", ("direction",)
-    ),
-    "breakaway": Quantity(
-        "load in a direction at which a cable begins to slide, first order",
-        "N",
-        "tip",
-        ("direction",),
-    ),
     "softest": Quantity("stiffness in the softest direction", "N m-1", "principal"),
     "stiffest": Quantity("stiffness in the stiffest direction", "N m-1", "principal"),
-    "anisotropy": Quantity("stiffest over softest", "1", "principal"),
     "isotropy": Quantity("softest over stiffest", "1", "principal"),
     "softest_direction": Quantity("softest direction, unit length", "1", "principal", ("axis",)),
     "stiffest_direction": Quantity("stiffest direction, unit length", "1", "principal", ("axis",)),
@@ -110,5 +97,5 @@ DIRECTIONAL: Final = frozenset(
 )
 """Names of the quantities that have a value for each direction."""
 
-DEFAULT: Final = ("tip_position", "along", "margin", "softest", "stiffest", "anisotropy")
+DEFAULT: Final = ("tip_position", "along", "margin", "softest", "stiffest", "isotropy")
 """Default outputs, which the maps need."""

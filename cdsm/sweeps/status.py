@@ -39,7 +39,7 @@ class SweepStatus(IntEnum):
     """The tip cannot move in some direction: cartesian and pseudoinverse do not exist. Set only if
     one of these two is requested."""
     UNSTABLE = 8
-    """The arm buckles (margin ≤ 0): softest, stiffest and anisotropy do not exist. If the tip is
+    """The arm buckles (margin ≤ 0): softest, stiffest and isotropy do not exist. If the tip is
     also immobile, cartesian and pseudoinverse do not exist."""
     WORKER_LOST = 9
     """The workers that computed the entry died several times: no quantity exists."""

@@ -268,6 +268,4 @@ def _rest(history: LoadHistory) -> Equilibrium:
         stiffness=K,
         reaction=frozen(reaction),
         residual=frozen(K.residual - reaction),
-        history=(),
-        iterations=0,
     )

@@ -16,8 +16,6 @@ from cdsm.batch import evaluation, evaluator, fused_kernel
 from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.inputs import run_slices
 from cdsm.batch.layout import DIRECTIONAL, QUANTITIES
-from cdsm.friction.breakaway import hole_loads
-from cdsm.stiffness_matrix.sticking import holding
 from cdsm.support.values import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.support.processes import uncompiled
@@ -25,9 +23,6 @@ from tests.support.rough import rough
 
 ROUNDING = 1e-12
 """Of the largest entry: other orders of summation, and what inverses make of them."""
-
-SUMMED_OTHERWISE = ("residual", "breakaway", "stuck_joint", "stuck_along", "stuck_compliance")
-"""What a single posture does not compute with the kernels of the batch; all else has equal bits."""
 
 DIRECTIONS = np.array([[0.0, 0.3, 1.0], [1.0, -2.0, 0.1], [0.0, 1.0, 0.0]])
 
@@ -131,14 +126,6 @@ def alone(name: str, K: cdsm.Stiffness) -> Any:
         return [K.along(u) for u in DIRECTIONS]
     if name == "pseudoinverse":
         return K.pseudoinverse()
-    if name == "breakaway":
-        pose, held = K.posture, holding(K.posture).any()
-        stuck = cdsm.stuck_stiffness(pose, K.tension, K.wrench)
-        units = DIRECTIONS / np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
-        return [hole_loads(stuck, u)[0].min() if held else 0.0 for u in units]
-    if name.startswith("stuck_"):
-        stuck = cdsm.stuck_stiffness(K.posture, K.tension, K.wrench)
-        return alone(name.removeprefix("stuck_"), stuck)
     return getattr(K, name) if hasattr(K, name) else getattr(K.posture, name)
 
 
@@ -161,11 +148,9 @@ def test_every_quantity_of_every_row_is_that_of_the_single_posture(name: str) ->
                 continue
             single = np.asarray(alone(output, K))
             assert batch[output].shape == (7, *single.shape), output
-            scale = abs(single[np.isfinite(single)]).max(initial=0.0)
-            # a residual is a difference: its scale is that of its terms
-            if output == "residual":
-                scale = abs(tension[r] @ abs(K.posture.length_jacobian)).max()
-            off = ROUNDING * scale if output in SUMMED_OTHERWISE else 0.0
+            # a residual is a difference: its scale is that of its terms; all else has equal bits
+            scale = abs(tension[r] @ abs(K.posture.length_jacobian)).max()
+            off = ROUNDING * scale if output == "residual" else 0.0
             np.testing.assert_allclose(batch[output][r], single, rtol=0.0, atol=off, err_msg=output)
 
 
@@ -181,60 +166,6 @@ def test_a_quantity_asked_for_alone_is_the_one_asked_for_with_all_others(output:
     )
     assert one.outputs == (output,)
     assert one.values[0].dtype == np.float64
-
-
-def test_holes_through_which_a_cable_goes_straight_do_not_stick() -> None:
-    """Each posture of a block has its own springs: the arm, or a part of it, is straight."""
-    arm = rough(random_arm(1, 4), 0.1)
-    q, tension, wrench = problem(arm, 40)
-    q[5] = 0.0
-    for row in range(6, 40, 3):
-        q[row, 2 * (row % 4) : 2 * (row % 4) + 2] = 0.0
-    names = ("joint", "stuck_joint", "breakaway", "stuck_along")
-    batch = cdsm.evaluate(arm, q, tension, wrench, names, direction=DIRECTIONS)
-    assert (batch["stuck_along"] >= 0.0).all()
-    assert not batch["breakaway"][5].any()
-    size = abs(batch["joint"][5]).max()
-    np.testing.assert_allclose(batch["stuck_joint"][5], batch["joint"][5], atol=1e-14 * size)
-    for r in range(40):
-        K = cdsm.stiffness(arm.at(q[r]), tension[r], wrench[r])
-        for name in names:
-            single = np.asarray(alone(name, K))
-            scale = abs(single).max()
-            np.testing.assert_allclose(batch[name][r], single, rtol=0, atol=ROUNDING * scale)
-
-
-def test_without_friction_the_stuck_arm_is_the_free_one_to_the_last_bit() -> None:
-    arm = random_arm(1, 3)
-    q, tension, wrench = problem(arm, 5)
-    names = ("stuck_joint", "stuck_along", "stuck_compliance", "breakaway")
-    stuck = cdsm.evaluate(arm, q, tension, wrench, names, direction="z")
-    free = cdsm.evaluate(arm, q, tension, wrench, ("joint", "along", "compliance"), direction="z")
-    for name, other in zip(names, free.outputs, strict=False):
-        np.testing.assert_array_equal(stuck[name], free[other])
-    assert not stuck["breakaway"].any()
-    assert stuck.ok.all()
-
-
-def test_breakaway_follows_from_tensions_that_are_distributed() -> None:
-    arm = rough(cdsm.presets.virtual_prototype(lead=0.2), 0.1)
-    q = np.random.default_rng(2).uniform(-0.2, 0.2, (6, arm.nv))
-    batch = cdsm.evaluate(
-        arm, q, outputs=("breakaway", "stuck_along"), direction="z", minimum=60.0, maximum=400.0
-    )
-    assert batch.outputs == ("breakaway", "stuck_along")
-    assert batch["breakaway"].shape == (6,)
-    for r in range(6):
-        pull = cdsm.distribute_tension(arm.at(q[r]), 60.0, 400.0)
-        found = cdsm.breakaway(pull.posture, pull, "z")
-        assert batch["breakaway"][r] == pytest.approx(found.first_order, rel=1e-9)
-        assert batch["stuck_along"][r] == pytest.approx(found.stiffness.along("z"), rel=1e-9)
-    outside = cdsm.evaluate(
-        arm, q, np.full(15, 1.0), outputs=("stuck_joint", "active"), check_limits=False
-    )
-    assert (outside.status == cdsm.Status.OUTSIDE_ELASTICITY).all()
-    assert np.isnan(outside["stuck_joint"]).all()
-    assert np.isfinite(outside["active"]).all()
 
 
 def test_quantities_of_the_posture_need_no_tensions() -> None:

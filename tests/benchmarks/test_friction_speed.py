@@ -32,31 +32,6 @@ def test_load_takes_at_most_eight_equilibria(clock: Clock | None) -> None:
         )
 
 
-@pytest.mark.parametrize(("free", "stuck"), [("joint", "stuck_joint"), ("along", "stuck_along")])
-def test_stuck_stiffness_takes_at_most_half_as_long_again(
-    clock: Clock | None, free: str, stuck: str
-) -> None:
-    arm = presets.virtual_prototype(cdsm.LinearElasticity(48e3), lead=0.3, friction=0.1)
-    rng = np.random.default_rng(5)
-    q, F = rng.uniform(-0.17, 0.17, (4000, arm.nv)), rng.uniform(30.0, 90.0, (4000, 15))
-    u = "z" if free == "along" else None
-
-    def batch(name: str) -> np.ndarray:
-        return cdsm.evaluate(arm, q, F, outputs=(name,), direction=u, threads=1)[name]
-
-    K = cdsm.stuck_stiffness(arm.at(q[0]), F[0])
-    single = K.along("z") if u else K.joint
-    np.testing.assert_allclose(batch(stuck)[0], single, rtol=0, atol=1e-12 * np.abs(single).max())
-    if clock:
-        clock.race(
-            f"{stuck} in a batch, n = 5, over {free}",
-            lambda: batch(stuck),
-            lambda: batch(free),
-            most=1.75,
-            fast_repeat=1,
-        )
-
-
 @pytest.mark.parametrize("friction", [0.1, 0.3])
 def test_proved_band_takes_some_linear_programs(clock: Clock | None, friction: float) -> None:
     """Proof and wider neighbourhoods included: at μ = 0.3 the first one is too small."""

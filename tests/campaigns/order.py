@@ -23,7 +23,7 @@ ROUNDING = 1e-12
 """Least eigenvalue that is rounding, over the norm of K_stuck."""
 
 
-def least(seed: int, postures: int = 1) -> float:
+def least(seed: int) -> float:
     """Smallest eigenvalue of K_stuck − K over the norm of K_stuck, of one random arm.
 
     Inf where the sizes drawn are those of no machine.
@@ -38,13 +38,11 @@ def least(seed: int, postures: int = 1) -> float:
     mu = rng.uniform(-0.2, 0.5, (len(plain.cables), 20)).round(3).clip(0.0)
     control = "force" if seed % 7 == 0 else "position"
     arm = rough(plain, lambda c, i: float(mu[c, i]), series_stiffness=spring, control=control)
-    q = rng.uniform(-0.9, 0.9, (postures, arm.nv)) * arm.upper
-    F = rng.uniform(5.0, 300.0, (postures, len(arm.cables)))
-    found = cdsm.evaluate(arm, q, F, outputs=("joint", "stuck_joint"), threads=1)
-    assert found.ok.all()
-    stuck = found["stuck_joint"]
-    values = np.linalg.eigvalsh(stuck - found["joint"])[:, 0]
-    return float((values / np.linalg.norm(stuck, 2, axis=(1, 2))).min())
+    pose = arm.at(rng.uniform(-0.9, 0.9, arm.nv) * arm.upper)
+    F = rng.uniform(5.0, 300.0, len(arm.cables))
+    stuck = cdsm.stuck_stiffness(pose, F).joint
+    values = np.linalg.eigvalsh(stuck - cdsm.stiffness(pose, F).joint)
+    return float(values[0] / np.linalg.norm(stuck, 2))
 
 
 def main(count: int) -> None:

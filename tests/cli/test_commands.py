@@ -16,7 +16,6 @@ from typer.testing import CliRunner, Result
 import cdsm
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.cli import app, options
-from cdsm.kernels.breakaway import set_breakaway
 from cdsm.kernels.distribution import search_tensions
 from cdsm.tension import DEFAULT_SOLVER
 from tests.interchange.test_caspr import cable, folder, link
@@ -236,17 +235,11 @@ def test_plan_follows_a_path_as_the_api_does(kind: str, geometry: Path, tmp_path
     np.testing.assert_allclose(told["tensions_N"], plan.tensions, rtol=1e-12)
     assert told["planned"] == list(plan.planned)
     np.testing.assert_allclose(told["achieved_N_per_m"], plan.achieved, rtol=1e-12)
-    assert [each["after"] for each in told["half_way"]] == [each.index for each in plan.between]
-    for each, between in zip(told["half_way"], plan.between, strict=True):
-        assert each["misfit"] == pytest.approx(between.misfit, rel=1e-6)
-        assert between.achieved is not None
-        assert each["achieved_N_per_m"] == pytest.approx(float(between.achieved), rel=1e-9)
     assert png.read_bytes().startswith(b"\x89PNG")
     assert film.read_bytes().startswith(b"GIF8")
     assert len(motors.read_text(encoding="utf-8").splitlines()) == len(targets) + 1
     text = call(*options).output
     assert "samples planned" in text
-    assert "half-way between samples the stiffness is up to" in text
     assert ("sample 2: stiffness: no admissible tensions" in text) == (kind == "angles")
 
 
@@ -619,7 +612,7 @@ def test_warm_compiles_all_kernels_and_says_how_long_it_took() -> None:
     result = call("warm")
     assert result.exit_code == 0, result.output
     assert "kernels are compiled" in result.output
-    kernels: tuple[Any, ...] = (evaluate_rows, search_tensions, set_breakaway)
+    kernels: tuple[Any, ...] = (evaluate_rows, search_tensions)
     assert all(kernel.signatures for kernel in kernels)
 
 

@@ -1,7 +1,5 @@
 """Angles, rigidity and tip force from wire and tension, against arms that know them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -83,21 +81,3 @@ def test_noise_averages_out_of_the_rigidity() -> None:
     rigidity = [1.0 / observed(0.0, noisy, seed)[-1][1].softness for seed in range(8)]
     assert np.mean(rigidity) == pytest.approx(0.9, abs=3e-3)
     assert np.std(rigidity) < 0.01
-
-
-def test_gain_of_softer_wires_on_springs_is_the_slope_of_the_tension() -> None:
-    """The springs keep their stiffness where the wires are softer than their laws say."""
-    plan, softness, spring = small_path(), 1.0 / 0.7, 20e3
-    law = plan.arm.cables[0].elasticity
-    arm = plan.arm.with_cables([replace(each, series_stiffness=spring) for each in plan.arm.cables])
-    reading = Reading(np.linspace(0.15, 0.3, 6), np.linspace(40.0, 90.0, 6))
-    observer = Observer(arm, EXACT)
-    estimate = observer.begin(plan.angles[0], reading)._replace(softness=softness)
-
-    def length(F: np.ndarray) -> np.ndarray:
-        return reading.wire * (1.0 + softness * law.strain(F)) + (F - law.rest) / spring
-
-    F, step = reading.tension, 1e-3
-    slope = (length(F + step) - length(F - step)) / (2.0 * step)
-    expected = (1.0 + softness * law.strain(F)) / slope
-    np.testing.assert_allclose(observer.gain(estimate, reading), expected, rtol=1e-8)

@@ -27,7 +27,7 @@ def test_noise_and_bias_stay_within_their_bound() -> None:
     errors = np.array([sensors.read(TRUTH, random).tension for _ in range(4000)]) - 53.0
     assert errors.mean() == pytest.approx(-1.0, abs=0.02)
     assert errors.std() == pytest.approx(0.5, rel=0.02)
-    assert abs(errors).max() <= sensors.tension_error == 3.0
+    assert abs(errors).max() <= 3.0
 
 
 def test_readings_are_late_by_the_delay() -> None:

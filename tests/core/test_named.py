@@ -268,7 +268,7 @@ def test_sweeps_become_tidy_tables() -> None:
 def test_elasticities_are_read_and_written_by_methods(tmp_path: Path) -> None:
     law = cdsm.presets.STRAND_1X19
     assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
-    header = PLAN.write(tmp_path / "plan.csv").read_text().splitlines()[0].split(",")
+    header = PLAN.write(tmp_path / "new.csv").read_text().splitlines()[0].split(",")
     assert header[-6:] == [
         *("tip x [m]", "tip y [m]", "tip z [m]"),
         *("stiffness [N/m]", "target [N/m]", "reason"),

@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 import cdsm
 from cdsm import presets
+from cdsm.friction.stuck import assemble_segments
 from cdsm.support.values import Array
 from tests.campaigns import order
 from tests.support import arms
@@ -41,6 +43,19 @@ def some(c: int, i: int) -> float:
 
 def everywhere(c: int, i: int) -> float:
     return 0.1
+
+
+def sliding(pose: cdsm.Posture, F: Array, signs: ArrayLike, wrench: Array) -> cdsm.Stiffness:
+    """Stiffness while cables slide where a sign is not 0; F (C,) [N] are the motors' tensions.
+
+    The tension beyond such a hole is that before it times exp(±μ φ).
+    """
+    chains = pose.segments.chains
+    steps = np.zeros(len(chains.segments))
+    steps[chains.hole + 1] = np.asarray(signs) * pose.segments.grip
+    total = np.cumsum(steps)
+    T = (F * np.exp(-total[chains.start[:-1]]))[chains.cable] * np.exp(total)
+    return assemble_segments(pose, T, np.asarray(signs) != 0, wrench, "sliding")
 
 
 @pytest.mark.parametrize("friction", [everywhere, some])
@@ -79,7 +94,7 @@ def test_without_friction_it_is_the_frictionless_stiffness(name: str, control: s
     expected = cdsm.stiffness(pose, F, wrench)
     for found in (
         cdsm.stuck_stiffness(pose, F, wrench),
-        cdsm.sliding_stiffness(pose, F, np.ones(len(pose.segments.wrap)), wrench),
+        sliding(pose, F, np.ones(len(pose.segments.wrap)), wrench),
     ):
         size = abs(expected.joint).max()
         for term in ("active", "passive", "gravity", "load", "joint"):
@@ -117,7 +132,7 @@ def test_sliding_stiffness_is_the_derivative_of_the_torque(name: str, control: s
     holes = zip(chains.cable[chains.hole].tolist(), chains.site.tolist(), strict=True)
     by_site = dict(zip(holes, signs.tolist(), strict=True))
     parts = blocks(pose.arm, lambda c, i: by_site[c, i] != 0)
-    K = cdsm.sliding_stiffness(pose, F, signs, wrench)
+    K = sliding(pose, F, signs, wrench)
     assert K.segment_tension is not None
     soft = np.zeros(len(chains.cable))
     soft[np.flatnonzero(np.diff(chains.cable, prepend=-1))] = 1.0 / SPRING
@@ -159,7 +174,7 @@ def test_sliding_stiffness_is_the_derivative_of_the_torque(name: str, control: s
 @pytest.mark.slow
 def test_stuck_arms_are_never_softer() -> None:
     for seed in range(200):
-        assert order.least(seed, postures=5) >= -order.ROUNDING, seed
+        assert order.least(seed) >= -order.ROUNDING, seed
 
 
 @pytest.mark.long
@@ -213,10 +228,6 @@ def test_law_of_a_cable_without_friction_is_not_asked_where_its_motor_holds_the_
         load = cdsm.breakaway(pose, F, "z").load
         band = cdsm.rest_band(pose, F, "z").first_order
         found.append([load, band, *cdsm.stuck_stiffness(pose, F).joint.ravel()])
-        batch = cdsm.evaluate(mixed, pose.q[None], F[None], outputs=("stuck_joint",))[
-            "stuck_joint"
-        ][0]
-        np.testing.assert_allclose(batch.ravel(), found[-1][2:], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-9)
     # with friction beyond the motor, segments of this cable are springs, and its law is asked
     rough_arm = arm.with_cables([replace(first, control="force"), *others])
@@ -266,7 +277,6 @@ def test_numbers_of_the_virtual_prototype(case: tuple[float, float]) -> None:
 
 def test_bad_input_is_named() -> None:
     pose, F, _ = posed("mixed", 0.1)
-    none = np.zeros(len(pose.segments.wrap))
     with pytest.raises(cdsm.InvalidInput, match="pose: 3 given"):
         cdsm.stuck_stiffness(3, F)  # type: ignore[arg-type]
     with pytest.raises(cdsm.InvalidInput, match=r"tension: shape \(2,\)"):
@@ -275,22 +285,6 @@ def test_bad_input_is_named() -> None:
         cdsm.InvalidInput, match=r"tension: .* given for cable1_1; cables only pull"
     ):
         cdsm.stuck_stiffness(pose, -F)
-    with pytest.raises(cdsm.InvalidInput, match="sliding: shape"):
-        cdsm.sliding_stiffness(pose, F, none[1:])
-    with pytest.raises(
-        cdsm.InvalidInput, match=r"sliding: 0.5 given for hole 1; a sign is -1, 0 or 1"
-    ):
-        cdsm.sliding_stiffness(pose, F, none + 0.5)
-    with pytest.raises(cdsm.InvalidInput, match=r"tension: .* cables only pull"):
-        cdsm.sliding_stiffness(pose, -F, none)
-    T = F[pose.segments.chains.cable]
-    with pytest.raises(cdsm.InvalidInput, match=r"N beside site 1 of cable1_1: the ratio"):
-        cdsm.sliding_stiffness(pose, T, none + 1.0)
-    T[-1] *= 1.2
-    with pytest.raises(cdsm.InvalidInput, match=r"N beside site 5 of cable3_4: the ratio"):
-        cdsm.sliding_stiffness(pose, T, none)
-    with pytest.raises(cdsm.InvalidInput, match="tension: shape"):
-        cdsm.sliding_stiffness(pose, F[1:], none)
     for use in (cdsm.stiffness_gradient, cdsm.Stiffness.report):
         with pytest.raises(cdsm.InvalidInput, match="cables are stuck; give a frictionless K"):
             use(cdsm.stuck_stiffness(pose, F))

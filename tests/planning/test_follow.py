@@ -1,15 +1,12 @@
-"""The rate: tensions change by no more than motors can, and earlier samples make way."""
+"""The rate: tensions change by no more than motors can."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
 import cdsm
-from cdsm import presets
 from cdsm.planning import follow
-from cdsm.planning.follow import Follower
 from cdsm.planning.objectives import along_constraints
 from cdsm.planning.stiffness_model import StiffnessModel
 from tests.support.locked import (
@@ -40,39 +37,6 @@ def test_target_that_jumps_is_hit_again_when_the_motors_are_there(rate: float, l
     if late:
         assert "change cable1_1 by 50 N in 1 step(s) from sample 5" in plan.infeasible[0].reason
         assert f"{rate:g} N are allowed" in plan.infeasible[0].reason
-
-
-@pytest.mark.slow
-def test_ramp_is_anticipated_where_other_tensions_of_the_same_stiffness_lead_there(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The least tensions of the ramp change by up to 25 N per step, and 18 N are allowed."""
-    # as in the paper tension only softens: the stiffer, the smaller the tensions, in long steps
-    arm = presets.virtual_prototype(cdsm.LinearElasticity(48e3), original_length="stretched")
-    q = np.full((40, 10), presets.TEN_DEGREES)
-    found = cdsm.stiffness_range(arm.at(q[0]), DOWN, 50.0, 800.0)
-    ramp = 0.3 + 0.5 * np.clip((np.arange(40) - 10) / 20.0, 0.0, 1.0)
-    targets = found.low + ramp * (found.high - found.low)
-    given: dict[str, Any] = {"target": targets, "minimum": 50.0, "maximum": 800.0, "angles": q}
-    free = cdsm.plan_path(arm, DOWN, **given)
-    assert free.complete
-    rate = 0.75 * float(free.steps.max())
-    plan = cdsm.plan_path(arm, DOWN, **given, rate=rate)
-    assert_holds(plan, 50.0, 800.0)
-    with monkeypatch.context() as patch:
-        patch.setattr(Follower, "_replan_towards", lambda self, goal: False)
-        greedy = cdsm.plan_path(arm, DOWN, **given, rate=rate)
-    with monkeypatch.context() as patch:
-        patch.setattr(follow, "_BACK", 3)
-        near = cdsm.plan_path(arm, DOWN, **given, rate=rate)
-    assert_holds(near, 50.0, 800.0)
-    assert len(plan.infeasible) <= 1
-    assert len(greedy.infeasible) >= 15
-    assert len(plan.infeasible) < len(near.infeasible) <= len(greedy.infeasible)
-    # what leads to the ramp costs more than the least, and the least comes back after it
-    efforts = [np.linalg.norm(each.tensions[0]) for each in (plan, free)]
-    assert efforts[0] >= efforts[1] * (1.0 - 1e-9)
-    np.testing.assert_allclose(plan.tensions[-1], free.tensions[-1], rtol=1e-6)
 
 
 @pytest.mark.parametrize("rate", [math.inf, 121.0, 119.0])

@@ -34,13 +34,7 @@ def test_samples_have_the_efforts_of_plans_from_scratch(law: cdsm.Elasticity) ->
     for i in range(0, 24, 2):
         alone = cdsm.plan_stiffness(arm.at(q[i]), DOWN, targets[i], 40.0, 400.0)
         effort = np.linalg.norm(plan.tensions[i])
-        assert effort == pytest.approx(alone.efforts[0], rel=1e-7)
-
-
-def test_few_steps_are_enough_from_the_sample_before() -> None:
-    plan = cdsm.plan_path(ARM, DOWN, 80e3, 50.0, angles=waving(100))
-    assert plan.complete
-    assert plan.iterations < 8 * 100
+        assert effort == pytest.approx(np.linalg.norm(alone.tension.values), rel=1e-7)
 
 
 def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
@@ -58,18 +52,15 @@ def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
 
 
 @pytest.mark.slow
-def test_several_directions_and_matrices_are_hit_at_every_sample() -> None:
+def test_several_directions_are_hit_at_every_sample() -> None:
     q = waving(3)
     held = [cdsm.stiffness(ARM.at(a), cdsm.distribute_tension(ARM.at(a), 60.0)) for a in q]
     directions = np.eye(3)[1:]
     several = [[K.along(u) for u in directions] for K in held]
     plan = cdsm.plan_path(ARM, directions, several, 30.0, 300.0, angles=q)
     np.testing.assert_allclose(plan.achieved, several, rtol=1e-9)
-    matrices = [(K.cartesian + K.cartesian.T) / 2.0 for K in held]
-    full = cdsm.plan_path(ARM, None, matrices, 30.0, 300.0, angles=q)
-    np.testing.assert_allclose(full.achieved, matrices, rtol=1e-8, atol=1e-8 * matrices[0].max())
-    one = cdsm.plan_path(ARM, None, matrices[0], 30.0, 300.0, angles=q[[0, 0]])
-    np.testing.assert_array_equal(one.target, [matrices[0]] * 2)
+    one = cdsm.plan_path(ARM, directions, several[0], 30.0, 300.0, angles=q[[0, 0]])
+    np.testing.assert_array_equal(one.target, [several[0]] * 2)
     for k in (0, 1):  # with nothing to go on from, and with something
         hard = np.array([[held[0].along(u) for u in np.eye(3)]] * 2)
         hard[k] *= [1.5, 0.7, 1.5]
@@ -208,7 +199,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"direction": np.eye(3)}, r"target: shape \(\) given; \(3,\)"),
     ({"direction": (0.0, 0.0, 0.0)}, "zero vector"),
     ({"direction": np.eye(2)}, "direction: shape"),
-    ({"direction": None, "target": np.triu(np.ones((3, 3)))}, "symmetric"),
+    ({"direction": None}, "direction"),
     ({"rate": 0.0}, "rate: 0 N given"),
     ({"rate": -1.0}, "rate: -1 N given"),
     ({"rate": math.nan}, "rate"),

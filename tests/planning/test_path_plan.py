@@ -90,5 +90,3 @@ def test_motors_pay_out_the_unstrained_length_whatever_the_stiffness_takes_for_i
     for plan in plans:
         lengths = plan.unstrained_lengths * (1.0 + STRAND.strain(plan.tensions))
         np.testing.assert_allclose(lengths, plan.cable_lengths, rtol=1e-14)
-    worst = [max(each.misfit for each in plan.between) for plan in plans]
-    assert worst[1] == pytest.approx(worst[0], rel=0.2)

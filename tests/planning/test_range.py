@@ -214,12 +214,6 @@ def test_end_of_the_elasticity_bounds_the_tensions() -> None:
     pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
     found = cdsm.stiffness_range(pose, DOWN, 50.0)
     assert found.high_tension.values.max() == pytest.approx(810.0, rel=1e-12)
-    # the strand stiffens as long as it is pulled; all searches for it end in one place
-    assert np.ptp(found.high_found) < 1e-9 * found.high
-    # what a search ended with balances to 1e-9 of the tensions, what is returned to rounding
-    assert found.low_found[0] == pytest.approx(found.low, rel=1e-8)
-    assert (np.diff(found.low_found) >= 0.0).all()
-    assert (np.diff(found.high_found) <= 0.0).all()
 
 
 def test_strand_whose_rigidity_levels_off_is_stiffest_before_its_end() -> None:
@@ -346,8 +340,6 @@ def test_no_sample_is_stiffer_where_the_rigidity_falls_again(law: cdsm.Elasticit
     pose = arms.random_posture(arms.random_arm(19, 3, "hinged", law), 19, 0.4)
     u = np.array([1.0, -0.5, 0.3])
     found = cdsm.stiffness_range(pose, u, 10.0, 400.0)
-    spread = found.high_found
-    assert spread[-1] < 0.9 * spread[0]
     values = []
     F = cdsm.distribute_tension(pose, 20.0, 300.0).values  # inside: no way leads out of a corner
     null = np.linalg.svd(pose.length_jacobian.T)[2][pose.arm.nv :].T

@@ -273,7 +273,6 @@ BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
     ({"wrench": (1.0, 2.0)}, cdsm.InvalidInput, "wrench"),
     ({"wrench": (0.0, 0.0, 1e5, 0.0, 0.0, 0.0)}, cdsm.CdsmError, "810 N|balances the arm"),
     ({"minimum": 900.0}, cdsm.ElasticityRangeError, "domain"),
-    ({"solver": "dapq"}, cdsm.UnknownName, "did you mean 'daqp'"),
     ({"pose": "here"}, cdsm.InvalidInput, "pose"),
 ]
 

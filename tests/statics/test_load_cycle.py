@@ -102,7 +102,6 @@ def test_without_friction_every_load_gives_the_equilibrium(
         np.testing.assert_allclose(history.reaction[k], rest.reaction, rtol=1e-6, atol=1e-9)
     assert not history.sliding.any()
     assert not history.dissipated.any()
-    assert abs(history.unaccounted).max() <= 1e-3 * abs(history.load_work).max()
 
 
 # --- energies -------------------------------------------------------------------------------
@@ -116,7 +115,6 @@ def test_closed_loop_loses_its_work_in_the_holes() -> None:
     lost = history.dissipated[last].sum()
     assert lost > 1e-5
     np.testing.assert_allclose(history.tip[-1], history.tip[-3], atol=1e-14)
-    assert abs(history.stored[last].sum()) < 1e-9 * lost
     assert history.load_work[last].sum() == pytest.approx(lost, rel=1e-8)
 
 
@@ -125,34 +123,19 @@ def test_loops_of_several_holes_close_slowly_and_lose_their_work_too() -> None:
     pose, pull = planar(0.1)
     history = cdsm.load_cycle(pose, pull, along_z(*[6.0, -6.0] * 3), accuracy=1e-10)
     last = slice(-2, None)
-    lost, stored = history.dissipated[last].sum(), history.stored[last].sum()
-    assert abs(stored) < 1e-5 * lost  # wire still creeps from segment to segment
-    assert history.load_work[last].sum() == pytest.approx(lost + stored, rel=1e-8)
+    lost = history.dissipated[last].sum()
+    # wire still creeps from segment to segment
+    assert history.load_work[last].sum() == pytest.approx(lost, rel=1e-5)
 
 
 @pytest.mark.parametrize("law", [WIRE, cdsm.StrandElasticity.eq19_repaired()])
-def test_energy_is_accounted_for_and_never_comes_from_holes(law: cdsm.Elasticity) -> None:
+def test_energy_never_comes_from_holes(law: cdsm.Elasticity) -> None:
     pose, pull = prototype(0.15, law)
     rng = np.random.default_rng(4)
     wrenches = np.c_[rng.uniform(-8.0, 8.0, (8, 3)), rng.uniform(-0.1, 0.1, (8, 3))]
     history = cdsm.load_cycle(pose, pull, wrenches)
     assert (history.dissipated >= 0.0).all()
     assert history.dissipated.sum() > 0.0
-    # relative to the work of a way in one direction, which a way back and forth may exceed
-    assert (abs(history.unaccounted) <= 5e-3 * abs(history.load_work) + 1e-9).all()
-
-
-def test_error_of_the_energy_falls_with_the_accuracy() -> None:
-    pose, pull = planar(0.2)
-    wrenches = along_z(5.0, -3.0, 0.0)
-    errors = []
-    for accuracy in (0.1, 1e-4, 1e-6):
-        history = cdsm.load_cycle(pose, pull, wrenches, accuracy=accuracy)
-        errors.append(abs(history.unaccounted).sum() / history.dissipated.sum())
-        told = "known to about" in str(history)
-        assert told == (errors[-1] > 0.01)
-    assert errors[0] > 0.01 > 1e-3 > errors[1]
-    assert errors[2] < 1e-5
 
 
 def test_locked_motors_keep_their_wire() -> None:
@@ -166,7 +149,7 @@ def test_locked_motors_keep_their_wire() -> None:
 
 
 @pytest.mark.parametrize("control", ["position", "force"])
-def test_work_of_motors_is_accounted_for(control: cdsm.cable.Control) -> None:
+def test_tension_falls_from_a_motor_that_pulls(control: cdsm.cable.Control) -> None:
     pose, pull = planar(0.2)
     cables = [
         cdsm.Cable(c.name, c.sites, WIRE, lead=c.lead, control=control if i == 0 else "position")
@@ -179,10 +162,7 @@ def test_work_of_motors_is_accounted_for(control: cdsm.cable.Control) -> None:
     first = [2e-4, 0.0] if control == "position" else [1.3 * F[0], F[0]]
     motors = np.array([[each, 0.0, 0.0, 0.0] for each in first])
     history = cdsm.load_cycle(pose, F, np.zeros((2, 6)), motors=motors, accuracy=1e-7)
-    work = history.motor_work.sum()
-    assert history.motor_work[0] > 0.0 > history.motor_work[1]
     assert abs(history.load_work).max() < 1e-15  # rounding of the balance at the reference
-    assert history.dissipated.sum() == pytest.approx(work - history.stored.sum(), rel=1e-4)
     assert history.dissipated.min() > 0.0
     T = history.tensions[0]
     holes = arm.at(pose.q).segments
@@ -408,7 +388,7 @@ def test_random_histories_stay_in_the_band_of_rest_and_come_near_its_ends() -> N
     assert 0.7 < far <= 1.0
 
 
-def test_snap_through_is_a_warning_and_its_energy_is_no_loss() -> None:
+def test_snap_through_is_a_warning() -> None:
     geometry = cdsm.Geometry.universal(
         joints=3,
         cables_per_joint=3,
@@ -424,9 +404,8 @@ def test_snap_through_is_a_warning_and_its_energy_is_no_loss() -> None:
     pose = arm.at(np.deg2rad([5.0, -5.0, 10.0, 3.0, 8.0, -6.0]))
     load = np.array([40.0, 15.0, 12.0, 0.0, 0.0, 0.0])
     history = cdsm.load_cycle(pose, cdsm.distribute_tension(pose, 30.0), [load, 0 * load, -load])
-    assert history.warnings == history.warnings[-1:]
-    assert history.warnings[0].startswith("SNAPS THROUGH at load 3: ")
-    assert history.unaccounted[2] > 5.0 * history.dissipated[2]
+    assert history.warnings == ("SNAPS THROUGH at load 3",)
+    assert history.snaps.tolist() == [False, False, True]
     # without friction the arm buckles on the same way
     with pytest.raises(cdsm.EquilibriumError, match="buckles at 7"):
         cdsm.weight_test(pose, cdsm.distribute_tension(pose, 30.0), -load[:3], steps=1)

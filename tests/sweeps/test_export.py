@@ -35,7 +35,7 @@ def test_a_store_can_be_read_and_written_as_netcdf(tmp_path: Path, everything: x
     xr.testing.assert_identical(cdsm.read_sweep(store), everything)
 
 
-SHOWN = ("tip_position", "tension", "margin", "along", "anisotropy", "joint_stiffness")
+SHOWN = ("tip_position", "tension", "margin", "along", "isotropy", "joint_stiffness")
 
 
 def read(path: Path) -> dict[str, list[str]]:
@@ -75,7 +75,7 @@ def test_csv_has_a_row_for_each_entry_and_a_column_for_each_component(
         ("tension_cable2_3 [N]", column("tension", "cable2_3")),
         ("margin [N m rad-1]", column("margin")),
         ("along_z [N m-1]", column("along", "z")),
-        ("anisotropy", column("anisotropy")),
+        ("isotropy", column("isotropy")),
         (
             "joint_stiffness_joint1_1_joint2_2 [N m rad-1]",
             column("joint_stiffness", "joint1_1", "joint2_2"),
