@@ -94,8 +94,6 @@ from cdsm.measures.forces import ForcePolytope as ForcePolytope
 from cdsm.measures.forces import force_polytope as force_polytope
 from cdsm.measures.payload import Payload as Payload
 from cdsm.measures.payload import payload as payload
-from cdsm.measures.wire_use import WireUse as WireUse
-from cdsm.measures.wire_use import wire_use as wire_use
 from cdsm.planning.gradient import StiffnessGradient as StiffnessGradient
 from cdsm.planning.gradient import stiffness_gradient as stiffness_gradient
 from cdsm.planning.half_way import HalfWay as HalfWay

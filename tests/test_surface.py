@@ -282,7 +282,6 @@ RESULTS: dict[str, Any] = {
     "Report": K.report(),
     "ForcePolytope": cdsm.force_polytope(POSE, 1.0, 200.0),
     "Payload": cdsm.payload(POSE, "z", 1.0, 200.0, deflection=1e-3),
-    "WireUse": cdsm.wire_use(PULL, diameter=1e-3, breaking_load=1e3, bend_diameter=5e-3),
     "TipForce": cdsm.tip_force(POSE, PULL.values, "z", 1e3),
     "TrackingRun": cdsm.track(small_path(0.1), steps=1, minimum=10.0),
 }

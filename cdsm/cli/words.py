@@ -7,7 +7,7 @@ from typing import Final
 
 # fmt: off
 _ALIKE: Final = (
-    "bands", "bend_diameter", "bins", "breaking_load", "count", "damping", "damping_ratio", "delay",
+    "bands", "bins", "count", "damping", "damping_ratio", "delay",
     "diameter", "direction", "encoder", "felt", "force", "force_std", "gauge_length", "gravity",
     "host", "largest_force", "largest_tension", "payload", "payload_from", "period", "port", "rate",
     "section", "seed", "skip", "solver", "steps", "target", "tension_bias", "tension_noise",

@@ -15,7 +15,7 @@ from cdsm.support.values import Array
 from cdsm.sweeps.quantities import QUANTITIES
 
 EVERYTHING = tuple(
-    name for name in QUANTITIES if name not in ("capacity_margin", "wire_safety", "wire_life")
+    name for name in QUANTITIES if name != "capacity_margin"
 )
 """All quantities that need no upper bound of the tensions and no size of the wire."""
 
