@@ -141,8 +141,8 @@ from cdsm.sweeps.run import sweep as sweep
 from cdsm.sweeps.status import SweepStatus as SweepStatus
 from cdsm.tension import Tension as Tension
 from cdsm.tension import distribute_tension as distribute_tension
-from cdsm.tolerance import Tolerance as Tolerance
-from cdsm.tolerance import Tolerances as Tolerances
+from cdsm.tolerances import Tolerance as Tolerance
+from cdsm.tolerances import Tolerances as Tolerances
 from cdsm.uncertainties.budget import Uncertainty as Uncertainty
 from cdsm.uncertainties.budget import uncertainty as uncertainty
 from cdsm.uncertainties.monte_carlo import MonteCarlo as MonteCarlo

@@ -24,7 +24,7 @@ from cdsm.support.validation import NO_WRENCH, instance, number_array, scalar, s
 from cdsm.support.values import Array, Given, ReadOnlyState, frozen
 from cdsm.sweeps.poses import PoseSet, poses_of
 from cdsm.tension import checked_bounds
-from cdsm.tolerance import Tolerances
+from cdsm.tolerances import Tolerances
 from cdsm.wires.catalogue import as_wire
 
 MISSED = "held"

@@ -21,7 +21,7 @@ from cdsm.support.files import read_text
 from cdsm.support.format import plural
 from cdsm.support.records import Integer, Number, parse, read_toml, record
 from cdsm.sweeps.poses import GridPoses, PoseSet, RandomPoses
-from cdsm.tolerance import Tolerances
+from cdsm.tolerances import Tolerances
 
 
 @record

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 _STATUS = Quantity("what became of the entry", "1", "joint")
 
 _WORST = {
-    "worst_friction": "all segments of the cables stay within the bounds, whatever loads came before"
+    "worst_friction": "all segments of the cables stay within the bounds, whatever loads came "
+    "before"
 }
 """Attribute of a Dataset that was computed with ``worst_friction``."""
 

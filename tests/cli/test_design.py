@@ -35,9 +35,7 @@ def test_the_example_writes_front_figures_and_the_files_of_an_arm(tmp_path: Path
     assert (
         "asked: largest first-order deflection under the load at most 1 mm\n" in text
     )  # 0.001 m in the file
-    names = (
-        "designs.csv front.csv front.pdf arm.pdf arm.toml arm.urdf arm.xml holes.csv cables.csv"
-    )
+    names = "designs.csv front.csv front.pdf arm.pdf arm.toml arm.urdf arm.xml holes.csv cables.csv"
     assert {path.name for path in (tmp_path / "a").iterdir()} == {*names.split()}
     head, *rows = (tmp_path / "a" / "designs.csv").read_text().splitlines()
     assert len(rows) == 40

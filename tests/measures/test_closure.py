@@ -1,4 +1,4 @@
-"""Tension factor, wrench closure, isotropy and the use of wires against closed forms."""
+"""Tension factor, wrench closure and isotropy against closed forms."""
 
 import numpy as np
 import pytest

@@ -192,7 +192,7 @@ VALUES: dict[str, Any] = {
     "PathPoses": cdsm.PathPoses(np.array([np.zeros(6), np.ones(6)]), 5),
     "RandomPoses": cdsm.RandomPoses(9, 1),
     "Tolerance": cdsm.Tolerance(0.05, correlation=0.5),
-    "Tolerances": cdsm.Tolerances(rigidity=0.05, lead=cdsm.Tolerance(1e-3, correlation=np.eye(9))),
+    "Tolerances": cdsm.Tolerances(rigidity=0.05, lead=cdsm.Tolerance(1e-3, correlation=0.3)),
     "Cables": POSE.arm.cables,
     "Remedy": UNSTABLE.remedies[0],
     "Bifurcation": cdsm.bifurcation(cdsm.critical_tension(SOFT), bounds=[10.0, 11.0]),

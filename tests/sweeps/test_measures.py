@@ -18,7 +18,8 @@ MAXIMUM = 150.0
 SHORT = cdsm.TabulatedElasticity((0.0, 60.0, 75.0), (0.0, 60.0 / 48e3, 75.0 / 48e3))
 LAWS = {"steel": STEEL, "short": SHORT}
 OUTPUTS = (
-    "tension", "payload", "capacity_margin", "margin", "along", "cable_clearance", "link_clearance", "disk_clearance",
+    "tension", "payload", "capacity_margin", "margin", "along",
+    "cable_clearance", "link_clearance", "disk_clearance",
 )  # fmt: skip
 
 
