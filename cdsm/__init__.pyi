@@ -91,8 +91,6 @@ from cdsm.measures.forces import ForcePolytope as ForcePolytope
 from cdsm.measures.forces import force_polytope as force_polytope
 from cdsm.measures.payload import Payload as Payload
 from cdsm.measures.payload import payload as payload
-from cdsm.measures.wire_use import WireUse as WireUse
-from cdsm.measures.wire_use import wire_use as wire_use
 from cdsm.planning.gradient import StiffnessGradient as StiffnessGradient
 from cdsm.planning.gradient import stiffness_gradient as stiffness_gradient
 from cdsm.planning.path import plan_path as plan_path
@@ -137,8 +135,8 @@ from cdsm.sweeps.run import sweep as sweep
 from cdsm.sweeps.status import SweepStatus as SweepStatus
 from cdsm.tension import Tension as Tension
 from cdsm.tension import distribute_tension as distribute_tension
-from cdsm.tolerance import Tolerance as Tolerance
-from cdsm.tolerance import Tolerances as Tolerances
+from cdsm.tolerances import Tolerance as Tolerance
+from cdsm.tolerances import Tolerances as Tolerances
 from cdsm.uncertainties.budget import Uncertainty as Uncertainty
 from cdsm.uncertainties.budget import uncertainty as uncertainty
 from cdsm.uncertainties.monte_carlo import MonteCarlo as MonteCarlo

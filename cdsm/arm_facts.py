@@ -25,7 +25,7 @@ from cdsm.support.format import JointUnits, plural
 from cdsm.support.validation import instance, one_of, sequence_of
 from cdsm.support.values import Array, Printed
 from cdsm.support.warning import warn
-from cdsm.tolerance import Tolerances
+from cdsm.tolerances import Tolerances
 
 CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
 """One or more cables, or the path of their file."""

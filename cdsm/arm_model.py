@@ -24,7 +24,7 @@ from cdsm.kernels.serpentine_guess import find_blocks
 from cdsm.kernels.tree import Indices, Routing, Tree
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
-from cdsm.tolerance import Tolerances
+from cdsm.tolerances import Tolerances
 
 _LIMIT_SLACK = 1e-9
 """Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""

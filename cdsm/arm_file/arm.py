@@ -29,8 +29,7 @@ from cdsm.geometry.tables import build, lines_of
 from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
 from cdsm.support.validation import RANGES, one_of
-from cdsm.tolerance import Tolerances
-from cdsm.tolerance.sources import from_table, tolerance_lines
+from cdsm.tolerances import Tolerances, from_table, tolerance_lines
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 from cdsm.wires.catalogue import Wire, as_wire

@@ -14,8 +14,6 @@ from cdsm.cli.options import AsJson
 from cdsm.cli.output import answer, console
 from cdsm.cli.values import misuse
 
-_RECORD = "designs.jsonl"
-
 
 def design(
     problem: Annotated[
@@ -57,7 +55,6 @@ def design(
 
     The deflection is how far the load moves the tip when the motors are locked before it acts. It
     is computed to first order, with the stiffness under the least tensions without the load.
-    A stopped search resumes from the files in --out.
     """
     from cdsm.batch.inputs import checked_threads
     from cdsm.design.problem_file import read_problem
@@ -66,20 +63,18 @@ def design(
     from cdsm.support.validation import whole_number
 
     file = read_problem(problem)
-    if (out / "arm.toml").exists() and not (out / _RECORD).exists():
+    if (out / "arm.toml").exists() and not (out / "front.csv").exists():
         raise misuse("--out", f"{out} has an arm.toml that no search wrote; give another folder.")
-    folder = make_folder(out)
     task = file.problem
     if refine:
         require_smooth(task)
-
+    folder = make_folder(out)
     processes = checked_threads(jobs)
     found = cdsm.search_designs(
         task,
         generations=generations or file.generations,
         population=population or file.population,
         seed=file.seed if seed is None else seed,
-        store=folder / _RECORD,
         jobs=processes,
         report=partial(_tell, task.objectives[0]),
     )
@@ -93,7 +88,6 @@ def design(
         write_text(folder / "designs.csv", every),
         write_text(folder / "front.csv", found.measured(jobs=processes).to_csv()),
         cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
-        write_text(folder / "front.html", found.to_html()),
         cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),
         *found.write_arm(folder, number),
     ]

@@ -88,26 +88,19 @@ class PoseOptions:
 
 @dataclass(frozen=True)
 class MeasureOptions:
-    """Options for the quantities payload, clearance, wire safety and wire life of a sweep."""
+    """Options for the quantities payload and clearance of a sweep."""
 
     worst_friction: Annotated[
         bool,
         typer.Option(
             "--worst-friction",
             help="Keep the tension of each segment of each cable within the bounds, whatever loads "
-            "came before; wires are then under their largest tension.",
+            "came before.",
         ),
     ] = False
     diameter: Annotated[
-        float, typer.Option(help="Diameter of the cables [mm], for clearances and wire_life.")
+        float, typer.Option(help="Diameter of the cables [mm], for clearances.")
     ] = 0.0
-    breaking_load: Annotated[
-        float | None, typer.Option(help="Breaking load of the wire [N], for wire_safety.")
-    ] = None
-    bend_diameter: Annotated[
-        float | None,
-        typer.Option(help="Diameter of the bend in the holes [mm], for wire_life."),
-    ] = None
 
 
 def sweep(
@@ -155,8 +148,6 @@ def sweep(
         outputs=[name.strip() for name in quantities.split(",")],
         worst_friction=measures.worst_friction,
         diameter=measures.diameter / 1000.0,
-        breaking_load=measures.breaking_load,
-        bend_diameter=None if measures.bend_diameter is None else measures.bend_diameter / 1000.0,
         store=resume,
     )
     conditions = Conditions(robot, tuple(low), friction=measures.worst_friction)

@@ -7,7 +7,7 @@ from typing import Final
 
 # fmt: off
 _ALIKE: Final = (
-    "bend_diameter", "bins", "breaking_load", "count", "damping", "damping_ratio", "diameter",
+    "bins", "count", "damping", "damping_ratio", "diameter",
     "direction", "force", "force_std", "gauge_length", "gravity", "host", "largest_force",
     "largest_tension", "port", "rate", "section", "seed", "skip", "solver", "steps", "target",
     "tension_std", "wire", "wrench",

@@ -1,4 +1,4 @@
-"""Evaluate many designs: in this process, in several processes, or on a cluster."""
+"""Evaluate many designs: in this process or in several processes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,6 @@ from cdsm.support.values import Array, Named, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
     from multiprocessing.synchronize import Semaphore
-
-    from distributed import Client
 
 
 @final
@@ -131,7 +129,6 @@ def evaluate_designs(
     designs: ArrayLike,
     *,
     jobs: int = 1,
-    client: Client | None = None,
     progress: bool = True,
 ) -> Designs:
     """Compute all quantities of designs over all postures and loads of the problem.
@@ -141,7 +138,6 @@ def evaluate_designs(
         designs: (D, n) [m, rad, N, -], a column for each of ``problem.variables``.
         jobs: Number of processes. With more than one, a script needs the usual guard
             ``if __name__ == "__main__":``.
-        client: Client of a dask cluster, instead of processes.
         progress: Show a bar, if there is a terminal.
 
     Raises:
@@ -155,7 +151,7 @@ def evaluate_designs(
         problem.values(row)
     found = []
     with (
-        workers(problem, jobs, client) as compute,
+        workers(problem, jobs) as compute,
         progress_bar("designs", len(rows), wanted=progress, rate=True) as advance,
     ):
         for each in compute(rows):
@@ -180,15 +176,13 @@ Compute = Callable[[Array], Iterable[Found]]
 
 
 @contextmanager
-def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterator[Compute]:
+def workers(problem: DesignProblem, jobs: int) -> Iterator[Compute]:
     """Open a context with a function that evaluates designs (D, n), and returns results in order.
 
-    The function uses ``jobs`` processes, or the cluster of ``client`` if it is given.
+    The function uses ``jobs`` processes.
     """
     whole_number("jobs", jobs, 1)
-    if client is not None:
-        yield _on_cluster(problem, client)
-    elif jobs == 1:
+    if jobs == 1:
         yield lambda rows: (measure(problem, row) for row in rows)
     else:
         context = get_context("spawn")  # a forked process would inherit threads of BLAS
@@ -201,17 +195,6 @@ def workers(problem: DesignProblem, jobs: int, client: Client | None) -> Iterato
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise
-
-
-def _on_cluster(problem: DesignProblem, client: Client) -> Compute:
-    from cdsm.sweeps.cluster import checked_client
-
-    checked_client(client)
-    # sent once for all calls: ``sent`` keeps the cluster from dropping the problem
-    sent = client.scatter(problem, broadcast=True, hash=False)
-    return lambda rows: client.gather(
-        [client.submit(measure, sent, row, pure=False) for row in rows]
-    )
 
 
 _problem: list[DesignProblem] = []  # the problem of a worker process

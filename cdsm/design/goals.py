@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, final, get_args
 
@@ -14,7 +13,6 @@ from cdsm.support.validation import one_of, scalar
 MeasureName = Literal[
     "stiffness",
     "softest",
-    "isotropy",
     "margin",
     "deflection",
     "motor_force",
@@ -28,12 +26,7 @@ MeasureName = Literal[
     "held",
     "mass",
     "length",
-    "cables",
-    "joint_range",
     "wire_length",
-    "wire_strain",
-    "wire_safety",
-    "wire_life",
 ]
 
 
@@ -55,7 +48,6 @@ _STIFF = ("N/mm", 1e3)
 KINDS: Final[dict[str, Kind]] = {
     "stiffness": Kind("least stiffness along", "N/m", _STIFF, "most", directed=True),
     "softest": Kind("least stiffness in any direction", "N/m", _STIFF, "most"),
-    "isotropy": Kind("least isotropy", "1", _ONE, "most"),
     "margin": Kind("least eigenvalue of K", "N m/rad", ("N m/rad", 1.0), "most"),
     "deflection": Kind(
         "largest first-order deflection under the load",
@@ -76,12 +68,7 @@ KINDS: Final[dict[str, Kind]] = {
     "held": Kind("share of postures held", "1", ("%", 1e-2), "most"),
     "mass": Kind("mass of the links", "kg", ("kg", 1.0), "least"),
     "length": Kind("length", "m", _MM, "most"),
-    "cables": Kind("number of cables", "1", _ONE, "least"),
-    "joint_range": Kind("least limit of a joint", "rad", ("°", math.pi / 180.0), "most"),
     "wire_length": Kind("wire, leads included", "m", ("m", 1.0), "least"),
-    "wire_strain": Kind("largest strain of a wire", "1", ("%", 1e-2), "least"),
-    "wire_safety": Kind("least breaking load over tension", "1", _ONE, "most"),
-    "wire_life": Kind("least life margin of a wire", "1", _ONE, "most"),
 }
 """Quantities of a design. If a quantity depends on posture or load, its value is the worst one over
 all postures and loads that are held, except for ``workspace``, ``held`` and ``wire_length``."""
@@ -144,24 +131,21 @@ class Objective(Measure):
     """A quantity that a search maximises or minimises.
 
     Attributes:
-        of: ``"stiffness"``, ``"softest"``, ``"isotropy"``, ``"margin"``, ``"deflection"``,
-            ``"motor_force"``, ``"payload"``, ``"capacity_margin"``, ``"tension_factor"``,
-            ``"cable_clearance"``, ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``,
-            ``"held"``, ``"mass"``, ``"length"``, ``"cables"``, ``"joint_range"``,
-            ``"wire_length"``, ``"wire_strain"``, ``"wire_safety"`` or ``"wire_life"``. A posture is
-            held under a load if tensions within the bounds balance it and the arm is stable. If the
-            value depends on posture or load, it is the worst one over all that are held.
-            ``stiffness``, ``softest``, ``isotropy`` and ``margin`` are computed with the least
-            tensions under the load. ``deflection`` is |C_vv f| with the force f of the load, to
-            first order. Its C_vv is computed with the least tensions without the load, since the
-            motors are locked before the load acts, as in :func:`~cdsm.payload` and
-            :func:`~cdsm.weight_test`. The deflection is inf if the arm is not held without load.
-            ``payload`` is the largest force along u that tensions within the bounds balance in
-            addition to the load; ``capacity_margin`` is the largest force that they balance in
-            every direction. ``workspace`` is the volume of the convex hull of the tips of held
-            postures, ``held`` the fraction of pairs of posture and load that are held.
-            :func:`~cdsm.clearance` and :func:`~cdsm.wire_use` define clearances and quantities of
-            wires.
+        of: ``"stiffness"``, ``"softest"``, ``"margin"``, ``"deflection"``, ``"motor_force"``,
+            ``"payload"``, ``"capacity_margin"``, ``"tension_factor"``, ``"cable_clearance"``,
+            ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``, ``"held"``, ``"mass"``,
+            ``"length"`` or ``"wire_length"``. A posture is held under a load if tensions within
+            the bounds balance it and the arm is stable. If the value depends on posture or load,
+            it is the worst one over all that are held. ``stiffness``, ``softest`` and ``margin``
+            are computed with the least tensions under the load. ``deflection`` is |C_vv f| with the
+            force f of the load, to first order. Its C_vv is computed with the least tensions
+            without the load, since the motors are locked before the load acts, as in
+            :func:`~cdsm.payload` and :func:`~cdsm.weight_test`. The deflection is inf if the arm is
+            not held without load. ``payload`` is the largest force along u that tensions within the
+            bounds balance in addition to the load; ``capacity_margin`` is the largest force that
+            they balance in every direction. ``workspace`` is the volume of the convex hull of the
+            tips of held postures, ``held`` the fraction of pairs of posture and load that are held.
+            :func:`~cdsm.clearance` defines clearances.
         direction: u of ``stiffness`` and ``payload``: an axis such as ``"-z"``, or (3,).
         goal: ``"most"`` to maximise, ``"least"`` to minimise; None: the usual one, e.g. the most
             stiffness, the least mass.

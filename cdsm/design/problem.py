@@ -24,7 +24,7 @@ from cdsm.support.validation import NO_WRENCH, instance, number_array, scalar, s
 from cdsm.support.values import Array, Given, ReadOnlyState, frozen
 from cdsm.sweeps.poses import PoseSet, poses_of
 from cdsm.tension import checked_bounds
-from cdsm.tolerance import Tolerances
+from cdsm.tolerances import Tolerances
 from cdsm.wires.catalogue import as_wire
 
 MISSED = "held"
@@ -55,8 +55,6 @@ class DesignProblem(ReadOnlyState):
             came before; see :func:`~cdsm.distribute_tension`. ``motor_force`` and the quantities of
             wires then belong to the largest tension that friction can cause along each cable.
         diameter: Diameter of the cables [m], for clearances and the life of wires.
-        breaking_load: Breaking load of the wire [N], for ``wire_safety``.
-        bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
         tolerances: Tolerances of every design; constraints on ``stiffness``, ``margin`` and
             ``motor_force`` must then be met with a margin of ``coverage`` standard uncertainties
             u. The value of such a quantity includes the margin, e.g. stiffness − coverage · u.
@@ -78,8 +76,6 @@ class DesignProblem(ReadOnlyState):
     maximum: float = math.inf
     worst_friction: bool = False
     diameter: float = 0.0
-    breaking_load: float | None = None
-    bend_diameter: float | None = None
     tolerances: Tolerances | None = None
     coverage: float = 2.0
 
@@ -107,8 +103,6 @@ class DesignProblem(ReadOnlyState):
             self.maximum,
             worst_friction=self.worst_friction,
             diameter=self.diameter,
-            breaking_load=self.breaking_load,
-            bend_diameter=self.bend_diameter,
         )
         if "deflection" in asked and not loads[:, :3].any(axis=1).all():
             raise InvalidInput("loads", "deflection needs a force in every load.")
@@ -140,7 +134,7 @@ class DesignProblem(ReadOnlyState):
         full, asked = self, {each.of for each in self.measures}
         for of in get_args(MeasureName):
             if of not in asked:
-                with suppress(InvalidInput):  # a direction, or data such as a breaking load
+                with suppress(InvalidInput):  # a direction, or a maximum of the tensions
                     full = replace(full, objectives=(*full.objectives, Objective(of)))
         return full
 

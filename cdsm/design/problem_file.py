@@ -21,7 +21,7 @@ from cdsm.support.files import read_text
 from cdsm.support.format import plural
 from cdsm.support.records import Integer, Number, parse, read_toml, record
 from cdsm.sweeps.poses import GridPoses, PoseSet, RandomPoses
-from cdsm.tolerance import Tolerances
+from cdsm.tolerances import Tolerances
 
 
 @record
@@ -76,8 +76,6 @@ class _File:
     maximum: Number | None = None
     worst_friction: bool = False
     diameter: Number = 0.0
-    breaking_load: Number | None = None
-    bend_diameter: Number | None = None
     tolerances: str | None = None
     coverage: Number = 2.0
     search: _Search = Field(default_factory=lambda: _Search())
@@ -163,8 +161,6 @@ def _problem(file: _File, folder: Path) -> DesignProblem:
         maximum=math.inf if file.maximum is None else file.maximum,
         worst_friction=file.worst_friction,
         diameter=file.diameter,
-        breaking_load=file.breaking_load,
-        bend_diameter=file.bend_diameter,
         tolerances=tolerances,
         coverage=file.coverage,
     )

@@ -24,7 +24,6 @@ from cdsm.measures.rows import (
     narrowed_bounds,
     payloads,
 )
-from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 from cdsm.tension import Tension, distribute_tension, grip
@@ -130,7 +129,7 @@ class _Arm:
 
         They are held if tensions within the bounds balance the arm, and the arm is stable.
         """
-        held, problem = self.held, self.problem
+        held = self.held
         C = self.found["compliance"][held][:, :3, :3]
         if each.of == "stiffness":
             u = np.array(each.direction)
@@ -143,24 +142,16 @@ class _Arm:
             return np.where(stable, moved, math.inf)[held]
         if each.of == "margin":
             return np.asarray(self.found["margin"][held])
-        if each.of in ("softest", "isotropy"):
-            return principal_stiffness(C)[each.of]
+        if each.of == "softest":
+            return principal_stiffness(C)["softest"]
         bounds = self.q[held], self.loads[held], self.low[held], self.high[held]
         if each.of == "payload":
             return payloads(self.arm, *bounds, np.array(each.direction)[None], 1)[:, 0]
         if each.of == "capacity_margin":
             return capacity_margins(self.arm, *bounds)
-        # the largest tension along each cable
-        F = self.found["tension"][held] * self.loss[held]
-        if each.of == "motor_force":
-            return np.asarray(F.max(axis=1))
-        if each.of == "wire_strain":
-            return np.asarray(np.nan_to_num(strains(self.arm, F), nan=math.inf).max(axis=1))
-        assert problem.breaking_load is not None  # the problem has checked what wires need
-        if each.of == "wire_safety":
-            return safety(F.max(axis=1), problem.breaking_load)
-        assert problem.bend_diameter is not None
-        return life_margin(F.max(axis=1), problem.diameter, problem.bend_diameter)
+        assert each.of == "motor_force"
+        along_cables = self.found["tension"][held] * self.loss[held]
+        return np.asarray(along_cables.max(axis=1))
 
     def _value(self, each: Measure) -> float:
         arm, held = self.arm, self.held
@@ -170,10 +161,6 @@ class _Arm:
             return sum(link.mass for link in arm.geometry.links)
         if each.of == "length":
             return arm.geometry.length
-        if each.of == "cables":
-            return float(len(arm.cables))
-        if each.of == "joint_range":
-            return float(arm.upper.min())
         if each.of == "workspace":
             return _volume(self.found["tip"][held][:, :3, 3])
         if not held.any():

@@ -21,7 +21,6 @@ from cdsm.interchange.mjcf import write_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import make_folder, write_text
 from cdsm.support.format import aligned, plain, plural
-from cdsm.support.markup import Document
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -29,7 +28,6 @@ from cdsm.urdf import write_urdf
 
 if TYPE_CHECKING:
     import pandas
-    from distributed import Client
     from matplotlib.figure import Figure
 
 _PRINTED = 20  # number of designs, evenly spread over a front, that a printed table shows
@@ -136,9 +134,7 @@ class DesignSearch(ReadOnlyState):
             write_text(into / "cables.csv", cable_table(arm)),
         ]
 
-    def measured(
-        self, *, jobs: int = 1, client: Client | None = None, progress: bool = True
-    ) -> Designs:
+    def measured(self, *, jobs: int = 1, progress: bool = True) -> Designs:
         """Evaluate the designs of the front in every quantity for which the problem has the data.
 
         ``measured().to_csv()`` is the table of the front, with all these quantities.
@@ -146,14 +142,13 @@ class DesignSearch(ReadOnlyState):
 
         Args:
             jobs: Number of processes; :func:`evaluate_designs` says what a script then needs.
-            client: Client of a dask cluster, instead of processes.
             progress: Show a bar, if there is a terminal.
 
         Raises:
             InvalidInput: ``jobs`` is below 1.
         """
         return evaluate_designs(
-            self.problem.in_full(), self._front.designs, jobs=jobs, client=client, progress=progress
+            self.problem.in_full(), self._front.designs, jobs=jobs, progress=progress
         )
 
     @property
@@ -189,15 +184,6 @@ class DesignSearch(ReadOnlyState):
         If there is one objective, its best value is plotted against the number of designs.
         """
         return cdsm.plots.plot_designs(self)
-
-    def to_html(self) -> Document:
-        """Return a page with the front: a click on a design shows its arm and its numbers.
-
-        The page needs no other file. A notebook shows it in a frame.
-        """
-        from cdsm.design.page import page_of  # matplotlib imports slowly
-
-        return page_of(self)
 
     def __repr__(self) -> str:
         return f"<DesignSearch: {plural(len(self.front), 'design')} on the front>"

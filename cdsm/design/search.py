@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,16 +14,12 @@ from cdsm.design.infeasible import explain
 from cdsm.design.problem import DesignProblem
 from cdsm.design.quantities import Found
 from cdsm.design.result import DesignProgress, DesignSearch
-from cdsm.design.store import Store
 from cdsm.design.variables import WHOLE
 from cdsm.kernels.tree import Indices
 from cdsm.support.extras import need
 from cdsm.support.progress import progress_bar
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 _FAR = 1e3
 """Number that stands for a violation or an objective that does not exist."""
@@ -36,9 +31,7 @@ def search_designs(
     generations: int = 40,
     population: int = 40,
     seed: int = 0,
-    store: str | os.PathLike[str] | None = None,
     jobs: int = 1,
-    client: Client | None = None,
     report: Callable[[DesignProgress], None] | None = None,
     progress: bool = True,
 ) -> DesignSearch:
@@ -46,17 +39,14 @@ def search_designs(
 
     NSGA-II of pymoo handles continuous variables, whole numbers and choices together. The first
     designs are random, and the given arm is one of them if it lies within the ranges. The same
-    problem and the same seed give the same bits, whatever ``jobs``, ``client`` and ``store`` are.
+    problem and the same seed give the same designs, whatever ``jobs`` is.
 
     Args:
         problem: The problem.
         generations: Number of generations, including the first, random one.
         population: Number of designs in each generation.
         seed: Seed of all random numbers.
-        store: File that keeps each evaluated design. A new search with the same arguments resumes
-            from it; one with more generations begins with the same designs.
         jobs: Number of processes, as for :func:`evaluate_designs`.
-        client: Client of a dask cluster, instead of processes.
         report: Function that is called after each generation with its :class:`DesignProgress`.
         progress: Show a bar, if there is a terminal.
 
@@ -65,21 +55,18 @@ def search_designs(
             constraint it misses by how much.
         InvalidInput: An argument is invalid.
         MissingExtra: pymoo is not installed.
-        FileError: The store cannot be read or written.
-        StoreError: The store belongs to another problem, seed or population.
     """
     instance("problem", problem, DesignProblem)
     steps = whole_number("generations", generations, 1)
     size = whole_number("population", population, 4)
     whole_number("seed", seed, 0)
     need("design", "pymoo")
-    kept = Store(store, problem, seed=seed, population=size)
     algorithm = _algorithm(problem, size, steps, seed)
     rows: list[Array] = []
     found: list[Found] = []
     history: list[DesignProgress] = []
     with (
-        workers(problem, jobs, client) as compute,
+        workers(problem, jobs) as compute,
         progress_bar("designs", steps * size, wanted=progress, rate=True) as advance,
     ):
         for step in range(steps):
@@ -90,7 +77,7 @@ def search_designs(
                 break
             names = [each.name for each in problem.variables]
             designs = np.array([[float(each[x]) for x in names] for each in asked.get("X")])
-            evaluated = kept.evaluated(designs, compute)
+            evaluated = [*compute(designs)]
             advance(len(designs))
             _tell(problem, algorithm, asked, designs, evaluated)
             rows += [*designs]

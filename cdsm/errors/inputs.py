@@ -57,7 +57,7 @@ class FileError(CdsmError, OSError):
 
 
 class StoreError(FileError):
-    """A store that contains another sweep or design search, or that another run is writing to.
+    """A store that contains another sweep, or that another run is writing to.
 
     Attributes:
         differences: Differences between the stored and the requested sweep, one text each; may be

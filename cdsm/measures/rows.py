@@ -36,8 +36,6 @@ def require(
     *,
     worst_friction: bool,
     diameter: float,
-    breaking_load: float | None,
-    bend_diameter: float | None,
 ) -> None:
     """Raise InvalidInput if an argument of :func:`~cdsm.sweep` for measures is missing or invalid.
 
@@ -50,16 +48,8 @@ def require(
             "friction = in ARM.toml, --friction, Manipulator.with_friction.",
         )
     quantity("diameter", diameter, "diameter", zero=True)
-    if breaking_load is not None:
-        quantity("breaking_load", breaking_load, "force")
-    if bend_diameter is not None:
-        quantity("bend_diameter", bend_diameter, "length")
     if "capacity_margin" in names and math.isinf(checked_bounds(arm, 0.0, maximum)[1].max()):
         raise InvalidInput("maximum", "capacity_margin needs a finite one [N].")
-    if "wire_safety" in names and breaking_load is None:
-        raise InvalidInput("breaking_load", "is needed for wire_safety [N].")
-    if "wire_life" in names and not (bend_diameter and diameter):
-        raise InvalidInput("bend_diameter", "is needed with diameter for wire_life [m].")
 
 
 def measured(

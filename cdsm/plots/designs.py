@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,16 +27,13 @@ if TYPE_CHECKING:
 _WIDEST = 34  # characters of a label beside an axis of 2.4 inches
 
 
-def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
+def plot_designs(found: DesignSearch) -> Figure:
     """Plot the objectives of all designs that meet the constraints, and their Pareto front.
 
     For a single objective, plot its best value against the number of designs.
 
     Args:
         found: The result of :func:`cdsm.search_designs` or :func:`cdsm.refine_design`.
-        named: Indices of designs in ``found.front``. In an SVG, the points of these designs get the
-            id ``design-INDEX-OBJECTIVE``, so that a page can find them; OBJECTIVE is the index of
-            the objective on the vertical axis.
 
     Raises:
         InvalidInput: ``found`` is not such a result.
@@ -64,16 +60,10 @@ def plot_designs(found: DesignSearch, named: Sequence[int] = ()) -> Figure:
         x, y = (every[objectives[n].key] / scales[n] for n in (0, k))
         panel.plot(x[feasible], y[feasible], ".", color="0.7", markersize=3, label="feasible")
         panel.plot(x[found.front], y[found.front], ".-", color=BLUE, linewidth=0.8, label="front")
-        for number in named:
-            n = found.front[number]
-            panel.plot(x[n], y[n], "o", color=BLUE, markersize=4, gid=f"design-{number}-{k}")
         chosen = found.front[found.compromise]
         ring = {"color": VERMILLION, "markerfacecolor": "none", "markersize": 8}
         panel.plot(x[chosen], y[chosen], "o", label="compromise", **ring)
         panel.set(xlabel=names[0], ylabel=names[k])
-        for axis, n in ((panel.xaxis, 0), (panel.yaxis, k)):
-            if objectives[n].of == "cables":
-                axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     heading(figure, f"{len(every)} designs of {found.problem.arm.name}")
     legend_below(figure, axes, 3)
     return figure

@@ -12,19 +12,6 @@ class Markup(str):
     __slots__ = ()
 
 
-class Document(str):
-    """A whole HTML page; a notebook shows it in a frame of its own."""
-
-    __slots__ = ()
-
-    def __repr__(self) -> str:
-        return f"<page of {len(self)} characters>"
-
-    def _repr_html_(self) -> str:
-        frame = {"width": "100%", "height": "760", "style": "border:0", "srcdoc": self}
-        return element("iframe", **frame)
-
-
 def element(name: str, *contents: str, **attributes: str) -> Markup:
     """Build an HTML element; contents are escaped unless they are :class:`Markup`.
 

@@ -27,7 +27,6 @@ from cdsm.measures.rows import (
     payloads,
     require,
 )
-from cdsm.measures.wire_use import life_margin, safety, strains
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.arguments import Choice
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
@@ -69,8 +68,6 @@ class SweepTask(ReadOnlyState):
     outputs: tuple[str, ...]  # names from QUANTITIES
     worst_friction: bool  # whether all segments of the cables stay within the bounds
     diameter: float  # of the cables [m]
-    breaking_load: float | None  # of the wire [N]
-    bend_diameter: float | None  # of the bend in the holes [m]
 
     def __post_init__(self) -> None:
         require(
@@ -79,8 +76,6 @@ class SweepTask(ReadOnlyState):
             self.maximum,
             worst_friction=self.worst_friction,
             diameter=self.diameter,
-            breaking_load=self.breaking_load,
-            bend_diameter=self.bend_diameter,
         )
 
     @property
@@ -120,7 +115,7 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     cases = shape[1] * shape[2]
     at = np.repeat(q, cases, axis=0)
     wrench = np.tile(np.repeat(wrenches, shape[2], axis=0), (shape[0], 1))
-    low, high, loss, bounded = _bounds(task, at, threads)
+    low, high, bounded = _bounds(task, at, threads)
     one = shape[2] == 1 and not task.worst_friction  # a bound for all rows
     together = [*(name for name in of_pose if name not in MEASURED), *needed]
     rows, status = _rows(
@@ -142,14 +137,11 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 
     held = exists("tension", status)
     if of_tension:
-        load, bend = task.breaking_load or math.nan, task.bend_diameter or math.nan
         F, bounds = rows["tension"][held], (task.arm, at[held], wrench[held], low[held], high[held])
         compute: dict[str, Callable[[], Array]] = {
             "tension": lambda: F,
             "payload": lambda: payloads(*bounds, task.directions.values, threads),
             "capacity_margin": lambda: capacity_margins(*bounds),
-            "wire_safety": lambda: safety(F * loss[held], load),
-            "wire_life": lambda: life_margin(F * loss[held], task.diameter, bend),
         }
         for name in of_tension:
             answer[name] = _spread(compute[name](), held)
@@ -163,7 +155,7 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
             )
             found = {name: _spread(values, held) for name, values in some.items()}
         if of_law:
-            _finish(arm, found, status_of_law, rows["tension"], loss, of_law)
+            _finish(found, status_of_law, of_law)
         by_law.append({name: found[name] for name in of_law} | {"status": status_of_law})
     for name in of_tension:
         answer[name] = answer[name].reshape(*shape, *answer[name].shape[1:])
@@ -175,25 +167,22 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
 
 def _bounds(
     task: SweepTask, q: Array, threads: int | None
-) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Return bounds of the tensions at the motors, and the friction, for R rows q (R, nv) [rad].
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return bounds of the tensions at the motors for R rows q (R, nv) [rad].
 
-    A row is a posture with a wrench and a minimum. The results are the lower bounds (R, C) [N], the
-    upper bounds (R, C) [N], the largest ratio of two tensions along each cable (R, C) [-], and
-    whether the lower bounds of a row are below its upper ones (R,). The ratio is 1 if the task has
-    no ``worst_friction``.
+    A row is a posture with a wrench and a minimum. The results are the lower and upper bounds
+    (R, C) [N], and whether the lower bounds of a row are below its upper ones (R,).
     """
     lows = task.minima.values
     minima = np.tile(lows, len(q) // len(lows))
     shape = len(q), len(task.arm.cables)
     if not task.worst_friction:
-        low, high, loss = (np.broadcast_to(x, shape) for x in (minima[:, None], task.maximum, 1.0))
-        return low, high, loss, np.broadcast_to(True, len(q))
+        low, high = (np.broadcast_to(x, shape) for x in (minima[:, None], task.maximum))
+        return low, high, np.broadcast_to(True, len(q))
     loss = np.ones(shape)
     exist = batch.evaluate(task.arm, q, outputs=[], threads=threads).ok
     loss[exist] = friction_losses(task.arm, q[exist], threads)
-    low, high, bounded = narrowed_bounds(task.arm, minima, task.maximum, loss)
-    return low, high, loss, bounded
+    return narrowed_bounds(task.arm, minima, task.maximum, loss)
 
 
 def _needed(names: list[str]) -> list[str]:
@@ -205,34 +194,16 @@ def _needed(names: list[str]) -> list[str]:
     if not names:
         return []
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
-    needed = [name for name in names if name not in (*extreme, "wire_strain")]
+    needed = [name for name in names if name not in extreme]
     needed += ["margin", "translational_compliance"] if extreme else ["margin"]
     return list(dict.fromkeys(needed))
 
 
-def _finish(
-    arm: Manipulator,
-    rows: Rows,
-    status: Statuses,
-    tension: Array,
-    loss: Array,
-    names: list[str],
-) -> None:
-    """Add to ``rows`` those quantities in ``names`` that a batch does not compute.
+def _finish(rows: Rows, status: Statuses, names: list[str]) -> None:
+    """Add the extreme stiffnesses in ``names`` to ``rows``; set ``status`` where the arm buckles.
 
-    They are ``wire_strain`` and the extreme stiffnesses with their directions (the stage
-    ``principal``). Also set ``status`` (R,) where a strain is outside its law or the arm buckles.
-    ``tension`` [N] and ``loss`` [-] are (R, C); ``loss`` is the largest ratio of two tensions along
-    a cable.
+    They and their directions are the stage ``principal``, which a batch does not compute.
     """
-    if "wire_strain" in names:
-        # friction may take a tension along a cable out of the domain of its law
-        held = exists("tension", status)
-        strain = _spread(strains(arm, (tension * loss)[held]), held)
-        status[held & np.isnan(strain).any(axis=1)] = SweepStatus.OUTSIDE_ELASTICITY
-        rows["wire_strain"] = strain
-        for values in rows.values():
-            values[status == SweepStatus.OUTSIDE_ELASTICITY] = np.nan
     extreme = [name for name in names if QUANTITIES[name].stage == "principal"]
     if extreme:
         # extreme stiffnesses exist in stable rows; a margin may be NaN

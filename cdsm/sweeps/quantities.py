@@ -57,14 +57,6 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "capacity_margin": Quantity(
         "largest force in any direction within the limits of the tensions", "N", "tension"
     ),
-    "wire_safety": Quantity("breaking load over the tension", "1", "tension", ("cable",)),
-    "wire_life": Quantity(
-        "life margin of a wire, 0.001 over pressure in the hole over strength",
-        "1",
-        "tension",
-        ("cable",),
-    ),
-    "wire_strain": Quantity("strain of a wire", "1", "joint", ("cable",)),
     "cable_stiffness": Quantity("cable stiffness, diagonal of K_L", "N m-1", "joint", ("cable",)),
     "active_stiffness": Quantity("active part of K, H_L F (Eq. 16)", "N m rad-1", "joint", _JOINTS),
     "passive_stiffness": Quantity(

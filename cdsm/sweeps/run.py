@@ -52,8 +52,6 @@ def sweep(
     outputs: Iterable[str] = DEFAULT,
     worst_friction: bool = False,
     diameter: float = 0.0,
-    breaking_load: float | None = None,
-    bend_diameter: float | None = None,
     store: str | os.PathLike[str] | None = None,
     client: Client | None = None,
     chunk: int | None = None,
@@ -82,10 +80,8 @@ def sweep(
         outputs: Names of quantities: keys of :data:`~cdsm.sweeps.quantities.QUANTITIES`.
         worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
             within the bounds, whatever loads came before. Then the bounds at the motors are
-            narrower, and safety, life and strain of a wire are at the largest tension along it.
-        diameter: Diameter of the cables [m], for clearances and ``wire_life``.
-        breaking_load: Breaking load of the wire [N], for ``wire_safety``.
-        bend_diameter: Diameter of the bend in the holes [m], for ``wire_life``.
+            narrower.
+        diameter: Diameter of the cables [m], for clearances.
         store: Zarr folder to which entries are written during the run. A new run with the same
             arguments computes only missing entries, including those of lost workers. The results
             are then the same, bit by bit, as without interruption. The returned Dataset reads from
@@ -127,8 +123,6 @@ def sweep(
         outputs=outputs_of(outputs),
         worst_friction=worst_friction,
         diameter=diameter,
-        breaking_load=breaking_load,
-        bend_diameter=bend_diameter,
     )
     specification = Specification(task, poses)
     most = _NUMBERS // arm.nv if chunk is None else whole_number("chunk", chunk, 1)

@@ -28,16 +28,9 @@ if TYPE_CHECKING:
 
 _STATUS = Quantity("what became of the entry", "1", "joint")
 
-_WIRE = {
-    "diameter": ("diameter of the cables", "m"),
-    "breaking_load": ("breaking load of the wire", "N"),
-    "bend_diameter": ("diameter of the bend in the holes", "m"),
-}
-"""Long name and unit of each argument of :func:`sweep` that is a property of the wire."""
-
 _WORST = {
-    "worst_friction": "all segments of the cables stay within the bounds, and wires are under their"
-    " largest tension, whatever loads came before"
+    "worst_friction": "all segments of the cables stay within the bounds, whatever loads came "
+    "before"
 }
 """Attribute of a Dataset that was computed with ``worst_friction``."""
 
@@ -150,8 +143,8 @@ def _labels(task: SweepTask, poses: Poses) -> dict[str, Label]:
         "minimum": lows.label(lows.values, (), "lower bound of all tensions", "N"),
         "maximum": label((), task.maximum, "upper bound of all tensions", "N"),
     }
-    wire = {name: getattr(task, name) for name in _WIRE}
-    labels |= {name: label((), size, *_WIRE[name]) for name, size in wire.items() if size}
+    if task.diameter:
+        labels["diameter"] = label((), task.diameter, "diameter of the cables", "m")
     own = {dim for name in task.outputs for dim in QUANTITIES[name].dims}
     if "direction" in own:
         labels |= directions.labels

@@ -31,8 +31,7 @@ class SweepStatus(IntEnum):
     SOLVER_FAILED = Status.SOLVER_FAILED
     """The solver found no tensions, though there are some: NaN for tensions and stiffness."""
     OUTSIDE_ELASTICITY = Status.OUTSIDE_ELASTICITY
-    """A tension is outside the domain of its law: the stiffness does not exist. With the output
-    ``wire_strain``, this includes the largest tension along a cable under ``worst_friction``."""
+    """A tension is outside the domain of its law: the stiffness does not exist."""
     SINGULAR = Status.SINGULAR
     """K_θ is singular (the arm is about to buckle): Cartesian quantities do not exist."""
     IMMOBILE = Status.IMMOBILE

@@ -1,7 +1,6 @@
-"""Derivatives of the least tensions and of the critical tension with respect to the inputs.
+"""Derivatives of the least tensions with respect to the inputs.
 
-An input is a number that can have a tolerance, such as the radius of one hole. The critical tension
-is the lower bound of the tensions at which the arm buckles.
+An input is a number that can have a tolerance, such as the radius of one hole.
 
 This module computes the change Σ y_c dF_c of a weighted sum of the least tensions F (Eq. 17), with
 constant weights y, for small changes of the arm. The cables balance the torque τ = J_Xᵀ W − g
@@ -19,7 +18,6 @@ The formula holds while the same cables stay at their bounds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -115,24 +113,3 @@ class Balance(NamedTuple):
         none = np.zeros_like(weights)
         given = none, none, none, weights, self.tension.wrench, 0.0, loaded
         return inputs.gradient(self.tension.posture, motion, _NO_VELOCITY, *given)[0]
-
-
-def buckling_gradient(
-    balance: Balance, inputs: Inputs, margin: Mapping[str, Array]
-) -> dict[str, Array]:
-    """Compute the derivatives of the critical tension F_min, the bound at which λ_min(K_θ) = 0.
-
-    They are with respect to ``inputs``, in an array for each source of uncertainty, such as
-    ``hole_radius``. ``balance`` has the least tensions with the lower bound F_min. ``margin`` has
-    the derivatives ∂λ of λ_min at constant tensions, in arrays by source, and y = ∂λ/∂F under the
-    key ``tension``. Then dF_min = −(∂λ + Σ y_c dF_c)/(Σ y_c dF_c/dF_min). The derivative with
-    respect to measured tensions is 0.
-    """
-    weights = margin["tension"]
-    low = balance.tension.minimum  # F_min, or a higher bound of the cable's own
-    moved, common = balance.gradient(inputs, weights), (low == low.min())[:, None].astype(float)
-    slope = float(balance.by_bounds(weights, common, 0.0 * common)[0])
-    return {
-        name: np.zeros_like(g) if name == "tension" else -(g + moved[name]) / slope
-        for name, g in margin.items()
-    }

@@ -22,7 +22,7 @@ from cdsm.stiffness_matrix.instability import verdict
 from cdsm.support.validation import scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
-from cdsm.tolerance import Tolerances
+from cdsm.tolerances import Tolerances
 from cdsm.uncertainties.inputs import inputs_of
 from cdsm.uncertainties.parts import Part, draw, standards, variance
 from cdsm.uncertainties.question import checked_question, chosen_tolerances
@@ -37,8 +37,7 @@ LINEAR = 0.05
 
 _PROBED = 100  # number of drawn arms with which the error of first-order propagation is estimated
 
-_ROUNDING = 1e-9
-"""A smaller relative uncertainty is rounding: critical tensions have an error of up to 1e-10."""
+_ROUNDING = 1e-9  # a smaller relative uncertainty is rounding
 
 
 @final
@@ -190,7 +189,7 @@ class Uncertainty(ReadOnlyState):
         No weight can measure such a stiffness. Otherwise the tuple is empty.
         """
         K = self.question.stiffness
-        read = self.question.of in ("along", "stuck", "margin")
+        read = self.question.of in ("along", "margin")
         return (verdict(K),) if read and not K.is_stable else ()
 
     @property
@@ -228,36 +227,33 @@ def uncertainty(
 ) -> Uncertainty:
     """Compute the standard uncertainty of a reading to first order (JCGM 100, Eq. 13).
 
-        u_c² = Σ_s σ_s² g_sᵀ R_s g_s
+        u_c² = Σ_s u_s² ((1 − ρ_s) g_s·g_s + ρ_s (Σ g_s)²)
 
     A reading is one number of the arm, such as its stiffness along a direction. Each source s of
-    uncertainty (such as all hole radii) has the standard uncertainty σ_s, the correlations R_s of
+    uncertainty (such as all hole radii) has the standard uncertainty u_s, the correlation ρ_s of
     its inputs, and the exact partial derivatives g_s of the reading with respect to these inputs.
-    For ``"tension"`` and ``"critical_tension"``, each arm with errors has its own least tensions;
-    cables at a bound stay there. For all other readings the tensions are measured: they are inputs
+    For ``"tension"``, each arm with errors has its own least tensions; cables at a bound stay
+    there. For all other readings the tensions are measured: they are inputs
     with errors, too.
 
     Args:
         pose: The posture.
-        tension: A :class:`~cdsm.Tension` or, unless ``of`` is ``"tension"`` or
-            ``"critical_tension"``, your own tensions (C,) [N].
+        tension: A :class:`~cdsm.Tension` or, unless ``of`` is ``"tension"``, your own
+            tensions (C,) [N].
         tolerances: Tolerances of the arm, the angles and the tensions; None: the tolerances of the
             arm, as in the table ``[tolerances]`` of its file.
-        direction: u (3,) in base axes, any length: for ``"along"``, ``"stuck"``, ``"tip"`` only.
-        of: ``"along"``: the stiffness along u [N/m], without friction. ``"stuck"``: the same while
-            all cables stick in their holes, see :func:`~cdsm.stuck_stiffness`; it does not depend
-            on the coefficient of friction, only on which holes have friction. ``"margin"``: the
+        direction: u (3,) in base axes, any length: for ``"along"`` and ``"tip"`` only.
+        of: ``"along"``: the stiffness along u [N/m], without friction. ``"margin"``: the
             smallest eigenvalue of K_θ [N m/rad]. ``"tip"``: the tip's coordinate along u [m].
-            ``"tension"``: the distributed tension of a cable [N]. ``"critical_tension"``: the lower
-            bound of tension at which the arm buckles [N]; see :func:`~cdsm.critical_tension`.
+            ``"tension"``: the distributed tension of a cable [N].
         cable: Name of the cable, for ``"tension"`` only.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; only with your own
             tensions.
 
     Raises:
         InvalidInput: An argument has the wrong type or shape; ``direction`` or ``cable`` is missing
-            or not wanted; the arm does not have one of the sources; so many cables are at a bound
-            that the least tensions have no derivative; or the arm does not buckle.
+            or not wanted; the arm does not have one of the sources; or so many cables are at a
+            bound that the least tensions have no derivative.
         UnknownName: ``of`` or ``cable`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.

@@ -16,12 +16,6 @@ from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.uncertainties.inputs import inputs_of
 
-_CONVERGED = 1e-10
-"""Relative step at which the search for a critical tension ends; its error is the step's square."""
-
-_STEPS = 40  # largest number of secant steps; 5 are usual
-_LONGEST = 0.2  # longest step relative to the tension
-
 
 class Drawn(NamedTuple):
     """Stiffness, tip and torques of N arms with random errors; see :class:`DrawnArms`."""
@@ -67,12 +61,9 @@ class DrawnArms:
             *(np.ascontiguousarray(place) for place in places),
         )
 
-    def evaluate(self, tension: Array | None = None) -> Drawn:
-        """Compute stiffness, tip and torques of all N arms under tensions (N, C) [N].
-
-        If ``tension`` is None, they are the tensions of K plus their random errors.
-        """
-        F = self._tension if tension is None else tension
+    def evaluate(self) -> Drawn:
+        """Compute stiffness, tip and torques of all N arms under the tensions with their errors."""
+        F = self._tension
         rigidity, strain = laws_at(self._K, F)
         locked = self._K.cable_stiffness > 0.0
         stretched = np.where(locked, rigidity * (self._scale + strain), 0.0)  # ε falls as EA rises
@@ -91,21 +82,15 @@ class DrawnArms:
         stiffness_of_draws(*arguments)
         return found
 
-    def distributed(self, minimum: Array | None = None, drawn: Drawn | None = None) -> Array:
+    def distributed(self) -> Array:
         """Compute the least tensions (N, C) [N] that balance the N arms.
-
-        ``minimum`` (N,) [N] is the lower bound of each arm, beside those of its cables; None: the
-        lower bounds of the arm without errors. ``drawn`` is a result of :meth:`evaluate`; None: it
-        is computed here.
 
         Raises:
             InvalidInput: No tensions balance one of the arms.
         """
-        arms, given = drawn or self.evaluate(), self._K.distribution
+        arms, given = self.evaluate(), self._K.distribution
         assert given is not None
-        own = np.array([cable.minimum for cable in self._K.posture.arm.cables])
-        least = given.minimum if minimum is None else np.maximum(minimum[:, None], own)
-        bounds = least, given.maximum
+        bounds = given.minimum, given.maximum
         low, high = (frozen(np.broadcast_to(x, self._tension.shape).copy()) for x in bounds)
         none = abs(arms.length_jacobian) < NO_ARM * self._K.posture.arm.length
         J, tension = np.where(none, 0.0, arms.length_jacobian), np.empty_like(low)
@@ -119,37 +104,6 @@ class DrawnArms:
                 "tolerances.",
             )
         return tension
-
-    def critical(self, start: float) -> Array:
-        """Find the critical tension of each arm (N,) [N]: the lower bound at which it buckles.
-
-        ``start`` [N] is that of the arm without errors.
-
-        Raises:
-            InvalidInput: An arm does not buckle near ``start``.
-        """
-        arms, root = self.evaluate(), np.full(self._count, start)
-
-        def margin(bound: Array) -> Array:
-            return margins(self.evaluate(self.distributed(bound, arms)).joint)
-
-        before, fell = root * (1.0 - 1e-3), margin(root * (1.0 - 1e-3))
-        found = np.zeros(self._count, dtype=np.bool_)
-        for _ in range(_STEPS):
-            now = margin(root)
-            slope = np.divide(now - fell, root - before, out=np.ones_like(now), where=~found)
-            steepest = abs(now) / (_LONGEST * root)  # at kinks of the tensions, secants may be flat
-            slope = np.copysign(np.maximum(abs(slope), steepest), slope)
-            step = np.divide(-now, slope, out=np.zeros_like(now), where=~found & (now != 0.0))
-            found |= abs(step) <= _CONVERGED * root
-            before, fell, root = root, now, root + step
-            if found.all():
-                return np.asarray(root)
-        raise InvalidInput(
-            "tolerances",
-            f"{np.count_nonzero(~found)} of {self._count} drawn arms do not buckle near the "
-            "critical tension; lower the tolerances.",
-        )
 
 
 def margins(joint: Array) -> Array:

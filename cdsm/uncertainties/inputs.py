@@ -20,7 +20,7 @@ from cdsm.kernels.sensitivity import single_gradient
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
-from cdsm.tolerance import Tolerances
+from cdsm.tolerances import Tolerances
 from cdsm.urdf import CROSS_MASS
 
 _NEAR = 1e-9  # a site this near to a disk [m] is on the disk
@@ -199,7 +199,7 @@ class Inputs:
                     "of each coordinate of its cable sites."
                 )
                 raise InvalidInput(name, f"{arm.name} {lacks.get(name, otherwise)}")
-            largest = max(np.max(part.standard) for part in parts)
+            largest = max(part.standard for part in parts)
             if name in _LENGTHS and largest > _LARGEST * arm.length:
                 raise InvalidInput(
                     name,

@@ -5,28 +5,24 @@ A reading is one number of an arm, such as its stiffness along a direction.
 
 from __future__ import annotations
 
-import hashlib
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, partial
-from pathlib import Path
+from functools import cached_property
 from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.errors import FileError, InvalidInput
+from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
 from cdsm.support.extras import need
-from cdsm.support.files import make_folder, read_text, write_file, write_text
 from cdsm.support.progress import progress_bar
 from cdsm.support.validation import flag, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import Tension
-from cdsm.tolerance import Tolerances
-from cdsm.tolerance.sources import tolerance_lines
+from cdsm.tolerances import Tolerances
 from cdsm.uncertainties.budget import Uncertainty, checked_probability, uncertainty
 from cdsm.uncertainties.question import chosen_tolerances
 from cdsm.uncertainties.readings import Reading
@@ -151,38 +147,34 @@ def monte_carlo(
     wrench: ArrayLike | None = None,
     draws: int = 100_000,
     seed: int = 0,
-    store: str | os.PathLike[str] | None = None,
     progress: bool = True,
 ) -> MonteCarlo:
     """Compute a reading for many arms with random errors within the tolerances (JCGM 101).
 
     A reading is one number of the arm, such as its stiffness along a direction. Each arm has its
     own angles, tensions, rigidities, leads, holes, disks, links and masses. The same seed gives the
-    same values to the last bit on any number of threads, even after an interruption.
+    same values on any number of threads.
 
     Args:
         pose: The posture.
-        tension: A :class:`~cdsm.Tension` or, unless ``of`` is ``"tension"`` or
-            ``"critical_tension"``, your own tensions (C,) [N].
+        tension: A :class:`~cdsm.Tension` or, unless ``of`` is ``"tension"``, your own
+            tensions (C,) [N].
         tolerances: Tolerances of the arm, the angles and the tensions; None: those of the arm.
-        direction: u (3,) in base axes, any length: for ``"along"``, ``"stuck"``, ``"tip"`` only.
+        direction: u (3,) in base axes, any length: for ``"along"`` and ``"tip"`` only.
         of: The reading; :func:`~cdsm.uncertainty` explains the names.
         cable: Name of the cable, for ``"tension"`` only.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; only with your own
             tensions.
         draws: Number of arms, 100 to 10⁸.
         seed: Seed of the random numbers, from 0.
-        store: Folder that keeps the values of finished blocks, so that an interrupted run resumes.
         progress: Show a progress bar on a terminal.
 
     Raises:
         InvalidInput: An argument is invalid for :func:`~cdsm.uncertainty`; ``draws`` or ``seed`` is
-            out of range; no tensions balance a drawn arm (``"tension"``, ``"critical_tension"``);
-            or a drawn arm does not buckle (``"critical_tension"``).
+            out of range; or no tensions balance a drawn arm (``"tension"``).
         UnknownName: ``of`` or ``cable`` is unknown.
         ElasticityRangeError: A drawn tension is outside the domain of its cable's law.
         SingularStiffness: The reading does not exist.
-        FileError: The folder cannot be used, or contains another run.
     """
     count = whole_number("draws", draws, 100, 10**8)
     start = whole_number("seed", seed, 0)
@@ -193,10 +185,12 @@ def monte_carlo(
     budget = uncertainty(
         pose, tension, tolerances, direction=direction, of=of, cable=cable, wrench=wrench
     )
-    folder = None if store is None else _open_store(store, budget, start)
     values = np.empty(count)
-    compute = partial(_block, budget, start, folder)
     blocks = _blocks(count)
+
+    def compute(block: tuple[int, int]) -> Array:
+        return budget.question.at(_errors(budget, start, block))
+
     with (
         progress_bar("Monte Carlo", count, wanted=wanted, rate=True) as advance,
         ThreadPoolExecutor(os.cpu_count()) as pool,
@@ -220,37 +214,3 @@ def _errors(budget: Uncertainty, seed: int, block: tuple[int, int]) -> dict[str,
     number, count = block
     errors = budget._drawn(np.random.default_rng([seed, number]), _BLOCK)
     return {source: drawn[:count] for source, drawn in errors.items()}
-
-
-def _block(budget: Uncertainty, seed: int, folder: Path | None, block: tuple[int, int]) -> Array:
-    """Return the readings (arms,) of the arms of one ``block`` (number, size).
-
-    They are read from the file of the block in ``folder``, if it exists; otherwise they are
-    computed and written to it.
-    """
-    number, count = block
-    path = None if folder is None else folder / f"{number:06d}.npy"
-    if path is not None and path.exists():
-        stored = np.load(path)
-        if stored.size >= count:
-            return np.asarray(stored[:count])
-    values = budget.question.at(_errors(budget, seed, block))
-    if path is not None:
-        write_file(path, lambda aside: np.save(aside, values))
-    return values
-
-
-def _open_store(store: str | os.PathLike[str], budget: Uncertainty, seed: int) -> Path:
-    """Create the folder ``store`` for the files of one run, and return it.
-
-    Raises FileError if the folder has another run: another reading, other tolerances or another
-    seed.
-    """
-    folder = make_folder(store)
-    parts = [budget.question.of, repr(budget.value), repr(budget.standard_uncertainty), str(seed)]
-    parts += tolerance_lines(budget.tolerances)
-    mark, path = hashlib.sha256("\n".join(parts).encode()).hexdigest(), folder / "run.txt"
-    if path.exists() and read_text(path) != mark:
-        raise FileError(folder, "contains another Monte Carlo run; give an empty folder.")
-    write_text(path, mark)
-    return folder

@@ -16,67 +16,59 @@ import numpy as np
 from cdsm.errors import InvalidInput
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
-from cdsm.tolerance import EVERY, LARGEST, WIDTH, Tolerance, Tolerances
+from cdsm.tolerances import EVERY, Tolerance, Tolerances
 
 _ALL = slice(None)
 
 
 class Part(NamedTuple):
-    """Inputs of one source of uncertainty that share a tolerance, with standard uncertainties."""
+    """Inputs of one source of uncertainty that share a tolerance."""
 
     inputs: slice | Indices  # indices of the inputs; a slice if they are all inputs of the source
-    standard: float | Array  # standard uncertainty: one number for all, or (k,)
     tolerance: Tolerance
 
     def variance(self, sensitivity: Array) -> float:
-        """Compute the variance gᵀ σ R σ g of a reading that the k inputs cause (JCGM 100, Eq. 13).
+        """Compute the variance of a reading that the k inputs cause (JCGM 100, Eq. 13).
 
-        g (k,) is ``sensitivity``, the partial derivatives of the reading with respect to the
-        inputs. σ is the diagonal matrix of the standard uncertainties, R (k, k) the correlations.
+        It is u² ((1 − ρ) g·g + ρ (Σ g)²), with g (k,) = ``sensitivity``, the partial derivatives of
+        the reading with respect to the inputs.
         """
-        return self.tolerance.variance(self.standard * sensitivity)
+        rho, g = self.tolerance.correlation, sensitivity
+        common = rho * float(g.sum()) ** 2 if rho else 0.0
+        return self.tolerance.standard**2 * ((1.0 - rho) * float(g @ g) + common)
 
     def draw(self, rng: np.random.Generator, errors: Array) -> None:
         """Draw random errors of the inputs into their columns of ``errors`` (draws, n).
 
         Correlated errors are sums of independent ones, so each input has its exact standard
-        uncertainty and correlations. Their distribution is only approximate if it is not normal,
-        and the correlation is a matrix or between 0 and 1.
+        uncertainty and correlations. Their distribution is only approximate if it is not normal
+        and the correlation is between 0 and 1.
         """
         tolerance, rho = self.tolerance, self.tolerance.correlation
         draws, count = errors[:, self.inputs].shape
-        if not isinstance(rho, float):
-            values, vectors = np.linalg.eigh(tolerance.matrix(count))
-            root = vectors * np.sqrt(values.clip(0.0))
-            drawn = _standardised(tolerance, rng, (draws, count)) @ root.T
-        elif rho in (0.0, 1.0):
+        if rho in (0.0, 1.0):
             drawn = _standardised(tolerance, rng, (draws, 1 if rho else count))
         else:
             own = _standardised(tolerance, rng, (draws, count))
             common = _standardised(tolerance, rng, (draws, 1))
             drawn = math.sqrt(1.0 - rho) * own + math.sqrt(rho) * common
-        errors[:, self.inputs] = self.standard * drawn
+        errors[:, self.inputs] = tolerance.standard * drawn
 
 
 def parts_of(
-    tolerances: Tolerances, labels: Mapping[str, Sequence[str]], tension: Array
+    tolerances: Tolerances, labels: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[Part, ...]]:
-    """Find the inputs to which each tolerance belongs, and their standard uncertainties.
+    """Find the inputs to which each tolerance belongs, by source, such as ``hole_radius``.
 
-    The keys are the sources of uncertainty, such as ``hole_radius``. ``labels`` are the names of
-    the inputs of each source. A standard uncertainty may depend on the ``tension`` (C,) [N].
+    ``labels`` are the names of the inputs of each source.
 
     Raises:
         InvalidInput: No input has the name that a tolerance gives, or two tolerances belong to one
-            input; or a tension is outside the range for which a tolerance is given, or the standard
-            uncertainty is too large at a tension, as near to slack.
+            input.
     """
     found: dict[str, tuple[Part, ...]] = {}
     for source, given in tolerances.given.items():
         names, parts = labels[source], []
-        if len(given) == 1 and given[0].of == EVERY and given[0].tensions is None:
-            found[source] = (Part(_ALL, given[0].standard, given[0]),)  # the usual case
-            continue
         taken = np.zeros(len(names), dtype=np.bool_)
         for each in given:
             inputs = _ALL if each.of == EVERY else _matching(source, each.of, names)
@@ -86,14 +78,7 @@ def parts_of(
                     source, f"{twice} has two tolerances; {each.of!r} is the second."
                 )
             taken[inputs] = True
-            standard = each.at(tension[inputs]) if each.tensions is not None else each.standard
-            if each.tensions is not None and np.max(standard) > LARGEST[source]:
-                raise InvalidInput(
-                    source,
-                    f"its standard uncertainty reaches {np.max(standard):.3g} at these tensions; "
-                    f"the largest allowed is {LARGEST[source]:g}. Raise the tensions.",
-                )
-            parts.append(Part(inputs, standard, each))
+            parts.append(Part(inputs, each))
         found[source] = tuple(parts)
     return found
 
@@ -110,7 +95,7 @@ def standards(parts: Sequence[Part], count: int) -> Array:
     """Return the standard uncertainties (count,) of all ``count`` inputs of one source."""
     found = np.zeros(count)
     for part in parts:
-        found[part.inputs] = part.standard
+        found[part.inputs] = part.tolerance.standard
     return found
 
 
@@ -139,7 +124,4 @@ def _standardised(tolerance: Tolerance, rng: np.random.Generator, shape: tuple[i
     """Draw random numbers (``shape``) with the distribution of ``tolerance`` and unit variance."""
     if tolerance.distribution == "normal":
         return rng.standard_normal(shape)
-    width = WIDTH[tolerance.distribution]
-    if tolerance.distribution == "uniform":
-        return rng.uniform(-width, width, shape)
-    return rng.triangular(-width, 0.0, width, shape)
+    return rng.uniform(-math.sqrt(3.0), math.sqrt(3.0), shape)

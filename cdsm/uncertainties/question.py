@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import get_args
 
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
-from cdsm.statics.buckling import critical_tension
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.directions import unit_direction
 from cdsm.support.validation import instance, one_of
-from cdsm.tension import Tension, distribute_tension
-from cdsm.tolerance import Tolerances
+from cdsm.tension import Tension
+from cdsm.tolerances import Tolerances
 from cdsm.uncertainties.readings import Question, Reading
-from cdsm.uncertainties.stuck import blocks_of
 
 READINGS = get_args(Reading)
 """Names of all readings."""
@@ -44,37 +41,20 @@ def checked_question(
     cable: str | None,
     wrench: ArrayLike | None,
 ) -> Question:
-    """Check the arguments of :func:`uncertainty`; return the reading they describe, with its arm.
-
-    For the reading ``critical_tension`` the critical tension is computed, for ``stuck`` the
-    equivalent arm. Raises the errors of :func:`uncertainty`.
-    """
+    """Check the arguments of :func:`uncertainty`; return the reading they describe."""
     one_of("reading", of, READINGS)
     K = stiffness(pose, tension, wrench)
     for name, value, wanted in (
-        ("direction", direction, of in ("along", "stuck", "tip")),
+        ("direction", direction, of in ("along", "tip")),
         ("cable", cable, of == "tension"),
     ):
         if (value is not None) != wanted:
             raise InvalidInput(
                 name, f"is needed for {of}." if wanted else f"has no meaning for {of}."
             )
-    if of in ("tension", "critical_tension"):
+    if of == "tension":
         instance("tension", tension, Tension)
-    if of == "critical_tension":
-        critical = critical_tension(pose, K.wrench).minimum
-        if not math.isfinite(critical):
-            raise InvalidInput("of", "the arm does not buckle, so no tension is critical.")
-        K = stiffness(pose, distribute_tension(pose, critical, wrench=K.wrench))
-    ties = None
-    if of == "stuck":
-        if not pose.arm.has_friction:
-            raise InvalidInput(
-                "of", "the arm has no friction in its holes; see Manipulator.with_friction."
-            )
-        blocks, F, ties = blocks_of(pose, K.tension)
-        K = stiffness(blocks, F, K.wrench)
     u = None if direction is None else unit_direction("direction", direction)
     names = pose.arm.cables.names
     index = None if cable is None else names.index(one_of("cable", cable, names))
-    return Question(of, K, u, index, ties)
+    return Question(of, K, u, index)

@@ -18,14 +18,13 @@ from cdsm.elasticity.answers import slope_of
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState
-from cdsm.tolerance import Tolerances
-from cdsm.uncertainties.balanced import Balance, buckling_gradient
+from cdsm.tolerances import Tolerances
+from cdsm.uncertainties.balanced import Balance
 from cdsm.uncertainties.drawn import DrawnArms, laws_at, margins
 from cdsm.uncertainties.inputs import Inputs, Places, inputs_of, rotations
 from cdsm.uncertainties.parts import Part, parts_of
-from cdsm.uncertainties.stuck import InputMap
 
-Reading = Literal["along", "stuck", "margin", "tip", "tension", "critical_tension"]
+Reading = Literal["along", "margin", "tip", "tension"]
 
 _NOWHERE = np.zeros(3)
 
@@ -35,58 +34,51 @@ class Question(ReadOnlyState):
     """Reading whose uncertainty is asked for: one number of an arm, such as a stiffness.
 
     Attributes:
-        of: Name of the reading: ``"along"``, ``"stuck"``, ``"margin"``, ``"tip"``, ``"tension"`` or
-            ``"critical_tension"``; :func:`~cdsm.uncertainty` explains them.
-        stiffness: The stiffness of the arm; for ``critical_tension``, under the critical tension;
-            for ``stuck``, the stiffness of the equivalent arm (:mod:`cdsm.uncertainties.stuck`).
-        direction: Unit direction (3,) of the readings ``along``, ``stuck`` and ``tip``; else None.
+        of: Name of the reading: ``"along"``, ``"margin"``, ``"tip"`` or ``"tension"``;
+            :func:`~cdsm.uncertainty` explains them.
+        stiffness: The stiffness of the arm.
+        direction: Unit direction (3,) of the readings ``along`` and ``tip``; else None.
         cable: Index of the cable whose ``tension`` is the reading; else None.
-        ties: For ``stuck``, which inputs of the equivalent arm belong to which input of the arm;
-            else None.
     """
 
     of: Reading
     stiffness: Stiffness
     direction: Array | None = None
     cable: int | None = None
-    ties: InputMap | None = None
 
     @property
     def labels(self) -> Mapping[str, Sequence[str]]:
         """Names of the inputs of each source of uncertainty: for ``hole_radius``, the holes."""
-        return (self.ties or inputs_of(self.stiffness.posture.arm)).labels
+        return inputs_of(self.stiffness.posture.arm).labels
 
     @property
     def unit(self) -> tuple[str, float]:
         """Unit in which the value is shown to the user, and its size in SI."""
         if self.of == "margin":
             return self.stiffness.posture.arm.stiffness_unit(), 1.0
-        force = ("N/mm", 1e3)
-        units = {"along": force, "stuck": force, "tip": ("mm", 1e-3)}
-        return units.get(self.of, ("N", 1.0))
+        return {"along": ("N/mm", 1e3), "tip": ("mm", 1e-3)}.get(self.of, ("N", 1.0))
 
     @property
     def si_unit(self) -> str:
         """SI unit of the value."""
-        return {"along": "N/m", "stuck": "N/m", "tip": "m"}.get(self.of, self.unit[0])
+        return {"along": "N/m", "tip": "m"}.get(self.of, self.unit[0])
 
     @property
     def name(self) -> str:
         """Name of the reading as text, with its direction or cable."""
         if self.direction is not None:
-            what = {"along": "stiffness", "stuck": "stuck stiffness"}.get(self.of, "tip")
+            what = "stiffness" if self.of == "along" else "tip"
             return f"{what} along {coordinates(self.direction)}"
         if self.cable is not None:
             return f"tension of {self.stiffness.posture.arm.cables[self.cable].name}"
-        return "smallest joint stiffness" if self.of == "margin" else "critical lower bound"
+        return "smallest joint stiffness"
 
     def parts(self, tolerances: Tolerances) -> dict[str, tuple[Part, ...]]:
         """Find the inputs to which each tolerance belongs, by source of uncertainty.
 
         :func:`~cdsm.uncertainties.parts.parts_of` explains the result.
         """
-        tension = (self.ties or self.stiffness).tension
-        return parts_of(tolerances, self.labels, tension)
+        return parts_of(tolerances, self.labels)
 
     @cached_property
     def _along(self) -> tuple[float, Array]:
@@ -99,12 +91,9 @@ class Question(ReadOnlyState):
         K = self.stiffness
         if self.of == "tension":
             return float(K.tension[self.cable])
-        if self.of == "critical_tension":
-            assert K.distribution is not None
-            return float(K.distribution.minimum.min())  # cables may have higher bounds of their own
         if self.direction is None:
             return K.margin
-        if self.of in ("along", "stuck"):
+        if self.of == "along":
             return self._along[0]
         return float(self.direction @ K.posture.tip[:3, 3])
 
@@ -115,21 +104,16 @@ class Question(ReadOnlyState):
         InvalidInput if the reading is a tension without a gradient.
         """
         K, inputs = self.stiffness, inputs_of(self.stiffness.posture.arm)
-        if self.of in ("along", "stuck"):
+        if self.of == "along":
             assert self.direction is not None
-            gradient = _along_gradient(K, inputs, self.direction, *self._along)
-            return gradient if self.ties is None else self.ties.to_arm(gradient)
+            return _along_gradient(K, inputs, self.direction, *self._along)
         if self.of == "tip":
             assert self.direction is not None
             return _tip_gradient(K, inputs, self.direction)
         if self.of == "tension":
             assert K.distribution is not None
             return Balance.of(K.distribution).gradient(inputs, np.eye(len(K.tension))[self.cable])
-        margin = _gradient(K, inputs, K.critical_direction, _NOWHERE)
-        if self.of == "margin":
-            return margin
-        assert K.distribution is not None
-        return buckling_gradient(Balance.of(K.distribution), inputs, margin)
+        return _gradient(K, inputs, K.critical_direction, _NOWHERE)
 
     def at(self, errors: Mapping[str, Array]) -> Array:
         """Compute the reading of N arms with errors (N,), in SI.
@@ -138,13 +122,11 @@ class Question(ReadOnlyState):
 
         Raises:
             ElasticityRangeError: A tension leaves the domain of its cable's law.
-            InvalidInput: No tensions balance an arm, or it does not buckle (critical tension only).
+            InvalidInput: No tensions balance an arm.
         """
-        arms = DrawnArms(self.stiffness, self.ties.to_blocks(errors) if self.ties else errors)
+        arms = DrawnArms(self.stiffness, errors)
         if self.of == "tension":
             return np.asarray(arms.distributed()[:, self.cable])
-        if self.of == "critical_tension":
-            return arms.critical(self.value())
         drawn = arms.evaluate()
         if self.of == "margin":
             return margins(drawn.joint)

@@ -289,14 +289,12 @@ def test_joints_without_a_column_stay_at_zero(geometry: Path, tmp_path: Path) ->
         ("stiffness", "--wire=nan"),
         ("stiffness", "--wire=0"),
         ("sweep", "--diameter=-1"),
-        ("sweep", "--breaking-load=0"),
-        ("sweep", "--bend-diameter=nan"),
     ],
 )
 def test_wrong_number_is_told_by_the_option_that_was_typed(
     geometry: Path, tmp_path: Path, command: str, option: str
 ) -> None:
-    sweep = ("--out", tmp_path / "s.csv", "--random", 2, "--quantities", "wire_safety,wire_life")
+    sweep = ("--out", tmp_path / "s.csv", "--random", 2, "--quantities", "disk_clearance")
     result = call(command, geometry, *(sweep if command == "sweep" else ()), option)
     assert result.exit_code == 1
     assert said(result.stderr).startswith(f"error: {option.split('=')[0]}: ")

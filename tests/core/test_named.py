@@ -181,7 +181,6 @@ RESULTS: dict[str, Any] = {
     "ForcePolytope": cdsm.force_polytope(POSE, 1.0, 200.0),
     "Payload": cdsm.payload(POSE, "z", 1.0, 200.0, deflection=1e-3),
     "Clearance": cdsm.clearance(POSE, 1e-3),
-    "WireUse": cdsm.wire_use(PULL, diameter=1e-3, breaking_load=1e3, bend_diameter=5e-3),
 }
 
 

@@ -14,9 +14,7 @@ import cdsm
 from cdsm.support.values import Array
 from cdsm.sweeps.quantities import QUANTITIES
 
-EVERYTHING = tuple(
-    name for name in QUANTITIES if name not in ("capacity_margin", "wire_safety", "wire_life")
-)
+EVERYTHING = tuple(name for name in QUANTITIES if name != "capacity_margin")
 """All quantities that need no upper bound of the tensions and no size of the wire."""
 
 STEEL = cdsm.LinearElasticity(48e3)

@@ -1,4 +1,4 @@
-"""Use of wires, clearances and worst friction in sweeps: the numbers of the single posture."""
+"""Clearances and worst friction in sweeps: the numbers of the single posture."""
 
 from pathlib import Path
 from typing import Any
@@ -8,19 +8,18 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm.sweeps.quantities import QUANTITIES
 from tests.support.sweeps import STEEL, short_arm
 
 Status = cdsm.SweepStatus
 
-WIRE: dict[str, float] = {"diameter": 1.2e-3, "breaking_load": 1500.0, "bend_diameter": 0.01}
+DIAMETER = 1.2e-3
 LOADS = {"none": np.zeros(6), "hung": np.array([0.0, 0.0, -2.0, 0.0, 0.0, 0.0])}
 MAXIMUM = 150.0
 SHORT = cdsm.TabulatedElasticity((0.0, 60.0, 75.0), (0.0, 60.0 / 48e3, 75.0 / 48e3))
 LAWS = {"steel": STEEL, "short": SHORT}
 OUTPUTS = (
-    "tension", "payload", "capacity_margin", "wire_strain", "wire_safety", "wire_life", "margin",
-    "along", "cable_clearance", "link_clearance", "disk_clearance",
+    "tension", "payload", "capacity_margin", "margin", "along",
+    "cable_clearance", "link_clearance", "disk_clearance",
 )  # fmt: skip
 
 
@@ -36,7 +35,7 @@ def swept(worst: bool, **changes: Any) -> xr.Dataset:
         "elasticity": LAWS,
         "outputs": OUTPUTS,
         "worst_friction": worst,
-        **WIRE,
+        "diameter": DIAMETER,
         **changes,
     }
     return cdsm.sweep(rough_arm(), cdsm.RandomPoses(8, 1), progress=False, **given)
@@ -46,7 +45,7 @@ def single(
     pose: cdsm.Posture, minimum: float, load: Any, worst: bool
 ) -> tuple[Status, dict[str, Any]]:
     """Status and measures of one entry, by the functions of a posture."""
-    clear = cdsm.clearance(pose, WIRE["diameter"])
+    clear = cdsm.clearance(pose, DIAMETER)
     found: dict[str, Any] = {
         f"{kind}_clearance": getattr(clear, f"{kind}s") for kind in ("cable", "link", "disk")
     }
@@ -58,22 +57,16 @@ def single(
     except cdsm.InvalidInput:  # friction leaves nothing between the bounds
         assert worst
         return Status.INFEASIBLE, found
-    largest = pull.values * np.exp(worst * cdsm.tension.grip(pose))
-    found["tension"], found["wire_safety"] = pull.values, WIRE["breaking_load"] / largest
-    pressure = 2.0 * largest / (WIRE["diameter"] * WIRE["bend_diameter"])
-    found["wire_life"] = 0.001 * 1770e6 / pressure
+    found["tension"] = pull.values
     polytope = cdsm.force_polytope(pose, *bounds, worst_friction=worst)
     found["capacity_margin"] = polytope.margin()
     ways = [polytope.normals @ u for u in np.eye(3)]
     found["payload"] = [(polytope.offsets[n > 1e-9] / n[n > 1e-9]).min() for n in ways]
     try:
-        use = cdsm.wire_use(pull, **WIRE, worst_friction=worst)
+        K = cdsm.stiffness(pose, pull)
     except cdsm.ElasticityRangeError:
         return Status.OUTSIDE_ELASTICITY, found
-    np.testing.assert_array_equal(use.safety, found["wire_safety"])
-    np.testing.assert_allclose(use.life_margin, found["wire_life"], rtol=1e-14)
-    K = cdsm.stiffness(pose, pull)
-    found |= {"wire_strain": use.strain, "margin": K.margin}
+    found["margin"] = K.margin
     found["along"] = [K.along(u) for u in np.eye(3)]
     return Status.OK if K.is_stable else Status.UNSTABLE, found
 
@@ -112,8 +105,8 @@ def test_worst_friction_takes_payload_and_costs_tension() -> None:
     assert "worst_friction" in rough.attrs
     assert rough.attrs["model"] == f"stiffness {free.attrs['model']}; tensions with friction"
     assert "worst_friction" not in free.attrs
-    assert rough.breaking_load == WIRE["breaking_load"]
-    assert rough.breaking_load.attrs["units"] == "N"
+    assert rough.diameter == DIAMETER
+    assert rough.diameter.attrs["units"] == "m"
 
 
 @pytest.mark.parametrize("chunk", [1, 7])
@@ -124,31 +117,20 @@ def test_blocks_and_a_stopped_run_change_no_bit(chunk: int, tmp_path: Path) -> N
     import zarr
 
     group: Any = zarr.open_group(path, mode="r+")
-    group["status"][3:8], group["wire_strain"][3:8] = Status.PENDING, np.nan
+    group["status"][3:8], group["margin"][3:8] = Status.PENDING, np.nan
     xr.testing.assert_identical(swept(True, chunk=chunk, store=path).load(), whole)
-    with pytest.raises(cdsm.StoreError, match=r"breaking_load: 1500\.0 in the store"):
-        swept(True, store=path, breaking_load=1400.0)
+    with pytest.raises(cdsm.StoreError, match=r"diameter: 0\.0012 in the store"):
+        swept(True, store=path, diameter=1e-3)
     with pytest.raises(cdsm.StoreError, match="worst_friction: "):
         swept(False, store=path)
-
-
-def test_wires_have_units_and_words() -> None:
-    for name in ("wire_strain", "wire_safety", "wire_life"):
-        assert QUANTITIES[name].units == "1"
-        assert QUANTITIES[name].dims == ("cable",)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"outputs": "wire_safety"}, "breaking_load: is needed for wire_safety"),
-        ({"outputs": "wire_life", "diameter": 1e-3}, "bend_diameter: is needed with diameter"),
-        ({"outputs": "wire_life", "bend_diameter": 1e-3}, "bend_diameter: is needed with diameter"),
         ({"worst_friction": True}, "worst_friction: .* has no friction in its holes; leave it out"),
         ({"worst_friction": 1}, "worst_friction: 1 given"),
         ({"diameter": -1.0}, "diameter"),
-        ({"breaking_load": 0.0}, "breaking_load"),
-        ({"bend_diameter": 0.0}, "bend_diameter"),
     ],
 )
 def test_what_a_measure_lacks_is_named(changes: dict[str, Any], said: str) -> None:

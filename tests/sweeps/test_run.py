@@ -64,8 +64,6 @@ def single(
         return {Status.OUTSIDE_ELASTICITY}, found
     found |= {f"{name}_stiffness": getattr(K, name) for name in ("active", "passive", "load")}
     found |= {"joint_stiffness": K.joint, "cable_stiffness": K.cable_stiffness, "margin": K.margin}
-    wire = cdsm.wire_use(pull, diameter=1e-3, breaking_load=1e3, bend_diameter=1e-2)
-    found["wire_strain"] = wire.strain
     found["translational_compliance"] = K.compliance[:3, :3]
     found["along"] = np.array([K.along(u) for u in np.eye(3)])
     status = {Status.OK if K.margin > 0.0 else Status.UNSTABLE}

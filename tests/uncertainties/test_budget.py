@@ -4,13 +4,13 @@ import inspect
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 import cdsm
-from cdsm.tolerance.sources import SOURCES
+from cdsm.tolerances import SOURCES, Distribution
 from cdsm.uncertainties.inputs import inputs_of
 from cdsm.uncertainties.parts import draw, parts_of
 from tests.support import arms
@@ -57,8 +57,8 @@ def test_contributions_add_as_squares_and_are_ranked() -> None:
 def test_correlation_decides_between_root_and_sum() -> None:
     pose, tension = posture()
 
-    def u(correlation: object) -> float:
-        tolerance = cdsm.Tolerance(0.05, correlation=correlation)  # type: ignore[arg-type]
+    def u(correlation: float) -> float:
+        tolerance = cdsm.Tolerance(0.05, correlation=correlation)
         budget = cdsm.uncertainty(
             pose, tension, cdsm.Tolerances(rigidity=tolerance), direction=[0, 1, 0]
         )
@@ -69,8 +69,7 @@ def test_correlation_decides_between_root_and_sum() -> None:
     ).sensitivities["rigidity"]
     assert u(0.0) == pytest.approx(0.05 * np.linalg.norm(g), rel=1e-14)
     assert u(1.0) == pytest.approx(0.05 * abs(g.sum()), rel=1e-14)
-    half = np.full((12, 12), 0.5) + 0.5 * np.eye(12)
-    assert u(half) == pytest.approx(u(0.5), rel=1e-14)
+    assert u(0.5) == pytest.approx(math.hypot(u(0.0), u(1.0)) / math.sqrt(2.0), rel=1e-14)
     # a stiffness without gravity and active part is proportional to EA: 5 % of it, but for them
     assert u(1.0) / cdsm.stiffness(pose, tension).along([0, 1, 0]) == pytest.approx(0.05, rel=0.02)
 
@@ -78,20 +77,13 @@ def test_correlation_decides_between_root_and_sum() -> None:
 def _asked(of: str, seed: int) -> dict[str, Any]:
     """Pose, tension and what else a reading needs, for one of ten arms."""
     arm = arms.random_arm(seed, 3, "universal" if seed % 2 else "hinged")
-    if of == "stuck":
-        arm = arm.with_friction(0.1)
-    if of == "critical_tension":  # soft wires buckle
-        arm = arm.with_cables(
-            [replace(cable, elasticity=cdsm.LinearElasticity(2e3)) for cable in arm.cables]
-        )
     pose, F = arms.random_posture(arm, seed), arms.random_tension(arm, seed)
-    given = of in ("tension", "critical_tension")
     along = pose.jacobian[:3] @ np.ones(arm.nv)  # a way the tip can go
     return {
         "pose": pose,
-        "tension": cdsm.distribute_tension(pose, 20.0) if given else F,
+        "tension": cdsm.distribute_tension(pose, 20.0) if of == "tension" else F,
         "of": of,
-        **({"direction": along} if of in ("along", "stuck", "tip") else {}),
+        **({"direction": along} if of in ("along", "tip") else {}),
         **({"cable": arm.cables[seed % len(arm.cables)].name} if of == "tension" else {}),
     }
 
@@ -101,11 +93,9 @@ def _asked(of: str, seed: int) -> dict[str, Any]:
     ("of", "angle", "least"),
     [
         ("along", 0.5, 9),
-        ("stuck", 0.5, 8),
         ("margin", 0.5, 8),
         ("tip", 0.5, 10),
         ("tension", 0.1, 7),
-        ("critical_tension", 0.1, 8),
     ],
 )
 def test_first_order_is_monte_carlo_where_it_says_so(of: str, angle: float, least: int) -> None:
@@ -157,16 +147,7 @@ def _wild_angles() -> dict[str, Any]:
     return {"pose": pose, "tension": tension, "of": "tip", "direction": "z", "tolerances": far}
 
 
-def _soft_wires() -> dict[str, Any]:
-    """Some degrees change the mode that buckles, and the cables at their bound."""
-    arm = cdsm.Manipulator(readme_arm().geometry, cdsm.LinearElasticity(3e3))
-    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
-    return {"pose": pose, "tension": cdsm.distribute_tension(pose, 20.0), "of": "critical_tension"}
-
-
-@pytest.mark.parametrize(
-    "case", [_near_straight, _two_least, _at_a_bound, _wild_angles, _soft_wires]
-)
+@pytest.mark.parametrize("case", [_near_straight, _two_least, _at_a_bound, _wild_angles])
 def test_first_order_says_where_it_does_not_hold(case: Callable[[], dict[str, Any]]) -> None:
     given = {"tolerances": WORKSHOP} | case()
     budget = cdsm.uncertainty(**given)
@@ -183,20 +164,16 @@ def test_the_interval_covers_the_truth() -> None:
     assert np.mean((run.values >= low) & (run.values <= high)) == pytest.approx(0.95, abs=0.01)
 
 
-def test_draws_are_the_same_bits_and_resume(tmp_path: object) -> None:
+def test_more_draws_begin_with_the_same_draws() -> None:
     pose, tension = posture()
-    store = f"{tmp_path}/run"
-    question = {"direction": [0, 0, 1], "draws": 2500, "seed": 5, "progress": False}
-    whole = cdsm.monte_carlo(pose, tension, WORKSHOP, **question)  # type: ignore[arg-type]
-    cdsm.monte_carlo(pose, tension, WORKSHOP, **(question | {"draws": 1500}), store=store)  # type: ignore[arg-type]
-    resumed = cdsm.monte_carlo(pose, tension, WORKSHOP, **question, store=store)  # type: ignore[arg-type]
-    np.testing.assert_array_equal(whole.values, resumed.values)
+    question: dict[str, Any] = {"direction": [0, 0, 1], "seed": 5, "progress": False}
+    whole = cdsm.monte_carlo(pose, tension, WORKSHOP, **question, draws=2500)
+    part = cdsm.monte_carlo(pose, tension, WORKSHOP, **question, draws=1500)
+    np.testing.assert_array_equal(whole.values[:1500], part.values)
     data = whole.to_xarray()
     assert data.sizes["draw"] == 2500
     assert data["along"].attrs["units"] == "N/m"
     assert data["hole_radius_error"].std() == pytest.approx(1e-4, rel=0.02)
-    with pytest.raises(cdsm.FileError, match="another Monte Carlo run"):
-        cdsm.monte_carlo(pose, tension, WORKSHOP, **(question | {"seed": 6}), store=store)  # type: ignore[arg-type]
 
 
 def test_samples_are_what_tools_for_sensitivity_analysis_take() -> None:
@@ -228,10 +205,10 @@ def test_samples_are_what_tools_for_sensitivity_analysis_take() -> None:
 
 def test_distributions_keep_their_standard_uncertainty() -> None:
     rng = np.random.default_rng(1)
-    for distribution in ("normal", "uniform", "triangular"):
+    for distribution in get_args(Distribution):
         for correlation in (0.0, 0.6, 1.0):
-            tolerance = cdsm.Tolerance(2.0, distribution, correlation)
-            parts = parts_of(cdsm.Tolerances(lead=tolerance), {"lead": ("a", "b")}, np.zeros(2))
+            tolerance = cdsm.Tolerance(2.0, distribution=distribution, correlation=correlation)
+            parts = parts_of(cdsm.Tolerances(lead=tolerance), {"lead": ("a", "b")})
             drawn = draw(parts["lead"], rng, 100_000, 2)
             np.testing.assert_allclose(drawn.std(axis=0), 2.0, rtol=0.01)
             found = np.mean(drawn[:, 0] * drawn[:, 1]) / 4.0
@@ -266,7 +243,7 @@ def test_two_spools_and_disks_drilled_together() -> None:
 
 
 def test_the_band_of_a_fit_is_the_tolerance_of_its_cables() -> None:
-    """Each cable has the half-width of the band at its own tension, and all share one error."""
+    """It has the mean half-width of the band at the tensions given, and all share one error."""
     rng = np.random.default_rng(4)
     force = np.linspace(0.0, 200.0, 300)
     fit = cdsm.fit_tensile_test(
@@ -276,26 +253,18 @@ def test_the_band_of_a_fit_is_the_tolerance_of_its_cables() -> None:
     arm = readme_arm()
     arm = arm.with_cables(
         [replace(cable, elasticity=fit.elasticity) for cable in arm.cables]
-    ).with_tolerances(cdsm.Tolerances(rigidity=fit.tolerance()))
+    ).with_tolerances(cdsm.Tolerances(rigidity=fit.tolerance(50.0, 120.0)))
     pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
     tension = cdsm.distribute_tension(pose, minimum=50.0)
     budget = cdsm.uncertainty(pose, tension, direction="y")
-    F = tension.values
+    F = np.linspace(50.0, 120.0, 1000)
     half = [np.interp(F, fit.tensions, np.log(end)) for end in (fit.band.low, fit.band.high)]
-    standard = (half[1] - half[0]) / 2.0 / 1.959963984540054
+    standard = np.sqrt(np.mean((half[1] - half[0]) ** 2)) / 2.0 / 1.959963984540054
     g = budget.sensitivities["rigidity"]
-    assert budget.standard_uncertainty == pytest.approx(abs(g @ standard), rel=1e-3)
+    assert budget.standard_uncertainty == pytest.approx(abs(g.sum()) * standard, rel=1e-2)
     assert 0.0005 < budget.relative < 0.05
-    short = cdsm.Tolerances(
-        rigidity=cdsm.Tolerance(np.full(2, 0.1), tensions=np.array([1.0, 40.0]))
-    )
-    with pytest.raises(cdsm.InvalidInput, match=r"known from 1 to 40 N, but a cable has \d"):
-        cdsm.uncertainty(pose, tension, short, direction="y")
-    vague = cdsm.Tolerances(
-        rigidity=cdsm.Tolerance(np.array([1.0, 0.1]), tensions=np.array([1.0, 500.0]))
-    )
-    with pytest.raises(cdsm.InvalidInput, match=r"rigidity: its standard .* Raise the tensions"):
-        cdsm.uncertainty(pose, tension, vague, direction="y")
+    with pytest.raises(cdsm.InvalidInput, match=r"low: from 50 to 900 N given; the band is from"):
+        fit.tolerance(50.0, 900.0)
 
 
 def test_the_tolerances_of_an_arm_are_those_of_its_budgets() -> None:
@@ -346,25 +315,18 @@ def test_bad_input_is_named() -> None:
     pose, tension = posture()
     with pytest.raises(cdsm.InvalidInput, match=r"lead: .*-0.001 given; a tolerance is not neg"):
         cdsm.Tolerances(lead=-1e-3)
-    with pytest.raises(cdsm.UnknownName, match=r"'rigidty'; did you mean 'rigidity'"):
-        cdsm.Tolerances(rigidty=0.05)  # type: ignore[call-arg]
     with pytest.raises(cdsm.InvalidInput, match=r"rigidity: .*relative"):
         cdsm.Tolerances(rigidity=5.0)
-    with pytest.raises(cdsm.InvalidInput, match="not positive semidefinite"):
-        cdsm.Tolerance(1.0, correlation=[[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]])  # type: ignore[arg-type]
-    matrix = cdsm.Tolerance(1e-3, correlation=np.eye(3))
-    with pytest.raises(cdsm.InvalidInput, match="12"):
-        cdsm.uncertainty(pose, tension, cdsm.Tolerances(lead=matrix), direction=[0, 0, 1])
+    with pytest.raises(cdsm.InvalidInput, match=r"correlation: -0.5 given; a number from 0 to 1"):
+        cdsm.Tolerance(1.0, correlation=-0.5)
+    with pytest.raises(cdsm.UnknownName, match="gauss"):
+        cdsm.Tolerance(1.0, distribution="gauss")  # type: ignore[arg-type]
     with pytest.raises(cdsm.InvalidInput, match="direction: is needed"):
         cdsm.uncertainty(pose, tension, WORKSHOP)
     with pytest.raises(cdsm.InvalidInput, match="direction: has no meaning"):
         cdsm.uncertainty(pose, tension, WORKSHOP, of="margin", direction=[0, 0, 1])
     with pytest.raises(cdsm.UnknownName, match="cable"):
         cdsm.uncertainty(pose, tension, WORKSHOP, of="tension", cable="cable9")
-    strand = cdsm.Manipulator(pose.arm.geometry, cdsm.presets.STRAND_1X19).at(pose.q)
-    pulled = cdsm.distribute_tension(strand, minimum=50.0)
-    with pytest.raises(cdsm.InvalidInput, match="does not buckle"):
-        cdsm.uncertainty(strand, pulled, WORKSHOP, of="critical_tension")
     straight = pose.arm.at(np.zeros(8))
     with pytest.raises(cdsm.SingularStiffness, match="infinite"):
         cdsm.uncertainty(straight, np.full(12, 50.0), WORKSHOP, direction=[1, 0, 0])
@@ -379,11 +341,6 @@ def test_bad_input_is_named() -> None:
             cdsm.uncertainty(pose, tension, twice, direction=[0, 0, 1])
     with pytest.raises(cdsm.InvalidInput, match=r"rigidity: .*a list or tuple of Tolerance"):
         cdsm.Tolerances(rigidity=[0.05])  # type: ignore[list-item]
-    with pytest.raises(cdsm.InvalidInput, match="lead: does not depend on tensions"):
-        cdsm.Tolerances(lead=cdsm.Tolerance(np.full(2, 0.1), tensions=np.array([1.0, 40.0])))
-    for tensions in ([1.0], [40.0, 1.0], [[1.0, 2.0]], [1.0, 2.0, 3.0]):
-        with pytest.raises(cdsm.InvalidInput, match="tensions"):
-            cdsm.Tolerance(np.full(2, 0.1), tensions=np.array(tensions))
     with pytest.raises(cdsm.InvalidInput, match="all zero"):
         cdsm.monte_carlo(pose, tension, cdsm.Tolerances(), direction=[0, 0, 1])
 
@@ -411,42 +368,42 @@ def test_reading_of_an_unstable_arm_says_so_first() -> None:
     band = cdsm.rest_band(pose, tension, "z")
     for said in (budget, drawn, band):
         assert str(said).splitlines()[0] == verdict
-    # friction holds it while no cable slides
-    stuck = cdsm.uncertainty(pose, tension, own, direction="z", of="stuck")
-    assert "UNSTABLE" not in str(stuck)
 
 
-@pytest.mark.parametrize("number", [2, 5])
-def test_critical_tension_beside_a_higher_bound_of_one_cable(number: int) -> None:
-    """The value is that of critical_tension, and its slope that of its differences."""
-    geometry = cdsm.Geometry.universal(
-        joints=2,
-        cables_per_joint=3,
-        link_length=0.05,
-        base_length=0.02,
-        disk_offset=0.012,
-        hole_radius=0.03,
-        link_mass=0.3,
-        lead=0.3,
-    )
-    plain = cdsm.Manipulator(geometry, cdsm.LinearElasticity(9000.0))
+# % of K along x, y, z of one sigma; common errors but of angles and tensions
+FRICTIONLESS = {
+    "rigidity": (5.1, 5.1, 5.1),
+    "joint_angle": (8.3, 0.41, 0.48),
+    "lead": (1.25, 1.24, 1.22),
+    "tension": (1.25, 1.13, 1.19),
+    "hole_radius": (0.82, 0.82, 0.82),
+    "disk_offset": (0.06, 0.06, 0.06),
+    "link_length": (0.37, 0.37, 0.37),
+    "link_mass": (0.01, 0.01, 0.01),
+}
 
-    def pose_of(spring: float) -> cdsm.Posture:
-        cables = [replace(each, series_stiffness=spring) for each in plain.cables]
-        cables[number] = replace(cables[number], minimum=13.6)
-        return plain.with_cables(cables).at(np.full(4, 0.05))
 
-    def critical(spring: float) -> float:
-        return cdsm.critical_tension(pose_of(spring)).minimum
+def test_the_budget_of_the_readmes_arm_is_that_of_an_independent_program() -> None:
+    """With the strand of Eq. 19; ±5.5 % of y and z from the wire, ±10 % of x from the angles.
 
-    pose, step = pose_of(600.0), 6e-2
-    tension = cdsm.distribute_tension(pose, critical(600.0))
-    tolerances = cdsm.Tolerances(spring=1e-3)
-    budget = cdsm.uncertainty(pose, tension, tolerances, of="critical_tension")
-    assert budget.value == pytest.approx(critical(600.0), rel=1e-12)
-    slope = 600.0 * (critical(600.0 + step) - critical(600.0 - step)) / (2.0 * step)
-    assert budget.sensitivities["spring"].sum() == pytest.approx(slope, rel=1e-6)
-    drawn = cdsm.monte_carlo(
-        pose, tension, tolerances, of="critical_tension", draws=100, progress=False
-    )
-    assert drawn.mean == pytest.approx(budget.value, abs=5.0 * budget.standard_uncertainty)
+    That program changes EA by 5 % and takes the change of K, which is not quite proportional: 5.1 %
+    beside a slope of 4.9 %. All other rows agree to their two digits.
+    """
+    geometry = readme_arm().geometry
+    arm = cdsm.Manipulator(geometry, cdsm.presets.STRAND_1X19)
+    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
+    F = cdsm.distribute_tension(pose, minimum=50.0).values
+    own = {name: getattr(WORKSHOP, name) for name in ("joint_angle", "tension")}
+    common = {
+        name: cdsm.Tolerance(tolerance.standard, correlation=1.0)
+        for name, (tolerance,) in WORKSHOP.given.items()
+        if name not in own
+    }
+    budgets = [
+        cdsm.uncertainty(pose, F, cdsm.Tolerances(**common, **own), direction=u) for u in "xyz"
+    ]
+    found = {s: [100.0 * b.contributions[s] / b.value for b in budgets] for s in FRICTIONLESS}
+    for source, values in FRICTIONLESS.items():
+        np.testing.assert_allclose(found[source], values, rtol=0.1, atol=0.02, err_msg=source)
+    total = [100.0 * b.relative for b in budgets]
+    np.testing.assert_allclose(total, (10.0, 5.5, 5.5), rtol=0.05)

@@ -13,7 +13,7 @@ from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput, TensileTestError
 from cdsm.support.validation import RANGES, one_of, scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
-from cdsm.tolerance import EVERY, Tolerance
+from cdsm.tolerances import EVERY, Tolerance
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile.loading import FEWEST, Points, loading
 from cdsm.wires.tensile.polynomials import polynomials
@@ -137,18 +137,34 @@ class TensileFit(ReadOnlyState):
             ]
         )
 
-    def tolerance(self, of: str = EVERY) -> Tolerance:
+    def tolerance(
+        self, low: float | None = None, high: float | None = None, *, of: str = EVERY
+    ) -> Tolerance:
         """Return the band as a tolerance for the rigidity of cables made of this wire.
 
-        The standard uncertainty of EA(F) is half the width of the band of ln EA, divided by 1.96.
-        The cables are assumed to be of one spool and share one error; ``of`` are their names, as
-        for :class:`~cdsm.Tolerance`. Raises InvalidInput for a fit by polynomials: it has no band.
+        The standard uncertainty of EA at a tension is half the width of the band of ln EA, divided
+        by 1.96. The tolerance has its root mean square from ``low`` to ``high`` [N], the tensions
+        at which the cables work; None: an end of the domain. The band is widest near slack. The
+        cables are assumed to be of one spool and share one error; ``of`` are their names, as for
+        :class:`~cdsm.Tolerance`.
+
+        Raises:
+            InvalidInput: ``low`` is not below ``high``, one of them is outside the domain, or the
+                fit is by polynomials: it has no band.
         """
         if self.band is None:
             raise InvalidInput("method", "a fit by polynomials has no band; fit by 'monotone'.")
+        first, last = self.band.tensions[[0, -1]].tolist()
+        a = first if low is None else scalar("low", low)
+        b = last if high is None else scalar("high", high)
+        if not first <= a < b <= last:
+            raise InvalidInput(
+                "low", f"from {a:g} to {b:g} N given; the band is from {first:g} to {last:g} N."
+            )
         half = np.log(self.band.high / self.band.low) / 2.0
-        standard = half / float(ndtri((1.0 + _CONFIDENCE) / 2.0))
-        return Tolerance(standard, correlation=1.0, of=of, tensions=self.band.tensions)
+        half = np.interp(np.linspace(a, b, _KNOTS), self.band.tensions, half)
+        standard = np.sqrt(np.mean(half**2)) / ndtri((1.0 + _CONFIDENCE) / 2.0)
+        return Tolerance(float(standard), correlation=1.0, of=of)
 
     def plot(self) -> Figure:
         """Plot force [N] against displacement [mm] with the fit; EA [kN] with band and stages."""
