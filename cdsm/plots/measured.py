@@ -42,7 +42,7 @@ _MOST_LABELS = 30  # above this number of measurements the axis shows numbers, n
 def plot_tensile_fit(fit: TensileFit) -> Figure:
     """Plot force against strain, measured and fitted, and the fitted rigidity EA against tension.
 
-    The second panel also shows the stages of the wire, and the 95 % band of EA if the fit has one.
+    The second panel also shows the stages of the wire and the 95 % band of EA.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
     tension, band = fit.tensions, fit.band
@@ -50,18 +50,10 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
     measured = 100.0 * fit.test.displacement / length
     fitted = 100.0 * (fit.start / length + fit.elasticity.strain(tension))
     left.plot(measured, fit.test.force, ".", color="0.6", ms=3, label="test")
-    left.plot(fitted, tension, color=VERMILLION, label=fit.method)
+    left.plot(fitted, tension, color=VERMILLION, label="fit")
     left.set(xlabel="strain [%]", ylabel="force [N]")
-    if band is not None:
-        right.fill_between(
-            tension,
-            KN * band.low,
-            KN * band.high,
-            color=BLUE,
-            alpha=0.3,
-            linewidth=0,
-            label="95 % band",
-        )
+    ends = KN * band.low, KN * band.high
+    right.fill_between(tension, *ends, color=BLUE, alpha=0.3, linewidth=0, label="95 % band")
     right.plot(tension, KN * fit.elasticity.rigidity(tension), color=VERMILLION, label="EA")
     shade_stages(right, [(stage.name, stage.low, stage.high) for stage in fit.stages])
     right.set(xlabel="tension [N]", ylabel="tangent rigidity EA [kN]")
