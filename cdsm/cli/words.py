@@ -8,10 +8,10 @@ from typing import Final
 # fmt: off
 _ALIKE: Final = (
     "bands", "bend_diameter", "bins", "breaking_load", "count", "damping", "damping_ratio", "delay",
-    "diameter", "direction", "encoder", "felt", "force", "force_std", "gauge_length", "gravity",
+    "diameter", "direction", "encoder", "felt", "force", "gauge_length", "gravity",
     "host", "largest_force", "largest_tension", "payload", "payload_from", "period", "port", "rate",
     "section", "seed", "skip", "solver", "steps", "target", "tension_bias", "tension_noise",
-    "tension_std", "wire", "wrench",
+    "wire", "wrench",
 )
 # fmt: on
 """Arguments of the library whose options have the same name."""

@@ -69,7 +69,6 @@ PLANNED = [
         forces=(0.0, 15.0, 30.0, 15.0, 0.0),
         minimum=150.0,
         displacement_std=5e-6,
-        force_std=0.05,
     )
     for angles, direction in TESTS
 ]

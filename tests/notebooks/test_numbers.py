@@ -67,7 +67,7 @@ def cables_and_experiments(nb: Shown) -> None:
         assert low < value < high
     np.testing.assert_allclose(nb.drops, (16.5, 40.6), atol=0.1)
     np.testing.assert_allclose(nb.rises, (8.65, 10.9), atol=0.05)
-    assert abs(nb.check[0] - 0.1103) < 1e-4
+    assert abs(nb.accuracy[0] - 0.1103) < 1e-4
 
 
 def weights_and_buckling(nb: Shown) -> None:

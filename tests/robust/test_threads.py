@@ -181,7 +181,6 @@ LOOP = cdsm.WeightLoop(
     forces=(1.0, 0.0),
     minimum=20.0,
     displacement_std=5e-6,
-    force_std=0.05,
 )
 VALUES: dict[str, Any] = {
     **RESULTS,
