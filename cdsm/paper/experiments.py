@@ -158,12 +158,13 @@ def figure_10() -> ExperimentFigure:
     ]
     return ExperimentFigure(
         name="fig10",
-        title="Fig. 10, Table II: stiffness over tension, 1×19 strand, fitted prototype",
+        title="Fig. 10: stiffness over tension, 1×19 strand, fitted prototype. "
+        "Table II with x and y exchanged in rows 2 to 4",
         swept="tension",
         relative=False,
         traces=tuple(
             Trace(
-                label=f"{axis}: {exchanged}",
+                label=axis,
                 swept=frozen(tensions),
                 computed=frozen(curve.copy()),
                 paper_at=TENSIONS,

@@ -135,7 +135,9 @@ def test_interval_that_the_model_ends_is_open_and_says_why() -> None:
             raise cdsm.InvalidInput("softness", "no such wire is sold.")
         return hinge(softness)
 
-    found = identify(model_of, readings(0.3), {"softness": (1e-4, 1e-1)})
+    found = identify(
+        model_of, readings(0.3), {"softness": (1e-4, 1e-1)}, start={"softness": 1.9e-3}
+    )
     assert found.confidence()["softness"][1] == math.inf
     (said,) = (each for each in found.warnings if "no upper limit" in each)
     assert "where the model ends" in said
@@ -158,7 +160,9 @@ def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
     (rigidity, _), _, _ = line(measured)
     beyond = 1.2 / rigidity
     alone = {"softness": (beyond, 1e-1)}
-    found = identify(lambda softness: hinge(softness), measured, alone)
+    found = identify(
+        lambda softness: hinge(softness), measured, alone, start={"softness": 2.0 * beyond}
+    )
     low, high = found.confidence()["softness"]
     assert found.values[0] == beyond
     assert low == -math.inf
