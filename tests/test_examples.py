@@ -1,12 +1,10 @@
 """The programs of examples/: each runs, and says what cdsm says."""
 
-import array
 import math
 from pathlib import Path
 
 import known_arms
 import mujoco_weight
-import newton_rest
 import numpy as np
 import pytest
 from ros2_stiffness_node import answer
@@ -53,50 +51,6 @@ def test_mujoco_comes_to_rest_where_cdsm_says() -> None:
     arm = mujoco_weight.posture()
     theirs, ours = mujoco_weight.simulate(*arm), mujoco_weight.compute(*arm)
     assert np.linalg.norm(theirs - ours) < 1e-4 * np.linalg.norm(ours)
-
-
-def test_tendons_for_newton_are_the_cables_span_by_span() -> None:
-    pose = newton_rest.arm(0.3).at([0.1, -0.2])
-    tension = cdsm.distribute_tension(pose, 20.0)
-    K = cdsm.stiffness(pose, tension)
-    tendons = newton_rest.guides(pose, tension)
-    assert [len(points) for points in tendons] == [1 + len(c.sites) for c in pose.arm.cables]
-    np.testing.assert_allclose(
-        [sum(each.rest for each in points[1:]) for points in tendons], K.free_lengths, rtol=1e-14
-    )
-    np.testing.assert_allclose(
-        [sum(each.compliance for each in points) for points in tendons],
-        1.0 / K.cable_stiffness,
-        rtol=1e-14,
-    )
-    places = [np.eye(4), pose.link_pose("link1"), pose.link_pose("link2")]
-    for points, length in zip(tendons, pose.cable_lengths, strict=True):
-        assert [each.friction for each in points] == [None, *[0.3] * (len(points) - 2), None]
-        path = np.array([(places[each.link] @ (*each.offset, 1.0))[:3] for each in points])
-        assert np.linalg.norm(np.diff(path, axis=0), axis=1).sum() == pytest.approx(
-            length, rel=1e-14
-        )
-
-
-def test_what_matlab_hands_over_is_taken() -> None:
-    """MATLAB makes an array.array of a row, and a memoryview of a matrix."""
-    row = array.array("d", [0.05] * ARM.nv)
-    pose = ARM.at(row)
-    np.testing.assert_array_equal(pose.q, np.full(ARM.nv, 0.05))
-    rows = np.array(memoryview(array.array("d", [0.05] * 3 * ARM.nv))).reshape(3, -1)
-    batch = cdsm.evaluate(ARM, rows, minimum=10, outputs=["along"], direction="z")
-    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10))
-    np.testing.assert_allclose(np.ravel(batch["along"]), K.along("z"), rtol=1e-12)
-
-
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.m")))
-def test_matlab_uses_names_that_exist(path: Path) -> None:
-    for line in path.read_text(encoding="utf-8").splitlines():
-        for word in line.split("%")[0].replace("(", " ").split():
-            if word.startswith("py.cdsm."):
-                thing: object = cdsm
-                for part in word.removeprefix("py.cdsm.").split("."):
-                    thing = getattr(thing, part)
 
 
 def test_the_files_of_known_arms_are_those_that_the_example_writes() -> None:

@@ -42,8 +42,6 @@ def identify(
         ),
     ],
     reading_std: Annotated[float, typer.Option(help="Standard deviation of a reading [mm].")],
-    force_std: Annotated[float, typer.Option(help="Standard deviation of a force [N].")] = 0.0,
-    tension_std: Annotated[float, typer.Option(help="Standard deviation of a tension [N].")] = 0.0,
     min_tension: Annotated[
         float | None,
         typer.Option(help="Lower bound of all tensions [N], if LOOPS.csv has no tensions."),
@@ -73,12 +71,7 @@ def identify(
     ranges = _ranges(free)
     parameters = ArmParameters(described, tuple(ranges))
     read = cdsm.read_loops(
-        loops,
-        described,
-        displacement_std=1e-3 * reading_std,
-        force_std=force_std,
-        tension_std=tension_std,
-        minimum=min_tension,
+        loops, described, displacement_std=1e-3 * reading_std, minimum=min_tension
     )
     shown = _Shown(parameters)
     if plan is not None:

@@ -41,9 +41,6 @@ def fit(
             help="Units of displacement and force if the file has none, such as mm,N.",
         ),
     ] = None,
-    method: Annotated[str, typer.Option(help="Fit: monotone, or polynomial as in the paper.")] = (
-        "monotone"
-    ),
     out: Annotated[
         Path | None,
         out_option(endings=(".toml",), metavar="WIRE.toml", help="Law of rigidity to write."),
@@ -73,13 +70,11 @@ def fit(
             test, columns=pairs[0], skip=skip, units=pairs[1], gauge_length=length
         )
         with progress_bar("fitting"):
-            fitted = cdsm.fit_tensile_test(data.displacement, data.force, data.gauge_length, method)
+            fitted = cdsm.fit_tensile_test(data.displacement, data.force, data.gauge_length)
     except cdsm.TensileTestError as error:
         raise cdsm.TensileTestError(_as_options(str(error))) from None
-    spread = None if tolerances is None else cdsm.Tolerances(rigidity=fitted.tolerance())
+    write(tolerances, lambda file: cdsm.Tolerances(rigidity=fitted.tolerance()).write(file))
     write(out, lambda file: cdsm.write_elasticity(fitted.elasticity, file))
-    if spread is not None:
-        write(tolerances, spread.write)
     write_picture(figure, fitted.plot)
     read = f"{test}: {data.source}"
     answer(as_json, lambda: {"read": data.source, **_numbers(fitted)}, f"{read}\n{fitted}")
@@ -113,14 +108,13 @@ def _as_options(message: str) -> str:
 
 def _numbers(fit: cdsm.TensileFit) -> Json:
     return {
-        "method": fit.method,
         "gauge_length_m": fit.test.gauge_length,
         "domain_N": [fit.elasticity.domain.low, fit.elasticity.domain.high],
         "rms_N": fit.rms,
         "stages_N": {stage.name: [stage.low, stage.high] for stage in fit.stages},
         "tension_N": fit.tensions,
         "rigidity_N": fit.elasticity.rigidity(fit.tensions),
-        "rigidity_low_N": None if fit.band is None else fit.band.low,
-        "rigidity_high_N": None if fit.band is None else fit.band.high,
+        "rigidity_low_N": fit.band.low,
+        "rigidity_high_N": fit.band.high,
         "notes": fit.notes,
     }

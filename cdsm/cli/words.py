@@ -8,9 +8,9 @@ from typing import Final
 # fmt: off
 _ALIKE: Final = (
     "bins", "count", "damping", "damping_ratio", "diameter",
-    "direction", "force", "force_std", "gauge_length", "gravity", "host", "largest_force",
+    "direction", "force", "gauge_length", "gravity", "host", "largest_force",
     "largest_tension", "port", "rate", "section", "seed", "skip", "solver", "steps", "target",
-    "tension_std", "wire", "wrench",
+    "wire", "wrench",
 )
 # fmt: on
 """Arguments of the library whose options have the same name."""

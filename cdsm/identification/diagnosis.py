@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import chdtrc
 
-from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE, other_minimum
+from cdsm.identification.intervals import NEGLIGIBLE, RANK_TOLERANCE
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.result import Identification
 from cdsm.support.values import Array
@@ -122,22 +121,10 @@ def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str
     ]
 
 
-def ambiguous(
-    problem: LeastSquares, best: Array, result: Identification, starts: Sequence[Array]
-) -> list[str]:
-    """Return a list with one warning if the measurements fit at another minimum too, else [].
-
-    Searches from ``starts`` look for another minimum of χ², outside the 95 % intervals of
-    ``result``, that fits as well as points inside do. ``best`` is the optimum of ``result``. All
-    points (P,) are in the unit cube of ``problem``.
-    """
-    intervals = np.array(list(result.confidence().values()))
-    other = other_minimum(problem, best, intervals, result._rise(0.95, scaled=False), starts)
-    if other is None:
-        return []
-    higher = problem.cost(other) - problem.cost(best)
+def lower_elsewhere(problem: LeastSquares, best: Array, lower: Array) -> list[str]:
+    """Return the warning that χ² is lower at the point ``lower`` than at the minimum ``best``."""
+    fall = problem.cost(best) - problem.cost(lower)
     return [
-        f"several optima, so no intervals: χ² is only {higher:.3g} higher at "
-        f"{problem.describe(other)}. Measure at other postures, directions or tensions, or narrow "
-        "the bounds to the values that are possible."
+        f"not the best fit, so no intervals: χ² is {fall:.3g} lower at {problem.describe(lower)}. "
+        "Give that as the start."
     ]

@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import CdsmError, InvalidInput
-from cdsm.identification.design import Criterion, Design
 from cdsm.identification.determination import Determination
 from cdsm.identification.experiment_plan import ExperimentPlan
 from cdsm.identification.least_squares import NoModelError
@@ -19,7 +18,7 @@ from cdsm.identification.search import check_call
 from cdsm.manipulator import Manipulator
 from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.progress import progress_allowed, track
-from cdsm.support.validation import number_array, one_of, scalar, whole_number
+from cdsm.support.validation import number_array, scalar, whole_number
 from cdsm.support.values import Array, frozen
 
 _STEP = 1e-5  # relative change of a parameter for its central difference
@@ -36,21 +35,16 @@ def plan_experiment(
     minimum: float | ArrayLike,
     tests: int,
     displacement_std: float,
-    force_std: float = 0.0,
-    tension_std: float = 0.0,
     steps: int = 4,
-    wanted: Sequence[str] | None = None,
-    known: Mapping[str, float] | None = None,
-    criterion: Criterion = "D",
     progress: bool = True,
 ) -> ExperimentPlan:
     """Choose the weight tests that determine parameters of an arm best; see :func:`identify`.
 
     Each combination of posture, direction and weight is a candidate: a :class:`WeightLoop` from
     zero force to the weight and back. The plan gives the number of repetitions of each candidate.
-    It minimises det C (D-optimal: the volume of the confidence region) or tr C (A-optimal: the sum
-    of relative variances) of the covariance C of the wanted parameters. ``efficiency``
-    of the plan is a proved bound on how much better another choice of as many tests could be.
+    One test after the other is added, each time the one that reduces det C of the covariance C of
+    the parameters most (D-optimal; det C is the squared volume of their confidence region). Such a
+    plan is good, not proved the best.
 
     The plan uses derivatives at the expected values. If the identified values differ much from
     them, plan again.
@@ -64,20 +58,13 @@ def plan_experiment(
         minimum: Lower bound of the tensions before the test [N], one number or (C,).
         tests: Total number of loops, repetitions included.
         displacement_std: Standard deviation of a reading along the weight [m].
-        force_std: Standard deviation of a force [N].
-        tension_std: Standard deviation of each tension [N].
         steps: Number of steps from zero force to the largest.
-        wanted: Names of the parameters to determine well; the others are unknown too, but the plan
-            does not minimise their uncertainty. Default: all.
-        known: Prior standard deviations of known parameters, by name, in the parameter's unit.
-        criterion: ``"D"`` or ``"A"``.
         progress: Show a bar on the standard error, if that is a terminal.
 
     Raises:
-        InvalidInput: An argument is invalid, or no candidate can be tested, or none determines the
-            wanted parameters.
-        UnknownName: ``model_of`` does not take a parameter, or a name in ``wanted`` or ``known`` is
-            not among ``parameters``.
+        InvalidInput: An argument is invalid, or no candidate can be tested, or none determines any
+            parameter.
+        UnknownName: ``model_of`` does not take a parameter.
     """
     return plan_tests(
         model_of,
@@ -89,13 +76,8 @@ def plan_experiment(
             steps,
             minimum=minimum,
             displacement_std=displacement_std,
-            force_std=force_std,
-            tension_std=tension_std,
         ),
         tests=tests,
-        wanted=wanted,
-        known=known,
-        criterion=criterion,
         progress=progress,
     )
 
@@ -106,9 +88,6 @@ def plan_tests(
     candidates: Sequence[WeightLoop],
     *,
     tests: int,
-    wanted: Sequence[str] | None = None,
-    known: Mapping[str, float] | None = None,
-    criterion: Criterion = "D",
     progress: bool = True,
 ) -> ExperimentPlan:
     """Choose the tests that determine parameters best among the loops ``candidates``.
@@ -118,50 +97,43 @@ def plan_tests(
     """
     values = _checked_parameters(parameters)
     check_call("model_of", model_of, 0, tuple(values))
-    one_of("criterion", criterion, ("D", "A"))
     most = whole_number("tests", tests, 1, _MOST)
-    names, chosen = tuple(values), _wanted(values, wanted, known or {})
-    prior = _prior(values, known or {})
+    names = tuple(values)
     with progress_allowed(progress):
         usable, rows, failures = _followed(model_of, values, candidates)
-    whole = Determination(names, np.vstack([*rows, prior]), np.ones(len(names)))
-    settled = [name for name in chosen if whole.is_determined[names.index(name)]]
-    if not settled:
+    whole = Determination(names, np.vstack(rows), np.ones(len(names)))
+    if not whole.rank:
         raise InvalidInput(
-            "wanted",
-            f"no candidate determines {', '.join(chosen)}: no prediction changes with "
-            f"{'; nor with '.join(whole.open_combinations)} (relative). Add other postures, "
-            "directions or weights, or state what is known.",
+            "parameters",
+            f"no candidate determines {', '.join(names)}. Add other postures, directions or "
+            "weights.",
         )
     basis = whole.coordinates
-    design = Design(
-        information=np.array([(J @ basis).T @ (J @ basis) for J in rows]),
-        known=(prior @ basis).T @ (prior @ basis),
-        wanted=basis[[names.index(name) for name in settled]],
-        criterion=criterion,
-        tests=most,
-    )
-    counts, efficiency = design.best()
-    even = np.bincount(
-        np.round(np.linspace(0, len(usable) - 1, most)).astype(int), minlength=len(usable)
-    )
-    M = design.total(counts)
-    sensitivities = design.sensitivities(M)[0] if efficiency else np.zeros(len(usable))
+    counts = greedy(np.array([(J @ basis).T @ (J @ basis) for J in rows]), most)
     return ExperimentPlan(
         names=names,
         values=frozen(np.array(list(values.values()))),
-        wanted=chosen,
-        criterion=criterion,
         candidates=usable,
-        counts=frozen(counts.astype(np.intp)),
-        even=frozen(even.astype(np.intp)),
+        counts=frozen(counts),
         jacobians=tuple(frozen(J) for J in rows),
-        known=frozen(prior),
-        efficiency=efficiency,
-        sensitivities=frozen(sensitivities / max(sensitivities.max(), 1e-300)),
         open_combinations=tuple(whole.open_combinations),
         failures=failures,
     )
+
+
+def greedy(information: Array, tests: int) -> NDArray[np.intp]:
+    """Choose ``tests`` of n candidates, repeated or not, one after the other; return counts (n,).
+
+    ``information`` (n, r, r) are the Fisher informations of the candidates for r parameters. Each
+    choice has the largest determinant of their sum, which starts from almost nothing.
+    """
+    total = 1e-9 * information.sum(axis=0)
+    counts = np.zeros(len(information), dtype=np.intp)
+    for _ in range(tests):
+        best = int(np.linalg.slogdet(total + information)[1].argmax())
+        total = total + information[best]
+        counts[best] += 1
+    return counts
 
 
 def _checked_parameters(parameters: Mapping[str, float]) -> dict[str, float]:
@@ -177,36 +149,6 @@ def _checked_parameters(parameters: Mapping[str, float]) -> dict[str, float]:
                 "0 given; intervals are judged relative to the expected value. Give a small one.",
             )
     return values
-
-
-def _wanted(
-    values: dict[str, float], wanted: Sequence[str] | None, known: Mapping[str, float]
-) -> tuple[str, ...]:
-    """Return the names of the parameters to determine: ``wanted``, or all if None.
-
-    Raises UnknownName if ``wanted`` or ``known`` has a name that is not in ``values``, InvalidInput
-    if ``wanted`` is empty.
-    """
-    chosen = tuple(values) if wanted is None else tuple(wanted)
-    for kind, given in (("wanted", chosen), ("known", known)):
-        for name in given:
-            one_of(f"parameter in {kind}", name, values, "Name one of the arm.")
-    if not chosen:
-        raise InvalidInput("wanted", "names no parameter; leave it out for all of them.")
-    return chosen
-
-
-def _prior(values: dict[str, float], known: Mapping[str, float]) -> Array:
-    """Return the prior knowledge as rows of a Jacobian, a diagonal matrix (P, P) [-].
-
-    The entry of a parameter p is |p|/σ if p is known with the standard deviation σ, else 0.
-    """
-    weights = dict.fromkeys(values, 0.0)
-    for name, std in known.items():
-        if not (sigma := scalar(f"known[{name!r}]", std)) > 0.0:
-            raise InvalidInput(f"known[{name!r}]", f"{sigma:g} given; it must be positive.")
-        weights[name] = abs(values[name]) / sigma
-    return np.diag(list(weights.values()))
 
 
 def _followed(
@@ -287,8 +229,8 @@ def _rows(
     r are the residuals of its m readings in standard deviations, p the parameters ``values`` of
     ``model_of``.
     """
-    exact = loop.simulated(Model.of(model_of, None, (loop,)).arm(values))
-    model = Model.of(model_of, None, (exact,)).weighted(values)
+    exact = loop.simulated(Model(model_of, None, (loop,)).arm(values))
+    model = Model(model_of, None, (exact,))
     columns = []
     for name, value in values.items():
         near, far = (

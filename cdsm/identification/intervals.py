@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Literal, NamedTuple, final
 
 import numpy as np
@@ -106,33 +105,6 @@ def _crossing(u: Array, height: Array, slope: Array, rise: float) -> float:
     return float(u[0] + width * brentq(cubic, 0.0, 1.0, xtol=1e-12))
 
 
-def other_minimum(
-    problem: LeastSquares, best: Array, intervals: Array, rise: float, starts: Sequence[Array]
-) -> Array | None:
-    """Search for another minimum of χ² that fits about as well; return None if none is found.
-
-    It counts if its χ² is at most ``rise`` above the least χ², and it is outside the confidence
-    ``intervals`` (P, 2). Such a minimum refutes all intervals, since they belong to only one of
-    several minima. Searches begin at those ``starts`` that are outside the intervals. ``starts``,
-    ``best`` and the result are points (P,) in the unit cube. Raises LowerOptimumError if χ² is
-    lower at the minimum than at ``best``.
-    """
-
-    def outside(point: Array) -> bool:
-        low, high = intervals.T
-        values = problem.box.parameters(point)
-        return bool(((values < low) | (values > high)).any())
-
-    for start in sorted(filter(outside, starts), key=problem.cost):
-        end = problem.search(start, method="trf", tolerances=_TOLERANCES, most=_SEARCHED)
-        higher = problem.cost(end) - problem.cost(best)
-        if higher < -NEGLIGIBLE:
-            raise LowerOptimumError(end)
-        if higher <= rise and outside(end):
-            return end
-    return None
-
-
 class _Knot(NamedTuple):
     """Point on the profile of a parameter, with the derivatives of Δχ².
 
@@ -158,17 +130,12 @@ class Profiler:
     exact: Sequence[float]  # values of Δχ² where the profile must be exact, rising
     far: float  # largest Δχ² of the profile, above all values in ``exact``
 
-    def profile(self) -> tuple[Profile, list[Array]]:
-        """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ².
-
-        Also return points (P,) in the unit cube, at most one on each side, where Δχ² falls again
-        after it has exceeded ``exact[0]``. Another minimum of χ² may be near them.
-        """
+    def profile(self) -> Profile:
+        """Compute the profile on both sides; raise LowerOptimumError if it finds a lower χ²."""
         (down, first), (up, last) = self._follow(-1), self._follow(1)
         knots = [*reversed(down), *up[1:]]
         box = Box(self.problem.box.bounds[[self.i]])
         u = np.array([knot.point[self.i] for knot in knots])
-        falls = [*self._falls(down, -1), *self._falls(up, 1)]
         return Profile(
             values=frozen(box.parameters(u)),
             rise=frozen(np.array([knot.rise for knot in knots])),
@@ -176,21 +143,7 @@ class Profiler:
             best=len(down) - 1,
             ends=(first, last),
             bounds=frozen(box.bounds[0]),
-        ), falls
-
-    def _falls(self, knots: list[_Knot], side: Side) -> list[Array]:
-        """Return a list of at most one point: the lowest knot at which the profile falls again.
-
-        ``knots`` are the computed points of the profile on one ``side``, from the optimum outward.
-        The profile falls again at a knot if Δχ² was above ``exact[0]`` at the knot before, and is
-        lower here or has a falling slope.
-        """
-        falling = [
-            knot
-            for before, knot in pairwise(knots)
-            if before.rise > self.exact[0] and (knot.rise < before.rise or side * knot.slope < 0.0)
-        ]
-        return [min(falling, key=lambda knot: knot.rise).point] if falling else []
+        )
 
     def _follow(self, side: Side) -> tuple[list[_Knot], str]:
         """Compute the profile on one side: its points from the optimum outward, and why they end.

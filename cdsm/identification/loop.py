@@ -1,4 +1,4 @@
-"""Loops of a weight test: forces, readings of the tip, and statistical weights of the readings."""
+"""Loops of a weight test: forces, and readings of the tip."""
 
 from __future__ import annotations
 
@@ -35,11 +35,9 @@ class WeightLoop:
         displacements: Readings (n,) along the direction or (n, 3) in base axes [m]; None if the
             test is only planned.
         displacement_std: Standard deviation of a reading [m].
-        force_std: Standard deviation of a force [N].
         tension: Cable tensions (C,) [N] before the first force. Give ``tension`` or ``minimum``.
         minimum: Lower bound of the tensions [N], one number or (C,).
             :func:`~cdsm.distribute_tension` then balances the model at these angles.
-        tension_std: Standard deviation of each tension [N], the same error over the whole loop.
         wrench: W (6,) at ``tool0`` without the forces, base axes: force [N], moment [N m].
         label: Name in reports and figures.
 
@@ -53,10 +51,8 @@ class WeightLoop:
     forces: tuple[float, ...]
     displacements: tuple[float, ...] | tuple[tuple[float, float, float], ...] | None = None
     displacement_std: float
-    force_std: float = 0.0
     tension: tuple[float, ...] | None = None
     minimum: float | tuple[float, ...] | None = None
-    tension_std: float = 0.0
     wrench: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     label: str = ""
 
@@ -79,12 +75,9 @@ class WeightLoop:
                 )
             rows = read.tolist()
             checked["displacements"] = tuple(rows if read.ndim == 1 else map(tuple, rows))
-        for name in ("displacement_std", "force_std", "tension_std"):
-            least = SMALLEST if name == "displacement_std" else 0.0
-            std = checked[name] = scalar(name, getattr(self, name))
-            if std < least:
-                needed = "positive" if least else "positive, or 0"
-                raise InvalidInput(name, f"{std:g} given; a standard deviation is {needed}.")
+        std = checked["displacement_std"] = scalar("displacement_std", self.displacement_std)
+        if std < SMALLEST:
+            raise InvalidInput("displacement_std", f"{std:g} m given; it must be positive.")
         for name, entry in checked.items():
             object.__setattr__(self, name, entry)
 
@@ -115,8 +108,8 @@ class WeightLoop:
 
         Args:
             arm: The arm, with friction in its holes.
-            random: Generator of random errors of readings, forces and tensions, or its seed. None:
-                without errors.
+            random: Generator of the random errors of the readings, or its seed. None: without
+                errors.
 
         Raises:
             InvalidInput: ``random`` is neither of these, or ``arm`` is not an arm.
@@ -128,16 +121,13 @@ class WeightLoop:
         pose, wrench = arm.at(self.angles), np.array(self.wrench)
         if self.tension is None:
             assert self.minimum is not None
-            tension = distribute_tension(pose, self.minimum, wrench=wrench).values.copy()
+            tension = distribute_tension(pose, self.minimum, wrench=wrench).values
         else:
             tension = np.array(self.tension)
-        forces, read = np.array(self.forces), np.zeros(len(self.forces))
+        tips = LoadingPath.of(pose, tension, wrench, self.applied).tips
+        read = (tips - pose.tip[:3, 3]) @ self._unit
         if random is not None:
-            tension += self.tension_std * random.normal(size=tension.size)
-            forces += self.force_std * random.normal(size=forces.size)
-            read += self.displacement_std * random.normal(size=forces.size)
-        tips = LoadingPath.of(pose, tension, wrench, np.outer(forces, self._unit)).tips
-        read += (tips - pose.tip[:3, 3]) @ self._unit
+            read += self.displacement_std * random.normal(size=read.size)
         return replace(self, displacements=tuple(read.tolist()))
 
 
@@ -148,40 +138,13 @@ def measured(measurement: Measurement | WeightLoop) -> Array:
     return np.array([measurement.value])
 
 
-class Weights:
-    """Statistical weights of the m readings of a loop; each axis has an unknown offset.
+def offset(loop: WeightLoop, predicted: Array) -> Array:
+    """Return predictions minus readings of a loop, averaged over each axis, (m,) [m].
 
-    e (m,) are the errors, predicted − measured, and V (m, m) is their covariance. The matrix Z (m,
-    k) adds the offsets z (k,) of the k axes to the readings. χ² is the least value of (e + Z z)ᵀ
-    V⁻¹ (e + Z z) over all z. With the matrix R of these weights, χ² = |R e|². An entry of R e is
-    the residual of one reading, in standard deviations.
-
-    Attributes:
-        root: R (m, m) [1/m], symmetric; the readings are sorted by force, then axis.
-        zero: Matrix (k, m) that gives the best offsets from the errors: z = −``zero`` e.
+    The zero of each axis is unknown, and this estimate of it has the least χ².
     """
-
-    def __init__(
-        self, loop: WeightLoop, by_forces: Array | None = None, by_tensions: Array | None = None
-    ) -> None:
-        """Compute the weights from the standard deviations of the loop.
-
-        ``by_forces`` (m, n) and ``by_tensions`` (m, C) [m/N] are the derivatives of the readings
-        with respect to the n forces and C tensions. The errors of forces or tensions are ignored if
-        their derivatives are None.
-        """
-        axes = len(loop.axes)
-        covariance = loop.displacement_std**2 * np.eye(len(loop.forces) * axes)
-        for slope, std in (by_forces, loop.force_std), (by_tensions, loop.tension_std):
-            if slope is not None:
-                covariance += std**2 * slope @ slope.T
-        inverse = np.linalg.inv(covariance)
-        zeros = np.tile(np.eye(axes), (len(covariance) // axes, 1))
-        normal = zeros.T @ inverse
-        self.zero = np.linalg.solve(normal @ zeros, normal)
-        values, vectors = np.linalg.eigh(inverse - normal.T @ self.zero)
-        values[:axes] = 0.0  # eigenvalues of the offsets, zero but for rounding
-        self.root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    error = (predicted - measured(loop)).reshape(len(loop.forces), -1)
+    return np.tile(error.mean(axis=0), len(loop.forces))
 
 
 def up_and_down(weight: float, steps: int) -> tuple[float, ...]:

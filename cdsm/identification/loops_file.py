@@ -33,8 +33,6 @@ def read_loops(
     arm: Manipulator,
     *,
     displacement_std: float,
-    force_std: float = 0.0,
-    tension_std: float = 0.0,
     minimum: ArrayLike | None = None,
 ) -> tuple[WeightLoop, ...]:
     """Read loops of a weight test from a CSV file: a header, then a line per reading.
@@ -60,20 +58,16 @@ def read_loops(
         path: The file.
         arm: The arm, whose joints and cables the columns name.
         displacement_std: Standard deviation of a reading [m].
-        force_std: Standard deviation of a force [N].
-        tension_std: Standard deviation of each tension [N].
         minimum: Lower bound of the tensions [N], one number or (C,), if the file has no tensions.
 
     Raises:
         FileError: The file cannot be read, a column is missing or has no unit, or an entry is
             wrong; the line and the column are named.
-        InvalidInput: A standard deviation or ``minimum`` is invalid.
+        InvalidInput: ``displacement_std`` or ``minimum`` is invalid.
     """
     instance("arm", arm, Manipulator)
     table = read_table(path)
-    return _Reader(path, arm, table).loops(
-        minimum, displacement_std=displacement_std, force_std=force_std, tension_std=tension_std
-    )
+    return _Reader(path, arm, table).loops(minimum, displacement_std=displacement_std)
 
 
 class _Reader:

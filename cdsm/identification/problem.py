@@ -6,7 +6,7 @@ The differences from the measurements are the residuals that :func:`identify` mi
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
 from cdsm.identification.least_squares import LeastSquares, NoModelError, no_model
-from cdsm.identification.loop import WeightLoop, Weights, measured
+from cdsm.identification.loop import WeightLoop, measured, offset
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
 from cdsm.statics.following import follow
@@ -29,7 +29,6 @@ from cdsm.tension import Tension, distribute_tension
 
 Parameters = dict[str, float]
 
-_STEP = 1e-4  # step of a tension [N] for the derivative of a loop with respect to it
 _STORED = 8  # sets of parameters whose paths are stored
 
 
@@ -49,26 +48,8 @@ class Model:
     # function that gives the tensions, or None
     tension_of: Callable[..., Tension | ArrayLike] | None
     measurements: tuple[Measurement | WeightLoop, ...]
-    # weights of the readings of each loop; None for a stiffness
-    weights: tuple[Weights | None, ...]
     _last_rest: dict[Measurement, Array] = field(default_factory=dict)
     _paths: dict[tuple[float, ...], list[LoadingPath | None]] = field(default_factory=dict)
-
-    @classmethod
-    def of(
-        cls,
-        model_of: Callable[..., Manipulator],
-        tension_of: Callable[..., Tension | ArrayLike] | None,
-        measurements: tuple[Measurement | WeightLoop, ...],
-    ) -> Model:
-        """Return the model of ``measurements``.
-
-        The weights of the loops account for errors of the readings; :meth:`weighted` adds those of
-        forces and tensions. If ``tension_of`` is None, the tensions follow from the fields of each
-        measurement.
-        """
-        weights = (Weights(each) if isinstance(each, WeightLoop) else None for each in measurements)
-        return cls(model_of, tension_of, measurements, tuple(weights))
 
     @property
     def count(self) -> int:
@@ -79,29 +60,6 @@ class Model:
     def loops(self) -> tuple[WeightLoop, ...]:
         """The loops among the measurements."""
         return tuple(each for each in self.measurements if isinstance(each, WeightLoop))
-
-    @property
-    def inexact_loads(self) -> bool:
-        """Whether a loop has errors of forces or tensions; weights then depend on parameters."""
-        return any(loop.force_std or loop.tension_std for loop in self.loops)
-
-    def weighted(self, parameters: Parameters) -> Model:
-        """Return the same model with weights that account for all errors of the loops.
-
-        The covariance of the readings of a loop is V = σ² 1 + σ_f² A Aᵀ + σ_F² B Bᵀ. A and B are
-        the derivatives of the readings with respect to forces and tensions, at ``parameters``. σ,
-        σ_f and σ_F are the standard deviations of readings, forces and tensions. With friction, a
-        force also changes all later readings.
-        """
-        arm = self.arm(parameters)
-        paths = self._paths_at(parameters, arm)
-        weights = [
-            Weights(each, *self._slopes(arm, each, path))
-            if isinstance(each, WeightLoop) and path
-            else None
-            for each, path in zip(self.measurements, paths, strict=True)
-        ]
-        return replace(self, weights=tuple(weights))
 
     def residuals(self, parameters: Parameters) -> Array:
         """Compute all residuals (n,) for these ``parameters``, in standard deviations."""
@@ -146,10 +104,9 @@ class Model:
     def weigh(self, predicted: list[Array]) -> Array:
         """Compute the residuals (n,) in standard deviations from a result of :meth:`predict`."""
         rows = []
-        for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
+        for each, found in zip(self.measurements, predicted, strict=True):
             if isinstance(each, WeightLoop):
-                assert weights is not None
-                rows.append(weights.root @ (found - measured(each)))
+                rows.append((found - offset(each, found) - measured(each)) / each.displacement_std)
             else:
                 rows.append((found - each.value) / each.std)
         return np.concatenate(rows)
@@ -159,13 +116,12 @@ class Model:
 
         The predictions of a loop get the fitted offset of each axis.
         """
-        rows = []
-        for each, weights, found in zip(self.measurements, self.weights, predicted, strict=True):
-            if weights is not None:
-                zero = weights.zero @ (found - measured(each))
-                found = found - np.tile(zero, len(found) // len(zero))
-            rows.append(found)
-        return np.concatenate(rows)
+        return np.concatenate(
+            [
+                found - offset(each, found) if isinstance(each, WeightLoop) else found
+                for each, found in zip(self.measurements, predicted, strict=True)
+            ]
+        )
 
     def arm(self, parameters: Parameters) -> Manipulator:
         """Build the arm of ``parameters``; raise NoModelError if there is none."""
@@ -218,27 +174,6 @@ class Model:
             tension = distribute_tension(pose, measurement.minimum, wrench=measurement.wrench)
         wrench = None if isinstance(tension, Tension) else measurement.wrench
         return stiffness(pose, tension, wrench)
-
-    def _slopes(self, arm: Manipulator, loop: WeightLoop, path: LoadingPath) -> tuple[Array, Array]:
-        """Compute the derivatives of the m readings of ``loop`` from its equilibria ``path``.
-
-        The first array (m, n) [m/N] has the derivatives with respect to the n forces, the second
-        one (m, C) [m/N] with respect to the C tensions. An array has no columns if the loop gives
-        forces or tensions without errors.
-        """
-        u, axes, pose = unit_direction("direction", loop.direction), loop.axes, path.start.pose
-        by_forces = np.zeros((len(loop.forces) * len(axes), 0))
-        by_tensions = by_forces
-        if loop.force_std:
-            by_forces = (axes @ path.by_forces(u)).reshape(len(by_forces), -1)
-        if loop.tension_std:
-            tension, wrench = path.tension, path.start.load.wrench
-            columns = []
-            for step in _STEP * np.eye(len(arm.cables)):
-                near, far = (path.beside(pose, tension + s * step, wrench) for s in (1.0, -1.0))
-                columns.append(((near - far) @ axes.T).ravel() / (2.0 * _STEP))
-            by_tensions = np.column_stack(columns)
-        return by_forces, by_tensions
 
     def _along(self, arm: Manipulator, measurement: Measurement, parameters: Parameters) -> float:
         K = self._stiffness(arm, measurement, parameters)

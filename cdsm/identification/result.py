@@ -43,7 +43,8 @@ class Identification(ReadOnlyState):
         predicted: Predicted numbers (n,): stiffnesses [N/m], and readings of loops [m] with fitted
             offsets.
         residuals: Residuals r (n,) in standard deviations [-]. For a stiffness, r is (predicted −
-            measured)/σ; for loops, see :class:`~cdsm.identification.loop.Weights`.
+            measured)/σ; for a reading of a loop with the fitted
+            offset.
         jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …].
         arm: Arm with these values.
         warnings: One sentence for each reason not to trust the result; empty if there is none.
@@ -127,14 +128,8 @@ class Identification(ReadOnlyState):
         parameter, or as far as the model exists. Then the measurements set no limit, and
         :attr:`warnings` report it at 95 %.
 
-        No parameter has a limit if the fit is not an optimum, or if another minimum of χ² outside
-        the 95 % intervals fits as well; :attr:`warnings` say so. Searches for such a minimum start
-        where Δχ² falls again along p_i, and at several points if :func:`identify` has no ``start``.
-        A minimum that no search reaches stays unknown.
-
-        Measured in 500 simulated experiments with loops (5 µm, 0.05 N): the 95 % intervals of
-        friction, EA, springs, two hole radii and a disk offset, identified together, hold the true
-        values in 94 to 96 %.
+        No parameter has a limit if the fit is not an optimum; :attr:`warnings` say so. Another
+        minimum of χ² that fits as well stays unknown: try other starts of :func:`identify`.
 
         Args:
             level: The probability, between 0 and 1.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.diagnosis import ambiguous, unfinished, warnings_of
+from cdsm.identification.diagnosis import lower_elsewhere, unfinished, warnings_of
 from cdsm.identification.intervals import LowerOptimumError, Profile, Profiler
 from cdsm.identification.least_squares import LeastSquares
 from cdsm.identification.loop import WeightLoop
@@ -30,17 +30,10 @@ _log = logging.getLogger("cdsm")
 
 _ON_BOUND = 1e-9  # a parameter this near to a bound (share of the range) counts as on the bound
 
-_CANDIDATES, _STARTS = 24, 3
-"""Number of points within the bounds that are evaluated, and number of the best of them from which
-searches start."""
-
 _COARSE, _FINE = (1e-10,) * 3, (1e-14,) * 3
 """ftol, xtol and gtol of the searches with one-sided and with central differences."""
 
 _OF_LOOPS = (1e-6, 1e-8, 1e-8)  # ftol, xtol and gtol of searches with loops, whose χ² is less exact
-
-_REWEIGHINGS = 2
-"""Number of times that the weights of loops are computed again with the parameters found so far."""
 
 _EVALUATIONS = 200  # largest number in a search, without those of the differences
 
@@ -63,8 +56,7 @@ def identify(
     domain of a law.
 
     A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
-    its width determines the friction. Errors of its forces and tensions are converted to correlated
-    errors of its readings.
+    its width determines the friction.
 
     The search predicts all measurements about 50 P times, the profiles of
     :meth:`Identification.confidence` about 20 P² times. A measurement with a force takes ten times
@@ -88,8 +80,8 @@ def identify(
             parameters; a loop of n forces has n − 1 per axis, since its offset is unknown.
         free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
             they are positive and a factor of 100 or more apart, the search is logarithmic.
-        start: First value of each parameter. If not given, several searches start from points
-            spread over the bounds (always the same points), and the best result is returned.
+        start: First value of each parameter; by default the middle of its bounds. The search ends
+            in the nearest minimum: give a start near the values that you expect.
         tension_of: Function ``tension_of(posture, measurement, **p)`` that returns the tensions
             (C,) [N] or a :class:`~cdsm.Tension`, for example with the offset of a load cell as a
             parameter. Both ``tension_of`` and ``model_of`` get all free parameters. The default is
@@ -98,7 +90,7 @@ def identify(
 
     Raises:
         InvalidInput: There are no measurements or fewer than parameters; bounds or start are
-            invalid; ``model_of`` fails or does not return an arm; or no start gives every
+            invalid; ``model_of`` fails or does not return an arm; or the start does not give every
             measurement a stable stiffness.
         UnknownName: ``model_of`` or ``tension_of`` does not take a parameter.
     """
@@ -116,24 +108,12 @@ def identify(
     check_call("model_of", model_of, 0, tuple(bounds))
     if tension_of is not None:
         check_call("tension_of", tension_of, 2, tuple(bounds))
-    model = Model.of(model_of, tension_of, measurements)
+    model = Model(model_of, tension_of, measurements)
     problem = problem_of(model, bounds)
     try:
         with progress_allowed(progress):
-            starts, others = _starts(problem, start), list[Array]()
-            for _ in range(_REWEIGHINGS if model.inexact_loads else 0):
-                model = model.weighted(problem.parameters(starts[0]))
-                problem = problem_of(model, bounds)
-                best, *ends = _optima(problem, starts)
-                starts, others = [best], others + ends
-            best, *ends = _optima(problem, starts)
-            while True:
-                try:
-                    return _result(model, problem, best, others + ends)
-                except LowerOptimumError as lower:  # a profile found a lower minimum
-                    _log.info("a profile found a lower minimum; the search goes on from there")
-                    found = _optima(problem, [lower.point])[0]
-                    best = min(found, lower.point, key=problem.cost)
+            best = _optimum(problem, _start(problem, start))
+            return _result(model, problem, best)
     except UserFaultError as fault:
         raise fault.args[0] from fault.__cause__
 
@@ -208,31 +188,20 @@ def check_call(name: str, function: object, positional: int, names: Sequence[str
         ) from None
 
 
-def _starts(problem: LeastSquares, start: Mapping[str, float] | None) -> list[Array]:
-    """Choose the points (P,) of the unit cube of ``problem`` from which searches start.
-
-    The only point is ``start`` if it is given; otherwise the points are the three with the least χ²
-    of 24 points spread over the cube. Raises InvalidInput if the model exists at none of them.
-    """
-    count = len(problem.names)
+def _start(problem: LeastSquares, start: Mapping[str, float] | None) -> Array:
+    """Return ``start``, or the middle of the bounds, as a point (P,) of the unit cube."""
     if start is None:
-        from scipy.stats import qmc  # here, because it imports slowly
-
-        # Halton's first point is a corner
-        spread = qmc.Halton(count, scramble=False).random(_CANDIDATES)[1:]
-        points = [np.full(count, 0.5), *spread]
+        point = np.full(len(problem.names), 0.5)
     else:
-        points = [problem.box.point(_checked_start(problem, start))]
-    if usable := [point for point in points if math.isfinite(problem.cost(point))]:
-        return sorted(usable, key=problem.cost)[:_STARTS]
-    failure = problem.failure(points[0])
-    assert failure is not None
-    where = f"none of {len(points)} starts gives" if start is None else "does not give"
-    raise InvalidInput(
-        "free" if start is None else "start",
-        f"{where} every measurement a stable prediction. At {problem.describe(points[0])}, "
-        f"{failure} Correct that, narrow the bounds, or give another start.",
-    ) from failure.__cause__
+        point = problem.box.point(_checked_start(problem, start))
+    if (failure := problem.failure(point)) is not None:
+        name = "the middle of the bounds" if start is None else "it"
+        raise InvalidInput(
+            "start",
+            f"{name} does not give every measurement a stable prediction. At "
+            f"{problem.describe(point)}, {failure} Correct that, or give another start.",
+        ) from failure.__cause__
+    return point
 
 
 def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
@@ -249,26 +218,19 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
     return values
 
 
-def _optima(problem: LeastSquares, starts: Sequence[Array]) -> list[Array]:
-    """Search from each of ``starts``; return the minima of χ², the best one first and refined."""
+def _optimum(problem: LeastSquares, start: Array) -> Array:
+    """Search from ``start`` (P,) for the minimum of χ², in the unit cube."""
     coarse, fine = (_OF_LOOPS, _OF_LOOPS) if problem.followed else (_COARSE, _FINE)
-    found = [
-        problem.search(point, method="trf", tolerances=coarse, most=_EVALUATIONS)
-        for point in track(starts, "searching the parameters")
-    ]
-    _log.info("χ² at the ends of the searches: %s", [f"{problem.cost(x):.6g}" for x in found])
-    first, *others = sorted(found, key=problem.cost)
+    first = problem.search(start, method="trf", tolerances=coarse, most=_EVALUATIONS)
     finer = problem.search(first, method="dogbox", tolerances=fine, most=_EVALUATIONS, central=True)
     best = min(finer, first, key=problem.cost)
     # rounding may leave an optimum beside its bound
     on_bound = np.where(best < _ON_BOUND, 0.0, np.where(best > 1.0 - _ON_BOUND, 1.0, best))
-    return [on_bound if math.isfinite(problem.cost(on_bound)) else best, *others]
+    return on_bound if math.isfinite(problem.cost(on_bound)) else best
 
 
-def _result(
-    model: Model, problem: LeastSquares, best: Array, ends: Sequence[Array]
-) -> Identification:
-    """Build the result at the optimum ``best``; other minima may be at ``ends`` of the searches."""
+def _result(model: Model, problem: LeastSquares, best: Array) -> Identification:
+    """Build the result at the optimum ``best`` (P,), in the unit cube."""
     values = problem.parameters(best)
     arm, predicted = model.predict(values)
     jacobian = problem.jacobian(best, central=True)
@@ -285,16 +247,13 @@ def _result(
         profiles=(),
     )
     follow = [j for j in range(best.size) if j not in result._determination.to_fix]
-    profiles, starts = list[Profile | None](), list(ends)
-    for i in track(range(best.size), "finding the confidence of the parameters"):
-        profile = None
-        if math.isfinite(result.std[i]):
+    profiles, refuted = list[Profile | None](), unfinished(problem, best, jacobian)
+    try:
+        for i in track(range(best.size), "finding the confidence of the parameters"):
             others = [j for j in follow if j != i]
-            profile, falls = Profiler(problem, best, jacobian, i, others, *result._goals).profile()
-            starts += falls
-        profiles.append(profile)
-    result = replace(result, profiles=tuple(profiles))
-    refuted = unfinished(problem, best, jacobian) + ambiguous(problem, best, result, starts)
-    if refuted:
-        result = replace(result, profiles=(None,) * best.size)
+            profiler = Profiler(problem, best, jacobian, i, others, *result._goals)
+            profiles.append(profiler.profile() if math.isfinite(result.std[i]) else None)
+    except LowerOptimumError as lower:
+        refuted += lower_elsewhere(problem, best, lower.point)
+    result = replace(result, profiles=(None,) * best.size if refuted else tuple(profiles))
     return replace(result, warnings=(*warnings_of(result), *refuted))

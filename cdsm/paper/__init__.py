@@ -14,21 +14,9 @@ from cdsm.paper.claims import (
     to_rows,
     to_summary,
 )
-from cdsm.paper.curves import Curve, StiffnessFigure
+from cdsm.paper.curves import Curve, LeadFigure, StiffnessFigure
 from cdsm.paper.experiments import ExperimentFigure, Trace, figure_10, figure_12, figure_13
-from cdsm.paper.friction_fit import RoughFit, RoughPrototype, identify_rough_prototype
-from cdsm.paper.lead import LeadFigure, figure_lead
-from cdsm.paper.prototype import Prototype
-from cdsm.paper.prototype_fit import (
-    BOUNDS,
-    STEPS,
-    PrototypeFigure,
-    PrototypeFit,
-    Step,
-    figure_prototype,
-    identify_prototype,
-)
-from cdsm.paper.simulation import figure_3, figure_4, figure_6, figure_7, figure_8
+from cdsm.paper.simulation import figure_3, figure_4, figure_6, figure_7, figure_8, figure_lead
 from cdsm.paper.strand import StrandFigure, figure_5
 
 FIGURES: Final[dict[str, Callable[[], Figure]]] = {
@@ -42,16 +30,13 @@ FIGURES: Final[dict[str, Callable[[], Figure]]] = {
     "fig10": figure_10,
     "fig12": figure_12,
     "fig13": figure_13,
-    "prototype": figure_prototype,
 }
 """Function that computes each figure, by the name of the figure."""
 
 # fmt: off
 __all__ = [
-    "BOUNDS", "EXPLANATION", "FIGURES", "HEADER", "STEPS", "SUMMARY", "Claim", "Curve",
-    "ExperimentFigure", "Figure", "LeadFigure", "Prototype", "PrototypeFigure", "PrototypeFit",
-    "RoughFit", "RoughPrototype", "Step", "StiffnessFigure", "StrandFigure", "Trace",
-    "identify_prototype", "identify_rough_prototype", "to_dict", "to_markdown", "to_rows",
+    "EXPLANATION", "FIGURES", "HEADER", "SUMMARY", "Claim", "Curve", "ExperimentFigure", "Figure",
+    "LeadFigure", "StiffnessFigure", "StrandFigure", "Trace", "to_dict", "to_markdown", "to_rows",
     "to_summary",
 ]
 # fmt: on

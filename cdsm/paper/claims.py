@@ -19,7 +19,7 @@ EXPLANATION = (
     "same with the unstrained length, which locked motors hold; hung weight: with that, the "
     "stiffness that a small weight at the tip measures. searched: what was chosen to meet the "
     "paper's number. Section V was measured with weights: there computed is that, on one prototype "
-    "identified from the same data within stated bounds. All of it is frictionless, links rigid. "
+    "whose dimensions were fitted to the same data. All of it is frictionless, links rigid. "
     "Left out: Fig. 9, a photograph, and Fig. 11, measured springs without printed numbers."
 )
 """Meaning of the columns, and the figures that are left out."""
@@ -82,10 +82,6 @@ class Figure(ABC):
     def numbers(self) -> dict[str, object]:
         """Return the curves as plain SI numbers, for JSON."""
 
-    def tables(self) -> tuple[str, ...]:
-        """Return tables of this figure for the report, in Markdown; by default none."""
-        return ()
-
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:
     """Convert values to a tuple of floats, as a :class:`Claim` stores them."""
@@ -143,9 +139,8 @@ def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
 
 
 def to_markdown(figures: Sequence[Figure]) -> str:
-    """Return Markdown: a table of all claims with assumptions, then the tables of each figure."""
-    further = [table for figure in figures for table in figure.tables()]
-    return "\n\n".join([markdown_table(HEADER, to_rows(figures)), EXPLANATION, *further]) + "\n"
+    """Return a table of all claims with their assumptions, in Markdown, and what it means."""
+    return f"{markdown_table(HEADER, to_rows(figures))}\n\n{EXPLANATION}\n"
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

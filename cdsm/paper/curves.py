@@ -103,6 +103,33 @@ class StiffnessFigure(Figure):
         }
 
 
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LeadFigure(Figure):
+    """Change of stiffness if the lower bound of tension rises from 100 N to 800 N, for each lead.
+
+    The lead is the straight cable between its actuator and the base disk. Changes (N, 2, 3) are
+    those of K_R (row 0) and of the stiffness that a small weight measures (row 1), in x, y and z.
+
+    Attributes:
+        leads: Leads of all cables (N,) [m].
+        stretched: Changes (N, 2, 3) [%] with the stretched length, l_0 = L, as in the paper.
+        original: Changes (N, 2, 3) [%] with the original length l_0.
+    """
+
+    leads: Array
+    stretched: Array
+    original: Array
+
+    def numbers(self) -> dict[str, object]:
+        """Return the leads [m] and the changes [%] as plain numbers, for JSON."""
+        return {
+            "lead_m": self.leads.tolist(),
+            "stretched_change_percent": self.stretched.tolist(),
+            "original_change_percent": self.original.tolist(),
+        }
+
+
 class Pair(NamedTuple):
     """The same curve computed twice, with two lengths in the cable stiffness."""
 

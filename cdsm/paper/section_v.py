@@ -6,7 +6,6 @@ from typing import Final
 
 import numpy as np
 
-from cdsm.support.directions import XYZ
 from cdsm.support.values import frozen
 
 TABLE_II: Final = frozen(
@@ -55,9 +54,19 @@ MEASURED: Final = 131.0
 HYBRID: Final = 1890.0
 """Stiffness of the hybrid cables (strand and spring together) of Fig. 12 [N/m]."""
 
-NAMES: Final = (
-    *(f"Table II, {axis}, row {row}" for row in range(1, 6) for axis in XYZ),
-    *("Fig. 12, first", "Fig. 12, second", "Fig. 13, first", "Fig. 13, second"),
-    "V-B, z",
-)
-"""Names of the 20 numbers of Section V."""
+# Conditions that the paper does not state, fitted with presets.fitted_prototype to its 20 numbers
+
+TENSION_OFFSET: Final = 17.3
+"""Actual minus reported tension of the force-controlled cables [N]."""
+
+SECOND_POSTURE: Final = frozen(np.deg2rad([-30.0, -30.0, 7.28]))
+"""Joint angles of the second configuration of Figs. 12 and 13 (3,) [rad]; the first is POSTURE."""
+
+HIGHEST_TENSION: Final = 34.4
+"""Highest tension in Fig. 12 [N]; the lowest is 3 N, as in Table II."""
+
+HYBRID_TENSION: Final = 3.0
+"""Tension in Fig. 13, and in the accuracy check with the hybrid cables of Fig. 12 [N]."""
+
+STIFFEST: Final = 8.04 * HYBRID
+"""Stiffness of the stiffest hybrid cables of Fig. 13 [N/m]; Fig. 11 gives no numbers."""

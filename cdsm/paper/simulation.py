@@ -13,20 +13,24 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdsm import presets
+from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import LinearElasticity
 from cdsm.paper.claims import Claim
 from cdsm.paper.curves import (
     FROM_FIG_6,
+    LeadFigure,
     Pair,
     Part,
     StiffnessFigure,
     Swept,
+    at_minimum,
     over_cases,
     over_minimum,
+    readings,
 )
-from cdsm.paper.digits import LEVEL
+from cdsm.paper.strand import LEVEL
 from cdsm.posture import Posture
-from cdsm.support.values import Array
+from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
 STRAND_END: Final = presets.STRAND_1X19.high
@@ -39,6 +43,9 @@ FIGURE_8_POSTURES: Final = {
     "S: 12° up, then 12° down": np.deg2rad([12.0, 6.0] * 2 + [0.0, 0.0] + [-12.0, -6.0] * 2),
 }
 """Postures of Fig. 8 [rad]. They are assumed: the paper shows only pictures."""
+
+LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
+"""Examined leads [m]. With a lead of 0.33 m or more the arm buckles below 800 N."""
 
 _POINTS = 25
 
@@ -106,6 +113,37 @@ def figure_4() -> StiffnessFigure:
     ]
     title = "Fig. 4: stiffness over cable tension, cable elasticity constant"
     return _figure("fig4", title, [strand, wire], claims)
+
+
+def figure_lead() -> LeadFigure:
+    """Compute, for each lead of the cables, the change of stiffness in Fig. 4.
+
+    With EA constant, tension softens the arm by the active stiffness, and stiffens it since the
+    original length of a locked wire is shorter than the cable: EA/l_0 = (EA + F)/L. Only the second
+    effect depends on the lead. The paper takes l_0 = L and has only the first.
+    """
+    stretched, original = (
+        frozen(np.array([_changes(lead, length) for lead in LEADS.tolist()]))
+        for length in ("stretched", "unstrained")
+    )
+    claim = Claim(
+        figure="Fig. 4, lead",
+        quantity="lead from which stiffness falls with tension",
+        unit="mm",
+        computed=_first_falls(stretched, "stretched", 0),
+        original=_first_falls(original, "unstrained", 0),
+        along=_first_falls(original, "unstrained", 1),
+        assumption="as Fig. 4, EA = 48 kN",
+        searched=FROM_FIG_6,
+    )
+    return LeadFigure(
+        name="lead",
+        title="Change of stiffness, 100 N to 800 N, over the lead of the cables, EA = 48 kN",
+        leads=LEADS,
+        stretched=stretched,
+        original=original,
+        claims=(claim,),
+    )
 
 
 def figure_6() -> StiffnessFigure:
@@ -195,6 +233,28 @@ def _figure(
         postures=tuple(pair.posture for pair in pairs),
         claims=tuple(claims),
     )
+
+
+def _changes(lead: float, length: OriginalLength) -> Array:
+    """Compute the changes (2, 3) [%] of a :class:`LeadFigure` with one lead [m]."""
+    arm = presets.virtual_prototype(presets.ELASTIC_STAGE, lead=lead, original_length=length)
+    first, last = (readings(at_minimum(arm, _TEN, F)) for F in (100.0, 800.0))
+    return np.asarray(100.0 * (last / first - 1.0))
+
+
+def _first_falls(changes: Array, length: OriginalLength, reading: int) -> tuple[float, ...]:
+    """Find the lead [mm] above which stiffness falls with tension in x, y, z; 0 if with any."""
+
+    def crossing(axis: int) -> float:
+        i = int(np.argmax(changes[:, reading, axis] < 0.0))
+        if i == 0:
+            return 0.0
+        root = brentq(
+            lambda lead: float(_changes(lead, length)[reading, axis]), LEADS[i - 1], LEADS[i]
+        )
+        return float(1e3 * root)
+
+    return tuple(crossing(axis) for axis in range(3))
 
 
 def _highest_minimum(pose: Posture) -> float:

@@ -42,7 +42,7 @@ _MOST_LABELS = 30  # above this number of measurements the axis shows numbers, n
 def plot_tensile_fit(fit: TensileFit) -> Figure:
     """Plot force against strain, measured and fitted, and the fitted rigidity EA against tension.
 
-    The second panel also shows the stages of the wire, and the 95 % band of EA if the fit has one.
+    The second panel also shows the stages of the wire and the 95 % band of EA.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
     tension, band = fit.tensions, fit.band
@@ -50,18 +50,10 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
     measured = 100.0 * fit.test.displacement / length
     fitted = 100.0 * (fit.start / length + fit.elasticity.strain(tension))
     left.plot(measured, fit.test.force, ".", color="0.6", ms=3, label="test")
-    left.plot(fitted, tension, color=VERMILLION, label=fit.method)
+    left.plot(fitted, tension, color=VERMILLION, label="fit")
     left.set(xlabel="strain [%]", ylabel="force [N]")
-    if band is not None:
-        right.fill_between(
-            tension,
-            KN * band.low,
-            KN * band.high,
-            color=BLUE,
-            alpha=0.3,
-            linewidth=0,
-            label="95 % band",
-        )
+    ends = KN * band.low, KN * band.high
+    right.fill_between(tension, *ends, color=BLUE, alpha=0.3, linewidth=0, label="95 % band")
     right.plot(tension, KN * fit.elasticity.rigidity(tension), color=VERMILLION, label="EA")
     shade_stages(right, [(stage.name, stage.low, stage.high) for stage in fit.stages])
     right.set(xlabel="tension [N]", ylabel="tangent rigidity EA [kN]")
@@ -161,43 +153,18 @@ def _plot_loop(
 
 
 def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
-    """Plot the expected 95 % interval of each parameter, and the gain by each candidate test.
-
-    The intervals are those after the planned tests, and after an equal number of evenly spaced
-    tests. The gain is that of one more repetition of a candidate, divided by the largest gain.
-    """
+    """Plot the expected 95 % interval of each parameter, and how often each candidate is tested."""
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.2, 2)
-    place, width = np.arange(len(plan.names)), 0.38
-    for shift, std, colour, label in (
-        (-width / 2.0, plan.even_std, "0.65", "evenly spaced"),
-        (width / 2.0, plan.std, BLUE, "planned"),
-    ):
-        half = 196.0 * std / abs(plan.values)
-        left.barh(
-            place + shift, np.where(np.isfinite(half), half, 0.0), width, color=colour, label=label
-        )
-        for y, x in zip(place + shift, half, strict=True):
-            if not np.isfinite(x):
-                left.text(0.0, y, " not determined", va="center", fontsize=SMALL)
-    left.set_yticks(place, plan.names)
+    half = 196.0 * plan.std / abs(plan.values)
+    left.barh(np.arange(half.size), np.where(np.isfinite(half), half, 0.0), color=BLUE)
+    for y in np.flatnonzero(~np.isfinite(half)):
+        left.text(0.0, y, " not determined", va="center", fontsize=SMALL)
+    left.set_yticks(np.arange(half.size), plan.names)
     left.invert_yaxis()
     left.set_xlabel("95 % interval, ± % of the expected value")
-    legend(left)
-    index, chosen = np.arange(len(plan.candidates)), plan.counts > 0
-    right.axhline(1.0, color="0.2", linewidth=0.8)
-    right.plot(index, plan.sensitivities, ".", color="0.65", label="candidate")
-    right.plot(index[chosen], plan.sensitivities[chosen], "o", color=VERMILLION, label="chosen")
-    for i in index[chosen]:
-        right.annotate(
-            f"{plan.counts[i]}×",
-            (i, plan.sensitivities[i]),
-            textcoords="offset points",
-            xytext=(0, -12),
-            ha="center",
-            fontsize=SMALL,
-        )
-    right.set(xlabel="candidate", ylabel="gain by one more test, over the largest", ylim=(0, 1.15))
-    right.xaxis.set_major_locator(MaxNLocator(integer=True))
-    legend(right)
-    heading(figure, f"{plural(len(plan.tests), 'test')}, {plan.criterion}-optimal")
+    right.bar(np.arange(plan.counts.size), plan.counts, color=VERMILLION)
+    right.set(xlabel="candidate", ylabel="tests")
+    for axis in (right.xaxis, right.yaxis):
+        axis.set_major_locator(MaxNLocator(integer=True))
+    heading(figure, plural(len(plan.tests), "test"))
     return figure

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from cdsm.errors import InvalidInput
 from cdsm.plots.arm import draw_arm, frame_arms
-from cdsm.plots.paper_experiments import plot_experiment, plot_prototype, plot_strand
+from cdsm.plots.paper_experiments import plot_experiment, plot_strand
 from cdsm.plots.style import (
     BLUE,
     COLORS,
@@ -193,14 +193,14 @@ def _plot_lead(result: paper.LeadFigure) -> Figure:
     Each has a panel, with a colour for each of x, y and z.
     """
     figure, (pair,) = panels(TWO_COLUMNS, 3.4, 2, sharey=True)
-    for axes, (name, reading) in zip(pair, _READINGS.items(), strict=True):
+    for row, (axes, reading) in enumerate(zip(pair, _READINGS.values(), strict=True)):
         for i, (axis, color) in enumerate(zip(XYZ, COLORS, strict=True)):
             for changes, length, style in (
-                (getattr(result, f"stretched_{name}"), "stretched", "-"),
-                (getattr(result, name), "unstrained", "--"),
+                (result.stretched, "stretched", "-"),
+                (result.original, "unstrained", "--"),
             ):
                 label = f"{axis}, {_LENGTHS[length]}"
-                axes.plot(MM * result.leads, changes[:, i], style, color=color, label=label)
+                axes.plot(MM * result.leads, changes[:, row, i], style, color=color, label=label)
         axes.axhline(0.0, color="0.2", linewidth=0.8)
         axes.set_xscale("symlog", linthresh=10.0, linscale=0.6)
         axes.set_xlim(0.0, MM * result.leads[-1])
@@ -278,6 +278,5 @@ _DRAWN: Final[dict[str, Callable[[Any], Figure]]] = {
     "fig12": plot_experiment,
     "fig13": plot_experiment,
     "lead": _plot_lead,
-    "prototype": plot_prototype,
 }
 """Function that draws each figure of :data:`cdsm.paper.FIGURES`, by name."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdsm.paper.strand import GAUGE_LENGTH, JOIN
 from cdsm.plots.measured import shade_stages
 from cdsm.plots.style import (
     BLUE,
@@ -45,28 +46,19 @@ def plot_strand(result: paper.StrandFigure) -> Figure:
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.4, 2)
     left.plot(MM * result.displacement, result.tension, color=BLUE, label="Eq. 19, repaired")
     shade_stages(left, _STAGES, "y")
-    left.set(xlabel=f"stretch of a {MM * result.gauge_length:g} mm wire [mm]", ylabel="force [N]")
+    left.set(xlabel=f"stretch of a {MM * GAUGE_LENGTH:g} mm wire [mm]", ylabel="force [N]")
     left.set_ylim(0.0, _STAGES[-1][-1])
     words = "stretch from 2.2 N on: below,\nEq. 19 is not positive"
     left.text(0.02, 0.15, words, transform=left.transAxes, fontsize=SMALL)
     caption(left, "(a)")
-    right.fill_between(
-        result.tension,
-        KN * result.low,
-        KN * result.high,
-        color=BLUE,
-        alpha=0.25,
-        linewidth=0.0,
-        label="tangent, all laws of the printed digits",
-    )
     right.plot(result.tension, KN * result.tangent, color=BLUE, label="tangent, repaired")
     right.plot(result.tension, KN * result.secant, "--", color=GREEN, label="secant (Eq. 18)")
-    lower = result.tension <= result.join  # above, the printed and the repaired law share digits
+    lower = result.tension <= JOIN  # above, the printed and the repaired law share digits
     printed = KN * result.printed
     line = {"color": VERMILLION, "linewidth": 1.2}
     right.plot(result.tension[lower], printed[lower], ":", label="as printed, misprint", **line)
     right.annotate(
-        f"as printed: {printed[lower][-1]:.0f} kN at {result.join:g} N",
+        f"as printed: {printed[lower][-1]:.0f} kN at {JOIN:g} N",
         (result.tension[lower][np.argmax(printed[lower] < -4.0)], -4.0),
         xytext=(60, -3.2),
         fontsize=SMALL,
@@ -74,7 +66,7 @@ def plot_strand(result: paper.StrandFigure) -> Figure:
         arrowprops={"arrowstyle": "<-", "color": VERMILLION, "linewidth": 0.8},
     )
     shade_stages(right, _STAGES)
-    right.set_ylim(-5.0, 1.2 * KN * result.high.max())  # the printed law falls far below
+    right.set_ylim(-5.0, 1.2 * KN * result.tangent.max())  # the printed law falls far below
     right.set_xlim(0.0, _STAGES[-1][-1])
     right.set(xlabel="tension [N]", ylabel="rigidity EA [kN]")
     caption(right, "(b)")
@@ -103,31 +95,6 @@ def plot_experiment(result: paper.ExperimentFigure) -> Figure:
             axes.set_ylabel(unit)
     for axes in grid[-1]:
         axes.set_xlabel("tension as reported [N]" if tension else "cable stiffness [N/mm]")
-    note = "the prototype's parameters were chosen to come near the paper's numbers (black)"
+    note = "the prototype was fitted to come near the paper's numbers (black)"
     legend_below(figure, grid[0, 0], 2, title=note)
-    return figure
-
-
-def plot_prototype(result: paper.PrototypeFigure) -> Figure:
-    """Plot the residual of each number in Section V, for each fit of a prototype to them."""
-    names = result.fits[0].step.numbers
-    figure, ((axes,),) = panels(TWO_COLUMNS, 5.0, 1)
-    places = np.arange(len(names))
-    looks = zip(result.fits, "os^D", (8, 5, 5, 5), (*COLORS, PURPLE), strict=True)
-    for fit, marker, size, color in looks:  # a ring: the first two fits have equal residuals
-        axes.plot(
-            100.0 * fit.residuals,
-            places[: fit.residuals.size],
-            marker,
-            color=color,
-            markersize=size,
-            markerfacecolor="none" if marker == "o" else color,
-            alpha=0.8,
-            label=f"{fit.step.label}: {fit.step.count}",
-        )
-    axes.axvline(0.0, color="0.2", linewidth=0.8)
-    axes.set_yticks(places, names, fontsize=SMALL)
-    axes.invert_yaxis()
-    axes.set_xlabel("100 ln(model/paper); Figs. 12, 13: (model − paper)/paper [%]")
-    legend_below(figure, axes, 1)
     return figure

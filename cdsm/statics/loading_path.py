@@ -1,6 +1,6 @@
 """Tip positions of an arm with friction under slow loads, and their first-order changes.
 
-The changes follow from small changes of the loads or of the arm, such as its friction.
+The changes follow from small changes of the arm, such as its friction.
 
 The arm moves through a series of equilibria: one at each load, and some between two loads. The code
 calls each a "rest". The natural length of a segment is the length of its wire at zero strain. At a
@@ -9,15 +9,14 @@ rest, the joint angles q solve r(q, a) = 0, with the residual torque r and the n
 rest. So the natural lengths become A(q, T), with the segment tensions T. They are the a of the next
 rest.
 
-A small change of loads or arm changes r by δr, q by δq = −K⁻¹ δr with K = ∂r/∂q, and A by δA. The
+A small change of the arm changes r by δr, q by δq = −K⁻¹ δr with K = ∂r/∂q, and A by δA. The
 code computes these changes from rest to rest. It assumes that cables slide in the same holes as
 before the change. So the result is the derivative, unless a cable is just about to start or to stop
 sliding in a hole.
 
-For a change of the loads, the tangents at each rest give δr and δA. For a change of the arm, the
-changed arm is evaluated at the recorded q, without a search for its own equilibrium: its residual
-torques there give δr, and its natural lengths there the part of δA that does not come from δq. The
-error for a change of size δ is of order δ².
+The changed arm is evaluated at the recorded q, without a search for its own equilibrium: its
+residual torques there give δr, and its natural lengths there the part of δA that does not come from
+δq. The error for a change of size δ is of order δ².
 """
 
 from __future__ import annotations
@@ -61,7 +60,6 @@ class LoadingPath:
     """
 
     loading: SlowLoading
-    tension: Array  # F (C,) [N] before the first load
     start: State
     rests: tuple[_Rest, ...]
     last: tuple[int, ...]  # rest at each load (n,)
@@ -73,17 +71,15 @@ class LoadingPath:
         tension: Array,
         wrench: Array,
         forces: Array,
-        parts: int = _PARTS,
         near: LoadingPath | None = None,
     ) -> LoadingPath:
         """Compute the equilibria of an arm under ``forces`` (n, 3) [N] at its tip, one by one.
 
         Before the first force the arm is balanced at ``pose`` under ``wrench`` (6,), which
-        continues to act, and the cables have the tensions ``tension`` F (C,) [N]. ``parts`` is the
-        number of equilibria that are computed over the range of the forces. ``near`` is the path of
-        a similar arm under the same loads: searches that use its joint motions are up to twice as
-        fast. Raises CdsmError if ``pose`` is beyond a joint limit, or no equilibrium was found on
-        the way.
+        continues to act, and the cables have the tensions ``tension`` F (C,) [N]. ``near`` is the
+        path of a similar arm under the same loads: searches that use its joint motions are up to
+        twice as fast. Raises CdsmError if ``pose`` is beyond a joint limit, or no equilibrium was
+        found on the way.
         """
         loading = slow_loading(pose, tension, wrench, 1.0)
         start = state = loading.begin(tension, wrench)
@@ -94,7 +90,7 @@ class LoadingPath:
             whole = wrench + np.append(force, np.zeros(3))
             target = Load(whole, np.zeros(pose.q.size), start.load.motors)
             before, reached = state.load, 0.0
-            part = longest = 1.0 / max(1.0, np.ceil(parts * change / swing - 0.01))
+            part = longest = 1.0 / max(1.0, np.ceil(_PARTS * change / swing - 0.01))
             while reached < 1.0:
                 goal = reached + part if reached + 1.5 * part < 1.0 else 1.0
                 motion = near.motion(len(rests), k, goal) if near else None
@@ -107,7 +103,7 @@ class LoadingPath:
                 else:
                     raise no_rest(pose, search, reached, f"the step to load {k + 1}")
             last.append(len(rests) - 1)
-        return cls(loading, tension, start, tuple(rests), tuple(last))
+        return cls(loading, start, tuple(rests), tuple(last))
 
     @property
     def tips(self) -> Array:
@@ -161,35 +157,6 @@ class LoadingPath:
             moved = give @ (arm.residual(beside, chain.tension) - share * start.load.holding)
             natural = chain.natural + left @ moved
             tips.append(beside.tip[:3, 3] + beside.jacobian[:3] @ moved)
-        return np.array([tips[i] for i in self.last])
-
-    def by_forces(self, direction: Array) -> Array:
-        """Compute ∂tip_i/∂f_j (n, 3, n) [m/N]: how a change of load j moves the tip at load i.
-
-        f_j [N] is a force along the unit vector ``direction`` (3,) that is added to load j.
-        """
-        count, problem, first = len(self.last), self.loading.problem, self.loading.start[:-1]
-        each, none = np.eye(count), np.zeros(count)
-        natural = np.zeros((len(self.start.settled.chain.natural), count))
-        tips = list[Array]()
-        for (state, k, part), (give, left) in zip(self.rests, self._responses, strict=True):
-            chain, pose = state.settled.chain, state.pose
-            added = part * each[k] + (1.0 - part) * (each[k - 1] if k else none)
-            forced = np.where(self.loading.forced, state.load.motors, np.nan)
-            grip = np.zeros_like(natural)
-            by_tension = problem.tangent(chain, forced, -chain.stretch[:, None] * natural, grip)
-            J = pose.jacobian[:3]
-            imbalance = pose.segments.length_jacobian.T @ by_tension - np.outer(
-                direction @ J, added
-            )
-            moved = give @ imbalance
-            # a slack cable keeps its wire, spread evenly
-            wire = np.add.reduceat(chain.natural, first)
-            share = np.add.reduceat(natural, first) / wire[:, None]
-            spread = chain.natural[:, None] * share[pose.segments.chains.cable]
-            taut = left @ moved - chain.compliance[:, None] * by_tension
-            natural = np.where((chain.tension == 0.0)[:, None], spread, taut)
-            tips.append(J @ moved)
         return np.array([tips[i] for i in self.last])
 
 

@@ -451,15 +451,6 @@ def test_fit_of_a_bad_file_is_one_message(tmp_path: Path) -> None:
     assert result.stderr.startswith("error: ")
 
 
-def test_fit_without_a_band_writes_neither_law_nor_tolerances(tmp_path: Path) -> None:
-    toml, spread = tmp_path / "strand.toml", tmp_path / "t.toml"
-    options = ("--method", "polynomial", "-o", toml, "--tolerances", spread)
-    result = call("fit", STRAND_TEST, *options)
-    assert result.exit_code == 1
-    assert "has no band" in result.stderr
-    assert not toml.exists()
-
-
 RAIL = """<robot name="rail"><link name="floor"/><link name="car"><inertial><mass value="0.3"/>
 <inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="way" type="prismatic"><parent link="floor"/><child link="car"/><axis xyz="1 0 0"/>

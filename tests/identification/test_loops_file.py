@@ -22,7 +22,7 @@ side,-10,z,150,5,0.1,
 def read(tmp_path: Path, text: str, **options: object) -> tuple[cdsm.WeightLoop, ...]:
     path = tmp_path / "loops.csv"
     path.write_text(text, encoding="utf-8")
-    options = {"displacement_std": 5e-6, "force_std": 0.05} | options
+    options = {"displacement_std": 5e-6} | options
     return cdsm.read_loops(path, hinge(), **options)  # type: ignore[arg-type]
 
 
@@ -34,7 +34,6 @@ def test_loops_come_out_in_si(tmp_path: Path) -> None:
         forces=(0.0, 8.0, 0.0),
         displacements=(1e-6, 0.25e-3, 0.06e-3),
         displacement_std=5e-6,
-        force_std=0.05,
         minimum=200.0,
         label="up",
     )

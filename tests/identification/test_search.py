@@ -558,7 +558,11 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], tuple[str, ..
     "tensions of another arm": (
         lambda: identify(prototype, [replace(EXACT[0], tension=(5.0,) * 4)], ONE),
         cdsm.InvalidInput,
-        ("free: none of 24 starts", "posture 1", "tension: shape (4,) given, (6,) needed"),
+        (
+            "start: the middle of the bounds does not give",
+            "posture 1",
+            "tension: shape (4,) given, (6,) needed",
+        ),
     ),
     "angles in degrees": (
         lambda: identify(prototype, [replace(EXACT[0], angles=(10.0, 0.0, 0.0))], ONE),
@@ -606,7 +610,7 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], tuple[str, ..
             start={"drive": 10.0},
         ),
         cdsm.InvalidInput,
-        ("start: does not give", "drive = 10", "buckles"),
+        ("start: it does not give", "drive = 10", "buckles"),
     ),
     "level": (lambda: NOISY.confidence(95.0), cdsm.InvalidInput, ("level: 95", "0.95")),
 }

@@ -65,21 +65,9 @@ def cables_and_experiments(nb: Shown) -> None:
     for name, value in nb.actual.items():
         low, high = nb.found.confidence(0.999)[name]
         assert low < value < high
-    fits = nb.summary.fits
-    expected = [(0.391, 0.139, 0.331), (0.211, 0.154, 0.331), (0.187, 0.116, 0.245)]
-    expected += [(0.108, 0.035, 0.152)]
-    np.testing.assert_allclose([fit.misfit for fit in fits], expected, atol=0.01)
-    last = fits[-1].prototype
-    np.testing.assert_allclose(last.levels[1:4], (11.0, 18.0, 48.0), atol=1.0)
-    np.testing.assert_allclose(abs(np.diag(last.weights)), (8.0, 10.0, 7.0), atol=1.0)
-    assert [len(fit.step.free) for fit in fits] == [13, 13, 17, 14]
-    assert [len(fit.at_bound) for fit in fits] == [8, 8, 8, 4]
-    assert np.ptp(nb.ratio) < 0.01
-    predicted = nb.predicted
-    np.testing.assert_allclose(predicted.table, nb.printed.predicted.table, rtol=2e-3)
-    np.testing.assert_allclose(predicted.drops, (0.165, 0.406), atol=0.003)
-    np.testing.assert_allclose(predicted.rises, (8.65, 10.9), atol=0.05)
-    assert abs(predicted.check - 110.3) < 0.5
+    np.testing.assert_allclose(nb.drops, (16.5, 40.6), atol=0.1)
+    np.testing.assert_allclose(nb.rises, (8.65, 10.9), atol=0.05)
+    assert abs(nb.accuracy[0] - 0.1103) < 1e-4
 
 
 def weights_and_buckling(nb: Shown) -> None:

@@ -22,16 +22,12 @@ def of_arm(results: Results, name: str) -> paper.StiffnessFigure:
     return figure
 
 
-def test_fig5_says_what_the_digits_leave_open(results: Results) -> None:
-    first, printed, bend, end, level = results["fig5"].claims
+def test_fig5_says_what_is_misprinted_and_what_the_digits_leave_open(results: Results) -> None:
+    first, printed, end, level = results["fig5"].claims
     assert first.computed[0] == pytest.approx(-0.9946, abs=1e-4)
     assert printed.computed[0] == pytest.approx(-69.4, abs=0.1)
-    assert bend.computed == pytest.approx((662.2, 367.5), abs=0.1)
     assert end.computed == pytest.approx((14.5, 84.8), abs=0.1)
     assert level.computed[0] == pytest.approx(0.75, abs=0.01)
-    figure = results["fig5"]
-    assert isinstance(figure, paper.StrandFigure)
-    assert ((figure.low <= figure.tangent) & (figure.tangent <= figure.high)).all()
 
 
 def test_fig5_curve_integrates_eq19(results: Results) -> None:
@@ -40,7 +36,7 @@ def test_fig5_curve_integrates_eq19(results: Results) -> None:
     slope = np.gradient(figure.tension, figure.displacement)
     # differences of a curve with a jump at 31 N and a steep start
     smooth = (figure.tension > 40.0) & (figure.tension < 800.0)
-    expected = figure.tangent / figure.gauge_length
+    expected = figure.tangent / 0.5
     np.testing.assert_allclose(slope[smooth], expected[smooth], rtol=2e-3)
     np.testing.assert_allclose(presets.STRAND_1X19.rigidity(figure.tension), figure.tangent)
 
@@ -76,13 +72,12 @@ def test_lead_decides_whether_stiffness_falls_with_tension(results: Results) -> 
     assert isinstance(figure, paper.LeadFigure)
     # without a lead as Fig. 4; K_R keeps 60 % of its fall with 0.1 m of lead, 80 % with 0.3 m
     strand, _ = claims(results, "fig4", "change of stiffness")
-    np.testing.assert_allclose(figure.pseudoinverse[0], strand.original, rtol=1e-9)
-    np.testing.assert_allclose(figure.stretched_pseudoinverse[0], strand.computed, rtol=1e-9)
-    share = figure.pseudoinverse[:, 0] / figure.stretched_pseudoinverse[:, 0]
+    np.testing.assert_allclose(figure.original[0, 0], strand.original, rtol=1e-9)
+    np.testing.assert_allclose(figure.stretched[0, 0], strand.computed, rtol=1e-9)
+    share = figure.original[:, 0, 0] / figure.stretched[:, 0, 0]
     assert np.interp(0.1, figure.leads, share) == pytest.approx(0.60, abs=0.01)
     assert share[-1] == pytest.approx(0.80, abs=0.01)
-    assert (figure.stretched_pseudoinverse < 0.0).all()
-    assert (figure.stretched_along < 0.0).all()
+    assert (figure.stretched < 0.0).all()
     (claim,) = figure.claims
     assert claim.computed == (0.0, 0.0, 0.0)
     np.testing.assert_allclose(claim.original, (1.88, 6.47, 7.44), atol=0.01)
@@ -174,5 +169,3 @@ def test_report_is_strict_json_and_a_table(results: Results) -> None:
     rows = table[2 : 2 + count]
     assert all(line.startswith(("| Fig.", "| Table", "| Section")) for line in rows)
     assert len({line.count("|") for line in table[: count + 2]}) == 1
-    (parameters,) = [line for line in table if line.startswith("| link_length |")]
-    assert parameters.startswith("| link_length | 0.03 | 0.15 | 0.03* | 0.03* |")

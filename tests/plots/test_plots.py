@@ -98,7 +98,7 @@ def test_experiments_show_the_papers_numbers_beside_the_computed(results: Result
             np.testing.assert_allclose(_shown(computed)[1], unit * trace.computed)
             np.testing.assert_allclose(_shown(printed)[1], unit * trace.paper)
         assert "[N" in figure.axes[-1].get_xlabel()
-        assert "parameters were chosen" in figure.legends[0].get_title().get_text()
+        assert "was fitted" in figure.legends[0].get_title().get_text()
 
 
 @pytest.mark.parametrize("name", ["fig3", "fig4", "fig6", "fig7"])
@@ -222,5 +222,3 @@ def test_shares_are_bars_that_add_up() -> None:
     assert 1e3 * heights == pytest.approx(shares.total)
     names = [label.get_text() for label in axes.get_xticklabels()]
     assert names == [*pose.arm.cables.names, "gravity", "load"]
-
-

@@ -74,17 +74,6 @@ def test_an_arm_beside_errs_by_the_square_of_its_distance() -> None:
     assert errors[0] / errors[1] == pytest.approx(100.0, rel=0.5)
 
 
-def test_each_force_moves_its_own_tip_and_those_that_remember_it() -> None:
-    slopes, h = path().by_forces(U), 1e-4
-    for k in range(len(FORCES)):
-        moved = [FORCES + s * h * np.eye(len(FORCES))[:, [k]] * U for s in (1.0, -1.0)]
-        differences = (path(moved[0]).tips - path(moved[1]).tips) / (2.0 * h)
-        np.testing.assert_allclose(slopes[:, :, k], differences, atol=1e-5 * abs(slopes).max())
-    assert (slopes[np.triu_indices(len(FORCES), 1)[0], :, np.triu_indices(9, 1)[1]] == 0.0).all()
-    # the largest force is remembered on the way down: holes slid as far as it pulled
-    assert abs(slopes[4, :, 3]).max() > 1e-3 * abs(slopes[4, :, 4]).max()
-
-
 def test_a_lead_of_none_is_another_chain() -> None:
     assert same_segments(arm().at(Q), arm(lead=0.2).at(Q))
     assert not same_segments(arm().at(Q), arm(lead=0.0).at(Q))

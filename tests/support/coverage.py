@@ -34,7 +34,7 @@ class Experiment:
     ) -> None:
         self.arm, self.true, self.free = model_of(**true), dict(true), free
         exact = tuple(loop.simulated(self.arm) for loop in planned)
-        self.model = Model.of(model_of, None, exact).weighted(self.true)
+        self.model = Model(model_of, None, exact)
         problem = problem_of(self.model, free)
         self.truth = problem.box.point(np.array(list(true.values())))
         self.jacobian = problem.jacobian(self.truth)
@@ -45,9 +45,7 @@ class Experiment:
         model = replace(self.model, measurements=tuple(loops))
         problem, every = problem_of(model, self.free), list(range(self.truth.size))
         best = _fitted(problem, self.truth, self.jacobian, every)
-        problem = problem_of(model.weighted(problem.parameters(best)), self.free)
         jacobian = problem.jacobian(best)
-        best = _fitted(problem, best, jacobian, every)
         least, found = problem.cost(best), {}
         for i, name in enumerate(self.true):
             others = [j for j in every if j != i]

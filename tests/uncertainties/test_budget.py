@@ -249,7 +249,6 @@ def test_the_band_of_a_fit_is_the_tolerance_of_its_cables() -> None:
     fit = cdsm.fit_tensile_test(
         cdsm.LinearElasticity(48e3).strain(force) * 0.5, force + rng.normal(0.0, 0.5, 300), 0.5
     )
-    assert fit.band is not None
     arm = readme_arm()
     arm = arm.with_cables(
         [replace(cable, elasticity=fit.elasticity) for cable in arm.cables]

@@ -49,33 +49,11 @@ def test_example_data_are_eq_19_integrated() -> None:
 def test_noisy_strand_is_recovered_within_5_percent(seed: int) -> None:
     displacement, force = strand_test(0.5, seed)
     monotone = cdsm.fit_tensile_test(displacement, force, GAUGE)
-    paper = cdsm.fit_tensile_test(displacement, force, GAUGE, "polynomial")
     for tensions in (np.linspace(10.0, 800.0, 400), np.geomspace(10.0, 800.0, 400)):
         assert monotone.elasticity.domain.low < 10.0
         assert monotone.elasticity.domain.high > 800.0
         assert error(monotone.elasticity, tensions) < 0.03
-        # the very family that the data come from: 3 % over log F, where the curve has 2 %
-        assert error(paper.elasticity, tensions) < 0.1
     assert monotone.rms == pytest.approx(0.5, rel=0.15)
-
-
-def test_under_more_noise_polynomials_lose_and_the_curve_does_not() -> None:
-    tensions = np.geomspace(15.0, 800.0, 400)
-    errors = []
-    for seed in range(5):
-        displacement, force = strand_test(2.0, seed)
-        errors.append(
-            [
-                error(
-                    cdsm.fit_tensile_test(displacement, force, GAUGE, how).elasticity,
-                    tensions,
-                )
-                for how in ("monotone", "polynomial")
-            ]
-        )
-    monotone, polynomial = np.median(errors, axis=0)
-    assert monotone < 0.05
-    assert polynomial > monotone
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -222,7 +200,6 @@ def covered(law: str, noise: float, seeds: range) -> Array:
         scatter = noise * np.random.default_rng(seed).normal(size=strain.size)
         force = np.interp(strain, stretch, fine) + scatter
         band = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE).band
-        assert band is not None
         low, high = (np.interp(PLACES, band.tensions, end) for end in (band.low, band.high))
         found.append((low <= truth) & (truth <= high))
     return np.array(found)
@@ -242,7 +219,6 @@ def test_band_contains_its_own_fit_and_few_points_are_told() -> None:
     first = [0, 2.1, 5.2, 9.5, 15, 21.8, 33.5, 47, 66.5]
     force = [*first, 93, 121, 150, 179.5, 240, 301, 363, 425, 488]
     fit = cdsm.fit_tensile_test(1e-4 * np.array(strain), force, 1.0)
-    assert fit.band is not None
     own = fit.elasticity.rigidity(fit.tensions)
     assert (fit.band.low <= own).all()
     assert (own <= fit.band.high).all()
@@ -256,7 +232,6 @@ def test_band_without_noise_is_as_wide_as_the_error_of_the_fit(points: int) -> N
     stretch = np.concatenate([[0.0], np.cumsum(np.diff(F) / toe((F[1:] + F[:-1]) / 2.0))])
     strain = np.linspace(0.0, stretch[-1], points)
     band = cdsm.fit_tensile_test(strain, np.interp(strain, stretch, F), 1.0).band
-    assert band is not None
     truth = toe(band.tensions)
     assert ((band.low <= truth) & (truth <= band.high))[band.tensions > 10.0].mean() > 0.95
 
@@ -267,7 +242,6 @@ def test_band_misses_a_kink_and_what_lies_next_to_it() -> None:
     strain = np.where(F < 200.0, F / 15e3, 200.0 / 15e3 + (F - 200.0) / 45e3)
     force = F + np.random.default_rng(0).normal(size=F.size)
     band = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE).band
-    assert band is not None
     truth = np.where(band.tensions < 200.0, 15e3, 45e3)
     inside = (band.low <= truth) & (truth <= band.high)
     assert inside[(band.tensions > 15.0) & (band.tensions < 800.0)].mean() > 0.85
@@ -278,8 +252,6 @@ def test_fit_is_reproducible_and_reports_itself() -> None:
     displacement, force = strand_test(0.5, 0)
     fit = cdsm.fit_tensile_test(displacement, force, GAUGE)
     again = cdsm.fit_tensile_test(displacement, force, GAUGE)
-    assert fit.band is not None
-    assert again.band is not None
     np.testing.assert_array_equal(fit.band.low, again.band.low)
     assert fit.elasticity == again.elasticity
     for text in ("400 points", "500 mm", "N", "pre-tensioning", "elastic", "rms"):
@@ -436,8 +408,6 @@ def test_other_bad_arguments_are_refused() -> None:
     bad[3] = np.nan
     with pytest.raises(cdsm.InvalidInput, match="force"):
         cdsm.fit_tensile_test(RAMP, bad, GAUGE)
-    with pytest.raises(cdsm.UnknownName, match="monotone"):
-        cdsm.fit_tensile_test(RAMP, PULL, GAUGE, "monoton")
     bent = 500.0 * (RAMP / RAMP[-1]) ** 0.2  # softens from the first point on: never elastic
     with pytest.raises(cdsm.TensileTestError, match="Sample more finely"):
         cdsm.fit_tensile_test(RAMP, bent, GAUGE)

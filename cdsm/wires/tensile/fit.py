@@ -11,12 +11,11 @@ from scipy.special import ndtri
 
 from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput, TensileTestError
-from cdsm.support.validation import RANGES, one_of, scalar
+from cdsm.support.validation import RANGES, scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tolerances import EVERY, Tolerance
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile.loading import FEWEST, Points, loading
-from cdsm.wires.tensile.polynomials import polynomials
 from cdsm.wires.tensile.record import TensileTest
 from cdsm.wires.tensile.spline import NEAR, Curve, fit_curve
 from cdsm.wires.tensile.stages import doubts, pretension_end, refuse_jumps, yield_onset
@@ -24,7 +23,6 @@ from cdsm.wires.tensile.stages import doubts, pretension_end, refuse_jumps, yiel
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_METHODS: Final = ("monotone", "polynomial")
 _CONFIDENCE: Final = 0.95
 _UNKNOWN: Final = 1e9  # largest factor from EA to an end of the band; more would tell nothing
 _EXACT: Final = 1e-4  # error of ln EA without noise: from the grid, and from the fitted table
@@ -101,9 +99,8 @@ class TensileFit(ReadOnlyState):
         rms: Root mean square of measured minus fitted force over the domain [N]. Averaged points
             count as one point.
         tensions: About 200 tensions F over the domain, ascending, shape (n,) [N].
-        band: 95 % confidence :class:`Band` of EA at these tensions; None for ``polynomial``.
+        band: 95 % confidence :class:`Band` of EA at these tensions.
         test: The test.
-        method: ``monotone`` or ``polynomial``.
         start: Displacement at the low end of the domain [m].
         notes: One sentence for each part of the test that was not used, and for each doubt.
     """
@@ -112,15 +109,14 @@ class TensileFit(ReadOnlyState):
     stages: tuple[Stage, ...]
     rms: float
     tensions: Array
-    band: Band | None
+    band: Band
     test: TensileTest
-    method: str
     start: float
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         low, high = self.elasticity.domain
-        return f"<TensileFit {self.method}, {low:.4g} to {high:.4g} N>"
+        return f"<TensileFit, {low:.4g} to {high:.4g} N>"
 
     def __str__(self) -> str:
         low, high = self.elasticity.domain
@@ -128,7 +124,7 @@ class TensileFit(ReadOnlyState):
         return "\n".join(
             [
                 f"Tensile test of {self.test.force.size} points, gauge length "
-                f"{1e3 * self.test.gauge_length:g} mm, fitted by {self.method!r}",
+                f"{1e3 * self.test.gauge_length:g} mm",
                 f"  tension   {low:.4g} N to {high:.4g} N",
                 f"  rigidity  {ends[0]:.4g} N to {ends[1]:.4g} N",
                 f"  rms       {self.rms:.3g} N of force",
@@ -149,11 +145,8 @@ class TensileFit(ReadOnlyState):
         :class:`~cdsm.Tolerance`.
 
         Raises:
-            InvalidInput: ``low`` is not below ``high``, one of them is outside the domain, or the
-                fit is by polynomials: it has no band.
+            InvalidInput: ``low`` is not below ``high``, or one of them is outside the domain.
         """
-        if self.band is None:
-            raise InvalidInput("method", "a fit by polynomials has no band; fit by 'monotone'.")
         first, last = self.band.tensions[[0, -1]].tolist()
         a = first if low is None else scalar("low", low)
         b = last if high is None else scalar("high", high)
@@ -173,19 +166,11 @@ class TensileFit(ReadOnlyState):
         return plot_tensile_fit(self)
 
 
-def fit_tensile_test(
-    displacement: ArrayLike,
-    force: ArrayLike,
-    gauge_length: float,
-    method: str = "monotone",
-    *,
-    join: float = 31.0,
-) -> TensileFit:
+def fit_tensile_test(displacement: ArrayLike, force: ArrayLike, gauge_length: float) -> TensileFit:
     r"""Fit the tangent rigidity EA(F) = l_0 dF/dΔl [N] of a wire to its tensile test.
 
-    ``monotone`` fits the forces by a C1 curve with EA > 0, whose log EA is a spline. Its smoothness
-    follows from the data (restricted likelihood). ``polynomial`` is the method of the paper, for
-    comparison: two polynomials of degree 6 through slopes of the measured curve, without a band.
+    The forces are fitted by a C1 curve with EA > 0, whose log EA is a spline. Its smoothness
+    follows from the data (restricted likelihood).
 
     Points of equal displacement are averaged. The fit ignores unloading, points after the largest
     force, single points far from their neighbours, and slack, which ends where the force rises
@@ -203,20 +188,14 @@ def fit_tensile_test(
         displacement: Δl, shape (n,) [m], in the order recorded.
         force: F, shape (n,) [N].
         gauge_length: l_0 [m].
-        method: ``monotone`` or ``polynomial``.
-        join: Tension at which the two polynomials meet [N].
 
     Raises:
         InvalidInput: An argument is not finite numbers.
-        UnknownName: ``method`` is unknown.
         TensileTestError: The arrays differ in length, there are fewer than 8 points, the gauge
             length is not positive, the wire is compressed, the force does not rise or is
-            discontinuous, the units are impossible (the likely mistake is named), fewer than 8
-            points lie below the yield (20 for polynomials), or the polynomials are not positive on
-            half the range.
+            discontinuous, the units are impossible (the likely mistake is named), or fewer than
+            8 points lie below the yield.
     """
-    one_of("method", method, _METHODS)
-    join = scalar("join", join)
     test = TensileTest(displacement, force, gauge_length)  # type: ignore[arg-type]
     points, noise, notes = loading(test)
     curve = fit_curve(points, noise)
@@ -234,25 +213,16 @@ def fit_tensile_test(
         spread = curve.spread(points)
         notes += (f"plastic from {onset:.4g} N on: left out",)
     refuse_jumps(curve, points)
-    if method == "monotone" and len(points.force) < NEAR:
+    if len(points.force) < NEAR:
         notes += (
             f"{len(points.force)} points, fewer than {NEAR}, give the band: it may contain EA less "
             "often than 95 %, since a bend of EA between two points shows in no scatter. Record "
             "more points where EA bends",
         )
-    elasticity: Elasticity
-    if method == "monotone":
-        elasticity = _as_law(curve, points)
-    else:
-        elasticity, cut = polynomials(points, join)
-        notes += cut
+    elasticity = _as_law(curve, points)
     grid, domain = curve.basis.tensions, elasticity.domain
     tensions = frozen(_grid(domain.first, domain.high, grid))
-    offsets = np.interp(tensions, grid, curve.strain) - elasticity.strain(tensions)
-    # the polynomials do not give the strain at the low end: take the best fit
-    start = (
-        offsets[0] if method == "monotone" else np.average(offsets, weights=np.gradient(tensions))
-    )
+    start = np.interp(tensions[0], grid, curve.strain) - elasticity.strain(tensions[0])
     strain = points.strain - start
     fitted = np.interp(strain, elasticity.strain(tensions), tensions)
     inside = (strain >= 0.0) & (fitted < tensions[-1])
@@ -263,9 +233,8 @@ def fit_tensile_test(
         stages=_stages(tensions, elastic_from, onset, most),
         rms=float(np.sqrt(np.mean((points.force - fitted)[inside] ** 2))),
         tensions=tensions,
-        band=_band(tensions, elasticity, curve, points) if method == "monotone" else None,
+        band=_band(tensions, elasticity, curve, points),
         test=test,
-        method=method,
         start=float(start) * test.gauge_length,
         notes=notes + doubts(points, spread, test.gauge_length),
     )

@@ -15,30 +15,12 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 
 from cdsm import presets
-from cdsm.support.validation import number_array
-from cdsm.support.values import Array, frozen
+from cdsm.paper.strand import HALF_UNITS, JOIN
+from cdsm.support.values import Array
 from cdsm.wires.laws import EQ19_PRINTED
 
-JOIN: Final = 31.0
-"""Tension at which the two branches of Eq. 19 meet [N]."""
-
-LEVEL: Final = (400.0, 810.0)
-"""Range of tension [N] over which the paper calls the rigidity near-constant (Section IV-C)."""
-
-HALF_UNITS: Final = (
-    frozen(np.array([5e-3, 5e-3, 5e-3, 5e-3, 5e-3, 5e-5, 5e-5])),
-    frozen(np.array([5e-2, 5e-3, 5e-3, 5e-5, 5e-9, 5e-12, 5e-15])),
-)
-"""Half a unit of the last printed digit of each coefficient, lowest power first.
-
-The first array belongs to the lower branch of Eq. 19, the second to the upper branch.
-"""
-
-_SAMPLES = 200  # number of tensions at which the lower branch is sampled
-
-_FORCE = 1e4
-"""Unit of rigidity [N] inside the linear programs; it scales them for the solver's tolerances."""
-
+_SAMPLES: Final = 200  # number of tensions at which the lower branch is sampled
+_FORCE: Final = 1e4  # unit of rigidity [N] inside the linear programs, for the solver's tolerances
 _PRINTED, _HALF = np.concatenate(EQ19_PRINTED), np.concatenate(HALF_UNITS)
 
 
@@ -46,8 +28,7 @@ def least_bend() -> tuple[float, float]:
     """Return the slopes dEA/dF [-] just below and just above 31 N whose difference is smallest.
 
     All laws are searched that are continuous at 31 N and round to the printed digits of Eq. 19,
-    except that the coefficient of F⁶ below 31 N may be any number. Even so, the slopes differ: no
-    such law is without a kink.
+    except that the coefficient of F⁶ below 31 N may be any number.
     """
     below, above = _branches(powers(JOIN, slope=True)[0])
     free: list[tuple[float | None, float | None]] = [(-1.0, 1.0)] * 14
@@ -56,23 +37,19 @@ def least_bend() -> tuple[float, float]:
     return float(below @ law), float(above @ law)
 
 
-def band(tension: ArrayLike) -> tuple[Array, Array]:
-    """Find the least and the largest EA [N] that the printed digits allow at each ``tension`` [N].
+def band(tension: Array) -> tuple[Array, Array]:
+    """Find the least and the largest EA (N,) [N] that the printed digits allow at N tensions [N].
 
-    Both results have the shape of ``tension``. All laws are considered that round to the printed
-    digits, are continuous at 31 N, and are not negative below 31 N.
-
-    Raises:
-        InvalidInput: ``tension`` is not finite numbers.
+    All laws are considered that round to the printed digits, are continuous at 31 N, and are not
+    negative below 31 N.
     """
-    values = number_array("tension", tension)
     lower, _ = _branches(powers(np.linspace(presets.STRAND_1X19.low, JOIN, _SAMPLES)))
     ends = []
-    for F in values.ravel():
+    for F in tension:
         row = _branches(powers(F)[0])[0 if F <= JOIN else 1]
         ends.append([row @ _least(sign * row, lower, [(-1.0, 1.0)] * 14) for sign in (1.0, -1.0)])
-    low, high = np.array(ends).reshape(-1, 2).T
-    return frozen(low.reshape(values.shape)), frozen(high.reshape(values.shape))
+    low, high = np.array(ends).T
+    return low, high
 
 
 def powers(tension: ArrayLike, slope: bool = False) -> Array:
@@ -85,11 +62,7 @@ def powers(tension: ArrayLike, slope: bool = False) -> Array:
 
 
 def _branches(rows: Array) -> tuple[Array, Array]:
-    """Extend ``rows`` (..., 7) by zeros, to (..., 14): first for the lower, then the upper branch.
-
-    A result multiplies all coefficients of Eq. 19: columns 0 to 6 those of the lower branch,
-    columns 7 to 13 those of the upper branch. The columns of the other branch are zero.
-    """
+    """Extend ``rows`` (..., 7) by zeros, to (..., 14): for the lower and for the upper branch."""
     none = np.zeros_like(rows)
     return np.hstack([rows, none]), np.hstack([none, rows])
 
