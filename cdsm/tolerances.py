@@ -22,10 +22,12 @@ EVERY: Final = "*"
 COMMON: Final = ("rigidity", "friction")
 """Sources whose inputs share one error by default: wires of one spool, holes of one material."""
 
-_LARGEST = dict.fromkeys(("rigidity", "spring", "friction"), 0.5) | dict.fromkeys(
-    ("joint_angle", "hole_angle"), 0.3
-)
-"""Largest allowed standard uncertainty by source: half of EA or k_series, μ = 0.5, 0.3 rad."""
+_LARGEST = {
+    **dict.fromkeys(("rigidity", "spring"), (0.5, "It is relative.")),
+    **dict.fromkeys(("joint_angle", "hole_angle"), (0.3, "It is in rad.")),
+    "friction": (0.5, "It is a coefficient."),
+}
+"""Largest allowed standard uncertainty of a source, and its unit in words."""
 
 
 @final
@@ -176,16 +178,11 @@ def _checked(source: str, value: object) -> tuple[Tolerance, ...]:
             given = (Tolerance(value, correlation=float(source in COMMON)),)  # type: ignore[arg-type]
     except InvalidInput as error:
         raise InvalidInput(source, str(error).removeprefix("standard: ")) from None
-    largest = _LARGEST.get(source, math.inf)
-    for each in given:
-        if each.standard > largest:
-            unit = "in rad" if "angle" in source else "relative"
-            unit = "a coefficient" if source == "friction" else unit
-            raise InvalidInput(
-                source,
-                f"a standard uncertainty of {each.standard:g} given; up to {largest:g} is a "
-                f"tolerance. It is {unit}.",
-            )
+    largest, unit = _LARGEST.get(source, (math.inf, ""))
+    for u in (each.standard for each in given):
+        if u > largest:
+            said = f"a standard uncertainty of {u:g} given; up to {largest:g} is a tolerance."
+            raise InvalidInput(source, f"{said} {unit}")
     return tuple(each for each in given if each.standard)
 
 
