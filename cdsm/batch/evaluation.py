@@ -169,9 +169,7 @@ def evaluate(
     angles = postures(arm, q)
     rows = len(angles)
     if (direction is None) != set(DIRECTIONAL).isdisjoint(names):
-        raise InvalidInput(
-            "direction", f"belongs to the outputs {', '.join(DIRECTIONAL)}: give both, or neither."
-        )
+        raise InvalidInput("direction", "belongs to the output along: give both, or neither.")
     given, loads, status = _checked_load(arm, angles, tension, wrench)
     bounds = None
     if minimum is not None:

@@ -674,11 +674,11 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
     ),
     "along without direction": (
         lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",)),
-        ("direction: belongs to the outputs along, ", "give both"),
+        ("direction: belongs to the output along: ", "give both"),
     ),
     "direction without along": (
         lambda: cdsm.evaluate(ARM, Q, F, direction=(1, 0, 0)),
-        ("direction: belongs to the outputs along, ",),
+        ("direction: belongs to the output along: ",),
     ),
     "direction zero": (
         lambda: cdsm.evaluate(ARM, Q, F, outputs=("along",), direction=(0, 0, 0)),
