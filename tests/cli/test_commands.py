@@ -52,10 +52,7 @@ def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:
     result = call("reproduce", "--out", tmp_path / "new" / "folder")
     assert result.exit_code == 0, result.output
     written = {path.name: path for path in (tmp_path / "new" / "folder").iterdir()}
-    figures = {f"fig{n}.png" for n in (3, 4, 5, 6, 7, 8, 10, 12, 13)} | {
-        "lead.png",
-        "prototype.png",
-    }
+    figures = {f"fig{n}.png" for n in (3, 4, 5, 6, 7, 8, 10, 12, 13)} | {"lead.png"}
     assert set(written) == figures | {"reproduction.json", "reproduction.md"}
     assert all(written[name].read_bytes().startswith(b"\x89PNG") for name in figures)
     assert "Fig. 6: increment of stiffness" in result.output

@@ -323,7 +323,9 @@ def test_a_model_that_ends_before_the_optimum_is_said() -> None:
             raise cdsm.InvalidInput("lead", "the tube is not that long.")
         return prototype(lead=lead)
 
-    found = identify(model_of, measured(prototype(lead=0.4)), {"lead": (0.05, 1.0)})
+    found = identify(
+        model_of, measured(prototype(lead=0.4)), {"lead": (0.05, 1.0)}, start={"lead": 0.1}
+    )
     assert 0.29 < found.parameters["lead"] <= 0.3
     sentence = next(each for each in found.warnings if "no optimum within the bounds" in each)
     assert "the tube is not that long" in sentence
@@ -346,7 +348,7 @@ def test_the_search_steps_back_from_where_tensions_leave_the_domain_or_the_arm_b
     assert found.warnings == ()
     # springs that soft let the arm buckle
     soft = prototype(drive=3e4)
-    found = identify(prototype, measured(soft, 6), {"drive": (10.0, 1e6)})
+    found = identify(prototype, measured(soft, 6), {"drive": (10.0, 1e6)}, start={"drive": 1e6})
     assert found.parameters["drive"] == pytest.approx(3e4, rel=1e-6)
 
 
