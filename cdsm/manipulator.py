@@ -27,6 +27,7 @@ from cdsm.kernels.segments import SHORTEST_SEGMENT
 from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture, site_paths
 from cdsm.support.files import write_text
+from cdsm.support.format import beyond
 from cdsm.support.validation import flag, instance, vector
 from cdsm.support.values import Array, frozen
 from cdsm.urdf import TIP, to_urdf
@@ -227,14 +228,17 @@ class Manipulator(ArmFacts):
         """Check joint angles (nv,) [rad] and return them read-only."""
         q = vector("q", q, self.nv, self._meaning_of_q)
         if flag("check_limits", check_limits):
-            beyond = self._model.beyond_limits(q)
-            if np.count_nonzero(beyond):
-                raise JointLimitError(
-                    [self.joint_names[i] for i in np.flatnonzero(beyond)],
-                    q[beyond].tolist(),
-                    list(zip(self.lower[beyond], self.upper[beyond], strict=True)),
-                    [self.joint_units[i] for i in np.flatnonzero(beyond)],
-                )
+            out = np.flatnonzero(self._model.beyond_limits(q)).tolist()
+            if out:
+                names = [self.joint_names[i] for i in out]
+                limits = [(float(self.lower[i]), float(self.upper[i])) for i in out]
+                units = [self.joint_units[i] for i in out]
+                units = [self.joint_units[i] for i in out]
+                texts = [
+                    beyond(name, q[i], *limit, unit)
+                    for i, name, limit, unit in zip(out, names, limits, units, strict=True)
+                ]
+                raise JointLimitError(texts, names, q[out].tolist(), limits)
         return q
 
     @cached_property

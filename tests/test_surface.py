@@ -452,7 +452,7 @@ ERRORS: tuple[cdsm.CdsmError, ...] = (
     cdsm.GeometryError(["a: is missing", "b: is odd"], "arm.toml"),
     cdsm.UrdfError("is no robot."),
     cdsm.CableError("cable1_1", "is too short."),
-    cdsm.JointLimitError(["joint1"], [2.0], [(-1.0, 1.0)]),
+    cdsm.JointLimitError(["joint1 is at 2 rad"], ["joint1"], [2.0], [(-1.0, 1.0)]),
     cdsm.ElasticityRangeError("outside.", [900.0], [3], ["cable1_1"]),
     cdsm.InfeasibleDesign("none meets all", ["held"], [0.02, 3.0]),
     cdsm.InfeasibleTension(np.array([0.1, -0.2]), "joint2", 3.5, ["cable1_1"]),

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self, final
 
-from cdsm.errors import CdsmError, FileError, GeometryError, InvalidInput, counted
+from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import read_toml, toml_value
 from cdsm.support.validation import one_of, sequence_of
@@ -131,7 +131,9 @@ class Tolerances:
             own = table.get("tolerances", table)
             return from_table(own if isinstance(own, dict) else table)
         except GeometryError as error:
-            raise FileError(path, f"does not hold tolerances, {counted(error.faults)}") from None
+            raise FileError(
+                path, f"does not hold tolerances:{listed(error.faults, 20, LINES)}"
+            ) from None
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write a TOML file from which :meth:`read` builds equal tolerances; return its path.
