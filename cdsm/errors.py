@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    Array = NDArray[np.float64]
+
 LINES = "\n  - "
 """Separator of :func:`listed` that puts each text on a line of its own."""
 
@@ -229,7 +231,7 @@ class InfeasibleTension(CdsmError):
 
     def __init__(
         self,
-        missing: NDArray[np.float64],
+        missing: Array,
         joint: str,
         relaxation: float,
         binding: Sequence[str],
@@ -280,7 +282,7 @@ class SingularStiffness(CdsmError, ArithmeticError):
             (3,) in base axes in which the tip cannot move.
     """
 
-    def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:
+    def __init__(self, problem: str, direction: Array) -> None:
         super().__init__(problem)
         self.direction = direction
 
@@ -288,7 +290,7 @@ class SingularStiffness(CdsmError, ArithmeticError):
 class SingularMass(CdsmError, ArithmeticError):
     """A joint motion, the unit vector ``direction`` (nv,), that moves no mass."""
 
-    def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:
+    def __init__(self, problem: str, direction: Array) -> None:
         super().__init__(problem)
         self.direction = direction
 
@@ -305,7 +307,7 @@ class EquilibriumError(CdsmError, ArithmeticError):
     def __init__(
         self,
         problem: str,
-        residual: NDArray[np.float64],
+        residual: Array,
         load_factor: float,
         joint: str,
         remedy: str = "Reduce the load, or stiffen the arm: raise the tensions, or take stiffer "
@@ -330,12 +332,7 @@ class UnreachableStiffness(CdsmError):
     """
 
     def __init__(
-        self,
-        direction: NDArray[np.float64],
-        target: float,
-        low: float,
-        high: float,
-        nearest: Sequence[float],
+        self, direction: Array, target: float, low: float, high: float, nearest: Sequence[float]
     ) -> None:
         self.direction = direction
         self.target = target

@@ -236,5 +236,9 @@ def _reading_faults(
         if (abs(theirs - ours) > _ROUNDING * np.outer(size, size)).any():
             masses = f"{theirs[3, 3]:g} kg instead of {ours[3, 3]:g} kg"
             yield f"link {listed(names[row])}: Pinocchio read {masses}, or another inertia"
-    if bare := [link for row in names if row and not given[row, 3, 3] for link in names[row]]:
+    turning = [joint for joint in joints if joint.get("type") != "fixed"]
+    # the cross of a universal joint has no length and may have no mass
+    crosses = {_ends(j)[0] for j in turning if not _vector(j.find("origin"), "xyz").any()}
+    massless = [link for row in names if row and not given[row, 3, 3] for link in names[row]]
+    if bare := [link for link in massless if link not in crosses]:
         warn(f"links that move without mass: {listed(bare)}. Gravity does not act on them.")

@@ -1,6 +1,7 @@
 """URDFs of strangers: what is let in, and that everything else is refused by name."""
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,10 @@ def test_links_that_move_without_mass_are_noted() -> None:
     assert inertial is not None
     with pytest.warns(cdsm.CdsmWarning, match="links that move without mass: l1"):
         gripper(inertial[0], "")
+    cross = GRIPPER.replace(inertial[0], "").replace('<origin xyz="0.1 0 0"/>', "")
+    with warnings.catch_warnings():  # l1 is now the cross of a universal joint
+        warnings.simplefilter("error")
+        read_urdf(cross)
 
 
 # --- files ----------------------------------------------------------------------------------
