@@ -100,6 +100,8 @@ class Manipulator(ArmFacts):
         """Build an arm from a URDF and cables: a tree of revolute, prismatic and fixed joints.
 
         For prismatic joints the coordinate is in m, the torque in N and the stiffness in N/m.
+        :attr:`urdf` has all numbers of the text written anew. A :class:`CdsmWarning` names joints
+        with limits beyond two turns, as if in degrees, and links that move without mass.
 
         Args:
             urdf: Path of the URDF file, or its text.
