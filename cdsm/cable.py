@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.elasticity import Elasticity, tension_at
 from cdsm.elasticity.answers import energy_of, rigidity_of, strain_of
 from cdsm.elasticity.law import checked_law
-from cdsm.errors import CableError, CdsmError, InvalidInput, named
+from cdsm.errors import CableError, CdsmError, InvalidInput, listed
 from cdsm.support.format import plural
 from cdsm.support.validation import (
     number_array,
@@ -232,7 +232,7 @@ class Cables(tuple[Cable, ...]):
         return np.array([cable.control == "position" for cable in self])
 
     def __repr__(self) -> str:
-        return f"<{plural(len(self), 'cable')}: {named(self.names)}>"
+        return f"<{plural(len(self), 'cable')}: {listed(self.names)}>"
 
     @overload
     def __getitem__(self, which: SupportsIndex | str, /) -> Cable: ...

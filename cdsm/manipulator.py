@@ -27,6 +27,7 @@ from cdsm.kernels.segments import SHORTEST_SEGMENT
 from cdsm.kernels.tree import Frames
 from cdsm.posture import Posture, site_paths
 from cdsm.support.files import write_text
+from cdsm.support.format import beyond
 from cdsm.support.validation import flag, instance, vector
 from cdsm.support.values import Array, frozen
 from cdsm.urdf import TIP, to_urdf
@@ -99,6 +100,8 @@ class Manipulator(ArmFacts):
         """Build an arm from a URDF and cables: a tree of revolute, prismatic and fixed joints.
 
         For prismatic joints the coordinate is in m, the torque in N and the stiffness in N/m.
+        :attr:`urdf` has all numbers of the text written anew. A :class:`CdsmWarning` names joints
+        with limits beyond two turns, as if in degrees, and links that move without mass.
 
         Args:
             urdf: Path of the URDF file, or its text.
@@ -227,14 +230,17 @@ class Manipulator(ArmFacts):
         """Check joint angles (nv,) [rad] and return them read-only."""
         q = vector("q", q, self.nv, self._meaning_of_q)
         if flag("check_limits", check_limits):
-            beyond = self._model.beyond_limits(q)
-            if np.count_nonzero(beyond):
-                raise JointLimitError(
-                    [self.joint_names[i] for i in np.flatnonzero(beyond)],
-                    q[beyond].tolist(),
-                    list(zip(self.lower[beyond], self.upper[beyond], strict=True)),
-                    [self.joint_units[i] for i in np.flatnonzero(beyond)],
-                )
+            out = np.flatnonzero(self._model.beyond_limits(q)).tolist()
+            if out:
+                names = [self.joint_names[i] for i in out]
+                limits = [(float(self.lower[i]), float(self.upper[i])) for i in out]
+                units = [self.joint_units[i] for i in out]
+                units = [self.joint_units[i] for i in out]
+                texts = [
+                    beyond(name, q[i], *limit, unit)
+                    for i, name, limit, unit in zip(out, names, limits, units, strict=True)
+                ]
+                raise JointLimitError(texts, names, q[out].tolist(), limits)
         return q
 
     @cached_property

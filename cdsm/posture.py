@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import cdsm
 from cdsm.cable import Cable
 from cdsm.cable_chains import Segments
-from cdsm.errors import InvalidInput, first_of
+from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.contacts import overlapping
 from cdsm.kernels import chains as chain_kernels
 from cdsm.kernels import stiffness as stiffness_kernels
@@ -175,7 +175,7 @@ class Posture(ReadOnlyState):
         pairs = [" and ".join(pair) for pair in self.self_contacts]
         if not pairs:
             return ()
-        return (f"the arm passes through itself: {first_of(pairs, 3, 'pairs of links')}",)
+        return (f"the arm passes through itself: {listed(pairs, 3, '; ')}",)
 
     @cached_property
     def segments(self) -> Segments:

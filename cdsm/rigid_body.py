@@ -133,6 +133,11 @@ class RigidBody:
             point=tip.placement.translation.copy(),
         )
 
+    def pseudo_inertias(self) -> Array:
+        """Compute :func:`pseudo_inertia` (1 + nv, 4, 4) of what the base and the joints carry."""
+        bodies = [self._model.inertias[i] for i in (0, *self._ids)]
+        return np.array([pseudo_inertia(each.mass, each.lever, each.inertia) for each in bodies])
+
     def tip(self, q: Array) -> tuple[Array, Array]:
         """Compute the pose (4, 4) of the tip and its Jacobian (6, nv), at joint angles q (nv,).
 
@@ -219,6 +224,28 @@ def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]
         )
         raise InvalidInput("joint_names", f"{faults}; name each joint that moves once.")
     return wanted
+
+
+def pseudo_inertia(mass: float, centre: Array, inertia: Array) -> Array:
+    """Compute the second moments ∫(r, 1)(r, 1)ᵀ dm (4, 4) of a body, which add up.
+
+    ``inertia`` (3, 3) is about the centre of mass.
+    """
+    moments = np.empty((4, 4))
+    about_centre = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    moments[:3, :3] = about_centre + mass * np.outer(centre, centre)
+    moments[:3, 3] = moments[3, :3] = mass * centre
+    moments[3, 3] = mass
+    return moments
+
+
+def accepts(urdf: str) -> bool:
+    """Return whether Pinocchio reads a URDF."""
+    try:
+        pin.buildModelFromXML(urdf)
+    except ValueError:
+        return False
+    return True
 
 
 def rotation_vector(rotation: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from cdsm.arm_model import GRAVITY, ArmParts
 from cdsm.cable import Cable
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import LinearElasticity
-from cdsm.errors import FileError, GeometryError, UnknownName, UrdfError, counted
+from cdsm.errors import LINES, FileError, GeometryError, UnknownName, UrdfError, listed
 from cdsm.geometry import Geometry, split_geometry
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.geometry.tables import build, lines_of
@@ -109,7 +109,7 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     if not faults:
         cables = attempt(build_cables, routed, keys, wires, path)
     if faults or keys is None or cables is None or tolerances is None:
-        raise FileError(path, f"cannot be read as an arm, {counted(faults)}")
+        raise FileError(path, f"cannot be read as an arm:{listed(faults, 20, LINES)}")
     g, length = keys.gravity, keys.original_length
     if robot is None:
         assert geometry is not None

@@ -20,7 +20,15 @@ from cdsm.arm_file.wires import (
 )
 from cdsm.cable import Cable, Site
 from cdsm.elasticity import LinearElasticity
-from cdsm.errors import CableError, FileError, GeometryError, InvalidInput, MissingWire, counted
+from cdsm.errors import (
+    LINES,
+    CableError,
+    FileError,
+    GeometryError,
+    InvalidInput,
+    MissingWire,
+    listed,
+)
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import (
     Friction,
@@ -121,7 +129,7 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
         return build_cables(read_routed(keys.cables), keys, wires, path)
     except GeometryError as error:
         faults = error.faults
-    raise FileError(path, f"cannot be read as cables, {counted(faults)}")
+    raise FileError(path, f"cannot be read as cables:{listed(faults, 20, LINES)}")
 
 
 _ANY = LinearElasticity(1.0)

@@ -18,7 +18,7 @@ from cdsm.control.schedule import Schedule, checked_plan
 from cdsm.control.schedule import tension_controlled as choose_cables
 from cdsm.control.sensors import Sensors
 from cdsm.control.stiffness_loop import StiffnessLoop
-from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, named
+from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, listed
 from cdsm.planning.path import checked_rate
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support import progress
@@ -102,7 +102,7 @@ def track(
     if own != its:
         other = sorted({*own} ^ {*its}) or its
         raise InvalidInput(
-            "plant", f"its arm and that of the plan differ in joints or cables: {named(other)}."
+            "plant", f"its arm and that of the plan differ in joints or cables: {listed(other)}."
         )
     schedule = Schedule.of(plan, whole_number("steps", steps, 1, _MOST_STEPS))
     size = len(schedule.references)

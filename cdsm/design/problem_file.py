@@ -15,7 +15,7 @@ from pydantic import Field
 from cdsm.design.goals import Constraint, Objective
 from cdsm.design.problem import DesignProblem
 from cdsm.design.variables import Variable
-from cdsm.errors import CdsmError, FileError, GeometryError, InvalidInput, counted
+from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput, listed
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import read_text
 from cdsm.support.format import plural
@@ -131,7 +131,7 @@ def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
         raise
     except CdsmError as error:
         faults = (str(error),)
-    raise FileError(path, f"is no design problem, {counted(faults)}")
+    raise FileError(path, f"is no design problem:{listed(faults, 20, LINES)}")
 
 
 def _problem(file: _File, folder: Path) -> DesignProblem:

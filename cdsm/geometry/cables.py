@@ -9,7 +9,7 @@ from dataclasses import replace
 from cdsm.cable import Cable, Control, Site
 from cdsm.elasticity import Elasticity
 from cdsm.elasticity.law import checked_law
-from cdsm.errors import InvalidInput, named
+from cdsm.errors import InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.support.validation import instance
 
@@ -88,7 +88,7 @@ def require_own_cables(geometry: Geometry, cables: Sequence[Cable]) -> None:
     ]:
         raise InvalidInput(
             "arm",
-            f"the lead or the holes of {named(moved)} are not those of its geometry, which "
+            f"the lead or the holes of {listed(moved)} are not those of its geometry, which "
             "alone is varied. Give them in the geometry.",
         )
 

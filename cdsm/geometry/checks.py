@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from cdsm.errors import first_of
+from cdsm.errors import listed
 from cdsm.geometry.holes import sharing
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def faults_of(geometry: GeometryFields) -> list[str]:
     ]
     if small:
         faults.append(
-            f"disk_radius: too small: {first_of(small, 1, 'joints')}; give more, or leave it out"
+            f"disk_radius: too small: {listed(small, 1, '; ')}; give more, or leave it out"
         )
     return faults
 
@@ -78,7 +78,7 @@ def _short_links(geometry: GeometryFields) -> list[str]:
     ]
     if not short:
         return []
-    names = first_of(short, 1, "links")
+    names = listed(short, 1, "; ")
     return [f"disk_offset: too large: {names}; lower disk_offset, or lengthen the links"]
 
 
@@ -128,7 +128,7 @@ def doubts_about(geometry: GeometryFields) -> list[str]:
     ]
     if groups:
         doubts.append(
-            f"cables share holes: {first_of(groups, 4, 'holes')}. Two cables in one hole rub, and "
+            f"cables share holes: {listed(groups, 4, '; ')}. Two cables in one hole rub, and "
             "few disks are built so. Set them apart by spread=, phase= or hole_angles=."
         )
     return doubts

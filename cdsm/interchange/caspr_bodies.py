@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from cdsm.errors import FileError, counted
+from cdsm.errors import LINES, FileError, listed
 from cdsm.support.directions import AXES
 from cdsm.support.files import read_text
 from cdsm.support.values import Array
@@ -196,7 +196,7 @@ def whole(where: str, text: str | None) -> int:
 def refuse(path: Path, faults: Sequence[str]) -> None:
     """Raise a FileError that lists all ``faults`` of the file, if there are any."""
     if faults:
-        raise FileError(path, f"cannot be read as a CASPR model, {counted(faults, most=20)}")
+        raise FileError(path, f"cannot be read as a CASPR model:{listed(faults, 20, LINES)}")
 
 
 def read_root(path: Path, tag: str, template: str) -> etree._Element:

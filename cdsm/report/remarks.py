@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.errors import named
+from cdsm.errors import listed
 from cdsm.geometry import doubts_about_units
 from cdsm.stiffness_matrix.prints import missing_leads
 
@@ -111,15 +111,15 @@ def _of_tensions(report: Report) -> Iterator[str]:
     locked = [each for each in report.cables if each.control == "position"]
     taut = [each for each in locked if not each.is_slack]
     if slack := [each.name for each in locked if each.is_slack]:
-        yield f"slack cables, 0 N: {named(slack)}. They stiffen one direction; raise minimum=."
+        yield f"slack cables, 0 N: {listed(slack)}. They stiffen one direction; raise minimum=."
     if forced := [each.name for each in report.cables if each.control == "force"]:
-        yield f"force-controlled, no passive stiffness: {named(forced)}."
+        yield f"force-controlled, no passive stiffness: {listed(forced)}."
     low = [each.name for each in taut if each.below <= CLOSE * each.tension]
     high = [each.name for each in taut if each.above <= CLOSE * each.tension]
     for names, end in ((low, "low"), (high, "high")):
         if names:
             yield (
-                f"within {100.0 * CLOSE:g} % of the {end} end of their law: {named(names)}. "
+                f"within {100.0 * CLOSE:g} % of the {end} end of their law: {listed(names)}. "
                 "The law is not defined beyond it."
             )
     yield from missing_leads(K)

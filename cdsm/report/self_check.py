@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, final
 
 import numpy as np
 
-from cdsm.errors import CdsmError, first_of
+from cdsm.errors import CdsmError, listed
 from cdsm.report.differences import Estimates, Noise, Sampled, gradients, hessians
 from cdsm.report.facts import torque_size
 from cdsm.report.potential import Neighbourhood
@@ -192,7 +192,7 @@ def _recomputed_terms(near: Neighbourhood) -> tuple[list[_SecondValue], list[_Se
         gradients, near, near.kinematic_torques, near.kinematic_torque_noise, step
     )
     if one_sided := [reason for cable in near.locked for reason in cable.one_sided()]:
-        named = first_of(one_sided, _NAMED, "cables")
+        named = listed(one_sided, _NAMED, "; ")
         stored = stretched = [_SecondValue(None, f"K_θ has another value on either side: {named}.")]
     else:
         step = near.first_elastic_step

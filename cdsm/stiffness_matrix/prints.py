@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdsm.errors import SingularStiffness
-from cdsm.errors.base import named
+from cdsm.errors import SingularStiffness, listed
 from cdsm.stiffness_matrix.cartesian import axis_of
 from cdsm.support.format import MODEL, key, plain
 
@@ -89,7 +88,7 @@ def missing_leads(K: Stiffness) -> tuple[str, ...]:
     if not lost:
         return ()
     return (
-        f"the series spring stretches by more than the whole cable is long: {named(lost)}. "
+        f"the series spring stretches by more than the whole cable is long: {listed(lost)}. "
         "Give a longer lead; without it K is off by up to F/EA.",
     )
 

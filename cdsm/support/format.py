@@ -81,15 +81,6 @@ def beyond(joint: str, value: float, low: float, high: float, unit: str) -> str:
     return f"{said} ({value:.4g} {unit} of {low:.4g} to {high:.4g} {unit})"
 
 
-def distinct_texts(values: Sequence[float]) -> list[str]:
-    """Return numbers as text with four digits, or more if different numbers would look the same."""
-    for digits in (4, 6, 8, 12):
-        texts = [f"{value:.{digits}g}" for value in values]
-        if len(set(texts)) == len(set(values)):
-            break
-    return texts
-
-
 def key(name: str, unit: str) -> str:
     """Return a JSON key with unit: ``margin`` in ``N m/rad`` becomes ``margin_Nm_per_rad``."""
     words = unit.replace("N m", "Nm").replace("/", " per ").split()

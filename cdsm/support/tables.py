@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
-from cdsm.errors import FileError, named
+from cdsm.errors import FileError, listed
 from cdsm.support.files import read_text
 from cdsm.support.records import misspelt
 from cdsm.support.values import Array
@@ -206,7 +206,7 @@ def named_columns(
             refuse(f"has a column {name}, which is not known{meant} Rename it")
         begin = _NUMBERED.match(name)
         if name not in known and begin and begin[0] in kinds:
-            refuse(f"has a column {name}, which is not known; there are {named(known)}")
+            refuse(f"has a column {name}, which is not known; there are {listed(known)}")
         found[name] = at, unit
     return found
 

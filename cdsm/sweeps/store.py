@@ -28,7 +28,7 @@ from xarray.core.indexing import (
     explicit_indexing_adapter,
 )
 
-from cdsm.errors import FileError, StoreError, listed
+from cdsm.errors import LINES, FileError, StoreError, listed
 from cdsm.support.files import require_folder
 from cdsm.sweeps.description import changed_laws
 from cdsm.sweeps.quantities import QUANTITIES
@@ -266,7 +266,7 @@ def _check(path: Path, specification: Specification) -> None:
         raise StoreError(
             path,
             "contains another sweep; repeat that one, or give another path to store=:"
-            + listed(different, most=8),
+            + listed(different, 8, LINES),
             different,
         )
 

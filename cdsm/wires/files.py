@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from cdsm.elasticity import Elasticity, LinearElasticity, SlackBelow
-from cdsm.errors import FileError, GeometryError, InvalidInput, listed
+from cdsm.errors import LINES, FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import Number, Rigidity, parse, read_toml, record, toml_lines
 from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
@@ -124,4 +124,4 @@ def read_elasticity(path: str | os.PathLike[str]) -> Elasticity:
         faults = error.faults
     except InvalidInput as error:
         faults = (str(error),)
-    raise FileError(path, f"is not an elasticity, {len(faults)} found:{listed(faults)}")
+    raise FileError(path, f"is not an elasticity:{listed(faults, 20, LINES)}")

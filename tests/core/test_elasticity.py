@@ -289,7 +289,7 @@ def test_tension_outside_the_domain_is_an_error_with_data(method: str) -> None:
     assert caught.value.tension == (2.2, 900.0)
     assert caught.value.indices == (1, 2)
     assert caught.value.cables == ()
-    for part in ("2.2, 900 N", "(2.2 N, 810 N]", "minimum="):
+    for part in ("2.2 N, 900 N", "(2.2 N, 810 N]", "minimum="):
         assert part in str(caught.value)
 
 
@@ -302,7 +302,7 @@ def test_linear_law_refuses_negative_tension(method: str) -> None:
 
 
 def test_long_list_of_offenders_is_cut_in_the_message_not_in_the_data() -> None:
-    with pytest.raises(cdsm.ElasticityRangeError, match=r", … N") as caught:
+    with pytest.raises(cdsm.ElasticityRangeError, match=r"N, and \d+ more") as caught:
         STRAND.rigidity(np.full(1000, 900.0))
     assert len(caught.value.tension) == 1000
     assert len(str(caught.value)) < 400

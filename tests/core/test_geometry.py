@@ -248,7 +248,7 @@ FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
     "number for a name": ({"name": 3}, ["name", "valid string", "3"]),
     "overlapping disks": (
         {"link_length": 0.019},
-        ["disk_offset: too large", "0.019 m", "0.02 m; and 3 links more; lower disk_offset"],
+        ["disk_offset: too large", "0.019 m", "0.02 m; and 3 more; lower disk_offset"],
     ),
     "touching disks": (
         {"link_length": 0.02},
@@ -327,7 +327,7 @@ def test_every_fault_is_listed_at_once() -> None:
     with pytest.raises(cdsm.GeometryError) as caught:
         cdsm.Geometry.universal(**{**UNIVERSAL, **faulty})
     assert [fault.split(":")[0] for fault in caught.value.faults] == list(faulty)
-    assert "5 faults" in str(caught.value)
+    assert len(caught.value.faults) == 5
     assert all(fault in str(caught.value) for fault in caught.value.faults)
 
 

@@ -7,7 +7,9 @@ import cdsm
 from cdsm.support.status import Status, summary
 
 ERRORS: dict[Status, cdsm.CdsmError] = {
-    Status.BEYOND_LIMITS: cdsm.JointLimitError(["joint1"], [2.0], [(-1.0, 1.0)]),
+    Status.BEYOND_LIMITS: cdsm.JointLimitError(
+        ["joint1 is at 2 rad"], ["joint1"], [2.0], [(-1.0, 1.0)]
+    ),
     Status.COINCIDENT_SITES: cdsm.CableError("cable1", "its sites coincide."),
     Status.INFEASIBLE: cdsm.InfeasibleTension(np.ones(1), "joint1", 1.0, ["cable1"]),
     Status.SOLVER_FAILED: cdsm.SolverError("daqp", "failed."),

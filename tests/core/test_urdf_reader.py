@@ -1,12 +1,20 @@
 """URDFs of strangers: what is let in, and that everything else is refused by name."""
 
+import re
+import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
+from lxml import etree
 
 import cdsm
 from cdsm.support.xml import DEEPEST
 from cdsm.urdf_reader import read_urdf
+
+DATA = Path(__file__).parents[1] / "data"
+GRIPPER = (DATA / "gripper.urdf").read_text(encoding="utf-8")
+CABLES = cdsm.read_cables(DATA / "gripper_cables.toml")
 
 LINK = (
     '<link name="{0}"><inertial><mass value="0.2"/>'
@@ -39,11 +47,96 @@ def changed(before: str, after: str) -> str:
     return text.replace(before, after, 1)
 
 
+def gripper(before: str = "", after: str = "") -> cdsm.Manipulator:
+    assert before in GRIPPER
+    text = GRIPPER.replace(before, after, 1) if before else GRIPPER
+    return cdsm.Manipulator.from_urdf(text, CABLES, tip="fl")
+
+
+# --- numbers --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("", ""),
+        ('<mass value="0.1"/>', '<mass value="0.1 "/>'),
+        ('<origin xyz="0.1 0 0"/>', '<origin xyz="0.1\t0\t0"/>'),
+    ],
+)
+def test_a_blank_or_tab_changes_no_tension(before: str, after: str) -> None:
+    pose = gripper(before, after).at(np.deg2rad([10.0, 10.0]))
+    pull = cdsm.distribute_tension(pose, minimum=10.0)
+    assert pull["j1up"] == pytest.approx(29.100, abs=1e-3)
+
+
+@pytest.mark.parametrize("blank", [" ", "\t", "\n", "&#9;", "&#10;", "&#13;", "\u00a0", "\u2009"])
+def test_white_space_around_numbers_changes_nothing(
+    blank: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    text = GRIPPER.replace(
+        "<inertial>", '<visual><geometry><box size="1 2 3"/></geometry></visual><inertial>'
+    )
+    numbers = re.compile(r'(?<=\s)(xyz|value|size|i..|lower|upper|effort|velocity)="([^"]*)"')
+    plain = read_urdf(text)
+    found = list(numbers.finditer(text))
+    assert len(found) > 50
+    for each in found:
+        spaced = f'{each[1]}="{blank}{blank.join(each[2].split(" "))}{blank}"'
+        assert read_urdf(text[: each.start()] + spaced + text[each.end() :]) == plain
+    everywhere = numbers.sub(rf'\1="{blank}\2{blank}"', text).replace(" 0", f"{blank}0")
+    assert read_urdf(everywhere) == plain
+    assert capfd.readouterr().err == ""  # Pinocchio complains of nothing
+
+
+def test_numbers_keep_every_digit() -> None:
+    text = read_urdf(changed("1e-4", "1.00000000000000023E-4 "))
+    inertia = etree.fromstring(text).find("link/inertial/inertia")
+    assert float(str(inertia.get("ixx"))) == 1.00000000000000023e-4
+    assert read_urdf(text) == text
+
+
+def test_masses_that_pinocchio_would_read_otherwise_are_errors(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("cdsm.urdf_reader._number_faults", lambda element: iter(()))
+    with pytest.raises(cdsm.UrdfError, match=r"link l2, fl, fr: Pinocchio read 0\.04 kg"):
+        gripper('<mass value="0.1"/>', '<mass value="0.1 "/>')
+
+
+def test_an_axis_left_out_is_x() -> None:
+    joint = '<origin xyz="0.1 0 0"/><axis xyz="0 1 0"/>'
+    arm = gripper(joint, joint.replace('<axis xyz="0 1 0"/>', ""))
+    np.testing.assert_allclose(arm.at([0.0, 0.3]).jacobian[3:, 1], [1.0, 0.0, 0.0], atol=1e-15)
+
+
+# --- doubts ---------------------------------------------------------------------------------
+
+
+def test_limits_that_look_like_degrees_are_doubted() -> None:
+    with pytest.warns(cdsm.CdsmWarning, match=r"joint j2: limits -90 to 90 rad .* Degrees\?"):
+        gripper('lower="-1" upper="1"', 'lower="-90" upper="90"')
+
+
+def test_links_that_move_without_mass_are_noted() -> None:
+    inertial = re.search("<inertial>.*?</inertial>", GRIPPER)
+    assert inertial is not None
+    with pytest.warns(cdsm.CdsmWarning, match="links that move without mass: l1"):
+        gripper(inertial[0], "")
+    cross = GRIPPER.replace(inertial[0], "").replace('<origin xyz="0.1 0 0"/>', "")
+    with warnings.catch_warnings():  # l1 is now the cross of a universal joint
+        warnings.simplefilter("error")
+        read_urdf(cross)
+
+
+# --- files ----------------------------------------------------------------------------------
+
+
 def test_text_and_file_are_read_alike(tmp_path: Path) -> None:
     text = robot(*chain())
     path = tmp_path / "bot.urdf"
     path.write_text(text, encoding="utf-8")
-    assert read_urdf(text) == read_urdf(path) == read_urdf(str(path)) == text
+    assert read_urdf(text) == read_urdf(path) == read_urdf(str(path))
 
 
 def test_declaration_and_byte_order_mark_are_no_faults(tmp_path: Path) -> None:
@@ -55,7 +148,9 @@ def test_declaration_and_byte_order_mark_are_no_faults(tmp_path: Path) -> None:
 
 def test_generated_arms_pass() -> None:
     arm = cdsm.presets.virtual_prototype()
-    assert read_urdf(arm.urdf) == arm.urdf
+    again = cdsm.Manipulator.from_urdf(arm.urdf, arm.cables, tip="tool0", gravity="-y")
+    q = np.full(arm.nv, 0.1)
+    np.testing.assert_array_equal(again.at(q).gravity_torque, arm.at(q).gravity_torque)
 
 
 @pytest.mark.parametrize(
@@ -69,23 +164,19 @@ def test_generated_arms_pass() -> None:
         (changed('type="revolute"', 'type="planar"'), "two prismatic and one revolute"),
         (changed('type="revolute"', 'type="bendy"'), "one of revolute, prismatic, fixed"),
         (changed("<axis", '<mimic joint="j2"/><axis'), "joint j1: mimics"),
-        (changed('xyz="0 1 0"', 'xyz="0 0 0"'), "joint j1: axis '0 0 0' has no direction"),
+        (changed('xyz="0 1 0"', 'xyz="0 0 0"'), "joint j1: its axis has no direction"),
         (changed('xyz="0 1 0"', 'xyz="0 1"'), "3 numbers are needed"),
         (changed('xyz="0 1 0"', 'xyz="0 nan 0"'), "it must be finite"),
-        (changed('lower="-1"', 'lower="2"'), "joint j1: lower limit 2 above the upper one 1"),
-        (changed('lower="-1"', 'lower="-inf"'), "j1: lower limit: '-inf' given"),
-        (changed("<axis", "<orgin/><axis"), "joint j1: <orgin> is not known; did you mean origin?"),
         (
-            changed("<axis", '<origin rpy_="0 0 1"/><axis'),
-            "joint j1: <origin> has rpy_, which is not known; did you mean rpy?",
+            changed('lower="-1"', 'lower="2"'),
+            "joint j1: lower limit 2 above 1; a revolute",
         ),
-        (changed('xyz="0 1 0"', 'xzy="0 1 0"'), "joint j1: <axis> has xzy"),
+        (changed('lower="-1"', 'lower="-inf"'), "joint j1: lower of <limit>: '-inf' given"),
+        (changed('xyz="0 1 0"', 'xzy="0 1 0"'), "joint j1: <axis> has no xyz"),
         (changed("<axis", "<origin/><origin/><axis"), "joint j1: has 2 <origin>; one is needed"),
-        (changed('<link name="a">', '<link name="a"><inertail/>'), "link a: <inertail> is not"),
-        (changed("<joint", '<jiont name="j0"/><joint'), "<jiont> is not known"),
         (
             changed("<link", '<xacro:arm xmlns:xacro="http://ros.org/wiki/xacro"/><link'),
-            "<xacro:arm> is left; run xacro",
+            "is a xacro file; run xacro on it first",
         ),
         (changed(' effort="1"', ""), 'joint j1: <limit> has no effort; write effort="0"'),
         (
@@ -93,8 +184,11 @@ def test_generated_arms_pass() -> None:
             "j1: has no <limit>",
         ),
         (changed('<mass value="0.2"/>', '<mass value="-0.2"/>'), "link a: mass -0.2 kg"),
-        (changed('<mass value="0.2"/>', '<mass value="1,5"/>'), "link a: mass: '1,5' given"),
-        (changed('<mass value="0.2"/>', ""), "link a: mass"),
+        (
+            changed('<mass value="0.2"/>', '<mass value="1,5"/>'),
+            "a: value of <mass>: '1,5' given",
+        ),
+        (changed('<mass value="0.2"/>', ""), "link a: has no <mass>"),
         (changed('ixx="1e-4"', 'ixx="3e-4"'), "link a: principal moments"),
         (changed('ixx="1e-4"', 'ixx="-1e-4"'), "which no body has"),
         (changed('ixx="1e-4"', 'ixx="1_0"'), "a number is needed"),
@@ -121,10 +215,15 @@ def test_generated_arms_pass() -> None:
             ),
             "the links d, e hang on each other",
         ),
-        (robot(LINK.format("a")), "no joint that moves"),
-        (robot(), "no joint that moves"),
+        (robot(LINK.format("a")), "has 0 joints that move"),
+        (robot(), "has 0 joints that move"),
         ("<robot name='x'><link", "not well-formed"),
+        (
+            changed("<axis", "<dynamics/><axis").replace('"j2"', '"j 2"'),
+            "joint j1: Pinocchio does not accept the URDF",
+        ),
         ("<html></html>", "root element <html>"),
+        ("<mujoco></mujoco>", "It is a MuJoCo model (MJCF)"),
         ('<!DOCTYPE robot [<!ENTITY x "y">]>' + robot(*chain()), "DOCTYPE"),
         ('<!DOCTYPE robot SYSTEM "file:///etc/passwd">' + robot(*chain()), "DOCTYPE"),
         (robot(*chain(), "<x>" * DEEPEST + "</x>" * DEEPEST), "deeper than"),
@@ -139,10 +238,10 @@ def test_faults_are_named(text: str, said: str) -> None:
 
 
 def test_elements_of_other_programs_are_no_faults() -> None:
-    others = changed("<axis", '<dynamics damping="1"/><drive kind="belt"/><axis')
+    others = changed("<axis", '<drive kind="belt"><limit lower="low"/></drive><axis')
     others = others.replace("<link", '<gazebo/><ros2_control name="r"/><link', 1)
-    others = others.replace("effort=", 'command_effort="2" gear_velocity="3" effort=')
-    assert read_urdf(others) == others
+    others = others.replace("effort=", 'command_effort="2" gear_velocity="x" effort=')
+    assert "ros2_control" in read_urdf(others)
 
 
 def test_billion_laughs_are_not_expanded() -> None:
@@ -173,7 +272,7 @@ def test_all_faults_are_told_at_once() -> None:
 
 def test_moments_of_inertia_may_be_let_pass() -> None:
     text = changed('ixx="1e-4"', 'ixx="3e-4"')
-    assert read_urdf(text, check_inertia=False) == text
+    assert "0.0003" in read_urdf(text, check_inertia=False)
 
 
 def test_two_hundred_joints_are_too_many_only_above_the_cap() -> None:
@@ -182,7 +281,7 @@ def test_two_hundred_joints_are_too_many_only_above_the_cap() -> None:
         return robot(*links, *(HINGE.format(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(count)))
 
     read_urdf(arm(200))
-    with pytest.raises(cdsm.UrdfError, match="201 joints that move; 200 are taken"):
+    with pytest.raises(cdsm.UrdfError, match="201 joints that move; 1 to 200 are needed"):
         read_urdf(arm(201))
 
 
