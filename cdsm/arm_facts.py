@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.arm_model import ArmModel, ArmParts
 from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import OriginalLength
-from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, InvalidInput
 from cdsm.geometry import LONGEST, Geometry, doubts_about_units
 from cdsm.rigid_body import RigidBody
@@ -26,6 +25,7 @@ from cdsm.support.validation import instance, one_of, sequence_of
 from cdsm.support.values import Array, Printed
 from cdsm.support.warning import warn
 from cdsm.tolerance import Tolerances
+from cdsm.wires.elasticity import Elasticity
 
 CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
 """One or more cables, or the path of their file."""

@@ -22,7 +22,6 @@ from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entri
 from cdsm.arm_model import GRAVITY, ArmParts
 from cdsm.cable import Cable
 from cdsm.cable_laws import OriginalLength
-from cdsm.elasticity import LinearElasticity
 from cdsm.errors import FileError, GeometryError, UnknownName, UrdfError, counted
 from cdsm.geometry import Geometry, split_geometry
 from cdsm.geometry.cables import serpentine_cables
@@ -35,6 +34,7 @@ from cdsm.tolerance.sources import from_table, tolerance_lines
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 from cdsm.wires.catalogue import Wire, as_wire
+from cdsm.wires.elasticity import LinearElasticity
 
 _HEAD = """\
 # An arm of cdsm. Units: m, rad, kg, N, N/m, m/s2. Base axes: x along the straight arm.

@@ -12,7 +12,6 @@ from cdsm.batch.arguments import Asked, Kept, Rows
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import checked_threads, kernel_arm, run_slices
 from cdsm.batch.layout import OK, POSTPONED, QUANTITIES, UNDECIDED, Codes
-from cdsm.batch.rigidities import rigidities
 from cdsm.batch.stuck_readings import STUCK, WITHOUT_FRICTION, read_stuck
 from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.compiling import FULL, WIDTH, is_new
@@ -93,10 +92,10 @@ class Evaluator:
             QUANTITIES[number]: slice(*place)
             for number, place in zip(self._wanted, pairwise(ends), strict=True)
         }
-        # whether the kernel needs rigidities that only Python computes
+        # whether the kernel needs rigidities of laws that are not linear
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
         laws = arm._model.wire_laws if self._sticks else arm._model.laws
-        self._asks = needs_springs and bool(laws.without_kernel)
+        self._asks = needs_springs and bool(laws.nonlinear)
         record = int(self._start[-1])
         width = WIDTH // (2 if record < _LONG else 4)
         self._block = FULL if record < _SHORT else max(1, min(width, len(q)))
@@ -130,7 +129,7 @@ class Evaluator:
     def _distribute(self, rows: Rows, found: Codes, out: Array) -> None:
         """Distribute the tensions of the postures ``rows``; compute all wanted quantities."""
         balance = self._empty_balance(len(found))
-        if self._asks:  # rigidities that only Python computes need the tensions first
+        if self._asks:  # rigidities need the tensions first
             self._evaluate(rows, np.array([layout.TENSION]), found, balance.tension, balance)
         else:
             self._evaluate(rows, self._wanted, found, out, balance)
@@ -202,7 +201,7 @@ class Evaluator:
         for first in range(0, len(found), blocks * width):
             part = slice(first, first + blocks * width)
             states, values = found[part], out[part]
-            some = self._with_rigidities(rows.take(part), states)
+            some = self._with_rigidities(rows.take(part))
             kept = empty.first(-(-len(states) // width))
             left = Balance(*(each[part] for each in balance))
             evaluate_rows(self._kernel_arm, some, asked, width, kept, left, values, states)
@@ -212,20 +211,18 @@ class Evaluator:
                 for name in chain(*names):
                     values[:, self._place[name]] = math.nan
 
-    def _with_rigidities(self, rows: Rows, found: Codes) -> Rows:
-        """Return ``rows``, with rigidities filled in if laws are functions of Python.
+    def _with_rigidities(self, rows: Rows) -> Rows:
+        """Return ``rows``, with rigidities, which numpy computes, if a law is not linear.
 
-        Kernels cannot call these functions. Nothing is filled in if no output needs rigidities, or
-        as long as the tensions are not known.
+        Nothing is filled in if no output needs rigidities, or as long as the tensions are not
+        known.
         """
         if not (self._asks and len(rows.tension)):
             return rows
-        model, usable = self._arm._model, found == OK
-        if len(rows.tension) < len(found):  # one row for all postures
-            usable = usable.any(keepdims=True)
-        rigidity = wire = rigidities(model.laws, rows.tension, usable)
+        model = self._arm._model
+        rigidity = wire = model.laws.rigidities(rows.tension)
         if self._sticks and model.wire_laws is not model.laws:
-            wire = rigidities(model.wire_laws, rows.tension, usable)
+            wire = model.wire_laws.rigidities(rows.tension)
         return rows._replace(rigidity=rigidity, wire=wire)
 
     def _read(

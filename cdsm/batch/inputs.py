@@ -32,8 +32,8 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
         highest=model.highest if checked else frozen(endless),
         blocks=model.blocks,
         smallest_arm=NO_ARM * arm.length,
-        laws=model.laws.wires,
-        wires=model.wire_laws.wires,
+        linear=frozen(np.stack([model.laws.constant, model.laws.linear])),
+        stuck=frozen(np.stack([model.wire_laws.constant, model.wire_laws.linear])),
         holes=model.holes,
     )
 

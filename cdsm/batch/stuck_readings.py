@@ -49,6 +49,7 @@ def read_stuck(
     values = read(kept.stuck, kept.stuck_parts, kept.jacobian, directions, wanted, status, width)
     if "breakaway" in names:
         F, motion = frozen(np.ascontiguousarray(tension)), np.ascontiguousarray(values["motion"])
-        own = arm.tree, arm.routing, arm.holes, arm.wires
-        set_breakaway(*own, rows.q, F, rows.wire, motion, width, load[: len(rows.q)])
+        own, linear = (arm.tree, arm.routing, arm.holes), arm.stuck[0] + arm.stuck[1] * F
+        wire = rows.wire if len(rows.wire) else frozen(linear)
+        set_breakaway(*own, rows.q, F, wire, motion, width, load[: len(rows.q)])
     return found | {name: values[free] for name, free in WITHOUT_FRICTION.items() if free in values}

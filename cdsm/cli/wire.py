@@ -77,7 +77,7 @@ def fit(
     except cdsm.TensileTestError as error:
         raise cdsm.TensileTestError(_as_options(str(error))) from None
     spread = None if tolerances is None else cdsm.Tolerances(rigidity=fitted.tolerance())
-    write(out, lambda file: cdsm.write_elasticity(fitted.elasticity, file))
+    write(out, lambda file: fitted.elasticity.write(file))
     if spread is not None:
         write(tolerances, spread.write)
     write_picture(figure, fitted.plot)
@@ -115,7 +115,7 @@ def _numbers(fit: cdsm.TensileFit) -> Json:
     return {
         "method": fit.method,
         "gauge_length_m": fit.test.gauge_length,
-        "domain_N": [fit.elasticity.domain.low, fit.elasticity.domain.high],
+        "domain_N": [fit.elasticity.low, fit.elasticity.high],
         "rms_N": fit.rms,
         "stages_N": {stage.name: [stage.low, stage.high] for stage in fit.stages},
         "tension_N": fit.tensions,

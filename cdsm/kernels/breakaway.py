@@ -36,7 +36,6 @@ from cdsm.kernels.stuck import (
     sticking_scratch,
 )
 from cdsm.kernels.tree import Frames, Routing, Tree, empty_frames, forward_kinematics
-from cdsm.kernels.wires import Wires, set_rigidity, wire_scratch
 from cdsm.support.values import Array
 
 ROUNDING = 1e-12
@@ -72,7 +71,6 @@ def set_breakaway(
     tree: Tree,
     routing: Routing,
     holes: Holes,
-    wires: Wires,
     q: Array,
     tension: Array,
     wire: Array,
@@ -86,10 +84,9 @@ def set_breakaway(
         tree: Joints of the arm.
         routing: Cable sites of the arm.
         holes: Holes of its cables.
-        wires: Laws of its cables.
         q: Joint angles (b, nv) [rad].
         tension: F (b, C) [N].
-        wire: EA (1 + ε) (b, C) or (1, C) [N]; empty, (0, C), to compute it from ``wires``.
+        wire: EA (1 + ε) (b, C) or (1, C) [N].
         motion: Joint motion θ̇ of the stuck arm per load, in B blocks of W postures (B, nv, D, W)
             [rad/N].
         width: W, the number of postures in a block.
@@ -104,14 +101,12 @@ def set_breakaway(
     moved, beside = np.empty((sites, 3, width)), np.empty((3, 3, width))
     rates = Velocities(links[0], links[1], moved, beside[0], beside[1], np.empty(width))
     slips = SlipRates(holding[0], holding[1], holding[2], beside[2])
-    load, wiring = np.empty(width), wire_scratch(wires, width)
+    load = np.empty(width)
     for b in range(motion.shape[0]):
         first = b * width
         fetch(q, first, angles, width)
         fetch(tension, first, F, width)
         fetch(wire, first, EA, width)
-        if not wire.shape[0]:
-            set_rigidity(wires, F, EA, wiring, width)
         forward_kinematics(tree, routing, angles, np.empty((2, width)), rotation, frames, width)
         for d in range(motion.shape[2]):
             _set_velocities(tree, routing, frames, motion[b], d, rates, width)

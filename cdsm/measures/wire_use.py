@@ -8,7 +8,6 @@ from typing import Final, final
 
 import numpy as np
 
-from cdsm.elasticity.answers import strain_of
 from cdsm.errors import ElasticityRangeError
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import aligned, plain
@@ -112,7 +111,7 @@ def wire_use(
     strain = np.empty_like(F)
     for c, cable in enumerate(arm.cables):
         try:
-            strain[c] = strain_of(cable.elasticity, largest[c])
+            strain[c] = cable.elasticity.strain(largest[c])
         except ElasticityRangeError as error:
             raise ElasticityRangeError(error.problem, error.tension, [c], [cable.name]) from None
     return WireUse(
@@ -136,10 +135,8 @@ def strains(arm: Manipulator, tension: Array) -> Array:
     found = np.full(tension.shape, math.nan)
     for c, cable in enumerate(arm.cables):
         law, F = cable.elasticity, tension[:, c]
-        first, high = law.domain.first, law.domain.high
-        inside = (first <= F) & (high >= F)
-        if inside.any():  # a user-defined law may fail on empty arrays
-            found[inside, c] = strain_of(law, F[inside])
+        inside = (law.low <= F) & (law.high >= F)
+        found[inside, c] = law.strain(F[inside])
     return found
 
 

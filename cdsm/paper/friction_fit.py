@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from cdsm import presets
 from cdsm.cable import Cable
-from cdsm.elasticity import LinearElasticity, ScaledElasticity
 from cdsm.errors import EquilibriumError
 from cdsm.identification.least_squares import LeastSquares, no_model
 from cdsm.manipulator import Manipulator
@@ -30,6 +29,7 @@ from cdsm.statics.loading_path import LoadingPath
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
+from cdsm.wires.elasticity import LinearElasticity
 
 ADDED: Final = {"friction": (0.0, 0.5), "bearing": (0.0, 500.0), "rigidity": (0.3, 1.5)}
 """Bounds of μ [-], of the stiffness of a bearing [N m/rad], and of the factor on Eq. 19 [-]."""
@@ -81,7 +81,7 @@ class RoughPrototype:
 
     def arm(self) -> Manipulator:
         """Build the arm; its last cables are the springs, unless ``bearing`` is 0."""
-        strand = ScaledElasticity(presets.STRAND_1X19, self.rigidity)
+        strand = presets.STRAND_1X19.scaled(self.rigidity)
         arm = arm_of(self.prototype, strand, self.prototype.drive_stiffness, self.friction)
         if self.bearing == 0.0:
             return arm

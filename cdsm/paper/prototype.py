@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm import presets
-from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import SingularStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.paper.claims import floats
@@ -20,6 +19,7 @@ from cdsm.statics.weight_test import weight_test
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
+from cdsm.wires.elasticity import Elasticity, LinearElasticity
 
 _RIGID = LinearElasticity(1e12)  # the series stiffness is the whole stiffness of a hybrid cable
 

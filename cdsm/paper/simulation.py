@@ -13,7 +13,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdsm import presets
-from cdsm.elasticity import LinearElasticity
 from cdsm.paper.claims import Claim
 from cdsm.paper.curves import (
     FROM_FIG_6,
@@ -28,6 +27,7 @@ from cdsm.paper.digits import LEVEL
 from cdsm.posture import Posture
 from cdsm.support.values import Array
 from cdsm.tension import distribute_tension
+from cdsm.wires.elasticity import LinearElasticity
 
 STRAND_END: Final = presets.STRAND_1X19.high
 """Tension [N] at which the elastic stage of the strand ends (text of Section IV-C)."""

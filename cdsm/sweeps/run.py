@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.inputs import checked_threads
-from cdsm.elasticity import Elasticity
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.support.directions import XYZ, Direction, unit_direction
@@ -30,6 +29,7 @@ from cdsm.sweeps.poses import PoseSet, poses_of
 from cdsm.sweeps.quantities import DEFAULT
 from cdsm.sweeps.specification import Specification
 from cdsm.sweeps.status import SweepStatus
+from cdsm.wires.elasticity import Elasticity
 
 if TYPE_CHECKING:
     import xarray

@@ -8,10 +8,9 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
-from cdsm.elasticity import Elasticity, LinearElasticity, SlackBelow
 from cdsm.errors import InvalidInput, UnknownName
-from cdsm.wires.files import read_elasticity
-from cdsm.wires.laws import StrandElasticity, TabulatedElasticity
+from cdsm.wires.elasticity import Elasticity, LinearElasticity
+from cdsm.wires.laws import StrandElasticity
 
 if TYPE_CHECKING:
     from cdsm.cable import Cable
@@ -37,7 +36,7 @@ def as_wire(wire: Wire) -> Elasticity:
 
     Args:
         wire: A law, a name of :data:`WIRES`, a constant rigidity EA [N], or the path of a TOML file
-            as :func:`~cdsm.write_elasticity` writes it.
+            as :meth:`Elasticity.write` writes it.
 
     Raises:
         UnknownName: No wire has this name.
@@ -50,7 +49,7 @@ def as_wire(wire: Wire) -> Elasticity:
     if isinstance(wire, str) and wire in WIRES:
         return WIRES[wire]
     if isinstance(wire, os.PathLike) or (isinstance(wire, str) and wire.endswith(_FILES)):
-        return read_elasticity(wire)
+        return Elasticity.read(wire)
     if isinstance(wire, str):
         raise UnknownName("wire", wire, WIRES, "Or give a rigidity EA in N, or a file WIRE.toml.")
     if isinstance(wire, bool) or not isinstance(wire, (int, float)):
@@ -64,20 +63,22 @@ def name_of(law: Elasticity) -> str | None:
 
 
 def label(law: Elasticity) -> str:
-    """Return a short text for a law: the name of its wire, its EA, or its kind with its domain."""
+    """Return a short text for a law: the name of its wire, its EA, or its kind and tensions."""
     known = name_of(law)
     if known is not None:
         return known
-    if isinstance(law, SlackBelow):
+    if law._constant is not None:
+        return f"EA {law._constant:.6g} N"
+    text = f"{law._kind}, {law.rest:.4g} to {law.high:.4g} N"
+    original = next((each for each, known in WIRES.items() if known._given == law._given), None)
+    if original is not None and law._kind == "strand":
+        text = original
+    if law._factor != 1.0:
+        text += f", EA times {law._factor:.6g}"
+    if law._slack:
         EA = float(law.rigidity(0.0))
-        return f"{label(law.law)}, with a slack branch of EA {EA:.4g} N below {law.rest:.4g} N"
-    if isinstance(law, LinearElasticity):
-        return f"EA {float(law.rigidity(0.0)):.6g} N"
-    kind = {StrandElasticity: "strand", TabulatedElasticity: "table"}.get(
-        type(law), type(law).__name__
-    )
-    low, high = law.domain
-    return f"{kind}, {low:.4g} to {high:.4g} N" if math.isfinite(high) else kind
+        text += f", with a slack branch of EA {EA:.4g} N below {law.rest:.4g} N"
+    return text
 
 
 def wires_text(cables: Iterable[Cable]) -> str:

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput, TensileTestError
 from cdsm.support.validation import RANGES, one_of, scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tolerance import EVERY, Tolerance
+from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile.loading import FEWEST, Points, loading
 from cdsm.wires.tensile.polynomials import polynomials
@@ -119,11 +119,11 @@ class TensileFit(ReadOnlyState):
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        low, high = self.elasticity.domain
+        low, high = self.elasticity.low, self.elasticity.high
         return f"<TensileFit {self.method}, {low:.4g} to {high:.4g} N>"
 
     def __str__(self) -> str:
-        low, high = self.elasticity.domain
+        low, high = self.elasticity.low, self.elasticity.high
         ends = self.elasticity.rigidity(self.tensions[[0, -1]])
         return "\n".join(
             [
@@ -230,8 +230,8 @@ def fit_tensile_test(
     else:
         elasticity, cut = polynomials(points, join)
         notes += cut
-    grid, domain = curve.basis.tensions, elasticity.domain
-    tensions = frozen(_grid(domain.first, domain.high, grid))
+    grid = curve.basis.tensions
+    tensions = frozen(_grid(elasticity.low, elasticity.high, grid))
     offsets = np.interp(tensions, grid, curve.strain) - elasticity.strain(tensions)
     # the polynomials do not give the strain at the low end: take the best fit
     start = (

@@ -11,7 +11,6 @@ from cdsm.errors import TensileTestError
 from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 from cdsm.wires.laws import StrandElasticity
-from cdsm.wires.quadrature import coefficient_table, piecewise
 from cdsm.wires.tensile.loading import Points
 
 _DEGREE = 6  # as in Eq. 19
@@ -60,7 +59,8 @@ def _positive(rows: list[list[float]], edges: tuple[float, ...]) -> list[tuple[f
     ``edges[i]`` to ``edges[i + 1]`` [N].
     """
     tensions = np.linspace(edges[0], edges[-1], 400)
-    values = piecewise(np.array(edges[1:-1]), coefficient_table(rows), tensions)
+    parts = [Polynomial(row)(tensions) for row in rows]
+    values = np.choose(np.searchsorted(edges[1:-1], tensions), parts)
     margin = 1e-6 * float(abs(values).max())  # keeps the strain ∫ dF/EA finite
     ranges = [(edges[0], edges[0])]
     for row, low, high in zip(rows, edges[:-1], edges[1:], strict=True):
