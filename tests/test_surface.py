@@ -300,7 +300,6 @@ PLAIN: dict[str, Any] = {
     "InfeasibleSample": cdsm.InfeasibleSample(3, "rate", "too far."),
     "LinearElasticity": STEEL,
     "StrandElasticity": cdsm.presets.STRAND_1X19,
-    "Domain": cdsm.presets.STRAND_1X19.domain,
     "SelfCheck": K.report().self_check,
     "Sensors": cdsm.Sensors(tension_noise=0.5),
 }

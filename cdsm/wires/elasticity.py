@@ -252,10 +252,12 @@ class Elasticity:
         inside = np.maximum(F, self.rest) if self._slack else F
         piece = table.piece(inside)
         x = inside - table.knots[piece]
-        strain, softness = table.coefficients[0][piece], np.zeros(())
-        for row in table.coefficients[1:]:
+        rows = table.coefficients.take(piece, axis=1)
+        softness = rows[0]
+        strain = softness * x + rows[1]
+        for row in rows[2:]:
             softness = softness * x + strain
-            strain = strain * x + row[piece]
+            strain = strain * x + row
         return strain + (F - inside) * softness if self._slack else strain, softness, x, piece
 
     def _tension_at(

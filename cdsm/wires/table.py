@@ -42,8 +42,10 @@ class Table(NamedTuple):
 
     def piece(self, tension: Array) -> Any:
         """Return the index of the piece of each tension [N]."""
+        if len(self.knots) == 2:
+            return np.zeros(np.shape(tension), dtype=np.intp)
         if self.pieces is None:
-            return np.searchsorted(self.knots[1:-1], tension) if len(self.knots) > 2 else 0
+            return np.searchsorted(self.knots[1:-1], tension)
         first, last = self.knots[0], self.knots[-1]
         root = np.sqrt(np.sqrt((tension - first) * (1.0 / (last - first))))
         return self.pieces[(root * (len(self.pieces) - 2)).astype(np.intp)]

@@ -5,7 +5,6 @@ import pytest
 
 import cdsm
 from cdsm import paper
-from cdsm.elasticity import ScaledElasticity
 from cdsm.paper.friction_fit import ADDED, RoughPrototype
 from cdsm.paper.prototype_fit import TABLE_START
 from cdsm.paper.section_v import POSTURE
@@ -35,7 +34,7 @@ def test_a_bearing_is_a_spring_parallel_to_its_joint() -> None:
 
 def test_a_factor_on_a_law_scales_its_rigidity_and_energy() -> None:
     law = cdsm.presets.STRAND_1X19
-    scaled = ScaledElasticity(law, 0.7)
+    scaled = law.scaled(0.7)
     F = np.array([5.0, 30.0, 80.0])
     np.testing.assert_allclose(scaled.rigidity(F), 0.7 * law.rigidity(F), rtol=1e-15)
     slope = (scaled.strain(F + 1e-4) - scaled.strain(F - 1e-4)) / 2e-4

@@ -13,7 +13,7 @@ REGION = admissible(POSE, 0.0, np.inf, np.zeros(6))
 
 
 def test_bounds_are_those_of_the_domains_and_the_least_tensions_are_within() -> None:
-    np.testing.assert_array_equal(REGION.low, STRAND.domain.first)
+    np.testing.assert_array_equal(REGION.low, STRAND.low)
     np.testing.assert_array_equal(REGION.high, 810.0)
     F = REGION.least.values
     assert ((REGION.low <= F) & (REGION.high >= F)).all()
@@ -35,14 +35,6 @@ def test_nearest_balances_and_no_balancing_tensions_are_nearer() -> None:
         if ((low <= there) & (high >= there)).all():
             assert np.linalg.norm(there - wanted) > np.linalg.norm(F - wanted)
     assert REGION.nearest(wanted, low + 800.0, low + 800.0) is None
-
-
-def test_pieces_meet_at_the_kink_and_cover_the_bounds() -> None:
-    F = REGION.least.values.copy()
-    F[:2] = 31.0, np.nextafter(31.0, 32.0)
-    low, high = REGION.piece(F)
-    assert (low[0], high[0]) == (REGION.low[0], 31.0)
-    assert (low[1], high[1]) == (F[1], 810.0)
 
 
 def test_within_keeps_to_the_change_and_the_bounds() -> None:

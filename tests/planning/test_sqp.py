@@ -1,4 +1,4 @@
-"""Searches end where the conditions of first order hold, on either side of kinks and at them."""
+"""Searches end where the conditions of first order hold, also in the sharp bend of Eq. 19."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ UP = np.array([[0.0, 0.0, 1.0]])
 KINK = 31.0
 
 
-def at_kinks(seed: int) -> tuple[StiffnessModel, Program]:
+def at_the_bend(seed: int) -> tuple[StiffnessModel, Program]:
     """Strands of which some end at 31 N, where more tension pays much less than below."""
     pose = arms.random_posture(arms.random_arm(seed, 2, "universal", STRAND), seed, 0.3)
     model = StiffnessModel(pose, 10.0, 200.0, np.zeros(6), 1e-4)
@@ -30,8 +30,8 @@ def at_kinks(seed: int) -> tuple[StiffnessModel, Program]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_no_feasible_step_has_less_effort_not_even_across_a_kink(seed: int) -> None:
-    model, program = at_kinks(seed)
+def test_no_feasible_step_has_less_effort_not_even_across_the_bend(seed: int) -> None:
+    model, program = at_the_bend(seed)
     found = search(program, program.anchor)
     F = found.evaluation.F
     assert abs(found.values).max() <= MET
@@ -50,21 +50,21 @@ def test_no_feasible_step_has_less_effort_not_even_across_a_kink(seed: int) -> N
     assert tried > 20
 
 
-def test_some_optima_are_at_kinks_and_found_from_either_side() -> None:
+def test_some_optima_are_in_the_bend_and_found_from_either_side() -> None:
     met = 0
     for seed in range(4):
-        model, program = at_kinks(seed)
+        model, program = at_the_bend(seed)
         ends = []
         for minimum in (15.0, 30.0, 40.0):
             F = cdsm.distribute_tension(model.pose, minimum).values
             ends.append(search(program, model.at(F)).evaluation.F)
         np.testing.assert_allclose(ends[1:], [ends[0]] * 2, rtol=1e-6)
-        met += int((abs(ends[0] - KINK) < 1e-9 * KINK).sum())
+        met += int((abs(ends[0] - KINK) < 2.0).sum())
     assert met > 0
 
 
 def test_other_objectives() -> None:
-    model, program = at_kinks(1)
+    model, program = at_the_bend(1)
     start = program.anchor
     for objective, better in ((HIGHEST, -1.0), (NEAREST, 0.0)):
         other = Program(model.region, start, program.constraints, objective, 30.0)

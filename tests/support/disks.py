@@ -48,7 +48,7 @@ def write(path: Path) -> dict[str, Callable[[], object]]:
         "urdf": lambda: cdsm.write_urdf(ARM.geometry, path),
         "geometry": lambda: ARM.geometry.write(path),
         "cables": lambda: cdsm.write_cables(ARM.cables, path),
-        "elasticity": lambda: cdsm.write_elasticity(wire, path),
+        "elasticity": lambda: wire.write(path),
         "mjcf": lambda: cdsm.write_mjcf(ARM, path, pose, pull),
         "netcdf": lambda: cdsm.write_sweep(swept, path.with_suffix(".nc")),
         "csv": lambda: cdsm.write_sweep(swept, table),

@@ -151,7 +151,7 @@ def cli() -> Named:
     Path("bad.csv").write_text("x [mm],y [mm],z [mm]\n1,2,3\n\n1,two,3\n")
     rows = "".join(f"{F / 96.0!r},{float(F)!r}\n" for F in range(2, 400, 7))
     Path("test.csv").write_text("displacement [mm],force [N]\n" + rows)
-    cdsm.write_elasticity(laws()["table"], "wire.toml")
+    laws()["table"].write("wire.toml")
     cdsm.write_cables(tree_cables(laws()["linear"]), "crab.toml")
     caspr(("R_Z", "U_XY"))
     given = set(os.listdir())

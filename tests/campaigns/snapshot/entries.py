@@ -20,7 +20,7 @@ import numpy as np
 from tests.campaigns.snapshot.environment import TREE
 
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic)
-BRIEF = {"Site", "Domain", "Joint", "Link", "CableRoute"}
+BRIEF = {"Site", "Joint", "Link", "CableRoute"}
 """Kinds whose repr says all."""
 
 

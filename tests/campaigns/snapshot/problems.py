@@ -11,9 +11,9 @@ from tests.campaigns.snapshot.entries import attempt
 from tests.campaigns.snapshot.environment import Named, cdsm
 from tests.campaigns.snapshot.jobs import job
 from tests.campaigns.snapshot.models import (
-    Own,
     arms,
     laws,
+    own,
     probe,
 )
 
@@ -140,7 +140,7 @@ def tests_of_wires() -> Named:
             yield f"{name} {method}", fit
             if not isinstance(fit, Exception):
                 yield f"{name} {method} plot", attempt(fit.plot)
-                cdsm.write_elasticity(fit.elasticity, "fit.toml")
+                fit.elasticity.write("fit.toml")
                 yield f"{name} {method} text", Path("fit.toml").read_text()
         rows = "".join(f"{1e3 * x!r}, {F!r}\n" for x, F in zip(shift.tolist(), force, strict=True))
         Path("test.csv").write_text(
@@ -162,7 +162,7 @@ def sweeps() -> Named:
     path = cdsm.PathPoses(np.outer([0.0, 0.4, -0.3], arm.upper), 5)
     cases = {
         "minimum": [1.0, 20.0, 60.0],
-        "elasticity": {"strand": laws()["strand"], "steel": laws()["linear"], "own": Own()},
+        "elasticity": {"strand": laws()["strand"], "steel": laws()["linear"], "own": own()},
         "wrench": {"none": np.zeros(6), "pulled": [1.0, 0.5, -2.0, 0.0, 0.05, 0.1]},
         "outputs": everything,
     }

@@ -187,7 +187,6 @@ def calls() -> dict[str, tuple[Callable[..., Any], list[str], dict[str, Any]]]:
         "write_sweep": {"path": "again.nc"},
         "read_sweep": {"path": "sweep.nc"},
         "read_cables": {"path": cdsm.write_cables(arm.cables, "cables.toml")},
-        "read_elasticity": {"path": cdsm.write_elasticity(law, "wire.toml")},
         "read_tensile_csv": {"path": "test.csv", "gauge_length": 0.5},
     }
     things: dict[str, Any] = {name: getattr(cdsm, name) for name in cdsm.__all__}
@@ -196,7 +195,7 @@ def calls() -> dict[str, tuple[Callable[..., Any], list[str], dict[str, Any]]]:
         for name in dir(kind):
             if isinstance(inspect.getattr_static(kind, name), classmethod) and name[0] != "_":
                 things[f"{kind.__name__}.{name}"] = getattr(kind, name)
-    for owner, value in {**found, "domain": law.domain}.items():
+    for owner, value in found.items():
         for name in dir(value):
             if name[0] != "_" and inspect.isfunction(inspect.getattr_static(type(value), name, 0)):
                 things[f"{owner}.{name}"] = getattr(value, name)
