@@ -148,7 +148,7 @@ from cdsm.uncertainties.monte_carlo import monte_carlo as monte_carlo
 from cdsm.urdf import to_urdf as to_urdf
 from cdsm.urdf import write_urdf as write_urdf
 from cdsm.wires.elasticity import Elasticity as Elasticity
-from cdsm.wires.elasticity import LinearElasticity as LinearElasticity
+from cdsm.wires.laws import LinearElasticity as LinearElasticity
 from cdsm.wires.laws import StrandElasticity as StrandElasticity
 from cdsm.wires.laws import TabulatedElasticity as TabulatedElasticity
 from cdsm.wires.tensile.fit import TensileFit as TensileFit

@@ -18,7 +18,8 @@ from cdsm.geometry import Geometry, Link
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.wires.catalogue import SOLID, STRAND
-from cdsm.wires.elasticity import Elasticity, LinearElasticity
+from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.laws import LinearElasticity
 
 # fmt: off
 __all__ = [

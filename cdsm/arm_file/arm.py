@@ -34,7 +34,7 @@ from cdsm.tolerance.sources import from_table, tolerance_lines
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 from cdsm.wires.catalogue import Wire, as_wire
-from cdsm.wires.elasticity import LinearElasticity
+from cdsm.wires.laws import LinearElasticity
 
 _HEAD = """\
 # An arm of cdsm. Units: m, rad, kg, N, N/m, m/s2. Base axes: x along the straight arm.

@@ -34,7 +34,7 @@ from cdsm.support.records import (
 )
 from cdsm.support.validation import sequence_of
 from cdsm.wires.catalogue import Wire, as_wire
-from cdsm.wires.elasticity import LinearElasticity
+from cdsm.wires.laws import LinearElasticity
 
 _HEAD = """\
 # cdsm cables. Units: m, N, N/m.

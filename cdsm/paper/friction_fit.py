@@ -29,7 +29,7 @@ from cdsm.statics.loading_path import LoadingPath
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
-from cdsm.wires.elasticity import LinearElasticity
+from cdsm.wires.laws import LinearElasticity
 
 ADDED: Final = {"friction": (0.0, 0.5), "bearing": (0.0, 500.0), "rigidity": (0.3, 1.5)}
 """Bounds of μ [-], of the stiffness of a bearing [N m/rad], and of the factor on Eq. 19 [-]."""

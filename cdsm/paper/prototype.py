@@ -19,7 +19,8 @@ from cdsm.statics.weight_test import weight_test
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
-from cdsm.wires.elasticity import Elasticity, LinearElasticity
+from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.laws import LinearElasticity
 
 _RIGID = LinearElasticity(1e12)  # the series stiffness is the whole stiffness of a hybrid cable
 

