@@ -218,7 +218,7 @@ class ArmFacts(Printed):
         return isinstance(other, type(self)) and self._parts == other._parts
 
     def __hash__(self) -> int:
-        return hash(self.urdf)  # a user-defined elasticity may not be hashable
+        return hash(self.urdf)
 
     def __getstate__(self) -> ArmParts:
         return self._parts
@@ -233,8 +233,7 @@ class ArmFacts(Printed):
             cables: One or more cables, or the path of their file.
 
         Raises:
-            InvalidInput: ``cables`` is empty or not a list or tuple of cables, or the rigidity of a
-                law is discontinuous.
+            InvalidInput: ``cables`` is empty, or not a list or tuple of cables.
             CableError: Two cables have the same name, or a cable is on an unknown link.
             FileError: The file cannot be read or does not describe cables.
             MissingWire: The file names no wire for some cables.

@@ -56,8 +56,8 @@ class Manipulator(ArmFacts):
             for Eq. 19.
 
     Raises:
-        InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, gravity is not
-            three numbers, or the rigidity of a user-defined law is discontinuous.
+        InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
+            not three numbers.
         CableError: Two cables have the same name, or a cable is on an unknown link.
         UnknownName: ``original_length`` is unknown.
         FileError: The file of the cables cannot be read.
@@ -118,8 +118,8 @@ class Manipulator(ArmFacts):
             MissingWire: The file of the cables names no wire for some of them.
             UrdfError: The URDF is not a supported robot; lists every fault.
             UnknownName: No link is called ``tip``, or ``original_length`` is unknown.
-            InvalidInput: ``urdf`` is neither a path nor a text, ``joint_names`` does not name each
-                moving joint once, or the rigidity of a user-defined law is discontinuous.
+            InvalidInput: ``urdf`` is neither a path nor a text, or ``joint_names`` does not name each
+                moving joint once.
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)

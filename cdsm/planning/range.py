@@ -140,7 +140,7 @@ def stiffness_range(
     bound, until no softer corner is found. This does not prove that ``low`` is the smallest. With
     the default number of starts, it was at most 0.3 % too high in 47 of 48 random arms (Eq. 19 or
     constant rigidity, up to 20 cables), and 1.9 % in the other, which tension can buckle. It was up
-    to 5.5 % too high with a user-defined law whose rigidity rises and falls again.
+    to 5.5 % too high with a law whose rigidity rises and falls again.
 
     Args:
         pose: The posture.

@@ -105,7 +105,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
             highest = min(2.0 * rest / slower, far) if slower > 0.0 else far
         highest = max(highest, 2.0 * low)
         while growth < 0.0 and highest < far and _balances(at, highest) and at(highest).is_stable:
-            highest *= 2.0  # a user-defined law may stiffen further
+            highest *= 2.0  # the law may stiffen further
     return (
         highest
         if _balances(at, highest)

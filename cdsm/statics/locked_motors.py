@@ -65,7 +65,6 @@ class LoadedArm:
     Raises:
         ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the
             whole cable, so that no wire is left. The error names the cables.
-        InvalidInput: A user-defined law gives a strain that is not finite.
     """
 
     def __init__(

@@ -90,8 +90,6 @@ def sweep(
             arguments computes only missing entries, including those of lost workers. The results
             are then the same, bit by bit, as without interruption. The returned Dataset reads from
             the store when needed.
-            A user-defined law is identified by its class, its state, and EA and strain at up to 185
-            tensions; if these have changed, the store has another sweep.
         client: Client of a dask cluster; the run waits while the cluster has no workers. None uses
             the threads of this machine.
         chunk: Number of stiffness matrices per block; an existing store keeps its own number.
@@ -107,8 +105,7 @@ def sweep(
         UnknownName: A joint or an output does not exist.
         MissingExtra: xarray, zarr or distributed is not installed.
         FileError: The store cannot be created, read or written.
-        StoreError: The store has another sweep, a user-defined law has changed, or another run is
-            writing to the store.
+        StoreError: The store has another sweep, or another run is writing to it.
         ClusterError: The client is closed, the scheduler is gone, or a worker cannot compute.
     """
     need("sweep", "xarray", *(["zarr"] if store is not None else []))
