@@ -118,8 +118,8 @@ class Manipulator(ArmFacts):
             MissingWire: The file of the cables names no wire for some of them.
             UrdfError: The URDF is not a supported robot; lists every fault.
             UnknownName: No link is called ``tip``, or ``original_length`` is unknown.
-            InvalidInput: ``urdf`` is neither a path nor a text, or ``joint_names`` does not name each
-                moving joint once.
+            InvalidInput: ``urdf`` is neither a path nor a text, or ``joint_names`` does not name
+                each moving joint once.
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)

@@ -151,8 +151,8 @@ def plan_stiffness(
     possible. If not, the tensions have the least sum of squared relative misses that was found, and
     ``reached`` is False.
 
-    The searches are local. With laws that stiffen they usually end at the same effort ‖F‖.
-    With one law that rises and falls, the effort found was 3.6 % above the least. If ``spread`` is above
+    The searches are local. With laws that stiffen they usually end at the same effort ‖F‖. With one
+    law that rises and falls, the effort found was 3.6 % above the least. If ``spread`` is above
     zero, the searches ended at different efforts, and more ``starts`` help. A ``spread`` of zero
     does not prove that the least effort was found.
 
