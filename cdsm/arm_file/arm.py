@@ -146,7 +146,7 @@ def _routed(cables: object, geometry: Geometry | None) -> list[UnwiredCable]:
     tables = {} if cables is None else cables
     if not isinstance(tables, dict):
         raise GeometryError([f"cables: is {cables!r}; give tables [cables.NAME] or [[cables]]"])
-    routed = serpentine_cables(geometry, LinearElasticity(1.0))
+    routed = serpentine_cables(geometry, LinearElasticity(1e5))
     own, faults = {}, []
     for name, table in tables.items():
         try:
@@ -183,7 +183,7 @@ def arm_text(parts: ArmParts) -> str:
         lines += _urdf_lines(parts)
     else:
         lines += ["[geometry]", *lines_of(geometry, "geometry."), ""]
-    plain = () if geometry is None else serpentine_cables(geometry, LinearElasticity(1.0))
+    plain = () if geometry is None else serpentine_cables(geometry, LinearElasticity(1e5))
     if [_path(cable) for cable in plain] != [_path(cable) for cable in cables]:
         return "\n".join([*lines, *cable_lines(cables, wires, settings)])
     for cable, wire, own in zip(cables, wires, settings, strict=True):

@@ -135,7 +135,7 @@ def with_current_keys(data: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-_ANY = LinearElasticity(1.0)
+_ANY = LinearElasticity(1e5)
 """Placeholder for a missing wire, so that all other faults of the file are found first."""
 
 

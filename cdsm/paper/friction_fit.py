@@ -89,7 +89,7 @@ class RoughPrototype:
             Cable(
                 f"bearing {cable.name}",
                 tuple(replace(site, friction=0.0) for site in cable.sites[-2:]),
-                LinearElasticity(1e12),
+                LinearElasticity(1e9).scaled(1e3),
                 series_stiffness=self.spring,
             )
             for cable in arm.cables
