@@ -14,7 +14,6 @@ from cdsm.batch import evaluate as evaluate
 from cdsm.cable import Cable as Cable
 from cdsm.cable import Cables as Cables
 from cdsm.cable import Site as Site
-from cdsm.cable import in_series as in_series
 from cdsm.control.mujoco_plant import MuJoCoPlant as MuJoCoPlant
 from cdsm.control.plant import SlowPlant as SlowPlant
 from cdsm.control.run import TrackingRun as TrackingRun
@@ -31,9 +30,6 @@ from cdsm.design.result import DesignProgress as DesignProgress
 from cdsm.design.result import DesignSearch as DesignSearch
 from cdsm.design.search import search_designs as search_designs
 from cdsm.design.variables import Variable as Variable
-from cdsm.elasticity import Domain as Domain
-from cdsm.elasticity import Elasticity as Elasticity
-from cdsm.elasticity import LinearElasticity as LinearElasticity
 from cdsm.errors import CableError as CableError
 from cdsm.errors import CdsmError as CdsmError
 from cdsm.errors import CdsmWarning as CdsmWarning
@@ -143,8 +139,8 @@ from cdsm.uncertainties.monte_carlo import MonteCarlo as MonteCarlo
 from cdsm.uncertainties.monte_carlo import monte_carlo as monte_carlo
 from cdsm.urdf import to_urdf as to_urdf
 from cdsm.urdf import write_urdf as write_urdf
-from cdsm.wires.files import read_elasticity as read_elasticity
-from cdsm.wires.files import write_elasticity as write_elasticity
+from cdsm.wires.elasticity import Elasticity as Elasticity
+from cdsm.wires.laws import LinearElasticity as LinearElasticity
 from cdsm.wires.laws import StrandElasticity as StrandElasticity
 from cdsm.wires.laws import TabulatedElasticity as TabulatedElasticity
 from cdsm.wires.tensile.fit import TensileFit as TensileFit

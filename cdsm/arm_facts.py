@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.arm_model import ArmModel, ArmParts
 from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import OriginalLength
-from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, InvalidInput
 from cdsm.geometry import LONGEST, Geometry, doubts_about_units
 from cdsm.rigid_body import RigidBody
@@ -26,6 +25,7 @@ from cdsm.support.validation import instance, one_of, sequence_of
 from cdsm.support.values import Array, Printed
 from cdsm.support.warning import warn
 from cdsm.tolerances import Tolerances
+from cdsm.wires.elasticity import Elasticity
 
 CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
 """One or more cables, or the path of their file."""
@@ -218,7 +218,7 @@ class ArmFacts(Printed):
         return isinstance(other, type(self)) and self._parts == other._parts
 
     def __hash__(self) -> int:
-        return hash(self.urdf)  # a user-defined elasticity may not be hashable
+        return hash(self.urdf)
 
     def __getstate__(self) -> ArmParts:
         return self._parts
@@ -233,8 +233,7 @@ class ArmFacts(Printed):
             cables: One or more cables, or the path of their file.
 
         Raises:
-            InvalidInput: ``cables`` is empty or not a list or tuple of cables, or the rigidity of a
-                law is discontinuous.
+            InvalidInput: ``cables`` is empty, or not a list or tuple of cables.
             CableError: Two cables have the same name, or a cable is on an unknown link.
             FileError: The file cannot be read or does not describe cables.
             MissingWire: The file names no wire for some cables.

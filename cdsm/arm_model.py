@@ -78,7 +78,6 @@ class ArmModel:
 
     def _set_cables(self, cables: tuple[Cable, ...]) -> None:
         self._cables, self.laws = cables, CableLaws(cables, self._original_length)
-        self.laws.require_continuity()
 
     def with_laws(self, cables: tuple[Cable, ...]) -> ArmModel:
         """Return a model with the laws of ``cables``, whose sites must be those of this model."""

@@ -9,9 +9,6 @@ from typing import Literal, SupportsIndex, final, get_args, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.elasticity import Elasticity, tension_at
-from cdsm.elasticity.answers import energy_of, rigidity_of, strain_of
-from cdsm.elasticity.law import checked_law
 from cdsm.errors import CableError, CdsmError, InvalidInput, listed
 from cdsm.support.format import plural
 from cdsm.support.validation import (
@@ -24,6 +21,7 @@ from cdsm.support.validation import (
     vector,
 )
 from cdsm.support.values import Array
+from cdsm.wires.elasticity import Elasticity, checked_law
 
 Control = Literal["position", "force"]
 
@@ -170,17 +168,16 @@ class Cable:
             InvalidInput: ``free_length`` is not a positive number.
             ElasticityRangeError: A tension is outside the domain of the elasticity.
         """
-        values = self.elasticity.domain.check(tension)
-        length = _length(free_length)
-        wire = length * strain_of(self.elasticity, values)
-        return np.asarray(wire + (values - self.elasticity.rest) / self.series_stiffness)
+        wire = _length(free_length) * self.elasticity.strain(tension)
+        spring = (np.asarray(tension) - self.elasticity.rest) / self.series_stiffness
+        return np.asarray(wire + spring)
 
     def tangent_stiffness(self, tension: ArrayLike, free_length: float) -> Array:
         """Compute dF/dΔl = 1/(l_0/EA(F) + 1/k_series) [N/m], whatever ``control`` is.
 
         Arguments (F, l_0), shapes and errors are those of :meth:`elongation`.
         """
-        rigidity = rigidity_of(self.elasticity, self.elasticity.domain.check(tension))
+        rigidity = self.elasticity.rigidity(tension)
         return np.asarray(1.0 / (_length(free_length) / rigidity + 1.0 / self.series_stiffness))
 
     def energy(self, tension: ArrayLike, free_length: float) -> Array:
@@ -188,9 +185,9 @@ class Cable:
 
         Arguments (F, l_0), shapes and errors are those of :meth:`elongation`.
         """
-        values = self.elasticity.domain.check(tension)
-        spring = (values**2 - self.elasticity.rest**2) / (2.0 * self.series_stiffness)
-        return np.asarray(_length(free_length) * energy_of(self.elasticity, values) + spring)
+        wire = _length(free_length) * self.elasticity.energy(tension)
+        squares = np.asarray(tension) ** 2 - self.elasticity.rest**2
+        return np.asarray(wire + squares / (2.0 * self.series_stiffness))
 
     def tension(self, elongation: ArrayLike, free_length: float) -> Array:
         """Compute F [N] at an elongation: the inverse of :meth:`elongation`.
@@ -203,12 +200,11 @@ class Cable:
             InvalidInput: ``elongation`` is not numbers, or ``free_length`` is not positive.
             ElasticityRangeError: No tension in the domain gives one of the elongations.
         """
-        return tension_at(
+        return self.elasticity._tension_at(
             number_array("elongation", elongation),
-            self.elasticity.domain,
-            lambda F: self.elongation(F, free_length),
-            lambda F: 1.0 / self.tangent_stiffness(F, free_length),
             "elongation",
+            _length(free_length),
+            1.0 / self.series_stiffness,
         )
 
 
@@ -249,16 +245,3 @@ def _length(value: float) -> float:
     if length <= 0.0:
         raise InvalidInput("free_length", f"{length:g} m given; it must be positive.")
     return length
-
-
-def in_series(*stiffness: float) -> float:
-    """Compute the stiffness 1/Σ(1/k) [N/m] of springs in series; each k [N/m] > 0 may be inf.
-
-    Raises:
-        InvalidInput: A stiffness is not a positive number.
-    """
-    if not stiffness:
-        raise InvalidInput("stiffness", "none given; give one or more in N/m.")
-    springs = [quantity("stiffness", k, "stiffness", infinite=True) for k in stiffness]
-    compliance = float((1.0 / np.array(springs)).sum())
-    return 1.0 / compliance if compliance > 0.0 else math.inf

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from cdsm.arm_facts import ArmFacts, CablesOrFile
 from cdsm.arm_model import GRAVITY
 from cdsm.cable_laws import OriginalLength
-from cdsm.elasticity import Elasticity
 from cdsm.errors import CableError, InvalidInput, JointLimitError
 from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
@@ -32,6 +31,7 @@ from cdsm.support.validation import flag, instance, vector
 from cdsm.support.values import Array, frozen
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
+from cdsm.wires.elasticity import Elasticity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,8 +57,8 @@ class Manipulator(ArmFacts):
             for Eq. 19.
 
     Raises:
-        InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, gravity is not
-            three numbers, or the rigidity of a user-defined law is discontinuous.
+        InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
+            not three numbers.
         CableError: Two cables have the same name, or a cable is on an unknown link.
         UnknownName: ``original_length`` is unknown.
         FileError: The file of the cables cannot be read.
@@ -121,8 +121,8 @@ class Manipulator(ArmFacts):
             MissingWire: The file of the cables names no wire for some of them.
             UrdfError: The URDF is not a supported robot; lists every fault.
             UnknownName: No link is called ``tip``, or ``original_length`` is unknown.
-            InvalidInput: ``urdf`` is neither a path nor a text, ``joint_names`` does not name each
-                moving joint once, or the rigidity of a user-defined law is discontinuous.
+            InvalidInput: ``urdf`` is neither a path nor a text, or ``joint_names`` does not name
+                each moving joint once.
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
@@ -140,7 +140,7 @@ class Manipulator(ArmFacts):
         other keys are optional:
 
         - ``wire``: the wire of all cables: a name such as ``"1x19-1.2mm"``, a constant EA [N], a
-          table in the form of :func:`~cdsm.read_elasticity`, or the NAME of a table
+          table in the form of :meth:`Elasticity.read`, or the NAME of a table
           ``[wires.NAME]``.
         - ``series_stiffness`` [N/m], ``control``, ``minimum``, ``maximum`` [N]: attributes of all
           cables, as in :class:`Cable`.
@@ -152,7 +152,7 @@ class Manipulator(ArmFacts):
         Args:
             path: The file; :meth:`write` writes one, ``cdsm new`` another with comments.
             wire: Wire of all cables, instead of the wires in the file: a law, a name, EA [N], or
-                the path of a file of :func:`~cdsm.write_elasticity`.
+                the path of a file of :meth:`Elasticity.write`.
 
         Raises:
             FileError: The file cannot be read or does not describe an arm. Every fault is listed.

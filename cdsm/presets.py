@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.cable_laws import OriginalLength
-from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.geometry import Geometry, Link
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.wires.catalogue import SOLID, STRAND
+from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.laws import LinearElasticity
 
 # fmt: off
 __all__ = [

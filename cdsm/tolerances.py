@@ -9,7 +9,7 @@ from dataclasses import KW_ONLY, dataclass, fields
 from pathlib import Path
 from typing import Any, Final, Literal, Self, final, get_args
 
-from cdsm.errors import CdsmError, FileError, GeometryError, InvalidInput, counted
+from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import Number, parse, read_toml, record, toml_value
 from cdsm.support.validation import one_of, scalar, sequence_of, text
@@ -151,7 +151,9 @@ class Tolerances:
             own = table.get("tolerances", table)
             return from_table(own if isinstance(own, dict) else table)
         except GeometryError as error:
-            raise FileError(path, f"does not hold tolerances, {counted(error.faults)}") from None
+            raise FileError(
+                path, f"does not hold tolerances:{listed(error.faults, 20, LINES)}"
+            ) from None
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write a TOML file from which :meth:`read` builds equal tolerances; return its path.

@@ -21,7 +21,6 @@ from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entri
 from cdsm.arm_model import GRAVITY, ArmParts
 from cdsm.cable import Cable
 from cdsm.cable_laws import OriginalLength
-from cdsm.elasticity import LinearElasticity
 from cdsm.errors import LINES, FileError, GeometryError, UnknownName, UrdfError, listed
 from cdsm.geometry import Geometry, split_geometry
 from cdsm.geometry.cables import serpentine_cables
@@ -33,6 +32,7 @@ from cdsm.tolerances import Tolerances, from_table, tolerance_lines
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 from cdsm.wires.catalogue import Wire, as_wire
+from cdsm.wires.laws import LinearElasticity
 
 _HEAD = """\
 # An arm of cdsm. Units: m, rad, kg, N, N/m, m/s2. Base axes: x along the straight arm.
@@ -144,7 +144,7 @@ def _routed(cables: object, geometry: Geometry | None) -> list[UnwiredCable]:
     tables = {} if cables is None else cables
     if not isinstance(tables, dict):
         raise GeometryError([f"cables: is {cables!r}; give tables [cables.NAME] or [[cables]]"])
-    routed = serpentine_cables(geometry, LinearElasticity(1.0))
+    routed = serpentine_cables(geometry, LinearElasticity(1e5))
     own, faults = {}, []
     for name, table in tables.items():
         try:
@@ -181,7 +181,7 @@ def arm_text(parts: ArmParts) -> str:
         lines += _urdf_lines(parts)
     else:
         lines += ["[geometry]", *lines_of(geometry, "geometry."), ""]
-    plain = () if geometry is None else serpentine_cables(geometry, LinearElasticity(1.0))
+    plain = () if geometry is None else serpentine_cables(geometry, LinearElasticity(1e5))
     if [_path(cable) for cable in plain] != [_path(cable) for cable in cables]:
         return "\n".join([*lines, *cable_lines(cables, wires, settings)])
     for cable, wire, own in zip(cables, wires, settings, strict=True):

@@ -19,7 +19,6 @@ from cdsm.arm_file.wires import (
     wire_entries,
 )
 from cdsm.cable import Cable, Site
-from cdsm.elasticity import LinearElasticity
 from cdsm.errors import (
     LINES,
     CableError,
@@ -43,6 +42,7 @@ from cdsm.support.records import (
 )
 from cdsm.support.validation import sequence_of
 from cdsm.wires.catalogue import Wire, as_wire
+from cdsm.wires.laws import LinearElasticity
 
 _HEAD = """\
 # cdsm cables. Units: m, N, N/m.
@@ -105,7 +105,7 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     - ``name``; ``sites``: two or more ``{link = "…", xyz = [x, y, z]}``, [m]. A site may also have
       ``friction`` and ``wrap`` [rad], as in :class:`~cdsm.Site`.
     - ``wire``: a name such as ``"1x19-1.2mm"``, a constant rigidity [N], or the NAME of a table
-      ``[wires.NAME]`` in the form of :func:`~cdsm.read_elasticity`.
+      ``[wires.NAME]`` in the form of :meth:`Elasticity.read`.
     - Optional: ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``),
       ``minimum`` and ``maximum`` [N]. These keys and ``wire`` may also stand at the top of the
       file, for all cables without their own.
@@ -132,7 +132,7 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     raise FileError(path, f"cannot be read as cables:{listed(faults, 20, LINES)}")
 
 
-_ANY = LinearElasticity(1.0)
+_ANY = LinearElasticity(1e5)
 """Placeholder for a missing wire, so that all other faults of the file are found first."""
 
 

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple, Self
 from pydantic import Field, model_validator
 
 from cdsm.cable import Cable, Control
-from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import GeometryError, InvalidInput, UnknownName
 from cdsm.support.records import CrossFaults, SpringStiffness, Tension, record, toml_value
 from cdsm.support.validation import one_of
-from cdsm.wires.catalogue import WIRES, name_of
-from cdsm.wires.files import from_table, table_of
+from cdsm.wires.catalogue import WIRES, from_table, name_of, table_of
+from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.laws import LinearElasticity
 
 
 @record

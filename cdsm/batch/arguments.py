@@ -8,7 +8,6 @@ from cdsm.batch.layout import Flags
 from cdsm.kernels.bodies import Masses
 from cdsm.kernels.serpentine_guess import Blocks
 from cdsm.kernels.tree import Indices, Routing, Tree
-from cdsm.kernels.wires import Wires
 from cdsm.support.values import Array, frozen
 
 
@@ -22,7 +21,7 @@ class Arm(NamedTuple):
     highest: Array  # upper joint limits (nv,) [rad]
     blocks: Blocks  # joints and cables in the order in which tensions are guessed
     smallest_arm: float  # moment arms below this are rounding errors, and count as 0 [m]
-    laws: Wires  # laws of the cables; EA is 0 where the motor controls the force
+    linear: Array  # EA (1 + ε) = a + b F of linear laws: a (C,) [N], b (C,); 0 for others (2, C)
     series: Array  # 1/k_series of each cable (C,) [m/N]
     rest: Array  # tension at which the series spring of each cable is unstrained (C,) [N]
 
@@ -38,7 +37,7 @@ class Rows(NamedTuple):
     tension: Array  # F (b, C) [N]; none if tensions are distributed or not needed
     low: Array  # lower bounds (b, C) [N] of distributed tensions
     high: Array  # upper bounds (b, C) [N]
-    rigidity: Array  # EA (1 + ε) (b, C) [N], −1 outside the domain; none if kernels know all laws
+    rigidity: Array  # EA (1 + ε) (b, C) [N], −1 outside the domain; none if all laws are linear
 
     def take(self, rows: slice | Indices) -> Rows:
         """Return the inputs of some ``rows``; an array with one row for all stays as it is."""

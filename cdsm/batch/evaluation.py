@@ -155,13 +155,11 @@ def evaluate(
             then distributed first.
         maximum: Upper bounds [N] of these tensions; no bounds if not given.
         check_limits: Skip postures beyond the joint limits; their status is ``BEYOND_LIMITS``.
-        threads: Maximum number of threads; by default one for each core. A user-defined elasticity
-            is called from all threads.
+        threads: Maximum number of threads; by default one for each core.
 
     Raises:
-        InvalidInput: An argument has the wrong shape or is not a number; a tension is negative; two
-            arguments contradict each other or one is missing; or a user-defined elasticity gives no
-            positive rigidity.
+        InvalidInput: An argument has the wrong shape or is not a number; a tension is negative; or
+            two arguments contradict each other or one is missing.
         UnknownName: An output does not exist.
     """
     instance("arm", arm, Manipulator)

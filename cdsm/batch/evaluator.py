@@ -12,7 +12,6 @@ from cdsm.batch.arguments import Asked, Kept, Rows
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import checked_threads, kernel_arm, run_slices
 from cdsm.batch.layout import OK, POSTPONED, QUANTITIES, UNDECIDED, Codes
-from cdsm.batch.rigidities import rigidities
 from cdsm.errors import InfeasibleTension, SolverError
 from cdsm.kernels.compiling import FULL, WIDTH, is_new
 from cdsm.kernels.distribution import search_tensions
@@ -87,9 +86,9 @@ class Evaluator:
             QUANTITIES[number]: slice(*place)
             for number, place in zip(self._wanted, pairwise(ends), strict=True)
         }
-        # whether the kernel needs rigidities that only Python computes
+        # whether the kernel needs rigidities of laws that are not linear
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
-        self._asks = needs_springs and bool(arm._model.laws.without_kernel)
+        self._asks = needs_springs and bool(arm._model.laws.nonlinear)
         record = int(self._start[-1])
         width = WIDTH // (2 if record < _LONG else 4)
         self._block = FULL if record < _SHORT else max(1, min(width, len(q)))
@@ -122,7 +121,7 @@ class Evaluator:
     def _distribute(self, rows: Rows, found: Codes, out: Array) -> None:
         """Distribute the tensions of the postures ``rows``; compute all wanted quantities."""
         balance = self._empty_balance(len(found))
-        if self._asks:  # rigidities that only Python computes need the tensions first
+        if self._asks:  # rigidities need the tensions first
             self._evaluate(rows, np.array([layout.TENSION]), found, balance.tension, balance)
         else:
             self._evaluate(rows, self._wanted, found, out, balance)
@@ -186,7 +185,7 @@ class Evaluator:
         for first in range(0, len(found), blocks * width):
             part = slice(first, first + blocks * width)
             states, values = found[part], out[part]
-            some = self._with_rigidities(rows.take(part), states)
+            some = self._with_rigidities(rows.take(part))
             kept = empty.first(-(-len(states) // width))
             left = Balance(*(each[part] for each in balance))
             evaluate_rows(self._kernel_arm, some, asked, width, kept, left, values, states)
@@ -196,18 +195,15 @@ class Evaluator:
                 for name in names:
                     values[:, self._place[name]] = math.nan
 
-    def _with_rigidities(self, rows: Rows, found: Codes) -> Rows:
-        """Return ``rows``, with rigidities filled in if laws are functions of Python.
+    def _with_rigidities(self, rows: Rows) -> Rows:
+        """Return ``rows``, with rigidities, which numpy computes, if a law is not linear.
 
-        Kernels cannot call these functions. Nothing is filled in if no output needs rigidities, or
-        as long as the tensions are not known.
+        Nothing is filled in if no output needs rigidities, or as long as the tensions are not
+        known.
         """
         if not (self._asks and len(rows.tension)):
             return rows
-        laws, usable = self._arm._model.laws, found == OK
-        if len(rows.tension) < len(found):  # one row for all postures
-            usable = usable.any(keepdims=True)
-        return rows._replace(rigidity=rigidities(laws, rows.tension, usable))
+        return rows._replace(rigidity=self._arm._model.laws.rigidities(rows.tension))
 
     def _read(self, kept: Kept, names: list[str], found: Codes, out: Array) -> None:
         """Compute the readings ``names`` from the arrays ``kept``; fill ``out`` and ``found``."""

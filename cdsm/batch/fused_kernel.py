@@ -52,7 +52,6 @@ from cdsm.kernels.stiffness import (
 )
 from cdsm.kernels.tension import Balance, certificate, set_infeasible
 from cdsm.kernels.tree import Indices, empty_frames, forward_kinematics
-from cdsm.kernels.wires import set_rigidity, wire_scratch
 from cdsm.support.values import Array
 
 
@@ -120,7 +119,7 @@ def evaluate_rows(
     zero = np.zeros((cables, width))
     six, shortest = np.empty((6, width)), np.empty(width)
     code, known = np.empty(width, dtype=np.intp), np.empty(width, dtype=np.intp)
-    wiring, slot = wire_scratch(arm.laws, width), np.zeros(cables, dtype=np.intp)
+    slot = np.zeros(cables, dtype=np.intp)
 
     for first in range(0, rows, width):
         block = first // width
@@ -199,7 +198,7 @@ def evaluate_rows(
         # quantities that need the rigidity of the cables
         if reached > LOAD:
             if not given.rigidity.shape[0]:
-                set_rigidity(arm.laws, F, stretched, wiring, width)
+                _set_linear(arm.linear, F, stretched, width)
             _note_outside(code, stretched, width)
             set_cable_stiffness(L, F, stretched, arm.series, arm.rest, k, width)
             clear(passive, width)
@@ -220,6 +219,14 @@ def _note(code: Indices, number: int, known: Indices, width: Width) -> None:
     for w in lanes(width):
         if code[w] == OK:
             known[w] = number + 1
+
+
+@inlined
+def _set_linear(linear: Array, tension: Array, rigidity: Array, width: Width) -> None:
+    """Fill ``rigidity`` (C, W) [N] with EA (1 + ε) of linear laws at F (C, W) [N]."""
+    for c in range(tension.shape[0]):
+        for w in lanes(width):
+            rigidity[c, w] = linear[0, c] + linear[1, c] * tension[c, w]
 
 
 @inlined

@@ -32,7 +32,7 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
         highest=model.highest if checked else frozen(endless),
         blocks=model.blocks,
         smallest_arm=NO_ARM * arm.length,
-        laws=model.laws.wires,
+        linear=frozen(np.stack([model.laws.constant, model.laws.linear])),
         series=model.laws.series,
         rest=model.laws.rest,
     )

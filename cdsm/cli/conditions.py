@@ -36,7 +36,7 @@ class Conditions:
             if own > min(self.minimum):
                 words[-1] += f" (cables of their own up to {own:g} N)"
             held = [cable for cable in self.arm.cables if cable.control == "position"]
-            first = max((cable.elasticity.domain.low for cable in held), default=0.0)
+            first = max((cable.elasticity.low for cable in held), default=0.0)
             if self.planned and first > max(own, *self.minimum):
                 words[-1] += f" (raised to {first:g} N, where the law of a wire begins)"
         if self.arm.original_length != "unstrained":

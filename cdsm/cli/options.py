@@ -160,7 +160,7 @@ class ArmOptions:
                 raise misuse(
                     "ARM", f"{self.arm} is a folder without a CASPR model; give an ARM.toml."
                 )
-            arm = cdsm.read_caspr(self.arm, elasticity=wire or cdsm.LinearElasticity(1.0))
+            arm = cdsm.read_caspr(self.arm, elasticity=wire or cdsm.presets.ELASTIC_STAGE)
             if wire is None:  # after reading, whose errors come first: the folder may hold no model
                 raise cdsm.MissingWire(self.arm)
             return arm

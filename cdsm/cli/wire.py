@@ -74,7 +74,7 @@ def fit(
     except cdsm.TensileTestError as error:
         raise cdsm.TensileTestError(_as_options(str(error))) from None
     write(tolerances, lambda file: cdsm.Tolerances(rigidity=fitted.tolerance()).write(file))
-    write(out, lambda file: cdsm.write_elasticity(fitted.elasticity, file))
+    write(out, lambda file: fitted.elasticity.write(file))
     write_picture(figure, fitted.plot)
     read = f"{test}: {data.source}"
     answer(as_json, lambda: {"read": data.source, **_numbers(fitted)}, f"{read}\n{fitted}")
@@ -109,7 +109,7 @@ def _as_options(message: str) -> str:
 def _numbers(fit: cdsm.TensileFit) -> Json:
     return {
         "gauge_length_m": fit.test.gauge_length,
-        "domain_N": [fit.elasticity.domain.low, fit.elasticity.domain.high],
+        "domain_N": [fit.elasticity.low, fit.elasticity.high],
         "rms_N": fit.rms,
         "stages_N": {stage.name: [stage.low, stage.high] for stage in fit.stages},
         "tension_N": fit.tensions,

@@ -28,7 +28,6 @@ from scipy.linalg import solve_triangular
 
 from cdsm.control.laws import Reading
 from cdsm.control.sensors import Sensors
-from cdsm.elasticity.answers import rigidity_of, strain_of
 from cdsm.friction.chain_problem import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -157,7 +156,7 @@ class Observer:
         T = shares * F[chains.cable]
         for law, of in self._problem.laws:
             mine = np.isin(chains.cable, of)
-            strain[mine] = strain_of(law, np.clip(T[mine], law.domain.first, law.domain.high))
+            strain[mine] = law.strain(np.clip(T[mine], law.low, law.high))
         total = np.add.reduceat(strain * segments.lengths, chains.start[:-1])
         return np.asarray(total / pose.cable_lengths)
 
@@ -169,7 +168,7 @@ class Observer:
         """
         soft = np.array(self.arm._model.laws.series)
         for law, of in self._problem.laws:
-            soft[of] += softness * wire[of] / rigidity_of(law, F[of])
+            soft[of] += softness * wire[of] / law.rigidity(F[of])
         return soft
 
     @cached_property
@@ -181,8 +180,8 @@ class Observer:
 
     @cached_property
     def _domains(self) -> Array:
-        domains = [cable.elasticity.domain for cable in self.arm.cables]
-        return np.array([[each.first for each in domains], [each.high for each in domains]])
+        laws = [cable.elasticity for cable in self.arm.cables]
+        return np.array([[law.low for law in laws], [law.high for law in laws]])
 
     @property
     def _encoder_spread(self) -> float:

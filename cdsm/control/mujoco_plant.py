@@ -145,8 +145,6 @@ def _tension(cable: Cable, elongation: float, wire: float) -> float:
     A law that begins above 0 N is not defined for a slack cable: ElasticityRangeError is raised. A
     law with a slack branch is slack only below the elongation at 0 N, which is negative.
     """
-    domain = cable.elasticity.domain
-    slack = float(cable.elongation(0.0, wire)) if 0.0 in domain else 0.0
-    if domain.low == 0.0 and elongation <= slack:
+    if cable.elasticity.low == 0.0 and elongation <= float(cable.elongation(0.0, wire)):
         return 0.0
     return float(cable.tension(elongation, wire))

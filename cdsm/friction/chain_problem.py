@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
-from cdsm.cable_laws import key
-from cdsm.elasticity import Elasticity, LinearElasticity
-from cdsm.elasticity.answers import energy_of, rigidity_of, strain_of
 from cdsm.kernels.chain_problem import chain_tangent, solve_chains
 from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
+from cdsm.wires.elasticity import Elasticity
 
 _ITERATIONS = 60
 """Largest number of Newton steps. Arms with linear laws need one, with strands 3 to 6."""
@@ -80,16 +78,16 @@ class ChainProblem:
         self._rest[first] = [cable.elasticity.rest for cable in cables]
         self._base, self._softness = np.ones(size), np.zeros(size)
         self._curved: list[tuple[Elasticity, Indices]] = []
-        by_law: dict[object, tuple[Elasticity, list[int]]] = {}
+        by_law: dict[Elasticity, list[int]] = {}
         for c, cable in enumerate(cables):
-            by_law.setdefault(key(cable.elasticity), (cable.elasticity, []))[1].append(c)
-        self.laws = list(by_law.values())
+            by_law.setdefault(cable.elasticity, []).append(c)
+        self.laws = list(by_law.items())
         for law, of in self.laws:
             segments = np.flatnonzero(np.isin(self._cable, of))
-            if isinstance(law, LinearElasticity):
-                self._softness[segments] = 1.0 / law.rigidity(0.0)
-            else:
+            if law._constant is None:
                 self._curved.append((law, segments))
+            else:
+                self._softness[segments] = 1.0 / law._constant
         if not unstrained:
             F = tension[self._cable]
             base, softness = self._strain(F)
@@ -210,7 +208,7 @@ class ChainProblem:
         for law, of in self._curved:
             inside, rigidity = _within(law, tension[of])
             softness[of] = 1.0 / rigidity
-            base[of] += strain_of(law, inside) - inside / rigidity
+            base[of] += law.strain(inside) - inside / rigidity
         return base, softness
 
     def _energy(self, tension: Array) -> Array:
@@ -218,11 +216,11 @@ class ChainProblem:
         energy = self._softness * tension**2 / 2.0
         for law, of in self._curved:
             T, (inside, rigidity) = tension[of], _within(law, tension[of])
-            energy[of] = energy_of(law, inside) + (T**2 - inside**2) / (2.0 * rigidity)
+            energy[of] = law.energy(inside) + (T**2 - inside**2) / (2.0 * rigidity)
         return energy
 
 
 def _within(law: Elasticity, tension: Array) -> tuple[Array, Array]:
     """Return ``tension`` clipped to the domain of ``law``, and the rigidities EA there [N]."""
-    inside = np.clip(tension, law.domain.first, law.domain.high)
-    return inside, rigidity_of(law, inside)
+    inside = np.clip(tension, law.low, law.high)
+    return inside, law.rigidity(inside)

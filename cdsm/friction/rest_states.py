@@ -32,7 +32,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.elasticity.answers import strain_of
 from cdsm.errors import ElasticityRangeError, SolverError
 from cdsm.friction.neighbourhood import Neighbourhood
 from cdsm.friction.remainders import TOO_FAR, Bends, Remainders
@@ -273,19 +272,19 @@ class _Wire(NamedTuple):
         If ``unstrained`` is False, ε is the strain minus the strain under F.
         """
         law = cable.elasticity
-        strain = float(strain_of(law, np.asarray(F)))
+        strain = float(law.strain(F))
         offset = 0.0 if unstrained else strain
         least, most = F - fall, F + rise
         at = np.linspace(least, most, _CELLS + 1)
-        outside = [F for F in (least, most) if not law.domain.first <= F <= law.domain.high]
+        outside = [F for F in (least, most) if not law.low <= F <= law.high]
         if outside:
             raise ElasticityRangeError(
-                f"of a band; the elasticity is defined on {law.domain} only. Raise the tensions, "
+                f"of a band; the elasticity is defined on {law._span} only. Raise the tensions, "
                 "or use an elasticity that covers them",
                 outside,
                 cables=[cable.name],
             )
-        b = 1.0 / (1.0 + strain_of(law, at) - offset)
+        b = 1.0 / (1.0 + law.strain(at) - offset)
         share = 1.0 / (1.0 + strain - offset)
         slope = float((b[-1] - b[0]) / (most - least)) if most > least else 0.0
         line = share + slope * (at - F)

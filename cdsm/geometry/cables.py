@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from cdsm.cable import Cable, Control, Site
-from cdsm.elasticity import Elasticity
-from cdsm.elasticity.law import checked_law
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.support.validation import instance
+from cdsm.wires.elasticity import Elasticity, checked_law
 
 
 def serpentine_cables(

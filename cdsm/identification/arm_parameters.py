@@ -7,12 +7,12 @@ from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 
-from cdsm.elasticity import Elasticity, LinearElasticity
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
 from cdsm.geometry.cables import require_own_cables, serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import instance, one_of, scalar, text
+from cdsm.wires.elasticity import Elasticity
 
 
 class _Kind(NamedTuple):
@@ -130,8 +130,8 @@ class ArmParameters:
                     own[i] = replace(own[i], **{attribute: value})
         if parts:
             geometry = geometry.replace(**{part: tuple(own) for part, own in parts.items()})
-        cables, laws = [], dict[tuple[int, float], Elasticity]()
-        routed = serpentine_cables(geometry, LinearElasticity(1.0))
+        cables, laws = [], dict[tuple[Elasticity, float], Elasticity]()
+        routed = serpentine_cables(geometry, self.arm.cables[0].elasticity)
         for old, new, route in zip(self.arm.cables, routed, geometry.cables, strict=True):
             sites = tuple(
                 replace(site, position=moved.position)
@@ -143,7 +143,7 @@ class ArmParameters:
             if "rigidity" in given:
                 law, factor = cable.elasticity, given["rigidity"]
                 # cables share their law: they are computed together
-                shared = laws.setdefault((id(law), factor), law.scaled(factor))
+                shared = laws.setdefault((law, factor), law.scaled(factor))
                 cable = replace(cable, elasticity=shared)
             if "spring" in given:
                 cable = replace(cable, series_stiffness=given["spring"])

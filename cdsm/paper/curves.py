@@ -16,13 +16,13 @@ import numpy as np
 
 from cdsm import presets
 from cdsm.cable_laws import OriginalLength
-from cdsm.elasticity import Elasticity
 from cdsm.manipulator import Manipulator
 from cdsm.paper.claims import Claim, Figure, floats
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
+from cdsm.wires.elasticity import Elasticity
 
 Part = Literal["active", "passive"]
 Swept = Literal["young_modulus", "tension"]

@@ -14,7 +14,6 @@ from scipy.optimize import brentq
 
 from cdsm import presets
 from cdsm.cable_laws import OriginalLength
-from cdsm.elasticity import LinearElasticity
 from cdsm.paper.claims import Claim
 from cdsm.paper.curves import (
     FROM_FIG_6,
@@ -32,6 +31,7 @@ from cdsm.paper.strand import LEVEL
 from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
+from cdsm.wires.laws import LinearElasticity
 
 STRAND_END: Final = presets.STRAND_1X19.high
 """Tension [N] at which the elastic stage of the strand ends (text of Section IV-C)."""

@@ -7,14 +7,12 @@ the domain of each elasticity: the tensions for which EA(F) is defined.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import daqp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.cable_laws import kinks
 from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
@@ -47,31 +45,6 @@ class Admissible:
     scale: float  # largest of the least tensions [N], or 1 N if all are zero
     rows: Array  # orthonormal basis (r, C) of the row space of J_Lᵀ, whose rank is r
     null: Array  # orthonormal basis (C, p) of the null space of J_Lᵀ, p = C − r
-
-    @cached_property
-    def kinks(self) -> list[tuple[int, float]]:
-        """Kinks of EA(F) (jumps of its slope) within the bounds, as (cable index, tension [N])."""
-        return [
-            (c, kink)
-            for c, cable in enumerate(self.least.posture.arm.cables)
-            if cable.control == "position"
-            for kink in kinks(cable.elasticity)
-            if self.low[c] <= kink < self.high[c]
-        ]
-
-    def piece(self, F: Array) -> tuple[Array, Array]:
-        """Return the bounds (C,) [N] of the box around F (C,) [N] in which no EA(F) has a kink.
-
-        A tension exactly at a kink belongs to the box below the kink, so the slope of EA below the
-        kink is used.
-        """
-        low, high = self.low.copy(), self.high.copy()
-        for c, kink in self.kinks:
-            if F[c] <= kink:
-                high[c] = min(high[c], kink)
-            else:
-                low[c] = max(low[c], np.nextafter(kink, np.inf))
-        return low, high
 
     def imbalance(self, F: Array) -> Array:
         """Return the error (r,) [N] of the balance under F (C,) [N]; zero if F balances the arm.
@@ -106,7 +79,7 @@ class Admissible:
 
     def tension(self, F: Array) -> Tension:
         """Return F (C,) [N] as a :class:`Tension`, without the rounding errors of its balance."""
-        exact = self.nearest(F, *self.piece(F))  # removes the rounding of short steps
+        exact = self.nearest(F, self.low, self.high)  # removes the rounding of short steps
         values = frozen(F if exact is None else exact)
         return replace(self.least, values=values, least=False)
 
@@ -125,15 +98,15 @@ def admissible(
     least = distribute_tension(pose, minimum, maximum, wrench)
     minimum, maximum, cables = least.minimum, least.maximum, pose.arm.cables
     # a force-controlled cable does not use its elasticity, so its domain does not matter
-    first = np.array([cable.elasticity.domain.first for cable in cables])
-    last = np.array([cable.elasticity.domain.high for cable in cables])
+    first = np.array([cable.elasticity.low for cable in cables])
+    last = np.array([cable.elasticity.high for cable in cables])
     low = np.where(cables.position_controlled, np.maximum(minimum, first), minimum)
     high = np.where(cables.position_controlled, np.minimum(maximum, last), maximum)
     outside = np.flatnonzero(low > high)
     if outside.size:
         raise ElasticityRangeError(
             f"nothing between minimum= and maximum= is in the domain "
-            f"{cables[outside[0]].elasticity.domain} of the elasticity. Change minimum= or "
+            f"{cables[outside[0]].elasticity._span} of the elasticity. Change minimum= or "
             "maximum=, or use an elasticity that covers them.",
             np.where(maximum < first, maximum, minimum)[outside].tolist(),
             outside.tolist(),

@@ -118,12 +118,10 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
 
     ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ, with the gradient J_c and the Hessian H_c of the length of
     cable c and k′_c = dk_c/dF_c. k′_c includes dEA/dF and the series spring. For example,
-    ``stiffness_gradient(K).along(u)`` is the gradient of ``K.along(u)``. At a kink of an
-    elasticity, the slope below the kink is used.
+    ``stiffness_gradient(K).along(u)`` is the gradient of ``K.along(u)``.
 
     Raises:
-        InvalidInput: ``stiffness`` is not a frictionless ``Stiffness``, or the slope of a
-            user-defined law is not finite.
+        InvalidInput: ``stiffness`` is not a frictionless ``Stiffness``.
         ElasticityRangeError: A tension is outside the domain of its elasticity.
     """
     K = instance("stiffness", stiffness, Stiffness).require_frictionless()

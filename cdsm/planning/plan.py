@@ -125,8 +125,8 @@ def plan_stiffness(
     otherwise an error is raised. The targets of several directions are hit if possible. If not, the
     tensions have the least sum of squared relative misses that was found, and ``reached`` is False.
 
-    The searches are local. With the laws of this library they usually end at the least effort ‖F‖.
-    With one user-defined law, the effort found was 3.6 % above the least; more ``starts`` help.
+    The searches are local. With laws that stiffen they usually end at the same effort ‖F‖. With one
+    law that rises and falls, the effort found was 3.6 % above the least; more ``starts`` help.
 
     Args:
         pose: The posture.

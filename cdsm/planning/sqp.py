@@ -28,17 +28,11 @@ reserve. If it is positive definite there already, the last steps converge quadr
 of the prediction. If c bends away from its tangent, a second program uses the value of c after the
 step (second-order correction). A step that leaves the stable tensions is moved back towards an
 anchor, a stable point well inside.
-
-**Kinks.** At a kink of a rigidity (Eq. 19 has one at 31 N) c is continuous, but its slope is not.
-Kinks divide the tensions into boxes ("pieces") on which c is smooth. A search crosses kinks until a
-step across a kink fails. Then it stays in its piece, whose walls act as bounds. If it ends at a
-wall, it starts again on the other side with the other slope, as long as this finds a better point.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -51,14 +45,12 @@ from cdsm.support.values import Array
 
 MET: Final = 1e-9  # largest magnitude of a constraint that counts as met
 _ITERATIONS = 100
-_CROSSINGS = 60  # largest number of restarts beyond a kink
 _FIRST_RADIUS = 4.0
 _SMALLEST_RADIUS = 1e-13
 _FIRST_PRICE, _LARGEST_PRICE = 10.0, 1e8
 _PREMIUM = 3.0  # price over the largest multiplier: above one the penalty is exact
 _ROUNDING = 1e-15
 _ARRIVED = 1e-10  # smaller steps and misses end a search: the next ones are of their square's size
-_AT_KINK = 1e-6  # relative distance from a kink that counts as zero
 
 
 class Objective(NamedTuple):
@@ -115,64 +107,30 @@ class Program:
 
 
 def search(program: Program, start: Evaluation) -> ConstraintValues:
-    """Find a local optimum from the stable point ``start``, also across kinks of EA(F)."""
-    best = _search(program, start, in_piece=False)
-    for _ in range(_CROSSINGS):
-        for F in _beyond_kinks(program.region, best.evaluation.F):
-            place = program.anchor.backtracked(F)
-            other = None if place is None else _search(program, place, in_piece=True)
-            if other is not None and program.better(other, best):
-                best = other
-                break
-        else:
-            break
-    return best
-
-
-def _beyond_kinks(region: Admissible, F: Array) -> Iterator[Array]:
-    """Yield F (C,) [N] moved just across its kinks of EA(F): all together, then each one alone."""
-    at = [(c, kink) for c, kink in region.kinks if abs(F[c] - kink) <= _AT_KINK * kink]
-    for group in ([at] if len(at) > 1 else []) + [[pair] for pair in at]:
-        beyond = F.copy()
-        for c, kink in group:
-            beyond[c] = np.nextafter(kink, np.inf) if F[c] <= kink else kink
-        yield beyond
-
-
-def _search(program: Program, start: Evaluation, *, in_piece: bool) -> ConstraintValues:
-    """Find a local optimum from ``start``; if ``in_piece``, between the kinks of EA around it."""
+    """Find a local optimum from the stable point ``start``."""
     region, iterate = program.region, program.constraints.at(start)
     multipliers = np.zeros(iterate.values.size if program.objective.effort else 0)
     step, radius = _Step(np.zeros_like(start.F), multipliers, 0.0, 0.0, _FIRST_PRICE), _FIRST_RADIUS
-    in_piece = in_piece or not region.kinks
     for _ in range(_ITERATIONS):
         if radius < _SMALLEST_RADIUS:
             break
-        low, high = region.piece(iterate.evaluation.F)
-        bounds = (low, high) if in_piece else (region.low, region.high)
-        local = _LocalModel(program, iterate, step, bounds, radius)
+        local = _LocalModel(program, iterate, step, (region.low, region.high), radius)
         step = local.step(step.price, local.c)
         length = float(abs(step.d).max(initial=0.0))
         small = length <= _ARRIVED and bool((abs(local.c) <= _ARRIVED).all())
         if small or step.predicted <= _ROUNDING * max(1.0, abs(program.merit(iterate, step.price))):
-            if not in_piece:  # finish on one side of the kinks, where c is smooth
-                in_piece = True
-            elif not program.met(iterate) and step.price < _LARGEST_PRICE:
-                # converged, but only at this low price
-                step = step._replace(price=min(100.0 * step.price, _LARGEST_PRICE))
-            else:
+            if program.met(iterate) or step.price >= _LARGEST_PRICE:
                 break
+            # converged, but only at this low price
+            step = step._replace(price=min(100.0 * step.price, _LARGEST_PRICE))
             continue
         candidate, fall = local.take(step)
-        F = iterate.evaluation.F + local.size * step.d
         if candidate is not None and fall >= 1e-4 * step.predicted:
             iterate = candidate
             if fall > 0.5 * step.predicted:
                 radius = max(radius, 3.0 * length)
             elif fall < 0.25 * step.predicted:
                 radius = length / 2.0
-        elif not in_piece and ((low > F) | (high < F)).any():
-            in_piece = True  # the model of this side of the kink fails on the other side
         else:
             radius = length / 4.0
     return iterate

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
-from cdsm.cable_laws import kinks
 from cdsm.errors import InvalidInput
 from cdsm.kernels.tension import OPTIMALITY
 from cdsm.planning.gradient import stiffness_gradient
@@ -100,7 +99,7 @@ def saturation(
         return _slope(at(lower), lower, u)
 
     places = log_samples(first, last)
-    bends = _kinks(at, places[(places >= first) & (places <= last)])
+    bends = _bends(at, places[(places >= first) & (places <= last)])
     beside = np.outer([1.0 - _JUST, 1.0 + _JUST], bends).ravel()
     places = np.unique(np.clip(np.concatenate([places, beside]), first, last))
     curve = np.array([(place, at(place).along(u), slope(place)) for place in places.tolist()])
@@ -141,12 +140,12 @@ def _stable(at: StiffnessAt, low: float, high: float) -> tuple[float, float]:
     return first + inset * (first > low), last - inset * (last < high)
 
 
-def _kinks(at: StiffnessAt, places: Array) -> Array:
+def _bends(at: StiffnessAt, places: Array) -> Array:
     """Find the lower bounds b [N], ascending, at which the slope of the stiffness jumps.
 
-    At such a bound, a cable reaches or leaves a limit of its tension, or passes a kink of its
-    rigidity. Between two of them the least tensions are linear in b. ``places`` are lower bounds,
-    ascending; the search covers the range from the first to the last.
+    At such a bound, a cable reaches or leaves a limit of its tension. Between two of them the least
+    tensions are linear in b. ``places`` are lower bounds, ascending; the search covers the range
+    from the first to the last.
     """
     found: list[float] = []
     todo = list(pairwise(places.tolist()))
@@ -155,11 +154,8 @@ def _kinks(at: StiffnessAt, places: Array) -> Array:
         a, b = todo.pop()
         one, other = at(a), at(b)
         if np.array_equal(_active(one, a), _active(other, b)):
-            for cable, F, G in zip(one.posture.arm.cables, one.tension, other.tension, strict=True):
-                if cable.control == "position":
-                    passed = (x for x in kinks(cable.elasticity) if min(F, G) <= x < max(F, G))
-                    found += [a + (kink - F) / (G - F) * (b - a) for kink in passed]
-        elif b - a <= max(_JUST * b, smallest):
+            continue
+        if b - a <= max(_JUST * b, smallest):
             found.append((a + b) / 2.0)
         else:
             todo += [(a, (a + b) / 2.0), ((a + b) / 2.0, b)]

@@ -27,7 +27,7 @@ from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     from cdsm.cable import Cable
-    from cdsm.elasticity import Domain, Elasticity
+    from cdsm.wires.elasticity import Elasticity
 
 _POINTS: Final = 400
 
@@ -41,7 +41,7 @@ def plot_elasticity(law: Elasticity) -> Figure:
     :class:`~cdsm.Elasticity`.
     """
     expect("law", law, "Elasticity")
-    tension = _tensions(law.domain)
+    tension = _tensions(law)
     figure, ((axes,),) = panels(ONE_COLUMN, 2.3, 1)
     axes.plot(tension, KN * law.rigidity(tension), color=BLUE, label="tangent, dF/dε")
     axes.plot(tension, KN * law.secant_rigidity(tension), "--", color=VERMILLION, label="secant")
@@ -67,7 +67,7 @@ def plot_cables(cables: Mapping[str, Cable] | Sequence[Cable], free_length: floa
     figure, ((axes,),) = panels(ONE_COLUMN, 2.3, 1)
     for k, (name, cable) in enumerate(named.items()):
         expect("cables", cable, "Cable")
-        tension = _tensions(cable.elasticity.domain)
+        tension = _tensions(cable.elasticity)
         values = N_PER_MM * cable.tangent_stiffness(tension, free_length)
         color = PALETTE[-3:][k % 3]
         axes.semilogy(tension, values, STYLES[k % len(STYLES)], color=color, label=name)
@@ -77,6 +77,5 @@ def plot_cables(cables: Mapping[str, Cable] | Sequence[Cable], free_length: floa
     return figure
 
 
-def _tensions(domain: Domain) -> Array:
-    high = domain.high if math.isfinite(domain.high) else _ENDLESS
-    return np.linspace(domain.first, high, _POINTS)
+def _tensions(law: Elasticity) -> Array:
+    return np.linspace(law.low, law.high if math.isfinite(law.high) else _ENDLESS, _POINTS)

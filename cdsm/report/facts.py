@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from cdsm.cable import Cable, Control
-from cdsm.errors import CdsmError, ElasticityRangeError, SingularStiffness
-from cdsm.report.potential import evaluate_law, joint_unit
+from cdsm.cable import Control
+from cdsm.errors import ElasticityRangeError, SingularStiffness
+from cdsm.report.potential import joint_unit
 from cdsm.stiffness_matrix.sticking import first_order_loads, holding, tension_gradient
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
@@ -168,20 +167,20 @@ def cable_states(K: Stiffness) -> tuple[CableState, ...]:
                 control=cable.control,
                 tension=float(F),
                 stiffness=float(k),
-                tangent=_number(cable, partial(law.rigidity, F)),
-                secant=_number(cable, partial(law.secant_rigidity, F)),
-                low=float(law.domain.low),
-                high=float(law.domain.high),
+                tangent=_number(law.rigidity, F),
+                secant=_number(law.secant_rigidity, F),
+                low=law.low,
+                high=law.high,
             )
         )
     return tuple(states)
 
 
-def _number(cable: Cable, answer: Callable[[], Array]) -> float | None:
-    """Return the number that ``answer()`` computes from the law of ``cable``; None if it fails."""
+def _number(answer: Callable[[Array], Array], tension: Array) -> float | None:
+    """Return what a method of a law gives at a tension; None outside the law."""
     try:
-        return float(evaluate_law(cable, answer))
-    except CdsmError:
+        return float(answer(tension))
+    except ElasticityRangeError:
         return None
 
 

@@ -12,20 +12,15 @@ it does the work m·ω.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.cable_laws import kinks
-from cdsm.elasticity import SlackBelow
-from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import JointUnits
 from cdsm.support.values import Array
-from cdsm.wires.laws import TabulatedElasticity
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
@@ -35,7 +30,7 @@ ONE_SIDED = 1e-4
 """A tension is at a bound or kink of its law if their relative distance is at most this."""
 
 _BESIDE = 1e-6
-"""A tension is at a point of a tabulated law if their relative distance is at most this."""
+"""A tension is at a point of a table if their relative distance is at most this."""
 
 
 class LockedCable(NamedTuple):
@@ -53,15 +48,13 @@ class LockedCable(NamedTuple):
         """Compute the tension (P,) [N] of this cable if the cables are longer by (P, C) [m]."""
         cable, start = self.cable, self.free_length
         more = longer[:, self.number]
-        return evaluate_law(
-            cable, lambda: cable.tension(float(cable.elongation(self.tension, start)) + more, start)
-        )
+        return cable.tension(float(cable.elongation(self.tension, start)) + more, start)
 
     def stored(self, longer: Array) -> Array:
         """Compute gain of energy minus F ΔL (P,) [J] if the cables are longer by ΔL (P, C) [m]."""
         cable, F, start = self.cable, self.tension, self.free_length
         tensions = self.tensions(longer)
-        more = evaluate_law(cable, lambda: cable.energy(tensions, start) - cable.energy(F, start))
+        more = cable.energy(tensions, start) - cable.energy(F, start)
         return np.asarray(more - F * longer[:, self.number])
 
     def room(self) -> float:
@@ -71,11 +64,10 @@ class LockedCable(NamedTuple):
         """
         F, law = self.tension, self.cable.elasticity
         edges = [edge for edge, _ in self._edges]
-        law = law.law if isinstance(law, SlackBelow) else law
-        if isinstance(law, TabulatedElasticity):
-            # the rigidity has kinks at the points of a table. A point too near leaves no room for
-            # a step and is ignored: the kink is then in the middle, and differences still converge
-            edges += [point for point in law.tensions if abs(F - point) > _BESIDE * F]
+        # the rigidity has kinks at the points of a table. A point too near leaves no room for a
+        # step and is ignored: the kink is then in the middle, and differences still converge
+        points = law._given.get("tensions", ())
+        edges += [point for point in points if abs(F - point) > _BESIDE * F]
         return min(abs(F - edge) for edge in edges)
 
     def one_sided(self) -> list[str]:
@@ -91,27 +83,10 @@ class LockedCable(NamedTuple):
         """Return tension [N] and name of each bound and kink of the law."""
         law = self.cable.elasticity
         return [
-            (law.domain.low, f"the low end of its law {law.domain}"),
-            (law.domain.high, f"the high end of its law {law.domain}"),
-            *((T, f"a sharp bend of its tangent rigidity, at {T:g} N") for T in kinks(law)),
-        ]
-
-
-def evaluate_law(cable: Cable, answer: Callable[[], Array]) -> Array:
-    """Return ``answer()``, which evaluates the law of ``cable``; InvalidInput if the law fails."""
-    try:
-        values = np.asarray(answer(), dtype=np.float64)
-    except CdsmError:
-        raise
-    except Exception as error:  # a user-defined law may raise anything
-        raise InvalidInput(
-            "elasticity", f"{cable.elasticity!r} of {cable.name} fails: {error!r}."
-        ) from error
-    if not np.isfinite(values).all():
-        raise InvalidInput(
-            "elasticity", f"{cable.elasticity!r} of {cable.name} gives numbers that are not finite."
-        )
-    return values
+            (law.low, f"the low end of its law {law._span}"),
+            (law.high, f"the high end of its law {law._span}"),
+            (law.rest, f"a sharp bend of its tangent rigidity, at {law.rest:g} N"),
+        ][: 3 if law._slack else 2]
 
 
 _FIRST = 2.0**-4  # largest step [rad], or in arm lengths for joints that slide

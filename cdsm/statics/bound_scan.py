@@ -26,7 +26,7 @@ PRECISION: Final = 1e-12
 """Relative precision of a bound or factor that is found by bisection or root finding."""
 
 _ABOVE: Final = 1.0 + 1e-9
-"""Factor just above the low end of a domain, because a domain may exclude its low end."""
+"""Factor just above the low end of a law: rounding may put a tension just below its bound."""
 
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
@@ -60,9 +60,9 @@ def tension_domain(arm: Manipulator) -> tuple[float, float]:
     ``high`` is at most the maximum of every cable. The range is within the domain of the law of
     every position-controlled cable.
     """
-    domains = [each.elasticity.domain for each in arm.cables if each.control == "position"]
-    low = max((each.low for each in domains), default=0.0) * _ABOVE
-    ends = [*(each.high for each in domains), *(each.maximum for each in arm.cables)]
+    laws = [each.elasticity for each in arm.cables if each.control == "position"]
+    low = max((each.low for each in laws), default=0.0) * _ABOVE
+    ends = [*(each.high for each in laws), *(each.maximum for each in arm.cables)]
     return low, min(ends)
 
 
@@ -105,7 +105,7 @@ def scan_end(at: StiffnessAt, low: float, highest: float) -> float:
             highest = min(2.0 * rest / slower, far) if slower > 0.0 else far
         highest = max(highest, 2.0 * low)
         while growth < 0.0 and highest < far and _balances(at, highest) and at(highest).is_stable:
-            highest *= 2.0  # a user-defined law may stiffen further
+            highest *= 2.0  # the law may stiffen further
     return (
         highest
         if _balances(at, highest)

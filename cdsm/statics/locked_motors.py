@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
-from cdsm.elasticity import Elasticity
-from cdsm.elasticity.answers import rigidity_of, strain_of
 from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.roots import rising_root
 from cdsm.support.values import Array, frozen
+from cdsm.wires.elasticity import Elasticity
 
 ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 """Relative rounding of a torque, from the angles, lengths and tensions in its sum."""
@@ -66,7 +65,6 @@ class LoadedArm:
     Raises:
         ElasticityRangeError: A law gives no strain; or a series spring stretches by more than the
             whole cable, so that no wire is left. The error names the cables.
-        InvalidInput: A user-defined law gives a strain that is not finite.
     """
 
     def __init__(
@@ -137,13 +135,13 @@ def require_domains(
     """
     for law, of in groups:
         F = tension[of]
-        outside = (law.domain.low * (1.0 - _BEYOND) > F) | (law.domain.high * (1.0 + _BEYOND) < F)
+        outside = (law.low * (1.0 - _BEYOND) > F) | (law.high * (1.0 + _BEYOND) < F)
         if np.count_nonzero(outside):
-            slack = (law.domain.low > F).any()
+            slack = (law.low > F).any()
             below = ", or continue it below by its slack_below()" if slack else ""
             at = np.arange(tension.size)[of][outside].tolist()
             raise ElasticityRangeError(
-                f"{where}; the elasticity is defined on {law.domain}, and says neither how a cable "
+                f"{where}; the elasticity is defined on {law._span}, and says neither how a cable "
                 "goes slack below it nor how it yields above. Change the tensions or the load, or "
                 f"use an elasticity that covers them{below}.",
                 F[outside].tolist(),
@@ -219,10 +217,10 @@ class _LockedLaw:
     ) -> None:
         self.law, self.cables = law, cables
         self._free_length, self._series = free_length, series
-        domain, size = law.domain, tension.shape
-        self._low, self._high = np.full(size, domain.first), np.full(size, domain.high)
+        size = tension.shape
+        self._low, self._high = np.full(size, law.low), np.full(size, law.high)
         # a slack branch has negative strains
-        self._least_strain = np.minimum(strain_of(law, np.asarray(domain.first)), 0.0)
+        self._least_strain = law.strain(law.low)
         softest = self._compliance(self._low)
         if (softest <= 0.0).any():
             which = np.flatnonzero(softest <= 0.0).tolist()
@@ -236,7 +234,7 @@ class _LockedLaw:
         self._before = 1.0 / softest  # stiffness below the law [N/m]
         # stiffness above the law [N/m]; elongation from its lower to its upper bound [m]
         self._after, self._span = np.zeros(size), self._high
-        if math.isfinite(domain.high):
+        if math.isfinite(law.high):
             self._after = 1.0 / self._compliance(self._high)
             self._span = self._elongation(self._high)
         self._start = lengths - self._elongation(tension)  # L where the law begins [m]
@@ -246,12 +244,12 @@ class _LockedLaw:
 
         The least tension is the lower end of the domain of the law.
         """
-        wire = self._free_length * (strain_of(self.law, F) - self._least_strain)
-        return np.asarray(wire + (F - self.law.domain.low) * self._series)
+        wire = self._free_length * (self.law.strain(F) - self._least_strain)
+        return np.asarray(wire + (F - self.law.low) * self._series)
 
     def _compliance(self, F: Array) -> Array:
         """Compute dΔl/dF = l_0/EA(F) + 1/k_series (n,) [m/N], with the elongation Δl."""
-        return np.asarray(self._free_length / rigidity_of(self.law, F) + self._series)
+        return np.asarray(self._free_length / self.law.rigidity(F) + self._series)
 
     def tension(self, lengths: Array, near: Array) -> tuple[Array, Array]:
         """Compute F [N] and dF/dL [N/m] at ``lengths`` L [m]; the search starts at F = ``near``."""

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable
-from cdsm.elasticity import ScaledElasticity
 from cdsm.errors import CdsmError, GeometryError
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.kernels.read import read_margin
@@ -226,4 +225,4 @@ def _with_disks(K: Stiffness, factor: float) -> tuple[Cable, ...]:
 def _stiffer(cable: Cable, factor: float) -> Cable:
     if cable.control == "force":
         return cable
-    return replace(cable, elasticity=ScaledElasticity(cable.elasticity, factor))
+    return replace(cable, elasticity=cable.elasticity.scaled(factor))

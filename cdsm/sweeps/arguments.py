@@ -10,12 +10,12 @@ from typing import Any, Generic, TypeVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput
 from cdsm.support.directions import Direction
 from cdsm.support.validation import number_array, one_of, scalar, text, vector
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.sweeps.quantities import QUANTITIES
+from cdsm.wires.elasticity import Elasticity
 
 _Values = TypeVar("_Values")
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm import batch
-from cdsm.elasticity import Elasticity
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import (
@@ -31,6 +30,7 @@ from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.arguments import Choice
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
 from cdsm.sweeps.status import SweepStatus, exists
+from cdsm.wires.elasticity import Elasticity
 
 BlockResult = dict[str, NDArray[Any]]
 """Outputs and ``status`` by name; the first axis is the posture, the next axes are the cases."""

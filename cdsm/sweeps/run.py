@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.inputs import checked_threads
-from cdsm.elasticity import Elasticity
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.support.directions import XYZ, Direction, unit_direction
@@ -30,6 +29,7 @@ from cdsm.sweeps.poses import PoseSet, poses_of
 from cdsm.sweeps.quantities import DEFAULT
 from cdsm.sweeps.specification import Specification
 from cdsm.sweeps.status import SweepStatus
+from cdsm.wires.elasticity import Elasticity
 
 if TYPE_CHECKING:
     import xarray
@@ -86,8 +86,6 @@ def sweep(
             arguments computes only missing entries, including those of lost workers. The results
             are then the same, bit by bit, as without interruption. The returned Dataset reads from
             the store when needed.
-            A user-defined law is identified by its class, its state, and EA and strain at up to 185
-            tensions; if these have changed, the store has another sweep.
         client: Client of a dask cluster; the run waits while the cluster has no workers. None uses
             the threads of this machine.
         chunk: Number of stiffness matrices per block; an existing store keeps its own number.
@@ -103,8 +101,7 @@ def sweep(
         UnknownName: A joint or an output does not exist.
         MissingExtra: xarray, zarr or distributed is not installed.
         FileError: The store cannot be created, read or written.
-        StoreError: The store has another sweep, a user-defined law has changed, or another run is
-            writing to the store.
+        StoreError: The store has another sweep, or another run is writing to it.
         ClusterError: The client is closed, the scheduler is gone, or a worker cannot compute.
     """
     need("sweep", "xarray", *(["zarr"] if store is not None else []))

@@ -17,7 +17,7 @@ from cdsm.support.directions import XYZ
 from cdsm.support.format import MODEL, JointUnits
 from cdsm.sweeps.arguments import Label, label
 from cdsm.sweeps.blocks import Block
-from cdsm.sweeps.description import attributes_of, law_text
+from cdsm.sweeps.description import attributes_of
 from cdsm.sweeps.evaluation import SweepTask
 from cdsm.sweeps.poses import Poses
 from cdsm.sweeps.quantities import QUANTITIES, Quantity
@@ -63,7 +63,7 @@ class Specification:
         laws = self.task.laws
         if laws.values != (None,):
             of = ["all cables"] if laws.names is None else laws.names.tolist()
-            texts = [law_text(law) for law in laws.values if law is not None]
+            texts = [repr(law) for law in laws.values if law is not None]
             attributes["elasticity"] = json.dumps(dict(zip(of, texts, strict=True)), indent=1)
         return xarray.Dataset(coords=_labels(self.task, self.poses), attrs=attributes)
 

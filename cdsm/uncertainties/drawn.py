@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cdsm.elasticity.answers import rigidity_of, strain_of
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.kernels.distribution import OPTIMAL, search_tensions
 from cdsm.kernels.draws import stiffness_of_draws
@@ -126,14 +125,14 @@ def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
     for law, of in laws.held:
         F = tension[..., of]
         try:
-            rigidity[..., of] = rigidity_of(law, F)
+            change, rigidity[..., of] = law.strain_and_rigidity(F)
             if arm.original_length == "unstrained":
-                strain[..., of] = strain_of(law, F)
+                strain[..., of] = change
         except ElasticityRangeError as error:
             low, high = float(F.min()), float(F.max())
             raise ElasticityRangeError(
                 f"at tensions from {low:.4g} to {high:.4g} N, which the tolerances reach; the "
-                f"elasticity is defined on {law.domain}. Raise the tensions, or lower the "
+                f"elasticity is defined on {law._span}. Raise the tensions, or lower the "
                 "tolerances.",
                 error.tension,
             ) from None

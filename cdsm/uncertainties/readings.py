@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 
-from cdsm.elasticity.answers import slope_of
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState
@@ -228,5 +227,5 @@ def _stretched_slope(K: Stiffness, strain: Array) -> Array:
     arm = K.posture.arm
     slope = np.zeros_like(strain)
     for law, of in arm._model.laws.held:
-        slope[of] = slope_of(law, K.tension[of])
+        slope[of] = law.rigidity_slope(K.tension[of])
     return slope * (1.0 + strain) + float(arm.original_length == "unstrained")

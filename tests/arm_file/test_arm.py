@@ -145,7 +145,7 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
     with pytest.raises(cdsm.MissingWire, match="has no wire for its cables"):
         read(tmp_path, text.replace("wire = 48e3\n", ""))
     law = cdsm.TabulatedElasticity((0.0, 50.0, 400.0), (0.0, 2e-3, 8e-3))
-    file = cdsm.write_elasticity(law, tmp_path / "wire.toml")
+    file = law.write(tmp_path / "wire.toml")
     for wire, expected in (
         ("1x19-1.2mm", presets.STRAND_1X19),
         (48e3, cdsm.LinearElasticity(48e3)),
@@ -232,15 +232,8 @@ def test_all_faults_are_listed_at_once(tmp_path: Path) -> None:
 
 
 def test_user_defined_wires_cannot_be_written(tmp_path: Path) -> None:
-    class Rubber(cdsm.Elasticity):
-        domain = cdsm.Domain(0.0, 100.0)
-
-        def rigidity(self, tension: Any) -> Any:
-            return np.full_like(self.domain.check(tension), 1e3)
-
-        strain = energy = rigidity
-
-    arm = cdsm.Manipulator(presets.virtual_prototype_geometry(), Rubber())
+    rubber = cdsm.Elasticity.from_rigidity(lambda F: 1e3 + F, 0.0, 100.0)
+    arm = cdsm.Manipulator(presets.virtual_prototype_geometry(), rubber)
     with pytest.raises(cdsm.InvalidInput, match="Tabulate its strain"):
         arm.write(tmp_path / "arm.toml")
     assert list(tmp_path.iterdir()) == []

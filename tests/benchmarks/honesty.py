@@ -171,7 +171,7 @@ def eq19_as_printed(group: Group) -> list[Reading]:
     for q, F in zip(group.q, group.tension, strict=True):
         pose = group.arm.at(q)
         active = np.einsum("c,cij->ij", F, pose.length_hessian)
-        strain = strand.strain(np.clip(F, strand.domain.first, strand.high))
+        strain = strand.strain(np.clip(F, strand.low, strand.high))
         EA = np.where(F <= 31.0, polyval(F, (*lower[:-1], -1e-3)), polyval(F, upper))
         springs = EA * (1.0 + strain) / pose.cable_lengths
         passive = (pose.length_jacobian.T * springs) @ pose.length_jacobian

@@ -85,9 +85,9 @@ class Truth(NamedTuple):
 
 def true_stiffness(group: Group, motion: Motion, row: int) -> Truth | None:
     assert group.tension is not None
-    domain = group.arm.cables[0].elasticity.domain
+    law = group.arm.cables[0].elasticity
     F = group.tension[row]
-    if not all(float(f) in domain for f in F):
+    if not all(law.low <= float(f) <= law.high for f in F):
         return None
     parts = motion.parts(F, group.springs(motion.lengths, F), group.wrench[row])
     K, size = parts.sum(axis=0), float(abs(parts).sum(axis=0).max())

@@ -65,9 +65,9 @@ def _geometry(path: Path) -> cdsm.Stiffness:
 
 
 def _elasticity(path: Path) -> None:
-    law = cdsm.read_elasticity(path)
-    last = min(law.domain.high, law.domain.first + 1e3)
-    F = np.linspace(law.domain.first, last, 7)
+    law = cdsm.Elasticity.read(path)
+    last = min(law.high, law.low + 1e3)
+    F = np.linspace(law.low, last, 7)
     assert np.isfinite([law.rigidity(F), law.strain(F), law.energy(F)]).all()
 
 
@@ -128,10 +128,10 @@ def whole_files(path: Path) -> Path:
     mixed_arm().write(path / "arm.toml")
     crab().write(path / "finger.toml")
     cdsm.write_cables(crab().cables, path / "cables.toml")
-    cdsm.write_elasticity(LAW, path / "linear.toml")
-    cdsm.write_elasticity(cdsm.presets.STRAND_1X19, path / "strand.toml")
+    LAW.write(path / "linear.toml")
+    cdsm.presets.STRAND_1X19.write(path / "strand.toml")
     table = cdsm.TabulatedElasticity((0.0, 20.0, 100.0, 300.0), (0.0, 2e-3, 5e-3, 9e-3))
-    cdsm.write_elasticity(table, path / "table.toml")
+    table.write(path / "table.toml")
     (path / "robot.urdf").write_text(TREE, encoding="utf-8")
     folder(path, link(1, "R_Y") + link(2, "U_XZ"), cable())
     rows = "\n".join(f"{0.01 * i:.3f},{3.0 * i:.2f}" for i in range(20))

@@ -221,7 +221,7 @@ def infeasible(
 
 def original_length(cable: cdsm.Cable, F: float, L: float) -> float:
     """l_0 [m] of a cable that is L long under F: what its spring leaves of L, unstrained."""
-    spring = (F - cable.elasticity.domain.low) / cable.series_stiffness
+    spring = (F - cable.elasticity.low) / cable.series_stiffness
     return (L - spring) / (1.0 + float(cable.elasticity.strain(F)))
 
 
@@ -444,9 +444,9 @@ def at_rest(pull: cdsm.Tension, wrench: Array) -> None:
         if cable.control == "force":
             assert abs(F - F0) <= 1e-12 * F0
             continue
-        if cable.elasticity.domain.first >= F:
+        if cable.elasticity.low >= F:
             continue  # slack, or at the end of what is known of it
-        F, l0 = min(F, cable.elasticity.domain.high), original_length(cable, F0, L)
+        F, l0 = min(F, cable.elasticity.high), original_length(cable, F0, L)
         stretched = cable.elongation(F, l0) - cable.elongation(F0, l0)
         size = reach(arm) + start.cable_lengths[c] + abs(cable.elongation(F, l0))
         assert abs(stretched - longer) <= 1e-9 * size, f"{cable.name}: {stretched} for {longer}"

@@ -344,7 +344,7 @@ def test_export_states_time_step_damping_and_actuators(geometry: Path, tmp_path:
 
 
 def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Path) -> None:
-    wire = cdsm.write_elasticity(cdsm.LinearElasticity(48e3), tmp_path / "wire.toml")
+    wire = cdsm.LinearElasticity(48e3).write(tmp_path / "wire.toml")
     by_file = call("stiffness", geometry, "--angles", 5, "--wire", wire, "--json")
     by_number = call("stiffness", geometry, "--angles", 5, "--wire", 48e3, "--json")
     assert by_file.stdout == by_number.stdout
@@ -432,7 +432,7 @@ def test_fit_reports_and_writes_elasticity_and_figure(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     for text in ("pre-tensioning", "elastic", "gauge length 500 mm", str(toml), str(png)):
         assert text in result.output
-    law = cdsm.read_elasticity(toml)
+    law = cdsm.Elasticity.read(toml)
     tension = np.geomspace(20.0, 780.0, 30)
     expected = cdsm.presets.STRAND_1X19.rigidity(tension)
     # the example data have no noise; the step of Eq. 19 at 31 N is smoothed over

@@ -9,7 +9,6 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.elasticity.answers import rigidity_of
 from cdsm.support.validation import RANGES
 from tests.support.arms import random_arm, random_posture, random_wrench
 from tests.support.locked import original_length
@@ -64,7 +63,7 @@ def test_cable_is_straight_to_its_motor_rigid_and_unbounded_unless_told() -> Non
 @pytest.mark.parametrize(("name", "spring"), CASES)
 def test_elongation_and_energy_begin_at_the_low_end(name: str, spring: float) -> None:
     cable = hybrid(spring, LAWS[name])
-    first = LAWS[name].domain.first
+    first = LAWS[name].low
     # the next number above 2.2 N, and rounding of 2.2² N² over twice the spring
     assert float(cable.elongation(first, LENGTH)) == pytest.approx(0.0, abs=1e-15)
     assert float(cable.energy(first, LENGTH)) == pytest.approx(0.0, abs=1e-15)
@@ -73,7 +72,6 @@ def test_elongation_and_energy_begin_at_the_low_end(name: str, spring: float) ->
 def test_ends_of_ranges_are_allowed_and_what_is_beyond_them_is_named() -> None:
     low, high = RANGES["stiffness"].low, RANGES["tension"].high
     assert hybrid(low).series_stiffness == low
-    assert cdsm.in_series(low, math.inf) == low
     assert cdsm.Cable("a", SITES, STRAND, maximum=high).maximum == high
     assert cdsm.Cable("a", SITES, STRAND, minimum=7.0, maximum=7.0).maximum == 7.0
     beyond: dict[str, tuple[float, str]] = {
@@ -94,7 +92,7 @@ def test_ends_of_ranges_are_allowed_and_what_is_beyond_them_is_named() -> None:
 @pytest.mark.parametrize("rigidity", RANGES["rigidity"][1:])
 def test_smallest_and_largest_rigidity_of_ones_own_are_usable(rigidity: float) -> None:
     law, tension = cdsm.LinearElasticity(rigidity), np.array([1.0, 2.0])
-    np.testing.assert_array_equal(rigidity_of(law, tension), rigidity)
+    np.testing.assert_array_equal(law.rigidity(tension), rigidity)
 
 
 def test_series_limits() -> None:
@@ -126,15 +124,6 @@ def test_arm_uses_the_same_tangent() -> None:
             l0 = original_length(cable, tension[c], pose.cable_lengths[c])
             expected = float(cable.tangent_stiffness(tension[c], l0))
         np.testing.assert_allclose(K.cable_stiffness[c], expected, rtol=1e-13)
-
-
-def test_springs_in_series() -> None:
-    assert cdsm.in_series(1000.0, 1000.0) == 500.0
-    assert cdsm.in_series(1000.0, math.inf) == 1000.0
-    assert cdsm.in_series(math.inf) == math.inf
-    for wrong in ((), (0.0,), (1.0, -1.0), (math.nan,)):
-        with pytest.raises(cdsm.InvalidInput):
-            cdsm.in_series(*wrong)
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0, math.nan, math.inf])
@@ -363,3 +352,18 @@ def test_only_holes_have_friction(keys: dict[str, Any]) -> None:
         cdsm.Cable("a", (rough[0], plain[1]), STEEL)
     with pytest.raises(cdsm.CableError, match=r"site 2 has friction or wrap.*cable ends there"):
         cdsm.Cable("a", (plain[0], rough[1]), STEEL, lead=0.1)
+
+
+def test_spring_longer_than_its_cable_is_told() -> None:
+    """Under 60 N a spring of 1 N/mm stretches by 60 mm, three times the 20 mm of cable1_1."""
+    geometry = cdsm.Geometry.universal(
+        joints=2, cables_per_joint=3, link_length=0.04, base_length=0.02, disk_offset=0.01,
+        hole_radius=0.03, link_mass=0.05,
+    )  # fmt: skip
+    wire, F = cdsm.LinearElasticity(2e3), np.full(6, 60.0)
+    for spring, lost in ((1e3, True), (3.1e3, False), (math.inf, False)):
+        cables = cdsm.serpentine_cables(geometry, wire, series_stiffness=spring)
+        arm = cdsm.Manipulator(geometry, cables=cables)
+        K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), F)
+        assert ("longer lead" in str(K)) == lost
+        assert any("longer lead" in line for line in K.report().notes) == lost

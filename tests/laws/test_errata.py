@@ -173,7 +173,7 @@ def test_eq19_repaired_is_the_optimum_of_its_linear_programs() -> None:
 
 def test_eq19_repaired_is_level_where_the_text_says_so() -> None:
     F = np.linspace(400.0, 810.0, 2000)
-    EA = REPAIRED.rigidity(F)
+    EA = REPAIRED.polynomial(F)
     assert EA.max() / EA.min() - 1.0 == pytest.approx(0.0075, abs=1e-4)
     assert np.ptp(EA) / 2.0 == pytest.approx(156.5, abs=0.5)
 
@@ -184,8 +184,8 @@ def test_eq19_repaired_is_negative_below_2_11_newton_and_rises_to_400() -> None:
     real = roots[(abs(roots.imag) < 1e-9) & (roots.real > 0.0) & (roots.real < 31.0)].real
     assert real == pytest.approx([2.109], abs=1e-3)
     F = np.linspace(2.2001, 400.0, 5000)
-    assert (REPAIRED.rigidity(F) > 0.0).all()
-    assert (np.diff(REPAIRED.rigidity(F)) > 0.0).all()
+    assert (REPAIRED.polynomial(F) > 0.0).all()
+    assert (np.diff(REPAIRED.polynomial(F)) > 0.0).all()
 
 
 def test_eq19_has_no_law_of_the_printed_digits_with_one_slope_at_31_newton() -> None:
@@ -202,7 +202,7 @@ def test_eq19_has_no_law_of_the_printed_digits_with_one_slope_at_31_newton() -> 
     low, high = digits.least_bend()
     assert low - high == pytest.approx(nominal - reach, rel=1e-6)
     step = 1e-4
-    ends = REPAIRED.rigidity([31.0 - step, 31.0, 31.0 + step])
+    ends = REPAIRED.polynomial([31.0 - step, 31.0, 31.0 + step])
     np.testing.assert_allclose(np.diff(ends) / step, (1022.0, 368.0), rtol=2e-3)
 
 
@@ -222,8 +222,8 @@ def test_eq19_leaves_35_kilonewton_open_at_810_newton() -> None:
 def test_eq19_law_is_within_the_band_of_its_digits() -> None:
     F = np.array([2.3, 5.0, 20.0, 31.0, 100.0, 400.0, 810.0])
     low, high = digits.band(F)
-    assert (low < REPAIRED.rigidity(F)).all()
-    assert (REPAIRED.rigidity(F) < high).all()
+    assert (low < REPAIRED.polynomial(F)).all()
+    assert (REPAIRED.polynomial(F) < high).all()
 
 
 def test_section_vb_error_is_relative_to_the_model() -> None:

@@ -140,7 +140,6 @@ FLAGS: dict[str, Callable[[Any], object]] = {
         POSE, UP, 10.0, 100.0, starts=2, progress=flag
     ),
     "progress of sweep": lambda flag: cdsm.sweep(ARM, Q, minimum=10.0, progress=flag),
-    "low_included": lambda flag: cdsm.Domain(1.0, 2.0, flag),
 }
 
 

@@ -457,46 +457,11 @@ def test_reference_at_the_very_end_of_a_law_is_inside() -> None:
     np.testing.assert_allclose(cdsm.equilibrium(pose, [810.0, 810.0]).tension, 810.0, rtol=1e-12)
 
 
-# the lower branch of Eq. 19 with its misprint: negative from 11 N
-NEGATIVE = cdsm.StrandElasticity(((*STRAND.coefficients[0][:-1], -1e-3),), (), 2.2, 810.0)
-
-
 def test_reference_outside_a_law_names_the_cables() -> None:
-    for law, F in ((STRAND, 1.0), (NEGATIVE, 15.0)):
-        pose = hinge(law=law).at([0.0])
-        with pytest.raises(cdsm.ElasticityRangeError) as caught:
-            cdsm.equilibrium(pose, [50.0, F])
-        assert caught.value.cables
-
-
-def test_law_that_gives_no_strain_names_the_cables() -> None:
-    # at 5 N it still has a rigidity, but none up to the end of its domain
-    pose = hinge(law=NEGATIVE).at([0.0])
-    with pytest.raises(cdsm.ElasticityRangeError, match="correct the coefficients") as caught:
-        cdsm.equilibrium(pose, [5.0, 5.0])
-    assert caught.value.cables == ("cable1_1", "cable1_2")
-
-
-class Odd(cdsm.Elasticity):
-    """A law of the user's own with a strain that is not a number."""
-
-    @property
-    def domain(self) -> cdsm.Domain:
-        return cdsm.Domain(0.0, math.inf)
-
-    def rigidity(self, tension: Any) -> Array:
-        return np.full(np.shape(tension), 1e3)
-
-    def strain(self, tension: Any) -> Array:
-        return np.full(np.shape(tension), math.nan)
-
-    def energy(self, tension: Any) -> Array:
-        return np.zeros(np.shape(tension))
-
-
-def test_law_of_the_users_own_that_is_not_finite_is_refused() -> None:
-    with pytest.raises(cdsm.InvalidInput, match="gives the strain"):
-        cdsm.equilibrium(hinge(law=Odd()).at([0.0]), [5.0, 5.0])
+    pose = hinge(law=STRAND).at([0.0])
+    with pytest.raises(cdsm.ElasticityRangeError) as caught:
+        cdsm.equilibrium(pose, [50.0, 1.0])
+    assert caught.value.cables
 
 
 # --- load steps and failure -----------------------------------------------------------------

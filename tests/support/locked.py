@@ -93,7 +93,7 @@ def potential(pose: cdsm.Posture, tension: Array, force: Array) -> Callable[[cds
                 total += tension[c] * longer[c]
                 continue
             l0, elongation = free[c], longer[c]
-            if elongation > 0.0 or cable.elasticity.domain.low > 0.0:
+            if elongation > 0.0 or cable.elasticity.low > 0.0:
                 total += float(cable.energy(cable.tension(elongation, l0), l0))
         return total
 

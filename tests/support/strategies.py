@@ -200,7 +200,7 @@ def fitted_elasticities() -> tuple[cdsm.Elasticity, ...]:
     wires = (cdsm.presets.STRAND_1X19, cdsm.LinearElasticity(2e5))
     laws: list[cdsm.Elasticity] = []
     for wire in wires:
-        force = np.linspace(wire.domain.first + 0.1, 600.0, 80)
+        force = np.linspace(wire.low + 0.1, 600.0, 80)
         laws.append(cdsm.fit_tensile_test(0.3 * wire.strain(force), force, 0.3).elasticity)
     force = np.linspace(0.0, 400.0, 60)
     toe = force / 8e4 + 1e-3 * (1.0 - np.exp(-force / 20.0))
@@ -453,9 +453,9 @@ def questions(draw: st.DrawFn, arms: Strategy[cdsm.Manipulator]) -> Question:
         return as_it_is
     above, share = 1.0 + draw(decades(1e-3, 1.0)), draw(st.sampled_from([0.5, 0.9, 1 - 1e-9, 1.0]))
     own = np.array([(cable.minimum, cable.maximum) for cable in arm.cables])
-    domains = [cable.elasticity.domain for cable in arm.cables]
-    lows = np.maximum(own[:, 0], [above * domain.first for domain in domains])
-    highs = np.minimum(own[:, 1], [domain.high for domain in domains])
+    laws = [cable.elasticity for cable in arm.cables]
+    lows = np.maximum(own[:, 0], [above * law.low for law in laws])
+    highs = np.minimum(own[:, 1], [law.high for law in laws])
     highs = np.maximum(lows, highs)
     for nearer in (1.0, 0.3, 0.05):  # what is not balanced when bent may be when almost straight
         angle = np.clip(nearer * q, arm.lower, arm.upper)
@@ -494,9 +494,9 @@ def tensions(draw: st.DrawFn, arm: cdsm.Manipulator) -> Array:
     few = draw(st.lists(st.sampled_from([0.0, 1.0]) | st.floats(0.0, 1.0), min_size=1, max_size=5))
     values = []
     for c, cable in enumerate(arm.cables):
-        domain, share = cable.elasticity.domain, few[c % len(few)]
-        most = min(domain.high, 2.0 * domain.low + 1e3)
-        values.append(min(domain.first + share * (most - domain.first), most))
+        law, share = cable.elasticity, few[c % len(few)]
+        low, most = law.low, min(law.high, 2.0 * law.low + 1e3)
+        values.append(min(low + share * (most - low), most))
     return np.array(values)
 
 

@@ -3,7 +3,6 @@
 import os
 import signal
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,37 +43,26 @@ CASES: dict[str, Any] = {"minimum": [1.0, 20.0, 60.0], "elasticity": LAWS, "wren
 """Postures within and beyond the limits, bounds below and in the domain of the strand."""
 
 
-@dataclass(frozen=True)
 class Deadly(cdsm.Elasticity):
     """A wire that kills the process that asks for its rigidity, once it comes to a file "die…".
 
-    Not if one tension is asked for, or rising ones: that is how it is described before a sweep
-    begins, and sampled when its arm is made.
-
     Attributes:
         folder: Its files are taken away one by one, in the order of their names.
-        low: Only under tensions above it [N].
+        least: Only under tensions above it [N].
     """
 
     folder: str
-    low: float = 0.0
+    least: float
 
-    def rigidity(self, tension: ArrayLike) -> Array:
-        rising = (np.diff(np.ravel(tension)) > 0.0).all()
-        if not rising and np.max(tension, initial=0.0) > self.low:
+    def __init__(self, folder: str, low: float = 0.0) -> None:
+        super().__init__("deadly", {"folder": folder}, 0.0, 1e6)
+        self.__dict__.update(folder=folder, least=low, _table=STEEL._table)
+
+    def strain_and_rigidity(self, tension: ArrayLike) -> tuple[Array, Array]:
+        if np.max(tension, initial=0.0) > self.least:
             for order in sorted(Path(self.folder).iterdir())[:1]:
                 with suppress(FileNotFoundError):  # another process was faster
                     order.unlink()
                     if order.name.startswith("die"):
                         os.kill(os.getpid(), signal.SIGKILL)
-        return STEEL.rigidity(tension)
-
-    def strain(self, tension: ArrayLike) -> Array:
-        return STEEL.strain(tension)
-
-    def energy(self, tension: ArrayLike) -> Array:
-        return STEEL.energy(tension)
-
-    @property
-    def domain(self) -> cdsm.Domain:
-        return STEEL.domain
+        return STEEL.strain_and_rigidity(tension)

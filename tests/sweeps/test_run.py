@@ -16,7 +16,6 @@ from cdsm.measures.payload import largest_force
 from cdsm.measures.program import Loads
 from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
-from cdsm.sweeps.description import law_text
 from cdsm.sweeps.evaluation import _BATCH_NAMES
 from cdsm.sweeps.quantities import QUANTITIES
 from cdsm.sweeps.status import LOST
@@ -246,36 +245,6 @@ def test_attributes_say_which_arm_it_was(everything: xr.Dataset) -> None:
     assert [cable["name"] for cable in cables] == [cable.name for cable in arm.cables]
     assert json.loads(everything.attrs["cable_elasticities"]) == [repr(STEEL)]
     assert json.loads(everything.attrs["elasticity"]) == {n: repr(law) for n, law in LAWS.items()}
-
-
-class Plain(cdsm.Elasticity):
-    """A law without a description of its own."""
-
-    def __init__(self, value: float) -> None:
-        self.value = np.full(2000, value)  # numpy would shorten it
-
-    domain = STEEL.domain
-
-    def rigidity(self, tension: Any) -> Array:
-        return np.full(np.shape(tension), self.value[0])
-
-    def strain(self, tension: Any) -> Array:
-        raise NotImplementedError
-
-    energy = strain
-
-
-class Shortened(Plain):
-    def __repr__(self) -> str:
-        return f"Shortened({self.value})"
-
-
-@pytest.mark.parametrize("kind", [Plain, Shortened])
-def test_laws_without_a_full_description_are_told_apart(kind: Callable[[float], Plain]) -> None:
-    first, second = kind(1e4), kind(1e4)
-    assert law_text(first) == law_text(second)
-    second.value[1000] += 1.0
-    assert law_text(first) != law_text(second)
 
 
 # --- pose sets -------------------------------------------------------------------------------

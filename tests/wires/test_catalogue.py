@@ -31,7 +31,7 @@ def strand(diameter: float, stretch_factor: float) -> float:
 )
 def test_wires_are_as_rigid_as_their_source_says(name: str, rigidity: float) -> None:
     path = EXAMPLES / "wires" / f"{name}.toml"
-    law = cdsm.read_elasticity(path)
+    law = cdsm.Elasticity.read(path)
     # the files have five digits
     assert float(law.rigidity(10.0)) == pytest.approx(rigidity, rel=5e-5)
     text = path.read_text(encoding="utf-8")

@@ -1,7 +1,12 @@
-"""Strain, tension, energy and rigidity of a wire belong together."""
+"""Strain, tension, energy and rigidity of a wire belong together, whatever the law is made from."""
 
+import math
+import pickle
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,88 +14,296 @@ from hypothesis import given, settings
 from scipy.integrate import quad
 
 import cdsm
+from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
-from cdsm.wires.rising_curve import slopes_at_points
 from tests.support.strategies import tabulated_elasticities
 
+STEEL = cdsm.LinearElasticity(226_195.0)
 STRAND = cdsm.StrandElasticity.eq19_repaired()
-TABLE = cdsm.TabulatedElasticity(
-    tuple(np.linspace(5.0, 800.0, 60)), tuple(STRAND.strain(np.linspace(5.0, 800.0, 60)))
-)
-LAWS = {"linear": cdsm.LinearElasticity(48e3), "strand": STRAND, "table": TABLE}
+POINTS = np.linspace(5.0, 800.0, 60)
+TABLE = cdsm.TabulatedElasticity(tuple(POINTS), tuple(STRAND.strain(POINTS)))
+
+
+def ramp(F: Array) -> Array:
+    return 5e3 + 100.0 * F
+
+
+LAWS: dict[str, cdsm.Elasticity] = {
+    "linear": STEEL,
+    "strand": STRAND,
+    "two ranges": cdsm.StrandElasticity(
+        ((5.0, 1.0, 0.02), (-36.6, 3.0, -0.004)), (40.0,), 1.0, 300.0
+    ),
+    "table": TABLE,
+    "function": cdsm.Elasticity.from_rigidity(ramp, 0.0, 1000.0),
+    "scaled": STRAND.scaled(1.25),
+    "slack": STRAND.slack_below(),
+}
+METHODS = ("rigidity", "strain", "secant_rigidity", "rigidity_slope", "energy")
+F = np.array([[6.0, 12.0, 28.0, 34.0], [60.0, 150.0, 250.0, 290.0]])
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_tension_inverts_strain(name: str) -> None:
+def test_shape_is_kept_and_scalars_give_what_arrays_give(name: str) -> None:
+    for method in METHODS:
+        ask = getattr(LAWS[name], method)
+        assert ask(F).shape == F.shape
+        assert ask(F[:0]).shape == (0, 4)
+        assert ask(7).shape == ()
+        np.testing.assert_allclose(ask(float(F[1, 2])), ask(F)[1, 2], rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_strain_and_energy_are_integrals_of_the_rigidity(name: str) -> None:
     law = LAWS[name]
-    tension = np.array([[6.0, 31.0, 31.5], [120.0, 400.0, 799.0]])
-    # strain is flat where the wire is stiff: 1e-16 of strain are some 1e-12 N there
-    np.testing.assert_allclose(law.tension(law.strain(tension)), tension, rtol=1e-11)
+    for a, b in ((6.0, 11.0), (33.0, 80.0), (80.0, 290.0)):
+        points = [p for p in POINTS if a < p < b]
+        for power, of in enumerate((law.strain, law.energy)):
+            area = quad(
+                lambda f, n=power: f**n / float(law.rigidity(f)),
+                a,
+                b,
+                points=points,
+            )[0]
+            assert float(of(b) - of(a)) == pytest.approx(area, rel=1e-7)
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_energy_by_strain_is_tension_and_tension_by_strain_is_rigidity(name: str) -> None:
+def test_slope_is_the_derivative_of_the_rigidity(name: str) -> None:
+    law, h = LAWS[name], 1e-4
+    slope = (law.rigidity(F + h) - law.rigidity(F - h)) / (2.0 * h)
+    atol = 1e-6 * float(law.rigidity(F).max())
+    np.testing.assert_allclose(law.rigidity_slope(F), slope, rtol=1e-5, atol=atol)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_tangent_follows_from_the_secant(name: str) -> None:
+    """With S = (F − F_0)/ε the tangent is S²/(S − (F − F_0) S')."""
+    law, h = LAWS[name], 1e-3
+    S = law.secant_rigidity(F)
+    np.testing.assert_allclose(S * law.strain(F), F - law.rest, rtol=1e-12)
+    slope = (law.secant_rigidity(F + h) - law.secant_rigidity(F - h)) / (2.0 * h)
+    np.testing.assert_allclose(S**2 / (S - (F - law.rest) * slope), law.rigidity(F), rtol=1e-4)
+    assert float(law.secant_rigidity(law.rest)) == float(law.rigidity(law.rest))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_tension_inverts_strain_both_ends_included(name: str) -> None:
     law = LAWS[name]
-    tension = np.array([12.0, 60.0, 250.0, 700.0])
-    strain = np.asarray(law.strain(tension))
-    errors = []
-    for step in (2e-5, 1e-5):
-        up, down = law.tension(strain + step), law.tension(strain - step)
-        force = (law.energy(up) - law.energy(down)) / (2.0 * step)
-        rigidity = (up - down) / (2.0 * step)
-        errors.append([force / tension - 1.0, rigidity / law.rigidity(tension) - 1.0])
-    coarse, fine = (abs(np.array(error)).max(axis=1) for error in errors)
-    assert np.all(coarse < 2e-2)
-    # second order (to 1e-9 if exact); a table's third derivative jumps at its points
-    assert np.all(fine < np.maximum(0.3 * coarse, 1e-9))
+    tension = np.array([law.low, *F.ravel(), min(law.high, 1e4)])
+    np.testing.assert_allclose(law.tension(law.strain(tension)), tension, rtol=1e-12, atol=1e-12)
+    assert float(law.strain(law.rest)) == pytest.approx(0.0, abs=1e-18)
+    assert float(law.tension(0.0)) == pytest.approx(law.rest, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_strain_out_of_reach_is_refused(name: str) -> None:
-    for strain in (-1e-3, 1e12):
-        with pytest.raises(cdsm.ElasticityRangeError, match="no tension of the domain"):
-            LAWS[name].tension(strain)
+def test_strain_out_of_reach_is_refused_with_the_reach(name: str) -> None:
+    law = LAWS[name]
+    beyond = float(law.strain(min(law.high, RANGES["tension"].high))) * (1.0 + 1e-9)
+    for strain in (float(law.strain(law.low)) - 1e-9, beyond):
+        with pytest.raises(
+            cdsm.ElasticityRangeError, match=r"^no tension .* strain.* reaches"
+        ) as e:
+            law.tension([0.0, strain])
+        assert e.value.indices == (1,)
 
 
-def test_table_passes_through_its_points() -> None:
-    np.testing.assert_allclose(
-        TABLE.strain(TABLE.tensions), np.subtract(TABLE.strains, TABLE.strains[0]), rtol=1e-13
-    )
-    assert tuple(TABLE.domain) == (5.0, 800.0)
+@pytest.mark.parametrize("bad", [math.nan, math.inf, "50", None, 1j, True], ids=repr)
+def test_what_is_no_tension_is_invalid_input(bad: Any) -> None:
+    for method in METHODS:
+        with pytest.raises(cdsm.InvalidInput, match="tension"):
+            getattr(STRAND, method)(bad)
 
 
-@pytest.mark.parametrize(
-    ("tensions", "strains"),
-    [
-        ((1.0,), (0.0,)),
-        ((1.0, 1.0), (0.0, 1.0)),
-        ((1.0, 2.0), (1.0, 0.0)),
-        ((1.0, 2.0), (0.0, 1.0, 2.0)),
-        ((-1.0, 2.0), (0.0, 1.0)),
-        ((1.0, float("nan")), (0.0, 1.0)),
-        ((0.0, 5e-324, 100.0), (0.0, 0.002, 0.005)),  # a slope beyond float64
-        ((0.0, 1e-9, 100.0), (0.0, 1e7, 2e7)),  # a slope beyond all materials
-        ((0.0, 1.0, 2.0), (-1e10, 1e-8, 2e-8)),  # equal, once counted from the first
-    ],
-)
-def test_table_that_does_not_rise_is_refused(
-    tensions: tuple[float, ...], strains: tuple[float, ...]
-) -> None:
-    with pytest.raises(cdsm.InvalidInput):
-        cdsm.TabulatedElasticity(tensions, strains)
+@pytest.mark.parametrize("method", METHODS)
+def test_tension_outside_the_law_is_an_error_with_data(method: str) -> None:
+    with pytest.raises(cdsm.ElasticityRangeError) as caught:
+        getattr(STRAND, method)([[50.0, 2.1], [900.0, 31.0]])
+    assert caught.value.tension == (2.1, 900.0)
+    assert caught.value.indices == (1, 2)
+    for part in ("2.1, 900 N", "[2.2 N, 810 N]", "minimum=", "slack_below() continues one to 0 N"):
+        assert part in str(caught.value)
+    with pytest.raises(cdsm.ElasticityRangeError, match=r"\[0 N, inf N\)"):
+        getattr(STEEL, method)(-1.0)
+    getattr(STRAND, method)([2.2, 810.0])
 
 
-# --- the curve between the points -----------------------------------------------------------
+def test_long_list_of_offenders_is_cut_in_the_message_not_in_the_data() -> None:
+    with pytest.raises(cdsm.ElasticityRangeError, match=r", … N") as caught:
+        STRAND.rigidity(np.full(1000, 900.0))
+    assert len(caught.value.tension) == 1000
+    assert len(str(caught.value)) < 400
+
+
+# --- equality, files ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_equal_laws_are_equal_in_memory_and_in_files(name: str, tmp_path: Path) -> None:
+    law = LAWS[name]
+    again = pickle.loads(pickle.dumps(law))
+    assert again == law
+    assert hash(again) == hash(law)
+    assert repr(again) == repr(law)
+    np.testing.assert_array_equal(again.energy(F), law.energy(F))
+    if name == "function":
+        assert law == cdsm.Elasticity.from_rigidity(ramp, 0.0, 1000.0)
+        with pytest.raises(cdsm.InvalidInput, match="Tabulate its strain"):
+            law.write(tmp_path / "wire.toml")
+        return
+    assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
+    names = {"StrandElasticity": cdsm.StrandElasticity, "LinearElasticity": cdsm.LinearElasticity}
+    assert eval(repr(law), names | {"TabulatedElasticity": cdsm.TabulatedElasticity}) == law
+
+
+def test_laws_of_other_values_differ_and_cannot_be_changed() -> None:
+    assert len({*LAWS.values(), cdsm.LinearElasticity(226_195)}) == len(LAWS)
+    assert repr(cdsm.LinearElasticity(5.0)) == "LinearElasticity(rigidity=5.0)"
+    with pytest.raises(AttributeError, match="high"):
+        STRAND.high = 900.0
+
+
+# --- constructors ---------------------------------------------------------------------------
+
+
+def test_linear_law_is_exact() -> None:
+    tension = np.array([0.0, 1.0, 7.5, 1e5])
+    for EA in (226_195.0, 49.0, *RANGES["rigidity"][1:]):
+        law = cdsm.LinearElasticity(EA)
+        np.testing.assert_array_equal(law.rigidity(tension), EA)
+        np.testing.assert_array_equal(law.strain(tension), tension / EA)
+        np.testing.assert_allclose(law.energy(tension), tension**2 / (2.0 * EA), rtol=1e-15)
+        assert law.scaled(2.0) == cdsm.LinearElasticity(2.0 * EA if EA < 1e12 else EA).scaled(
+            1.0 if EA < 1e12 else 2.0
+        )
+    wire = cdsm.LinearElasticity.of_wire(200e9, 1.2e-3)
+    np.testing.assert_allclose(wire.rigidity(5.0), 200e9 * math.pi * 1.2e-3**2 / 4.0, rtol=1e-15)
+
+
+def test_rigidity_in_a_wrong_unit_is_doubted_once() -> None:
+    for EA, doubt in ((48.0, "kN"), (200e9, "E instead of EA")):
+        with pytest.warns(cdsm.CdsmWarning, match=doubt) as caught:
+            cdsm.LinearElasticity(EA).scaled(1.1).rigidity(5.0)
+        assert len(caught) == 1
+
+
+@pytest.mark.parametrize("join", [31.0])
+def test_corner_of_eq19_is_bridged_and_nothing_else_changes(join: float) -> None:
+    away = np.concatenate([np.linspace(2.2, join - 1.7, 500), np.linspace(join + 1.7, 810.0, 500)])
+    np.testing.assert_allclose(STRAND.rigidity(away), STRAND.polynomial(away), rtol=1e-8)
+    near = np.linspace(join - 1.7, join + 1.7, 400)
+    np.testing.assert_allclose(STRAND.rigidity(near), STRAND.polynomial(near), rtol=7.5e-3)
+    slope = STRAND.rigidity_slope(near)
+    assert (slope > 0.0).all()
+    assert abs(np.diff(slope)).max() < 12.0  # no jump; that of the polynomials is 654
+
+
+def test_function_is_sampled_to_eight_digits_and_its_corners_are_told() -> None:
+    law = cdsm.Elasticity.from_rigidity(ramp, 0.0, 1000.0)
+    tension = np.linspace(0.0, 1000.0, 777)
+    np.testing.assert_allclose(law.rigidity(tension), ramp(tension), rtol=1e-8)
+    np.testing.assert_allclose(law.strain(tension), np.log1p(tension / 50.0) / 100.0, rtol=1e-10)
+    constant = cdsm.Elasticity.from_rigidity(lambda _: 48e3, 0.0, 500.0)
+    np.testing.assert_allclose(constant.rigidity(tension[:300]), 48e3, rtol=1e-12)
+
+    def corner(F: Array) -> Array:
+        return np.where(F < 100.0, 1e3 + 100.0 * F, 11e3)
+
+    with pytest.raises(cdsm.InvalidInput, match="joins="):
+        cdsm.Elasticity.from_rigidity(corner, 0.0, 500.0)
+    law = cdsm.Elasticity.from_rigidity(corner, 0.0, 500.0, joins=(100.0,))
+    np.testing.assert_allclose(law.rigidity(tension[:380]), corner(tension[:380]), rtol=1e-2)
+
+
+BAD: dict[str, tuple[Callable[[], object], str]] = {
+    **{
+        f"rigidity {value!r:.20}": (lambda value=value: cdsm.LinearElasticity(value), "rigidity")  # type: ignore[misc]
+        for value in (0, -1.0, math.nan, math.inf, "5", None, [5.0], 1j, True, 1e13, 5e-324)
+    },
+    **{
+        f"diameter {value!r}": (
+            lambda value=value: cdsm.LinearElasticity.of_wire(200e9, value),  # type: ignore[misc]
+            "diameter",
+        )
+        for value in (0.0, -1.0, math.nan, math.inf, "5", None, [5.0])
+    },
+    "young": (lambda: cdsm.LinearElasticity.of_wire(-1.0, 1e-3), "young_modulus"),
+    "no range": (lambda: cdsm.StrandElasticity((), (), 0.0, 1.0), "coefficients"),
+    "empty range": (lambda: cdsm.StrandElasticity(((),), (), 0.0, 1.0), "coefficients"),
+    "nan": (lambda: cdsm.StrandElasticity(((math.nan,),), (), 0.0, 1.0), "coefficients"),
+    "number": (lambda: cdsm.StrandElasticity(3, (), 0.0, 1.0), "coefficients"),  # type: ignore[arg-type]
+    "flat": (lambda: cdsm.StrandElasticity((1.0, 2.0), (), 0.0, 1.0), "coefficients"),  # type: ignore[arg-type]
+    "joins": (lambda: cdsm.StrandElasticity(((1.0,),), (0.5,), 0.0, 1.0), "joins"),
+    "join outside": (lambda: cdsm.StrandElasticity(((1.0,), (1.0,)), (2.0,), 0.0, 1.0), "rise"),
+    "ranges apart": (
+        lambda: cdsm.StrandElasticity(((10.0,), (20.0,)), (5.0,), 0.0, 9.0),
+        "do not meet at 5 N: 10 N below, 20 N above",
+    ),
+    "not positive": (
+        lambda: cdsm.StrandElasticity(((10.0, -1.0), (-20.0, 1.0)), (15.0,), 2.2, 100.0),
+        "must be positive. Narrow",
+    ),
+    "empty domain": (lambda: cdsm.StrandElasticity(((1.0,),), (), 1.0, 1.0), "rise"),
+    "negative low": (lambda: cdsm.StrandElasticity(((1.0,),), (), -1.0, 1.0), "0 <= low"),
+    "high inf": (lambda: cdsm.StrandElasticity(((1.0,),), (), 0.0, math.inf), "high"),
+    **{
+        f"function {n}": (
+            partial(cdsm.Elasticity.from_rigidity, f, 0.0, 500.0),  # type: ignore[arg-type]
+            f"rigidity.*{said}",
+        )
+        for n, (f, said) in enumerate(
+            [
+                (lambda F: F * math.nan, "is nan N at"),
+                (lambda F: 1e3 - 10.0 * F, "Narrow the domain"),
+                (lambda F: np.ones(3), "fails at .*array"),
+                (lambda F: 1.0 if F < 3.0 else 2.0, "fails at .*array"),
+                (lambda F: "stiff", "fails at"),
+                (lambda F: np.where(F < 50.0, 1e4, 1.1e4), "jumps"),
+            ]
+        )
+    },
+    "function's ends": (lambda: cdsm.Elasticity.from_rigidity(ramp, 5.0, 5.0), "low < high"),
+    **{
+        f"table {n}": (lambda a=a, b=b: cdsm.TabulatedElasticity(a, b), "tensions|strains")  # type: ignore[misc]
+        for n, (a, b) in enumerate(
+            [
+                ((1.0,), (0.0,)),
+                ((1.0, 1.0), (0.0, 1.0)),
+                ((1.0, 2.0), (1.0, 0.0)),
+                ((1.0, 2.0), (0.0, 1.0, 2.0)),
+                ((-1.0, 2.0), (0.0, 1.0)),
+                ((1.0, math.nan), (0.0, 1.0)),
+                ((0.0, 5e-324, 100.0), (0.0, 0.002, 0.005)),  # a slope beyond float64
+            ]
+        )
+    },
+    "factor": (lambda: STRAND.scaled(0.0), "factor"),
+    "factor text": (lambda: STEEL.scaled("x"), "factor"),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_constructor_input_names_the_argument(case: str) -> None:
+    make, said = BAD[case]
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        make()
+
+
+def test_scaled_law_is_as_many_times_as_rigid_and_stretches_as_many_times_less() -> None:
+    for law in LAWS.values():
+        stiffer = law.scaled(1.25)
+        np.testing.assert_allclose(stiffer.rigidity(F), 1.25 * law.rigidity(F), rtol=1e-15)
+        np.testing.assert_allclose(stiffer.strain(F), law.strain(F) / 1.25, rtol=1e-15)
+        np.testing.assert_allclose(stiffer.energy(F), law.energy(F) / 1.25, rtol=1e-15)
+        assert (stiffer.low, stiffer.high, stiffer.rest) == (law.low, law.high, law.rest)
+
+
+# --- the curve between the points of a table ------------------------------------------------
 
 EXACT: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
     "Eq. 19": (STRAND.strain, STRAND.rigidity),
     "power 0.3": (lambda F: 1e-3 * F**0.3, lambda F: 1e3 * F**0.7 / 0.3),
-    "power 0.7": (lambda F: 1e-3 * F**0.7, lambda F: 1e3 * F**0.3 / 0.7),
     "exponential": (lambda F: 5e-3 * np.log1p(F / 20.0), lambda F: (F + 20.0) / 5e-3),
-    "exponential, then straight": (
-        lambda F: 1e-3 * np.log1p(F / 3.0) + F / 5e4,
-        lambda F: 1.0 / (1e-3 / (F + 3.0) + 2e-5),
-    ),
     "toe": (
         lambda F: 2e-3 * (1.0 - np.exp(-F / 30.0)) + F / 5e4,
         lambda F: 1.0 / (2e-3 / 30.0 * np.exp(-F / 30.0) + 2e-5),
@@ -99,133 +312,43 @@ EXACT: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
 """Strain and rigidity of wires that stiffen."""
 
 
-def even(low: float, high: float) -> Array:
-    return np.linspace(low, high, 5)
-
-
-def twofold(low: float, high: float) -> Array:
-    """Each step is twice the one before."""
-    return np.asarray(low + (high - low) * np.array([0.0, 1.0, 3.0, 7.0, 15.0]) / 15.0)
-
-
-def one_two_five(low: float, high: float) -> Array:
-    points = np.outer(10.0 ** np.arange(3), [1.0, 2.0, 5.0]).ravel()
-    return points[(points >= low) & (points <= high)][-5:]
-
-
 @pytest.mark.parametrize("wire", EXACT)
-@pytest.mark.parametrize(
-    ("spacing", "within"), [(even, 0.02), (twofold, 0.08), (one_two_five, 0.09)]
-)
-def test_five_exact_points_give_the_rigidity_in_the_last_interval(
-    spacing: Callable[[float, float], Array], within: float, wire: str
-) -> None:
-    """With the slope of PCHIP at the end they were up to 9, 260 and 872 % off."""
+def test_exact_points_give_the_rigidity(wire: str) -> None:
     strain, rigidity = EXACT[wire]
-    for high in (120.0, 200.0, 400.0, 800.0):
-        for low in (2.5, 5.0, 10.0, 15.0):
-            points = spacing(low, high)
-            if len(points) < 5:
-                continue
-            law = cdsm.TabulatedElasticity(tuple(points), tuple(strain(points)))
-            F = np.linspace(points[-2], points[-1], 80)
-            np.testing.assert_allclose(law.rigidity(F), rigidity(F), rtol=within)
-
-
-def test_rigidity_converges_with_the_square_of_the_step() -> None:
-    strain, rigidity = EXACT["toe"]
-    F = np.linspace(0.0, 200.0, 2001)
-    errors = []
-    for count in (40, 80, 160):
-        points = np.linspace(0.0, 200.0, count + 1)
-        law = cdsm.TabulatedElasticity(tuple(points), tuple(strain(points)))
-        errors.append(abs(law.rigidity(F) / rigidity(F) - 1.0).max())
-    assert errors[0] < 0.02
-    for coarse, fine in pairwise(errors):
-        assert fine < coarse / 3.5
-
-
-def test_wire_that_stiffens_until_its_last_point_has_no_pole_there() -> None:
-    """Once EA rose to 1.7 MN at the end of the first, and the second was refused."""
-    tensions, strains = (0.0, 10.0, 30.0, 80.0, 200.0), (0.0, 0.02, 0.03, 0.036, 0.042)
-    law = cdsm.TabulatedElasticity(tensions, strains)
-    assert float(law.rigidity(200.0)) == pytest.approx(29e3, rel=0.02)
-    assert (np.diff(law.rigidity(np.linspace(0.0, 200.0, 400))) > 0.0).all()
-    steeper = cdsm.TabulatedElasticity((*tensions[:-1], 300.0), (*strains[:-1], 0.045))
-    assert float(steeper.rigidity(300.0)) == pytest.approx(41e3, rel=0.02)
+    points = np.geomspace(5.0, 800.0, 30)
+    law = cdsm.TabulatedElasticity(tuple(points), tuple(strain(points)))
+    np.testing.assert_allclose(law.strain(points), strain(points) - strain(points[0]), rtol=1e-12)
+    tension = np.linspace(10.0, 800.0, 500)
+    error = abs(law.rigidity(tension) / rigidity(tension) - 1.0)
+    assert error.max() < 0.05
+    assert np.median(error) < 3e-3
 
 
 @settings(deadline=None)
 @given(tabulated_elasticities())
-def test_curve_meets_its_points_and_its_rigidity_the_bound(law: cdsm.TabulatedElasticity) -> None:
+def test_curve_meets_its_points_and_rises(law: cdsm.TabulatedElasticity) -> None:
     points, strains = np.array(law.tensions), np.array(law.strains)
     np.testing.assert_allclose(law.strain(points), strains - strains[0], rtol=1e-12, atol=1e-18)
-    chords = np.diff(points) / np.diff(strains)
-    around = np.max([chords, np.append(chords[1:], 0.0), np.append(0.0, chords[:-1])], axis=0)
-    for low, high, most in zip(points, points[1:], around, strict=False):
-        F = np.linspace(low, high, 60)
-        assert (np.diff(law.strain(F)) > 0.0).all()
-        assert (law.rigidity(F) > 0.0).all()
-        assert (law.rigidity(F) <= 2.1 * most).all()
-    inside = points[1:-1]
-    above = np.nextafter(inside, np.inf)
-    # one unit in the last place can be 1e-13 of a piece along which EA changes ten-thousandfold
-    np.testing.assert_allclose(law.rigidity(above), law.rigidity(inside), rtol=1e-8)
-
-
-def test_bound_of_the_rigidity_is_nearly_reached() -> None:
-    """It holds for every a and b that the slopes at the points can have."""
-    t = np.linspace(0.0, 1.0, 1001)
-    u = 1.0 - t
-    for M in (1.0, 1.5, 2.0, 2.5, 10.0, 1e3):
-        worst = 0.0
-        for a in np.geomspace(1.0 / M, 3.0, 25):
-            for b in np.geomspace(1.0 / M, 3.0, 25):
-                D, N = t * t + (a + b) * t * u + u * u, b * t * t + 2.0 * t * u + a * u * u
-                worst = max(worst, float((D * D / N).max()))
-        assert worst <= max(2.1, M) * (1.0 + 1e-12)
-        assert worst >= 0.95 * max(2.0, M)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_strain_energy_and_slope_are_integrals_and_derivative_of_the_rigidity(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    points = np.cumsum([rng.uniform(0.0, 5.0), *rng.uniform(1.0, 60.0, 5)])
-    strains = np.cumsum([0.3, *np.diff(points) / 10.0 ** rng.uniform(3.0, 5.0, 5)])
-    law = cdsm.TabulatedElasticity(tuple(points), tuple(strains))
-    for k in range(5):
-        a, b = points[k], points[k] + 0.7 * (points[k + 1] - points[k])
-        for asked, integrand in (
-            (law.strain, lambda x: 1.0 / law.rigidity(x)),
-            (law.energy, lambda x: x / law.rigidity(x)),
-        ):
-            expected = quad(integrand, a, b, epsabs=0.0, epsrel=1e-12)[0]
-            assert float(asked(b) - asked(a)) == pytest.approx(expected, rel=1e-11)
-        step = 1e-4 * (b - a)
-        rise = float(law.rigidity(b + step) - law.rigidity(b - step)) / (2.0 * step)
-        assert float(law.rigidity_slope(b)) == pytest.approx(rise, rel=1e-5, abs=1e-6)
-    below = np.nextafter(points[2], 0.0)
-    assert law.rigidity_slope(points[2]) == pytest.approx(float(law.rigidity_slope(below)))
-
-
-def test_slopes_at_points_follow_a_parabola_through_the_logarithms_of_the_chords() -> None:
-    """It levels off at its last end; at its first it would go on faster than a straight line."""
-
-    def log(y: Array) -> Array:
-        return 7.0 - 0.5 * y + 0.06 * y**2
-
-    rise = np.array([0.3, 0.2, 0.5, 0.4, 0.3])
-    y = np.cumsum([0.0, *rise])
-    middle = y[:-1] + rise / 2.0
-    slopes = slopes_at_points(np.exp(log(middle)), rise)
-    np.testing.assert_allclose(np.log(slopes[1:]), log(y[1:]), rtol=1e-13)
-    straight = log(middle[0]) - (log(middle[1]) - log(middle[0])) / 0.25 * 0.15
-    assert np.log(slopes[0]) == pytest.approx(straight, rel=1e-13)
+    for low, high in pairwise(points):
+        tension = np.linspace(low, high, 60)
+        assert (law.rigidity(tension) > 0.0).all()
+        assert (np.diff(law.strain(tension)) >= 0.0).all()
+    above = np.nextafter(points[1:-1], np.inf)
+    np.testing.assert_allclose(law.rigidity(above), law.rigidity(points[1:-1]), rtol=1e-6)
 
 
 def test_two_points_are_a_straight_line() -> None:
-    law = cdsm.TabulatedElasticity((10.0, 60.0), (0.1, 0.2))
-    F = np.linspace(10.0, 60.0, 7)
-    np.testing.assert_allclose(law.rigidity(F), 500.0, rtol=1e-14)
-    np.testing.assert_allclose(law.rigidity_slope(F), 0.0, atol=1e-12)
-    np.testing.assert_allclose(law.energy(F), (F**2 - 100.0) / 1000.0, rtol=1e-13, atol=1e-15)
+    law, tension = cdsm.TabulatedElasticity((10.0, 60.0), (0.1, 0.2)), np.linspace(10.0, 60.0, 7)
+    np.testing.assert_allclose(law.rigidity(tension), 500.0, rtol=1e-13)
+    np.testing.assert_allclose(law.energy(tension), (tension**2 - 100.0) / 1000.0, atol=1e-12)
+
+
+def test_own_law_works_in_single_postures_and_batches() -> None:
+    law = cdsm.Elasticity.from_rigidity(lambda F: 1e3 + F, 0.0, 1e3)
+    arm = cdsm.presets.virtual_prototype(elasticity=law)
+    tension = np.full(len(arm.cables), 50.0)
+    K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), tension)
+    l0 = K.posture.cable_lengths / (1.0 + np.log(1.05))  # ε = ∫ dF/(1 kN + F)
+    np.testing.assert_allclose(K.cable_stiffness, 1050.0 / l0, rtol=1e-9)
+    batch = cdsm.evaluate(arm, np.zeros((2, arm.nv)), tension=tension, outputs=("joint",))
+    np.testing.assert_allclose(batch["joint"][1], K.joint, rtol=1e-10, atol=1e-12)

@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 import cdsm
 from cdsm.cli import app
-from cdsm.elasticity import ScaledElasticity
 from cdsm.support.values import Array
 from tests.support.arms import readme_geometry
 
@@ -30,8 +29,8 @@ def pulled(law: cdsm.Elasticity, least: float) -> tuple[cdsm.Posture, cdsm.Tensi
 
 @pytest.mark.parametrize("name", LAWS)
 def test_rigidity_is_continuous_and_positive_and_the_strain_its_integral(name: str) -> None:
-    law, low = LAWS[name].slack_below(), LAWS[name].domain.low
-    assert tuple(law.domain) == (0.0, LAWS[name].domain.high)
+    law, low = LAWS[name].slack_below(), LAWS[name].low
+    assert (law.low, law.high) == (0.0, LAWS[name].high)
     around = law.rigidity([0.0, low * (1.0 - 1e-12), low, low * (1.0 + 1e-9)])
     assert (around > 0.0).all()
     np.testing.assert_allclose(around, around[0], rtol=1e-6)
@@ -56,7 +55,7 @@ def test_rigidity_is_continuous_and_positive_and_the_strain_its_integral(name: s
 @pytest.mark.parametrize("name", LAWS)
 def test_within_the_law_all_is_the_same_to_the_bit(name: str) -> None:
     law, slack = LAWS[name], LAWS[name].slack_below()
-    F = np.linspace(law.domain.first, law.domain.high, 300)
+    F = np.linspace(law.low, law.high, 300)
     for ask in ("rigidity", "rigidity_slope", "strain", "energy"):
         np.testing.assert_array_equal(getattr(slack, ask)(F), getattr(law, ask)(F))
     (pose, pull), (pose_slack, pull_slack) = pulled(law, 8.0), pulled(slack, 8.0)
@@ -115,7 +114,7 @@ def test_stiffness_on_the_branch_is_that_of_the_potential(least: float, spring: 
     cables = cdsm.serpentine_cables(GEOMETRY, TABLE.slack_below(), series_stiffness=spring)
     pose = cdsm.Manipulator(GEOMETRY, cables=cables).at(BENT)
     pull = cdsm.distribute_tension(pose, least)
-    assert pull.values.min() < TABLE.domain.low < pull.values.max()
+    assert pull.values.min() < TABLE.low < pull.values.max()
     report = cdsm.stiffness(pose, pull).report()
     assert report.trustworthy, report.faults
     assert report.self_check.passed
@@ -136,14 +135,14 @@ def test_wire_that_would_vanish_is_refused() -> None:
 @pytest.mark.parametrize("name", LAWS)
 def test_files_hold_the_branch(name: str, tmp_path: Path) -> None:
     law = LAWS[name].slack_below()
-    path = cdsm.write_elasticity(law, tmp_path / "wire.toml")
+    path = law.write(tmp_path / "wire.toml")
     assert "slack_below = true" in path.read_text(encoding="utf-8")
-    assert cdsm.read_elasticity(path) == law
+    assert cdsm.Elasticity.read(path) == law
     path.write_text(path.read_text(encoding="utf-8").replace("= true", "= false"))
-    assert cdsm.read_elasticity(path) == LAWS[name]
+    assert cdsm.Elasticity.read(path) == LAWS[name]
     path.write_text(path.read_text(encoding="utf-8").replace("= false", "= 1"))
     with pytest.raises(cdsm.FileError, match="slack_below"):
-        cdsm.read_elasticity(path)
+        cdsm.Elasticity.read(path)
     arm = cdsm.Manipulator(GEOMETRY, law)
     assert cdsm.Manipulator.read(arm.write(tmp_path / "arm.toml")) == arm
 
@@ -173,9 +172,9 @@ def test_batches_know_the_branch() -> None:
 def test_scaled_law_is_at_rest_where_its_law_is() -> None:
     """On a series spring the rest counts: the original length follows from it."""
     slack = STRAND.slack_below()
-    assert ScaledElasticity(slack, 1.5).rest == slack.rest == STRAND.rest > 0.0
+    assert slack.scaled(1.5).rest == slack.rest == STRAND.rest > 0.0
     cable = cdsm.Manipulator(GEOMETRY, slack).cables[0]
     sprung = replace(cable, series_stiffness=500.0)
-    scaled = replace(sprung, elasticity=ScaledElasticity(slack, 1.0))
+    scaled = replace(sprung, elasticity=slack.scaled(1.0))
     F = np.array([1.0, 10.0, 50.0])
     np.testing.assert_array_equal(scaled.elongation(F, 0.3), sprung.elongation(F, 0.3))

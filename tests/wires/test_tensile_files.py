@@ -232,7 +232,7 @@ def test_command_line_speaks_of_its_options(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", [INSTRON, ZWICK])
 def test_measured_points_are_no_law_of_a_wire(path: Path) -> None:
     with pytest.raises(cdsm.FileError, match="Fit it first: `cdsm fit`"):
-        cdsm.read_elasticity(path)
+        cdsm.Elasticity.read(path)
     with pytest.raises(cdsm.FileError, match="Fit it first: `cdsm fit`"):
         as_wire(str(path))  # as --wire does
 

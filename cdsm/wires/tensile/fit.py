@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from cdsm.elasticity import Elasticity
 from cdsm.errors import InvalidInput, TensileTestError
 from cdsm.support.validation import RANGES, scalar
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tolerances import EVERY, Tolerance
+from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile.loading import FEWEST, Points, loading
 from cdsm.wires.tensile.record import TensileTest
@@ -115,11 +115,11 @@ class TensileFit(ReadOnlyState):
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        low, high = self.elasticity.domain
+        low, high = self.elasticity.low, self.elasticity.high
         return f"<TensileFit, {low:.4g} to {high:.4g} N>"
 
     def __str__(self) -> str:
-        low, high = self.elasticity.domain
+        low, high = self.elasticity.low, self.elasticity.high
         ends = self.elasticity.rigidity(self.tensions[[0, -1]])
         return "\n".join(
             [
@@ -220,8 +220,8 @@ def fit_tensile_test(displacement: ArrayLike, force: ArrayLike, gauge_length: fl
             "more points where EA bends",
         )
     elasticity = _as_law(curve, points)
-    grid, domain = curve.basis.tensions, elasticity.domain
-    tensions = frozen(_grid(domain.first, domain.high, grid))
+    grid = curve.basis.tensions
+    tensions = frozen(_grid(elasticity.low, elasticity.high, grid))
     start = np.interp(tensions[0], grid, curve.strain) - elasticity.strain(tensions[0])
     strain = points.strain - start
     fitted = np.interp(strain, elasticity.strain(tensions), tensions)
