@@ -151,9 +151,8 @@ class Tolerances:
             own = table.get("tolerances", table)
             return from_table(own if isinstance(own, dict) else table)
         except GeometryError as error:
-            raise FileError(
-                path, f"does not hold tolerances:{listed(error.faults, 20, LINES)}"
-            ) from None
+            faults = listed(error.faults, 20, LINES)
+            raise FileError(path, f"does not hold tolerances:{faults}") from None
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write a TOML file from which :meth:`read` builds equal tolerances; return its path.

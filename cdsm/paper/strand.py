@@ -15,11 +15,7 @@ from cdsm.paper.claims import Claim, Figure
 from cdsm.support.values import Array, frozen
 from cdsm.wires.laws import EQ19_PRINTED
 
-GAUGE_LENGTH: Final = 0.5
-"""Length of the tested wire [m]. It is assumed: the paper does not give it."""
-
-JOIN: Final = 31.0
-"""Tension at which the two branches of Eq. 19 meet [N]."""
+GAUGE_LENGTH, JOIN = 0.5, 31.0  # [m], [N]
 
 LEVEL: Final = (400.0, 810.0)
 """Range of tension [N] over which the paper calls the rigidity near-constant (Section IV-C)."""
@@ -45,6 +41,8 @@ class StrandFigure(Figure):
         tangent: Tangent rigidity EA of the repaired Eq. 19 (N,) [N].
         secant: Secant rigidity (Eq. 18) of the repaired Eq. 19 (N,) [N].
         printed: EA by Eq. 19 as printed (N,) [N].
+        gauge_length: Length of the tested wire [m]. It is assumed: the paper does not give it.
+        join: Tension at which the two branches of Eq. 19 meet [N].
     """
 
     tension: Array
@@ -52,11 +50,13 @@ class StrandFigure(Figure):
     tangent: Array
     secant: Array
     printed: Array
+    gauge_length: float = GAUGE_LENGTH
+    join: float = JOIN
 
     def numbers(self) -> dict[str, object]:
         """Return the curves as plain SI numbers, for JSON."""
         return {
-            "gauge_length_m": GAUGE_LENGTH,
+            "gauge_length_m": self.gauge_length,
             "tension_N": self.tension.tolist(),
             "displacement_m": self.displacement.tolist(),
             "tangent_rigidity_N": self.tangent.tolist(),

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdsm.paper.strand import GAUGE_LENGTH, JOIN
 from cdsm.plots.measured import shade_stages
 from cdsm.plots.style import (
     BLUE,
@@ -46,19 +45,19 @@ def plot_strand(result: paper.StrandFigure) -> Figure:
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.4, 2)
     left.plot(MM * result.displacement, result.tension, color=BLUE, label="Eq. 19, repaired")
     shade_stages(left, _STAGES, "y")
-    left.set(xlabel=f"stretch of a {MM * GAUGE_LENGTH:g} mm wire [mm]", ylabel="force [N]")
+    left.set(xlabel=f"stretch of a {MM * result.gauge_length:g} mm wire [mm]", ylabel="force [N]")
     left.set_ylim(0.0, _STAGES[-1][-1])
     words = "stretch from 2.2 N on: below,\nEq. 19 is not positive"
     left.text(0.02, 0.15, words, transform=left.transAxes, fontsize=SMALL)
     caption(left, "(a)")
     right.plot(result.tension, KN * result.tangent, color=BLUE, label="tangent, repaired")
     right.plot(result.tension, KN * result.secant, "--", color=GREEN, label="secant (Eq. 18)")
-    lower = result.tension <= JOIN  # above, the printed and the repaired law share digits
+    lower = result.tension <= result.join  # above, the printed and the repaired law share digits
     printed = KN * result.printed
     line = {"color": VERMILLION, "linewidth": 1.2}
     right.plot(result.tension[lower], printed[lower], ":", label="as printed, misprint", **line)
     right.annotate(
-        f"as printed: {printed[lower][-1]:.0f} kN at {JOIN:g} N",
+        f"as printed: {printed[lower][-1]:.0f} kN at {result.join:g} N",
         (result.tension[lower][np.argmax(printed[lower] < -4.0)], -4.0),
         xytext=(60, -3.2),
         fontsize=SMALL,

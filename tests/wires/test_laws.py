@@ -248,7 +248,7 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
     "high inf": (lambda: cdsm.StrandElasticity(((1.0,),), (), 0.0, math.inf), "high"),
     **{
         f"function {n}": (
-            partial(cdsm.Elasticity.from_rigidity, f, 0.0, 500.0),  # type: ignore[arg-type]
+            partial(cdsm.Elasticity.from_rigidity, f, 0.0, 500.0),
             f"rigidity.*{said}",
         )
         for n, (f, said) in enumerate(
