@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError
-from cdsm.kernels.stiffness import single_cable_stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.wires.elasticity import Elasticity
 
@@ -80,8 +79,10 @@ class CableLaws:
         F (C,) [N], both checked and not negative.
         """
         rigidity = self._rigidity(tension) if self.nonlinear else self.constant
-        k = single_cable_stiffness(lengths, tension, rigidity, self.linear, self.series, self.rest)
-        return frozen(k)
+        stretched = rigidity + self.linear * tension  # EA (1 + ε), 0 of force-controlled cables
+        wire = lengths - self.series * (tension - self.rest)
+        with np.errstate(divide="ignore"):
+            return frozen(np.where(stretched > 0.0, 1.0 / (wire / stretched + self.series), 0.0))
 
     def _rigidity(self, tension: Array) -> Array:
         """Compute EA (1 + ε) (C,) [N] at F (C,) [N]; for linear laws only its constant part, EA."""

@@ -6,29 +6,33 @@ results that depend only on them. A posture is frozen: :meth:`Manipulator.at` ma
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, final, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from cdsm.arm_facts import ArmFacts, CablesOrFile
-from cdsm.arm_model import GRAVITY
-from cdsm.cable_laws import OriginalLength
+from cdsm.cable import Cable, Cables, checked_cables
+from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import CableError, InvalidInput, JointLimitError
-from cdsm.geometry import Geometry
+from cdsm.geometry import LONGEST, Geometry, doubts_about_units
 from cdsm.geometry.cables import serpentine_cables
-from cdsm.kernels.posture import single_pose
-from cdsm.kernels.segments import SHORTEST_SEGMENT
-from cdsm.kernels.tree import Frames
-from cdsm.posture import Posture, site_paths
+from cdsm.posture import Posture
+from cdsm.rigid_body import RigidBody
+from cdsm.routing import SHORTEST_SEGMENT, Routing
+from cdsm.segments import Chains
+from cdsm.support.directions import Direction, gravity_vector
 from cdsm.support.files import write_text
-from cdsm.support.format import beyond
-from cdsm.support.validation import flag, instance, vector
-from cdsm.support.values import Array, frozen
+from cdsm.support.format import JointUnits, beyond, plural
+from cdsm.support.validation import flag, instance, one_of, vector
+from cdsm.support.values import Array, Printed, frozen
+from cdsm.support.warning import warn
+from cdsm.tolerances import Tolerances
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
 from cdsm.wires.elasticity import Elasticity
@@ -38,9 +42,39 @@ if TYPE_CHECKING:
 
     from cdsm.wires.catalogue import Wire
 
+CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
+"""One or more cables, or the path of their file."""
+
+GRAVITY = (0.0, 0.0, -9.81)
+"""Default gravity in base axes [m/s²]."""
+
+LIMIT_SLACK = 1e-9
+"""Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
+
+_FARTHEST = 5.0  # longest plausible lead and distance of a site [m]; or ten arm lengths, if more
+
+ANOTHER_ARM = (
+    "another arm; distribute it for this one. with_cables, with_friction, with_gravity and "
+    "with_tolerances return another arm."
+)
+"""What is wrong with tensions of another arm, and what to do."""
+
+
+class ArmParts(NamedTuple):
+    """Everything that defines an arm; two arms are equal if these parts are equal."""
+
+    geometry: Geometry | None
+    urdf: str
+    cables: Cables
+    tip: str
+    gravity: tuple[float, ...]
+    original_length: OriginalLength
+    joint_names: tuple[str, ...] | None
+    tolerances: Tolerances = Tolerances()
+
 
 @final
-class Manipulator(ArmFacts):
+class Manipulator(Printed):
     """A cable-driven arm: rigid links, joints, cables.
 
     Args:
@@ -65,13 +99,18 @@ class Manipulator(ArmFacts):
         MissingWire: The file of the cables names no wire for some of them.
     """
 
+    _parts: ArmParts
+    _body: RigidBody
+    _routing: Routing
+    _laws: CableLaws
+
     def __init__(
         self,
         geometry: Geometry,
         elasticity: Elasticity | Sequence[Elasticity] | None = None,
         *,
         cables: CablesOrFile | None = None,
-        gravity: ArrayLike = GRAVITY,
+        gravity: Direction = GRAVITY,
         original_length: OriginalLength = "unstrained",
     ) -> None:
         described = instance("geometry", geometry, Geometry)
@@ -83,7 +122,7 @@ class Manipulator(ArmFacts):
                 "give one of elasticity= (for the cables of the geometry) and cables=; "
                 + ("both were given." if cables is not None else "neither was."),
             )
-        self._build(described, to_urdf(described), cables, TIP, gravity, original_length)
+        self._build(_parts(described, to_urdf(described), cables, TIP, gravity, original_length))
 
     @classmethod
     def from_urdf(
@@ -93,7 +132,7 @@ class Manipulator(ArmFacts):
         *,
         tip: str,
         joint_names: Sequence[str] | None = None,
-        gravity: ArrayLike = GRAVITY,
+        gravity: Direction = GRAVITY,
         check_inertia: bool = True,
         original_length: OriginalLength = "unstrained",
     ) -> Manipulator:
@@ -127,7 +166,7 @@ class Manipulator(ArmFacts):
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
         arm = cls.__new__(cls)
-        arm._build(None, text, cables, tip, gravity, original_length, joint_names)
+        arm._build(_parts(None, text, cables, tip, gravity, original_length, joint_names))
         return arm
 
     @classmethod
@@ -165,7 +204,7 @@ class Manipulator(ArmFacts):
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
 
         arm = cls.__new__(cls)
-        arm._build(*read_arm(path, wire))
+        arm._build(_parts(*read_arm(path, wire)))
         return arm
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -182,18 +221,16 @@ class Manipulator(ArmFacts):
         return write_text(path, arm_text(self._parts))
 
     def plot(self, q: ArrayLike | None = None) -> Figure:
-        """Plot the arm in mm at joint angles q (nv,) [rad].
+        """Plot the arm in mm at q (nv,) [rad]; None: each angle is 0, or the limit nearest to 0.
 
-        If q is None, each angle is 0, or the limit nearest to 0.
-
-        Raises:
-            InvalidInput: q is not (nv,) finite real numbers.
-            JointLimitError: An angle is beyond its limit.
+        Raises InvalidInput and JointLimitError as :meth:`at`.
         """
         return self.at(np.clip(0.0, self.lower, self.upper) if q is None else q).plot()
 
     def at(self, q: ArrayLike, *, check_limits: bool = True) -> Posture:
         """Evaluate the arm at joint angles q: kinematics, cable lengths and gravity.
+
+        Pinocchio gives tip, J_X and gravity; L and J_L follow from its twists and placements.
 
         Args:
             q: Joint angles (nv,) [rad], in the order of :attr:`joint_names`.
@@ -205,40 +242,48 @@ class Manipulator(ArmFacts):
             CableError: Two neighbouring sites of a cable coincide at this posture.
         """
         q = self._angles(q, check_limits)
-        tip, jacobian, lengths, length_jacobian, torque, stiffness, *frames = self._pose(q)
-        return Posture(
+        routing = self._routing
+        state = self._body.state(q, routing.used)
+        site = routing.sites(state.placement)
+        spans = routing.spans(state.twist, site)
+        self._require_apart(spans.length, q)
+        pose = Posture(
             arm=self,
             q=q,
-            tip=frozen(tip),
-            jacobian=frozen(jacobian),
-            cable_lengths=frozen(lengths),
-            length_jacobian=frozen(length_jacobian),
-            gravity_torque=frozen(torque),
-            gravity_stiffness=frozen(stiffness),
-            _frames=Frames(*map(frozen, frames)),
+            tip=frozen(state.tip),
+            jacobian=frozen(state.jacobian),
+            cable_lengths=frozen(routing.lengths(spans.length)),
+            length_jacobian=frozen(routing.jacobian(spans)),
+            gravity_torque=frozen(state.gravity_torque),
+            gravity_stiffness=frozen(state.gravity_stiffness),
+            _twist=frozen(state.twist),
+            _sites=frozen(site),
         )
+        pose.__dict__["_spans"] = spans  # a cached property
+        return pose
 
     def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
         """Compute only L(q) (C,) [m], lead included (Eq. 8); equal to ``at(q).cable_lengths``.
 
-        The lead is the straight cable between actuator and base disk. Arguments and errors are
-        those of :meth:`at`.
+        Arguments and errors are those of :meth:`at`.
         """
-        return frozen(self._pose(self._angles(q, check_limits))[2])
+        q, routing = self._angles(q, check_limits), self._routing
+        site = routing.sites(self._body.joint_placements(q, routing.used))
+        length = np.linalg.norm(site[:, routing.second] - site[:, routing.first], axis=0)
+        self._require_apart(length, q)
+        return frozen(routing.lengths(length))
 
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
         """Check joint angles (nv,) [rad] and return them read-only."""
         q = vector("q", q, self.nv, self._meaning_of_q)
         if flag("check_limits", check_limits):
-            out = np.flatnonzero(self._model.beyond_limits(q)).tolist()
+            out = np.flatnonzero(self._beyond_limits(q)).tolist()
             if out:
                 names = [self.joint_names[i] for i in out]
                 limits = [(float(self.lower[i]), float(self.upper[i])) for i in out]
-                units = [self.joint_units[i] for i in out]
-                units = [self.joint_units[i] for i in out]
                 texts = [
-                    beyond(name, q[i], *limit, unit)
-                    for i, name, limit, unit in zip(out, names, limits, units, strict=True)
+                    beyond(name, q[i], *limit, self.joint_units[i])
+                    for i, name, limit in zip(out, names, limits, strict=True)
                 ]
                 raise JointLimitError(texts, names, q[out].tolist(), limits)
         return q
@@ -248,19 +293,267 @@ class Manipulator(ArmFacts):
         coordinate = "angle [rad] or way [m]" if self.slides.any() else "angle [rad]"
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
-    def _pose(self, q: Array) -> tuple[Array, ...]:
-        """Compute the fields of :class:`Posture` after ``q``, by the kernel ``single_pose``.
+    def _beyond_limits(self, q: Array) -> NDArray[np.bool_]:
+        """Return for each joint angle of q (nv,) whether it is beyond its limits (nv,)."""
+        return np.asarray((q < self.lower - LIMIT_SLACK) | (q > self.upper + LIMIT_SLACK))
 
-        q (nv,) [rad] must be checked. Raises CableError if two neighbouring sites coincide.
+    def _require_apart(self, length: Array, q: Array) -> None:
+        """Raise CableError if a segment, of the ``length`` (S,) [m], has no direction."""
+        if length.min(initial=math.inf) < SHORTEST_SEGMENT:
+            cable = self.cables[int(self._routing.cable[length.argmin()])]
+            raise CableError(
+                cable.name,
+                f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
+                "direction there. Move a site, or change the posture.",
+            )
+
+    @property
+    def geometry(self) -> Geometry:
+        """Geometry from which the arm was built; InvalidInput for an arm from a URDF."""
+        if self._parts.geometry is None:
+            raise InvalidInput(
+                "geometry", f"{self.name} was made from a URDF and has none; see arm.urdf."
+            )
+        return self._parts.geometry
+
+    @property
+    def is_serpentine(self) -> bool:
+        """Whether the arm was built from a :class:`~cdsm.Geometry`."""
+        return self._parts.geometry is not None
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self._body.name
+
+    @cached_property
+    def length(self) -> float:
+        """Length of the path from the base through the joints to the tip, all joints at zero [m].
+
+        For an arm from a URDF the length is at least the largest distance of a cable site from the
+        joint that moves the site. So the length is never zero: tolerances are multiples of it.
         """
-        *pose, shortest = single_pose(self._model.arrays, q)
-        if shortest < SHORTEST_SEGMENT:
-            site = pose[-1]
-            for cable, path in zip(self.cables, site_paths(self.cables, site), strict=True):
-                if (np.linalg.norm(np.diff(path, axis=0), axis=1) < SHORTEST_SEGMENT).any():
-                    raise CableError(
-                        cable.name,
-                        f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has "
-                        "no direction there. Move a site, or change the posture.",
-                    )
-        return tuple(pose)
+        if self.is_serpentine:
+            return self.geometry.length
+        reach = float(np.linalg.norm(self._routing.point, axis=1).max())
+        return max(self._body.length, reach)
+
+    @property
+    def tip_link(self) -> str:
+        """Name of the link whose frame is the tip."""
+        return self._parts.tip
+
+    @property
+    def urdf(self) -> str:
+        """URDF text of the arm."""
+        return self._parts.urdf
+
+    @property
+    def cables(self) -> Cables:
+        """Cables of the arm, in the order of every (C,) array; ``cables["cable1_1"]`` is one."""
+        return self._parts.cables
+
+    @cached_property
+    def gravity(self) -> Array:
+        """Gravity in base axes (3,) [m/s²]."""
+        return frozen(np.array(self._parts.gravity))
+
+    @property
+    def original_length(self) -> OriginalLength:
+        """Length of a wire that is l_0 in EA/l_0: ``"unstrained"``, or ``"stretched"`` (paper)."""
+        return self._parts.original_length
+
+    @cached_property
+    def has_friction(self) -> bool:
+        """Whether any cable has friction in a hole. Results that neglect this friction say so."""
+        return any(any(cable.friction) for cable in self.cables)
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """Uncertainties of the arm's dimensions and measured values; zero if none were given."""
+        return self._parts.tolerances
+
+    @property
+    def nv(self) -> int:
+        """Number of degrees of freedom."""
+        return self._body.nv
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of every (nv,) array."""
+        return self._body.joint_names
+
+    @property
+    def slides(self) -> NDArray[np.bool_]:
+        """Whether each joint is prismatic (nv,); its coordinate is then a length [m]."""
+        return self._body.slides
+
+    @property
+    def joint_units(self) -> tuple[str, ...]:
+        """Unit of each joint's coordinate (nv,): rad, or m for a prismatic joint."""
+        return JointUnits(self.slides).coordinates
+
+    def torque_unit(self, joint: int | None = None) -> str:
+        """Return the unit of torque of a joint or, if None, of all: "N m", "N" or "N m or N"."""
+        return JointUnits(self.slides).torque(joint)
+
+    def stiffness_unit(self) -> str:
+        """Return the unit of eigenvalues of K_θ: "N m/rad", "N/m" or "N m/rad or N/m"."""
+        return JointUnits(self.slides).stiffness()
+
+    @property
+    def lower(self) -> Array:
+        """Lower joint limits (nv,) [rad]; [m] for prismatic joints."""
+        return self._body.lower
+
+    @property
+    def upper(self) -> Array:
+        """Upper joint limits (nv,) [rad]; [m] for prismatic joints."""
+        return self._body.upper
+
+    def __repr__(self) -> str:
+        return f"<Manipulator {self}>"
+
+    def __str__(self) -> str:
+        free = plural(self.nv, "degree") + " of freedom"
+        if self.is_serpentine:
+            free = f"{plural(len(self.geometry.joints), 'joint')} ({free})"
+        return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.6g} m long"
+
+    def _build(self, parts: ArmParts, robot: Manipulator | None = None) -> None:
+        """Set all attributes from checked parts; ``robot`` is an arm with the same rigid bodies.
+
+        :attr:`_doubts` are issued as warnings, except those of ``robot``, which the user has seen.
+        """
+        if robot is None:
+            body = RigidBody(parts.urdf, parts.tip, np.array(parts.gravity), parts.joint_names)
+        else:
+            body = robot._body
+        self._body, self._parts = body, parts._replace(joint_names=body.joint_names)
+        self._routing = Routing.of(body, parts.cables)
+        self._laws = CableLaws(parts.cables, parts.original_length)
+        for doubt in self._doubts:
+            if robot is None or doubt not in robot._doubts:
+                warn(f"{self.name}: {doubt}")
+
+    @cached_property
+    def _chains(self) -> Chains:
+        """All cables of the arm, divided at their holes into segments."""
+        return Chains.of(self.cables)
+
+    @cached_property
+    def _chain_routing(self) -> Routing:
+        """Routing of the segments of :attr:`_chains`, each as a cable of its own."""
+        return Routing.of(self._body, self._chains.segments, every=True)
+
+    @cached_property
+    def _segment_laws(self) -> CableLaws:
+        """Elasticities of the segments of :attr:`_chains`."""
+        return CableLaws(self._chains.segments, self.original_length)
+
+    @cached_property
+    def _doubts(self) -> list[str]:
+        """Texts of warnings: lengths look as if not in metres, or no joint moves the tip."""
+        length = self._body.length
+        # without lengths between the joints, the frame of the robot may be as long as any arm
+        most = max(_FARTHEST, 10.0 * length) if length > 0.0 else LONGEST
+        sizes = [(f"the lead of {each.name}", each.lead, most) for each in self.cables]
+        sizes += [
+            (f"a site of {each.name}", math.hypot(*site.position), most)
+            for each in self.cables
+            for site in each.sites
+        ]
+        # a geometry warns of its own length
+        largest = max(sizes, key=lambda size: size[1])
+        doubts = doubts_about_units(0.0 if self.is_serpentine else length, [largest])
+        if not self._body.tip_joints.size:
+            doubts.append(
+                f"no joint moves its tip {self._parts.tip}, so its stiffness is infinite; give "
+                "another link as tip."
+            )
+        return doubts
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, type(self)) and self._parts == other._parts
+
+    def __hash__(self) -> int:
+        return hash(self.urdf)
+
+    def __getstate__(self) -> ArmParts:
+        return self._parts
+
+    def __setstate__(self, parts: ArmParts) -> None:
+        self._build(parts)
+
+    def with_cables(self, cables: CablesOrFile) -> Self:
+        """Return an arm with the same robot and other cables.
+
+        Args:
+            cables: One or more cables, or the path of their file.
+
+        Raises:
+            InvalidInput: ``cables`` is empty, or not a list or tuple of cables.
+            CableError: Two cables have the same name, or a cable is on an unknown link.
+            FileError: The file cannot be read or does not describe cables.
+            MissingWire: The file names no wire for some cables.
+        """
+        return self._replace(cables=checked_cables(cables))
+
+    def with_friction(self, friction: float) -> Self:
+        """Return the same arm with one friction coefficient μ [-] in all holes.
+
+        Raises:
+            InvalidInput: ``friction`` is negative, above 2, or not a number.
+        """
+        return self._replace(cables=Cables(cable.with_friction(friction) for cable in self.cables))
+
+    def with_tolerances(self, tolerances: Tolerances) -> Self:
+        """Return the same arm with other :class:`Tolerances`; InvalidInput for another type."""
+        return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
+
+    def with_gravity(self, gravity: Direction) -> Self:
+        """Return the same arm under another gravity (3,) [m/s²] in base axes.
+
+        The name of an axis, such as ``"-y"``, means 9.81 m/s² along this axis.
+
+        Raises:
+            InvalidInput: Gravity is neither an axis nor three numbers.
+        """
+        arm = type(self).__new__(type(self))
+        g = tuple(gravity_vector("gravity", gravity).tolist())
+        arm._build(self._parts._replace(gravity=g))
+        return arm
+
+    def _with_laws(self, laws: Sequence[Elasticity]) -> Self:
+        """Return the same arm with other laws, one per cable; faster, since the rest is kept."""
+        pairs = zip(self.cables, laws, strict=True)
+        cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
+        arm = type(self).__new__(type(self))
+        arm._body, arm._routing = self._body, self._routing
+        arm._parts = self._parts._replace(cables=cables)
+        arm._laws = CableLaws(cables, self.original_length)
+        return arm
+
+    def _replace(self, **changes: Any) -> Self:
+        """Return the same robot with other parts that do not concern its rigid bodies."""
+        arm = type(self).__new__(type(self))
+        arm._build(self._parts._replace(**changes), self)
+        return arm
+
+
+def _parts(
+    geometry: Geometry | None,
+    urdf: str,
+    cables: CablesOrFile,
+    tip: str,
+    gravity: Direction,
+    original_length: OriginalLength,
+    joint_names: Sequence[str] | None = None,
+    tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
+) -> ArmParts:
+    """Check the arguments of :class:`Manipulator`; ``urdf`` is a text that has been checked."""
+    one_of("original_length", original_length, get_args(OriginalLength))
+    g = tuple(gravity_vector("gravity", gravity).tolist())
+    names = None if joint_names is None else tuple(joint_names)
+    held = checked_cables(cables)
+    return ArmParts(geometry, urdf, held, tip, g, original_length, names, tolerances)

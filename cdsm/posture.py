@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, final
@@ -11,13 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.cable import Cable
-from cdsm.cable_chains import Segments
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.contacts import overlapping
-from cdsm.kernels import chains as chain_kernels
-from cdsm.kernels import stiffness as stiffness_kernels
-from cdsm.kernels.tree import Frames, Routing
+from cdsm.routing import Spans, cross, dot
+from cdsm.segments import Segments
 from cdsm.support.format import JointUnits, aligned, coordinates, plain, plural
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import one_of
@@ -59,7 +56,8 @@ class Posture(ReadOnlyState):
     length_jacobian: Array
     gravity_torque: Array
     gravity_stiffness: Array
-    _frames: Frames
+    _twist: Array
+    _sites: Array
 
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
@@ -96,24 +94,33 @@ class Posture(ReadOnlyState):
         )
 
     @cached_property
+    def _spans(self) -> Spans:
+        """The cable segments whose length joints change."""
+        return self.arm._routing.spans(self._twist, self._sites)
+
+    @cached_property
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
-        routing, count = self.arm._model.routing, len(self.cable_lengths)
-        hessian = stiffness_kernels.single_length_hessian(
-            routing.segment, routing.joint, *self._frames, np.ones(count), np.arange(count), count
-        )
-        return frozen(hessian)
+        routing = self.arm._routing
+        one, count = np.ones(routing.cable.size), len(self.cable_lengths)
+        return frozen(routing.hessians(self._spans, one, routing.cable, count))
 
     @cached_property
     def cable_paths(self) -> tuple[Array, ...]:
         """Sites of each cable in base axes, one array (sites, 3) per cable [m]."""
-        paths = site_paths(self.arm.cables, self._frames.site)
-        return tuple(frozen(path.copy()) for path in paths)
+        ends = np.cumsum([len(cable.sites) for cable in self.arm.cables])
+        return tuple(frozen(path.copy()) for path in np.split(self._sites.T, ends[:-1]))
+
+    @cached_property
+    def _placements(self) -> Array:
+        """Poses (nv+1, 4, 4) of the base and of the joints' frames."""
+        body = self.arm._body
+        return frozen(body.joint_placements(self.q, range(body.nv + 1)))
 
     @property
     def joint_positions(self) -> Array:
         """Positions of the joints (nv, 3) [m]: one point on each joint axis."""
-        return self._frames.origin[1:]
+        return self._placements[1:, :3, 3]
 
     @property
     def bones(self) -> tuple[Array, ...]:
@@ -124,8 +131,8 @@ class Posture(ReadOnlyState):
     def brackets(self) -> tuple[Array, ...]:
         """Lines (2, 3) [m] from each cable site to the nearest of the bones of the site's link."""
         lines = []
-        for row, site in zip(self.arm._model.routing.row, self._frames.site, strict=True):
-            feet = [foot(site, bone) for bone in self._bones[row]] or [self._frames.origin[row]]
+        for row, site in zip(self.arm._routing.row, self._sites.T, strict=True):
+            feet = [foot(site, bone) for bone in self._bones[row]] or [self._placements[row, :3, 3]]
             nearest = min(feet, key=lambda each: float(np.linalg.norm(each - site)))
             lines.append(frozen(np.array([site, nearest])))
         return tuple(lines)
@@ -135,7 +142,7 @@ class Posture(ReadOnlyState):
 
         A link is given by the number of the joint that carries it, from 1; 0 is the base.
         """
-        rows = self.arm._model.routing.row.tolist()
+        rows = self.arm._routing.row.tolist()
         brackets = zip(rows, self.brackets, strict=True)
         return (
             [bone for row, each in enumerate(self._bones) if row not in without for bone in each],
@@ -145,17 +152,18 @@ class Posture(ReadOnlyState):
     @cached_property
     def _bones(self) -> tuple[tuple[Array, ...], ...]:
         """Lines (2, 3) [m] from the base, and from each joint, to the next joints or the tip."""
-        origin, parent = self._frames.origin, self.arm._model.tree.parent
-        ends = [*zip(parent[1:], origin[1:], strict=True)]
+        origin, body = self._placements[:, :3, 3], self.arm._body
+        ends = [*zip(body.parent[1:], origin[1:], strict=True)]
         bones: list[list[Array]] = [[] for _ in origin]
-        for row, end in [*ends, (self.arm._model.masses.tip, self.tip[:3, 3])]:
+        last = int(body.tip_joints[-1]) + 1 if body.tip_joints.size else 0
+        for row, end in [*ends, (last, self.tip[:3, 3])]:
             if (origin[row] != end).any():
                 bones[row].append(frozen(np.array([origin[row], end])))
         return tuple(map(tuple, bones))
 
     def link_pose(self, link: str) -> Array:
         """Compute the pose (4, 4) [m] of a link's frame in base axes, or raise UnknownName."""
-        return frozen(self.arm._model.body.placement(self.q, link))
+        return frozen(self.arm._body.placement(self.q, link))
 
     @cached_property
     def self_contacts(self) -> tuple[tuple[str, str], ...]:
@@ -166,8 +174,8 @@ class Posture(ReadOnlyState):
         """
         if not self.arm.is_serpentine:
             return ()
-        disks = self.arm.geometry.disks
-        return tuple(overlapping(disks, {disk.link: self.link_pose(disk.link) for disk in disks}))
+        disks, poses = self.arm.geometry.disks, self.arm._body.link_placements(self.q)
+        return tuple(overlapping(disks, {disk.link: poses[disk.link] for disk in disks}))
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -180,21 +188,22 @@ class Posture(ReadOnlyState):
     @cached_property
     def segments(self) -> Segments:
         """Lengths of cable segments between holes, and wrap angles; computed on first use."""
-        model = self.arm._model
-        found = chain_kernels.single_chains(model.arrays[:6], model.chain_arrays, self.q)
-        lengths, jacobian, wrap, gradient, *frames = found
-        return Segments(
-            chains=model.chains,
-            lengths=frozen(lengths),
-            length_jacobian=frozen(jacobian),
-            wrap=frozen(wrap),
-            wrap_jacobian=frozen(gradient),
-            _routing=Routing(*model.chain_arrays[:5]),
-            _frames=Frames(*map(frozen, frames)),
-        )
+        arm = self.arm
+        routing = arm._chain_routing
+        sites = routing.sites(arm._body.joint_placements(self.q, routing.used))
+        return Segments.at(arm._chains, routing, self._twist, sites)
 
     def _equals(self, other: Posture) -> bool:
         return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))
+
+    def _active(self, tension: Array) -> Array:
+        """Compute the active term H_L·F (nv, nv) [N m/rad] of K_θ for tensions F (C,) [N]."""
+        routing = self.arm._routing
+        return np.asarray(routing.hessian(self._spans, tension[routing.cable]))
+
+    def _load(self, wrench: Array) -> Array:
+        """Compute the load term −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad] of K_θ for a wrench W (6,)."""
+        return load_stiffness(self.jacobian, wrench, self.arm._body.tip_joints)
 
     def _joint_stiffness(self, tension: Array, cable_stiffness: Array, wrench: Array) -> Array:
         """Compute five matrices (5, nv, nv) [N m/rad]: active, passive and load term, P, and K_θ.
@@ -202,20 +211,32 @@ class Posture(ReadOnlyState):
         P is the entrywise sum of the magnitudes of the four terms of K_θ. ``tension`` (C,) [N],
         ``cable_stiffness`` (C,) [N/m] and ``wrench`` (6,) must be checked.
         """
-        model = self.arm._model
-        terms = stiffness_kernels.single_stiffness(
-            model.routing.segment,
-            model.routing.joint,
-            *self._frames,
-            self.jacobian,
-            self.length_jacobian,
-            self.gravity_stiffness,
-            tension,
-            cable_stiffness,
-            wrench,
-            model.masses.tip_joints,
-        )
-        return frozen(terms)
+        J = self.length_jacobian
+        active, load = self._active(tension), self._load(wrench)
+        passive, gravity = (J.T * cable_stiffness) @ J, self.gravity_stiffness
+        sizes = abs(active) + abs(passive) + abs(gravity) + abs(load)
+        return frozen(np.stack([active, passive, load, sizes, active + passive + gravity + load]))
+
+
+def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp]) -> Array:
+    """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,) at the tip, from J_X (6, nv).
+
+    The joint a is before b on the way to the tip: the entries (a, b) and (b, a) are −(f × z_a)·v_b
+    for the force f. A moment m adds −(m × z_a)·z_b to the entry (b, a) alone.
+    """
+    nv = jacobian.shape[1]
+    J = jacobian[:, tip_joints]
+    v, z = J[:3], J[3:]
+    force = -dot(cross(wrench[:3, None], z)[:, :, None], v[:, None])
+    later = np.tril(np.ones(force.shape), -1)
+    load = force * (1.0 - later) + (force * (1.0 - later)).T * later
+    if wrench[3:].any():
+        load -= dot(cross(wrench[3:, None], z)[:, :, None], z[:, None]).T * later
+    if tip_joints.size == nv and (tip_joints == np.arange(nv)).all():
+        return np.asarray(load)
+    whole = np.zeros((nv, nv))
+    whole[np.ix_(tip_joints, tip_joints)] = load
+    return whole
 
 
 @final
@@ -287,11 +308,6 @@ class MomentArms(ReadOnlyState):
         slide = " [-] where the joint slides;" if self.slides.any() else ""
         note = f"moment arms [mm],{slide} positive: the cable turns the joint to positive angles"
         return "\n".join([*aligned([["", *self.joints], *rows]), note])
-
-
-def site_paths(cables: Sequence[Cable], sites: Array) -> list[Array]:
-    """Divide the positions of all cable sites, (P, 3) [m], into one array for each cable."""
-    return np.split(sites, np.cumsum([len(cable.sites) for cable in cables])[:-1])
 
 
 def foot(point: Array, line: Array) -> Array:

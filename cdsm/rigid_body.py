@@ -1,8 +1,8 @@
-"""Rigid-body model of an arm. Only this module imports Pinocchio.
+"""Rigid-body model of an arm: everything that Pinocchio says about joint angles.
 
-Pinocchio crashes on wrong ids, misreads unusual memory layouts, and its scratch data are not
-thread-safe. Therefore this module finds links by name, and each thread has scratch data of its own.
-Callers must pass checked arrays; they receive copies.
+Only this module imports Pinocchio. It crashes on wrong ids, misreads unusual memory layouts, and
+its scratch data are not thread-safe. Therefore this module finds links by name, and each thread has
+scratch data of its own. Callers must pass checked arrays; they receive copies.
 """
 
 from __future__ import annotations
@@ -13,19 +13,46 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput, UrdfError
-from cdsm.kernels.bodies import Masses
-from cdsm.kernels.tree import Tree
 from cdsm.support.validation import one_of, sequence_of
 from cdsm.support.values import Array, frozen
+
+
+class State(NamedTuple):
+    """What Pinocchio computes at joint angles q; all in base axes, joints in the order of q."""
+
+    tip: Array  # pose of the tip (4, 4), translation in m
+    jacobian: Array  # J_X (6, nv) at the tip, linear rows first
+    gravity_torque: Array  # g = ∂V/∂θ (nv,)
+    gravity_stiffness: Array  # ∂g/∂θ (nv, nv)
+    twist: (
+        Array  # (v, z) of each joint (6, nv): a point x that joint j moves has ∂x/∂θ_j = v + z × x
+    )
+    placement: Array  # poses (n, 4, 4) of the bodies that were asked for
+
+
+class TreeArrays(NamedTuple):
+    """The kinematic tree as plain arrays. Row 0 is the base, row i is joint i in the order of q."""
+
+    parent: NDArray[np.intp]  # row of the joint before, (nv+1,)
+    order: NDArray[np.intp]  # rows, sorted so that each joint comes after its parent (nv,)
+    rotation: Array  # frame of each joint in that of its parent at q = 0 (nv+1, 3, 3)
+    translation: Array  # (nv+1, 3) [m]
+    twist: Array  # unit twist of each joint in its own frame (nv+1, 6), linear part first
+    mass: Array  # of what each joint carries (nv+1,) [kg]
+    centre: Array  # centre of these masses in the joint's frame (nv+1, 3) [m]
+    tip: int  # row of the joint that carries the tip
+    tip_rotation: Array  # frame of the tip in that of its joint (3, 3)
+    tip_point: Array  # (3,) [m]
 
 
 class Shapes(NamedTuple):
     """Shapes of a URDF that a viser server draws: how to move them, and which joints have any."""
 
     place: Callable[[Array], None]  # moves the shapes to joint angles (nv,) [rad]
-    rows: frozenset[int]  # rows in Tree of the joints whose links have shapes
+    rows: frozenset[int]  # rows in TreeArrays of the joints whose links have shapes
 
 
 class RigidBody:
@@ -53,7 +80,8 @@ class RigidBody:
         # index in Pinocchio's order of each of our coordinates, and the inverse permutation
         self._theirs = frozen(np.array([names.index(name) for name in self.joint_names]))
         self._ours = frozen(np.argsort(self._theirs))
-        self._ids: tuple[int, ...] = tuple((1 + self._theirs).tolist())
+        self._sorted = self.joint_names == names
+        self._rows = (0, *(1 + self._theirs).tolist())  # Pinocchio's index of each row
         self.nv: int = model.nv
         self.name: str = model.name
         self.lower: Array = frozen(np.array(model.lowerPositionLimit)[self._theirs])
@@ -65,107 +93,123 @@ class RigidBody:
         }
         self._tip = self._frame(tip)
         self._scratch = threading.local()
+        self.parent: list[int] = [self._row(model.parents[i]) for i in self._rows]
+        self.tip_joints = frozen(
+            np.array(self.joints_to(self._row(model.frames[self._tip].parentJoint)), np.intp) - 1
+        )
         self._twists = frozen(self._local_twists())
-        self.slides = frozen(np.asarray(~self._twists[:, 3:].any(axis=1)))
+        self.slides = frozen(np.asarray(~self._twists[1:, 3:].any(axis=1)))
 
     @property
     def link_names(self) -> tuple[str, ...]:
         """Names of all links."""
         return tuple(self._frames)
 
-    def locate(self, link: str) -> tuple[int, Array, Array]:
-        """Return the row in :class:`Tree` of the joint that carries a link, and the link's frame.
-
-        The frame is a rotation (3, 3) and a translation (3,) [m] in the frame of this joint. Raises
-        UnknownName if the arm has no such link.
-        """
-        frame = self._model.frames[self._frame(link)]
-        return (
-            self._row(frame.parentJoint),
-            frame.placement.rotation.copy(),
-            frame.placement.translation.copy(),
-        )
-
-    def tree(self) -> Tree:
-        """Build the kinematic tree as plain arrays."""
-        model = self._model
-        rows = (0, *self._ids)
-        return Tree.of(
-            parent=np.array([self._row(model.parents[i]) for i in rows], dtype=np.intp),
-            order=1 + self._ours,
-            rotation=np.array([model.jointPlacements[i].rotation for i in rows]),
-            translation=np.array([model.jointPlacements[i].translation for i in rows]),
-            axis=np.vstack([np.zeros(3), self._twists[:, 3:]]),
-            slide=np.vstack([np.zeros(3), self._twists[:, :3]]),
-        )
-
-    @property
-    def length(self) -> float:
-        """Length of the path from the base through the joints to the tip at q = 0 [m]."""
-        frame = self._model.frames[self._tip]
-        length = float(np.linalg.norm(frame.placement.translation))
-        for joint in reversed(self._path(frame.parentJoint)):
-            length += float(np.linalg.norm(self._model.jointPlacements[joint].translation))
-        return length
-
-    def _local_twists(self) -> Array:
-        """Compute the unit twist of each joint in the joint's frame (nv, 6), linear part first."""
+    def state(self, q: Array, rows: Sequence[int] = ()) -> State:
+        """Compute everything at joint angles q (nv,), with the poses of the bodies in ``rows``."""
         model, data = self._model, self._data()
-        pin.computeJointJacobians(model, data, pin.neutral(model))
-        return np.array(
-            [
-                pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[:, i - 1]
-                for i in self._ids
-            ]
-        )
-
-    def masses(self) -> Masses:
-        """Return masses of the bodies that the joints carry, gravity, and the tip's frame."""
-        model, tip = self._model, self._model.frames[self._tip]
-        inertias = [model.inertias[i] for i in (0, *self._ids)]
-        return Masses(
-            mass=np.array([inertia.mass for inertia in inertias]),
-            centre=np.array([inertia.lever for inertia in inertias]),
-            gravity=np.array(model.gravity.linear),
-            tip=self._row(tip.parentJoint),
-            tip_joints=np.array([self._row(j) - 1 for j in self._path(tip.parentJoint)], np.intp),
-            rotation=tip.placement.rotation.copy(),
-            point=tip.placement.translation.copy(),
-        )
-
-    def pseudo_inertias(self) -> Array:
-        """Compute :func:`pseudo_inertia` (1 + nv, 4, 4) of what the base and the joints carry."""
-        bodies = [self._model.inertias[i] for i in (0, *self._ids)]
-        return np.array([pseudo_inertia(each.mass, each.lever, each.inertia) for each in bodies])
+        slope = pin.computeGeneralizedGravityDerivatives(model, data, self._permuted(q))
+        jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
+        poses, ids = data.oMi, self._rows
+        placement = np.array([poses[ids[row]].homogeneous for row in rows]).reshape(-1, 4, 4)
+        # for a model with one joint, Pinocchio returns vectors
+        shape, nv = (6, self.nv), self.nv
+        J, twist = jacobian.reshape(shape), data.J.reshape(shape)
+        torque, slope = data.g, slope.reshape(nv, nv)
+        if self._sorted:
+            J, twist, torque, slope = J.copy(), twist.copy(), torque.copy(), slope.copy()
+        else:
+            order = self._theirs
+            J, twist, torque = J[:, order], twist[:, order], torque[order]
+            slope = slope[order[:, None], order]
+        tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
+        return State(tip, J, torque, slope, twist, placement)
 
     def tip(self, q: Array) -> tuple[Array, Array]:
-        """Compute the pose (4, 4) of the tip and its Jacobian (6, nv), at joint angles q (nv,).
-
-        The Jacobian has the linear rows first, in base axes.
-        """
+        """Compute the pose (4, 4) of the tip and J_X (6, nv) at joint angles q (nv,)."""
         model, data = self._model, self._data()
-        pin.computeJointJacobians(model, data, q[self._ours])
+        pin.computeJointJacobians(model, data, self._permuted(q))
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         pose: Array = pin.updateFramePlacement(model, data, self._tip).homogeneous
-        # for a model with one joint, Pinocchio returns a vector
         return pose, jacobian.reshape(6, self.nv).take(self._theirs, axis=1)
 
+    def joint_placements(self, q: Array, rows: Sequence[int]) -> Array:
+        """Compute the poses (n, 4, 4) of the joints' frames in ``rows``; row 0 is the base."""
+        data = self._data()
+        pin.forwardKinematics(self._model, data, self._permuted(q))
+        return np.array([data.oMi[self._rows[row]].homogeneous for row in rows]).reshape(-1, 4, 4)
+
+    def link_placements(self, q: Array) -> dict[str, Array]:
+        """Compute the poses (4, 4) of the frames of all links in base axes, by name."""
+        data = self._data()
+        pin.framesForwardKinematics(self._model, data, self._permuted(q))
+        return {name: data.oMf[index].homogeneous for name, index in self._frames.items()}
+
     def placement(self, q: Array, link: str) -> Array:
-        """Compute the pose of a link's frame in the base frame (4, 4), or raise UnknownName."""
+        """Compute the pose (4, 4) of one link's frame in base axes, or raise UnknownName."""
         model, data, frame = self._model, self._data(), self._frame(link)
-        pin.forwardKinematics(model, data, q[self._ours])
+        pin.forwardKinematics(model, data, self._permuted(q))
         placement: Array = pin.updateFramePlacement(model, data, frame).homogeneous
         return placement
 
     def potential_energy(self, q: Array) -> float:
         """Compute the gravitational energy V of all links [J] at joint angles (nv,) [rad]."""
-        return float(pin.computePotentialEnergy(self._model, self._data(), q[self._ours]))
+        return float(pin.computePotentialEnergy(self._model, self._data(), self._permuted(q)))
 
     def mass_matrix(self, q: Array) -> Array:
         """Compute the joint-space mass matrix M (nv, nv) [kg m²] at joint angles (nv,) [rad]."""
-        M = np.array(pin.crba(self._model, self._data(), q[self._ours])).reshape(self.nv, self.nv)
-        ours: Array = M[np.ix_(self._theirs, self._theirs)]
+        M = np.array(pin.crba(self._model, self._data(), self._permuted(q)))
+        ours: Array = M.reshape(self.nv, self.nv)[np.ix_(self._theirs, self._theirs)]
         return ours
+
+    def locate(self, link: str) -> tuple[int, Array, Array]:
+        """Return the row of the joint that carries a link, and the link's frame in the joint's.
+
+        The frame is a rotation (3, 3) and a translation (3,) [m]. Raises UnknownName if the arm has
+        no such link.
+        """
+        frame = self._model.frames[self._frame(link)]
+        place = frame.placement
+        return self._row(frame.parentJoint), place.rotation.copy(), place.translation.copy()
+
+    def joints_to(self, row: int) -> list[int]:
+        """Return the rows of the joints from the base to the joint in ``row``, included."""
+        rows: list[int] = []
+        while row:
+            rows.insert(0, row)
+            row = self.parent[row]
+        return rows
+
+    @property
+    def length(self) -> float:
+        """Length of the path from the base through the joints to the tip at q = 0 [m]."""
+        model = self._model
+        steps = [model.jointPlacements[self._rows[1 + joint]] for joint in self.tip_joints]
+        steps.append(model.frames[self._tip].placement)
+        return float(sum(np.linalg.norm(step.translation) for step in steps))
+
+    def arrays(self) -> TreeArrays:
+        """Return the kinematic tree as plain arrays."""
+        model, tip = self._model, self._model.frames[self._tip]
+        places = [model.jointPlacements[i] for i in self._rows]
+        inertias = [model.inertias[i] for i in self._rows]
+        return TreeArrays(
+            parent=np.array(self.parent, dtype=np.intp),
+            order=1 + self._ours,
+            rotation=np.array([place.rotation for place in places]),
+            translation=np.array([place.translation for place in places]),
+            twist=self._twists,
+            mass=np.array([inertia.mass for inertia in inertias]),
+            centre=np.array([inertia.lever for inertia in inertias]),
+            tip=self._row(tip.parentJoint),
+            tip_rotation=tip.placement.rotation.copy(),
+            tip_point=tip.placement.translation.copy(),
+        )
+
+    def pseudo_inertias(self) -> Array:
+        """Compute :func:`pseudo_inertia` (1 + nv, 4, 4) of what the base and the joints carry."""
+        bodies = [self._model.inertias[i] for i in self._rows]
+        return np.array([pseudo_inertia(each.mass, each.lever, each.inertia) for each in bodies])
 
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
         """Draw the visual shapes of a URDF below a node of a viser server, and return them.
@@ -190,14 +234,23 @@ class RigidBody:
                 "of a package:// are looked for in the folders of ROS_PACKAGE_PATH."
             ) from None
         rows = frozenset(self._row(shape.parentJoint) for shape in shapes.geometryObjects)
-        return Shapes(lambda q: drawn.display(q[self._ours]), rows)
+        return Shapes(lambda q: drawn.display(self._permuted(q)), rows)
 
-    def _path(self, joint: int) -> list[int]:
-        """Return Pinocchio's indices of the joints from the base to ``joint``, included."""
-        return list(self._model.supports[joint])[1:]
+    def _local_twists(self) -> Array:
+        """Compute the unit twist of each joint in its own frame (nv+1, 6), linear part first."""
+        model, data = self._model, self._data()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        local = [
+            pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[:, i - 1]
+            for i in self._rows[1:]
+        ]
+        return np.vstack([np.zeros(6), *local])
+
+    def _permuted(self, q: Array) -> Array:
+        return q if self._sorted else q[self._ours]
 
     def _row(self, joint: int) -> int:
-        """Convert Pinocchio's index of a joint to its row in :class:`Tree`; the base is 0."""
+        """Convert Pinocchio's index of a joint to our row; the base is 0."""
         return 1 + int(self._ours[joint - 1]) if joint else 0
 
     def _frame(self, link: str) -> int:

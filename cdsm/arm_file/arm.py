@@ -18,13 +18,13 @@ from cdsm.arm_file.cables import (
     setting_lines,
 )
 from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entries
-from cdsm.arm_model import GRAVITY, ArmParts
-from cdsm.cable import Cable
+from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.errors import LINES, FileError, GeometryError, UnknownName, UrdfError, listed
 from cdsm.geometry import Geometry, split_geometry
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.geometry.tables import build, lines_of
+from cdsm.manipulator import GRAVITY, ArmParts
 from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
 from cdsm.support.validation import RANGES, one_of
@@ -113,14 +113,14 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     g, length = keys.gravity, keys.original_length
     if robot is None:
         assert geometry is not None
-        return ArmParts(geometry, to_urdf(geometry), cables, TIP, g, length, None, tolerances)
+        return ArmParts(geometry, to_urdf(geometry), Cables(cables), TIP, g, length, None, tolerances)
     source = robot.text if robot.file is None else Path(path).parent / robot.file
     assert source is not None
     try:
         urdf = read_urdf(source, check_inertia=robot.check_inertia)
     except FileError as error:
         raise FileError(path, f"urdf.file: {error}") from None
-    return ArmParts(None, urdf, cables, robot.tip, g, length, robot.joint_names, tolerances)
+    return ArmParts(None, urdf, Cables(cables), robot.tip, g, length, robot.joint_names, tolerances)
 
 
 def _tolerances(given: object) -> Tolerances:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.arm_facts import ANOTHER_ARM
 from cdsm.batch import layout
 from cdsm.batch.distribution import Tensions
 from cdsm.batch.evaluator import Evaluator
@@ -19,7 +18,7 @@ from cdsm.batch.inputs import given_tension, given_wrench, postures
 from cdsm.batch.labels import to_dataset
 from cdsm.batch.layout import DIRECTIONAL, QUANTITIES, Codes, Flags
 from cdsm.errors import InvalidInput, UnknownName
-from cdsm.manipulator import Manipulator
+from cdsm.manipulator import ANOTHER_ARM, Manipulator
 from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.status import summary
 from cdsm.support.tidy import tidy

@@ -88,7 +88,7 @@ class Evaluator:
         }
         # whether the kernel needs rigidities of laws that are not linear
         needs_springs = bool(self._wanted.size) and self._wanted[-1] > layout.LOAD
-        self._asks = needs_springs and bool(arm._model.laws.nonlinear)
+        self._asks = needs_springs and bool(arm._laws.nonlinear)
         record = int(self._start[-1])
         width = WIDTH // (2 if record < _LONG else 4)
         self._block = FULL if record < _SHORT else max(1, min(width, len(q)))
@@ -203,7 +203,7 @@ class Evaluator:
         """
         if not (self._asks and len(rows.tension)):
             return rows
-        return rows._replace(rigidity=self._arm._model.laws.rigidities(rows.tension))
+        return rows._replace(rigidity=self._arm._laws.rigidities(rows.tension))
 
     def _read(self, kept: Kept, names: list[str], found: Codes, out: Array) -> None:
         """Compute the readings ``names`` from the arrays ``kept``; fill ``out`` and ``found``."""

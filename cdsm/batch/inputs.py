@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.arguments import Arm
+from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.errors import InvalidInput
 from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
@@ -22,7 +23,7 @@ _MOST = 4096
 
 def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
     """Return an arm as arrays for the kernel; its joint limits are infinite if not checked."""
-    model, endless = arm._model, np.full(arm.nv, np.inf)
+    model, endless = kernel_arrays(arm), np.full(arm.nv, np.inf)
     checked = flag("check_limits", check_limits)
     return Arm(
         tree=model.tree,
@@ -32,9 +33,9 @@ def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
         highest=model.highest if checked else frozen(endless),
         blocks=model.blocks,
         smallest_arm=NO_ARM * arm.length,
-        linear=frozen(np.stack([model.laws.constant, model.laws.linear])),
-        series=model.laws.series,
-        rest=model.laws.rest,
+        linear=frozen(np.stack([arm._laws.constant, arm._laws.linear])),
+        series=arm._laws.series,
+        rest=arm._laws.rest,
     )
 
 

@@ -83,7 +83,7 @@ class Observer:
 
     def update(self, before: Estimate, reading: Reading) -> Estimate:
         """Return the estimate after one more reading; ``before`` is the previous estimate."""
-        locked, laws = self.arm.cables.position_controlled, self.arm._model.laws
+        locked, laws = self.arm.cables.position_controlled, self.arm._laws
         F, wire = np.clip(reading.tension, *self._domains), reading.wire
         pose, x = before.pose, before.softness
         strain = self._mean_strain(pose, before.shares, F)
@@ -166,7 +166,7 @@ class Observer:
         The paid-out ``wire`` l_0 (C,) [m] is constant, EA is that of the laws, and ``softness`` is
         1/s. The result is (C,) [m/N].
         """
-        soft = np.array(self.arm._model.laws.series)
+        soft = np.array(self.arm._laws.series)
         for law, of in self._problem.laws:
             soft[of] += softness * wire[of] / law.rigidity(F[of])
         return soft

@@ -72,7 +72,7 @@ class MuJoCoPlant:
 
         pose = self.arm.at(q)
         text = to_mjcf(self.arm, pose, tension, damping_ratio=self.damping_ratio)
-        wire = self.arm._model.laws.original_lengths(pose.cable_lengths, tension)
+        wire = self.arm._laws.original_lengths(pose.cable_lengths, tension)
         model = mujoco.MjModel.from_xml_string(text)
         return MuJoCoState(model, pose, Reading(wire, tension), frozen(np.zeros(q.size)))
 

@@ -101,7 +101,7 @@ class SlowPlant:
         """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         pose = self.arm.at(q)
         loading = slow_loading(pose, tension, wrench, self.accuracy)
-        wire = self.arm._model.laws.original_lengths(pose.cable_lengths, tension)
+        wire = self.arm._laws.original_lengths(pose.cable_lengths, tension)
         return SlowState(loading, wire, loading.begin(tension, wrench))
 
     def move(self, state: SlowState, command: Command, wrench: Array) -> SlowState:

@@ -79,7 +79,7 @@ class StiffnessLoop:
         except CdsmError as error:
             refused = str(error)
         lengths = arm.cable_lengths(wanted.angles)
-        laws = arm._model.laws
+        laws = arm._laws
         reference = wanted._replace(
             tension=np.clip(mean / estimate.ratio, self.minimum, self.maximum),
             wire=laws.original_lengths(lengths, mean),

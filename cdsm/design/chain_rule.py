@@ -167,7 +167,7 @@ def _column(arm: Manipulator, inputs: Inputs, variable: Variable) -> dict[str, A
         links = [f"link{k + 1}" for k in joints]
         moves = [name in links for name in labels["link_length"]]
         rows = {
-            arm._model.body.locate(name)[0]: geometry.links[k]
+            arm._body.locate(name)[0]: geometry.links[k]
             for k, name in zip(joints, links, strict=True)
         }
         heavier = [

@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.kernels.chains import STRAIGHT
+from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.posture import Posture
+from cdsm.segments import STRAIGHT
 from cdsm.support.values import Array
 from cdsm.uncertainties.inputs import Inputs, Places, rotations
 
@@ -34,7 +35,7 @@ def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> 
         turned: Derivatives (nv, n) of the joint angles with respect to the variables.
     """
     segments, first = pose.segments, inputs.first
-    chains, site = segments.chains, segments._frames.site
+    chains, site = segments.chains, segments._sites.T
     along = site[1::2] - site[::2]
     length = np.linalg.norm(along, axis=1)
     u, v = (along[s] / length[s, None] for s in (chains.hole, chains.hole + 1))
@@ -59,7 +60,7 @@ def grip_slopes(pose: Posture, inputs: Inputs, moved: Places, turned: Array) -> 
 
 def _motion(pose: Posture, moved: Places) -> Array:
     """Return the derivatives (n, P, 3) of the P cable sites in base axes, at constant angles."""
-    tree, row = pose.arm._model.tree, pose.arm._model.routing.row
+    tree, row = kernel_arrays(pose.arm).tree, pose.arm._routing.row
     rotation, origin = rotations(pose), np.zeros_like(moved.origin)
     for i in tree.order.tolist():
         before = tree.parent[i]

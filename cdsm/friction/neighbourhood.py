@@ -35,7 +35,7 @@ class Neighbourhood:
 
     def __init__(self, K: Stiffness, room: float) -> None:
         segments = K.posture.segments
-        chains, laws = segments.chains, K.posture.arm._model.segment_laws
+        chains, laws = segments.chains, K.posture.arm._segment_laws
         cable, start, F = chains.cable, chains.start, K.tension
         with np.errstate(divide="ignore"):
             soft = 1.0 / laws.stiffness(segments.lengths, F[cable])

@@ -102,7 +102,7 @@ class Bends:
     def __init__(self, K: Stiffness) -> None:
         pose = K.posture
         steps = _STEP * np.eye(pose.q.size)
-        self._joints = pose.arm._model.masses.tip_joints
+        self._joints = pose.arm._body.tip_joints
         self._ends = [
             [pose.arm.at(pose.q + sign * step, check_limits=False) for sign in (1.0, -1.0)]
             for step in steps

@@ -113,7 +113,7 @@ class RestStates:
         near, cost = self._near, np.zeros(self._program[-1].size)
         cost[: near.joints.size] = (u @ self._pose.jacobian[:3]) * near.joints
         found = self._maximum(cost)
-        tip_joints = self._pose.arm._model.masses.tip_joints
+        tip_joints = self._pose.arm._body.tip_joints
         force = np.append(u, np.zeros(3))
         curved = single_load_stiffness(self._pose.jacobian, force, tip_joints)
         more = float(near.curved(curved)) + near.cubed(self._bends.of_wrench(force)) + self._tip

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.kernels.stiffness import single_load_stiffness
-from cdsm.posture import Posture
+from cdsm.posture import Posture, load_stiffness
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
 from cdsm.stiffness_matrix.sticking import Flags, tension_gradient
 from cdsm.support.values import Array, frozen
@@ -48,20 +47,20 @@ def assemble_segments(
     ``sliding`` (P,) marks the holes in which cables slide. The result stores ``friction``
     (``"stuck"`` or ``"sliding"``) and ``distribution``.
     """
-    model, segments = pose.arm._model, pose.segments
+    segments = pose.segments
     gradient = tension_gradient(pose, tension, sliding)
-    active = segments.tension_stiffness(tension).sum(axis=0)
+    active = segments.active(tension)
     passive = segments.length_jacobian.T @ gradient
     if friction == "stuck":
         passive = (passive + passive.T) / 2.0  # symmetric but for rounding
-    load = single_load_stiffness(pose.jacobian, wrench, model.masses.tip_joints)
+    load = load_stiffness(pose.jacobian, wrench, pose.arm._body.tip_joints)
     terms = active, passive, pose.gravity_stiffness, load
     F = tension[segments.chains.start[:-1]]
     return Stiffness(
         posture=pose,
         tension=frozen(F),
         wrench=wrench,
-        cable_stiffness=model.laws.stiffness(pose.cable_lengths, F),
+        cable_stiffness=pose.arm._laws.stiffness(pose.cable_lengths, F),
         active=frozen(active),
         passive=frozen(passive),
         gravity=pose.gravity_stiffness,

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.arm_model import GRAVITY
 from cdsm.cable import Cable, Site
 from cdsm.errors import CableError, FileError, InvalidInput, UnknownName
 from cdsm.interchange.caspr_bodies import BASE, Body, read_bodies, read_root, refuse, whole
-from cdsm.manipulator import Manipulator
+from cdsm.manipulator import GRAVITY, Manipulator
 from cdsm.support.files import as_path
 from cdsm.support.xml import XmlFault, numbers
 from cdsm.urdf import TIP, E, inertial, joint, origin, urdf_text

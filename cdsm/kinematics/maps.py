@@ -136,7 +136,7 @@ def _checked_guess(arm: Manipulator, guess: ArrayLike | None) -> Array:
     if guess is None:
         return frozen(np.zeros(arm.nv))
     angles = vector("guess", guess, arm.nv, arm._meaning_of_q)
-    beyond = arm._model.beyond_limits(angles)
+    beyond = arm._beyond_limits(angles)
     if beyond.any():
         i = int(beyond.argmax())
         limits = arm.lower[i], arm.upper[i], arm.joint_units[i]

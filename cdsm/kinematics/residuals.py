@@ -14,8 +14,8 @@ from typing import final
 import numpy as np
 
 from cdsm.errors import CableError
-from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.manipulator import Manipulator
+from cdsm.posture import load_stiffness
 from cdsm.rigid_body import rotation_vector
 from cdsm.support.values import Array, frozen
 
@@ -76,7 +76,7 @@ class TipResidual(Residual):
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """Compute the error r of the tip, (3,) or (6,), and ∂r/∂q (3, nv) or (6, nv) at q."""
-        (tip, jacobian), length = self.arm._model.body.tip(q), self.arm.length
+        (tip, jacobian), length = self.arm._body.tip(q), self.arm.length
         linear, angular = jacobian[:3] / length, jacobian[3:]
         if self.target.ndim == 1:
             return (tip[:3, 3] - self.target) / length, linear
@@ -93,14 +93,14 @@ class TipResidual(Residual):
         wrench = np.zeros(6)
         wrench[: weight.size] = weight
         wrench[:3] /= self.arm.length
-        jacobian, joints = self.arm._model.body.tip(q)[1], self.arm._model.masses.tip_joints
-        return -single_load_stiffness(frozen(jacobian), frozen(wrench), joints)
+        jacobian, joints = self.arm._body.tip(q)[1], self.arm._body.tip_joints
+        return -load_stiffness(frozen(jacobian), frozen(wrench), joints)
 
     def hessian(self, q: Array) -> Array:
         """Compute the Hessian of ½‖r‖² (nv, nv) with respect to q; it is exact for all r."""
         # ∂(½φ²) = φ·ω exactly, so the second derivative contains that of φ only once
         r, J = self.evaluate(q)
-        angular = self.arm._model.body.tip(q)[1][3 : r.size]
+        angular = self.arm._body.tip(q)[1][3 : r.size]
         return self.curvature(q, r) + J[:3].T @ J[:3] + angular.T @ J[3:]
 
 

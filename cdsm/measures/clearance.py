@@ -9,6 +9,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.batch.inputs import checked_threads, postures, run_slices
 from cdsm.kernels.clearance import clearance_rows
 from cdsm.kernels.tree import Indices, Routing
@@ -154,10 +155,10 @@ def _rows(arm: Manipulator, q: Array, diameter: float, threads: int) -> tuple[Ar
     Also returns the indices of the two nearest bodies for each distance (B, 3, 2).
     """
     distance, nearest = np.empty((len(q), 3)), np.empty((len(q), 3, 2), dtype=np.intp)
-    shape = _shape(arm)
+    shape, tree = _shape(arm), kernel_arrays(arm).tree
 
     def fill(part: slice) -> None:
-        clearance_rows(arm._model.tree, *shape[:7], q[part], distance[part], nearest[part])
+        clearance_rows(tree, *shape[:7], q[part], distance[part], nearest[part])
 
     run_slices(fill, len(q), 1, threads)
     return distance - diameter * _BESIDE, nearest
@@ -169,7 +170,7 @@ def _shape(arm: Manipulator) -> _Shape:
 
     This takes milliseconds, so the results for the last arms are cached.
     """
-    model = arm._model
+    model = kernel_arrays(arm)
     rows = model.routing.row.tolist()
     points = model.routing.point.tolist()
     segment, start = [], 0

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.batch import evaluate
+from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.batch.inputs import checked_threads, run_slices
 from cdsm.errors import InvalidInput
 from cdsm.kernels.chains import grip_rows
@@ -78,9 +79,9 @@ def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> A
     This is the largest ratio of two tensions along the cable. The sum is over its holes, with the
     friction coefficient μ and the wrap angle φ.
     """
-    model, grip = arm._model, np.empty((len(q), len(arm.cables)))
+    model, grip = kernel_arrays(arm), np.empty((len(q), len(arm.cables)))
     *routing, _, hole, own = model.chain_arrays
-    holes = hole, own, model.chains.cable[hole], model.chains.friction
+    holes = hole, own, arm._chains.cable[hole], arm._chains.friction
 
     def fill(part: slice) -> None:
         grip_rows(model.tree, Routing(*routing), *holes, q[part], grip[part])

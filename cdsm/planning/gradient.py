@@ -125,5 +125,5 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
         ElasticityRangeError: A tension is outside the domain of its elasticity.
     """
     K = instance("stiffness", stiffness, Stiffness).require_frictionless()
-    slope, _ = K.posture.arm._model.laws.slopes(K.tension, K.cable_stiffness)
+    slope, _ = K.posture.arm._laws.slopes(K.tension, K.cable_stiffness)
     return StiffnessGradient(stiffness=K, cable_stiffness=slope)

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from cdsm.errors import InvalidInput
-from cdsm.kernels.stiffness import single_load_stiffness
 from cdsm.planning import kernels
 from cdsm.planning.admissible import admissible
-from cdsm.posture import Posture
+from cdsm.posture import Posture, load_stiffness
 from cdsm.support.format import JointUnits
 from cdsm.support.validation import SMALLEST, instance, scalar
 from cdsm.support.values import Array
@@ -70,9 +69,7 @@ class StiffnessModel:
         self.jacobian = pose.jacobian * unit
         # products with the cached tensor are faster than a loop over the cables
         self.geometry = pose.length_hessian * squared, pose.length_jacobian * unit
-        load = single_load_stiffness(
-            pose.jacobian, region.least.wrench, pose.arm._model.masses.tip_joints
-        )
+        load = load_stiffness(pose.jacobian, region.least.wrench, pose.arm._body.tip_joints)
         self.constant = (pose.gravity_stiffness + load) * squared
         self.scale = max(float(abs(self.at(region.least.values).eigenvalues).max()), SMALLEST)
         self.floor = part * self.scale
@@ -97,7 +94,7 @@ class Evaluation:
     def __init__(self, model: StiffnessModel, F: Array) -> None:
         self.model = model
         self.F = F
-        self._springs = model.pose.arm._model.laws.stiffness(model.pose.cable_lengths, F)
+        self._springs = model.pose.arm._laws.stiffness(model.pose.cable_lengths, F)
         self.K, self.eigenvalues, self.eigenvectors = kernels.stiffness_at(
             model.constant, *model.geometry, F, self._springs
         )
@@ -105,7 +102,7 @@ class Evaluation:
     @cached_property
     def spring_slopes(self) -> tuple[Array, Array]:
         """Derivatives dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] of the cable stiffnesses k."""
-        return self.model.pose.arm._model.laws.slopes(self.F, self._springs)
+        return self.model.pose.arm._laws.slopes(self.F, self._springs)
 
     @property
     def reserve(self) -> float:

@@ -137,7 +137,7 @@ class Neighbourhood:
         """
         moment = self._wrench[3:] if moment is None else moment
         pose, arm = self._pose, self._pose.arm
-        body, force = arm._model.body, self._wrench[:3]
+        body, force = arm._body, self._wrench[:3]
         start = body.potential_energy(pose.q)
         rows = []
         for q in self._angles(places):

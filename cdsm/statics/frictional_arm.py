@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cdsm.friction.chain_problem import ChainProblem, ChainSolution
-from cdsm.kernels import stiffness as stiffness_kernels
 from cdsm.posture import Posture
 from cdsm.statics.locked_motors import ROUNDING, tilt_torque
 from cdsm.support.values import Array
@@ -89,23 +88,10 @@ class FrictionalArm(NamedTuple):
         grip[holes.hole, :nv] = holes.friction[:, None] * segments.wrap_jacobian
         slopes = self.problem.tangent(chain, self.forced, gradient, grip)
         slope, rounded = slopes[:, :nv].copy(), abs(slopes[:, nv])
-        model = pose.arm._model
-        segment, joint = model.chain_arrays[2:4]
-        *_, K = stiffness_kernels.single_stiffness(
-            segment,
-            joint,
-            *segments._frames,
-            pose.jacobian,
-            J,
-            pose.gravity_stiffness,
-            T,
-            np.zeros(T.size),
-            self.wrench,
-            model.masses.tip_joints,
-        )
+        K = segments.active(T) + pose.gravity_stiffness + pose._load(self.wrench)
         K = K + J.T @ slope
         residual = self.residual(pose, T)
         terms = (T + rounded) @ abs(J) + abs(self.wrench) @ abs(pose.jacobian)
         terms += abs(pose.gravity_torque) + abs(K) @ abs(pose.q)
-        terms += tilt_torque(pose, T[segment[:-1, 0]])
+        terms += tilt_torque(segments._routing, segments._spans, segments._sites, T)
         return FrictionalState(pose, chain, residual, residual, ROUNDING * terms, K, slope)

@@ -84,7 +84,7 @@ def load_cycle(
         EquilibriumError: No equilibrium was found in the step to a load. The error names the load.
     """
     F, W = checked_tension(pose, tension, None)
-    pose.arm._model.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
+    pose.arm._laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
     loads = number_array("wrenches", wrenches, "wrench")
     if loads.ndim != 2 or loads.shape[1] != 6 or not 0 < len(loads) <= MOST_LOADS:
         raise InvalidInput(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
+from cdsm.routing import Routing, Spans
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.roots import rising_root
 from cdsm.support.values import Array, frozen
@@ -74,7 +75,7 @@ class LoadedArm:
         self.tension = tension
         self.wrench = wrench
         self.stops = stops(reference)
-        laws, L = reference.arm._model.laws, reference.cable_lengths if lengths is None else lengths
+        laws, L = reference.arm._laws, reference.cable_lengths if lengths is None else lengths
         self._free_length = laws.original_lengths(L, tension)
         self._laws = []
         for law, cables in laws.held:
@@ -173,24 +174,22 @@ def rounding(K: Stiffness) -> Array:
     terms = force @ abs(pose.length_jacobian) + abs(K.wrench) @ abs(pose.jacobian)
     turned = abs(K.joint) @ abs(pose.q)
     terms += abs(pose.gravity_torque) + turned
-    terms += tilt_torque(pose, K.tension[pose.arm._model.routing.segment[:-1, 0]])
+    terms += tilt_torque(
+        pose.arm._routing, pose._spans, pose._sites, K.tension[pose.arm._routing.cable]
+    )
     return np.asarray(ROUNDING * terms)
 
 
-def tilt_torque(pose: Posture, tension: Array) -> Array:
+def tilt_torque(routing: Routing, spans: Spans, sites: Array, tension: Array) -> Array:
     """Compute the error of joint torques (nv,) [N m] per relative error of the site positions.
 
     An error of a position turns the segments that end at the site, the short ones most. ``tension``
-    [N] has one entry for each segment whose length depends on the joints.
+    (S,) [N] is that of each segment.
     """
-    start, end, over, joint = pose.arm._model.moving
-    site, origin = pose._frames.site, pose._frames.origin
-    far = site[end]
-    arms = np.concatenate([far - site[start], far, far[over] - origin[joint]])
-    sizes = np.sqrt(np.add.reduce(arms * arms, axis=1))
-    apart, away, arm = np.split(sizes, (start.size, 2 * start.size))
-    force = (tension * away / apart)[over] * arm
-    torque = np.bincount(joint, force, minlength=len(origin))[1:]
+    away = np.linalg.norm(sites[:, routing.second], axis=0)
+    lever = np.linalg.norm(spans.motion, axis=0) + spans.length[:, None]
+    force = (tension * away / spans.length)[:, None] * lever * (routing.sign != 0.0)
+    torque = np.bincount(routing.path.ravel(), force.ravel(), minlength=routing.nv)
     return np.asarray(torque, dtype=np.float64)
 
 

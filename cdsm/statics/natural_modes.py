@@ -15,7 +15,6 @@ import numpy as np
 from scipy.linalg import eigh
 
 import cdsm
-from cdsm.arm_model import joints_to
 from cdsm.errors import InvalidInput, SingularMass
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
@@ -124,7 +123,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
         raise InvalidInput(
             "stiffness", "belongs to another posture or arm; compute it for this one."
         )
-    M = arm._model.body.mass_matrix(pose.q)
+    M = arm._body.mass_matrix(pose.q)
     spectrum, motions = np.linalg.eigh(M)
     if spectrum[0] <= _MASSLESS * spectrum[-1]:
         raise _massless(pose, motions[:, 0])
@@ -210,16 +209,12 @@ def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
     M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω). J_v and J_ω are the Jacobians of the velocity of the centre of
     mass and of the angular velocity of a body.
     """
-    arm, frames = pose.arm, pose._frames
-    M = np.zeros((arm.nv, arm.nv))
+    body, M = pose.arm._body, np.zeros((pose.arm.nv, pose.arm.nv))
     for link, mass, centre, inertia in carried:
-        place, row = pose.link_pose(link), arm._model.body.locate(link)[0]
-        R, joints = place[:3, :3], np.array(joints_to(arm._model.tree, row)[::-1], dtype=np.intp)
-        angular = frames.axis[joints]
-        linear = np.cross(angular, R @ centre + place[:3, 3] - frames.origin[joints])
-        if len(frames.slide):
-            linear += frames.slide[joints]
-        M[np.ix_(joints - 1, joints - 1)] += (
-            mass * linear @ linear.T + angular @ R @ inertia @ R.T @ angular.T
-        )
+        place = pose.link_pose(link)
+        joints = np.array(body.joints_to(body.locate(link)[0]), dtype=np.intp) - 1
+        angular, R = pose._twist[3:, joints], place[:3, :3]
+        linear = pose._twist[:3, joints] + np.cross(angular.T, R @ centre + place[:3, 3]).T
+        turned = angular.T @ R
+        M[np.ix_(joints, joints)] += mass * linear.T @ linear + turned @ inertia @ turned.T
     return M

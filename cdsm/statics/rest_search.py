@@ -79,11 +79,11 @@ def equilibrium(
 def require_between_stops(pose: Posture) -> None:
     """Raise InvalidInput if a joint is beyond its stop."""
     arm, q = pose.arm, pose.q
-    beyond = arm._model.beyond_limits(q)
+    beyond = arm._beyond_limits(q)
     if np.count_nonzero(beyond):
         i = int(beyond.argmax())
         unit = arm.joint_units[i]
-        stop = arm.lower[i] if q[i] < arm._model.lowest[i] else arm.upper[i]
+        stop = arm.lower[i] if q[i] < arm.lower[i] else arm.upper[i]
         raise InvalidInput(
             "pose",
             f"{arm.joint_names[i]} = {place(q[i], unit)} is beyond its stop at "

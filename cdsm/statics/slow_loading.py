@@ -218,7 +218,7 @@ class SlowLoading(NamedTuple):
 
     def _stored(self, state: State) -> float:
         pose, chain = state.pose, state.settled.chain
-        weight = pose.arm._model.body.potential_energy(pose.q)
+        weight = pose.arm._body.potential_energy(pose.q)
         return weight + self.problem.stored(chain.natural, chain.tension)
 
 

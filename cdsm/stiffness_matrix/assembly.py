@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.arm_facts import ANOTHER_ARM
 from cdsm.errors import InvalidInput
+from cdsm.manipulator import ANOTHER_ARM
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.value import Stiffness
 from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
@@ -33,7 +33,7 @@ def stiffness(
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     F, W = checked_tension(pose, tension, wrench)
-    k = pose.arm._model.laws.stiffness(pose.cable_lengths, F)
+    k = pose.arm._laws.stiffness(pose.cable_lengths, F)
     return assemble(pose, F, W, k, tension if isinstance(tension, Tension) else None)
 
 

@@ -114,7 +114,7 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
 
     def margin(changed: Posture, tension: Array) -> float:
         """Compute the smallest eigenvalue of K_θ of a changed arm under tensions (C,) [N]."""
-        k = changed.arm._model.laws.stiffness(changed.cable_lengths, tension)
+        k = changed.arm._laws.stiffness(changed.cable_lengths, tension)
         return read_margin(changed._joint_stiffness(tension, k, K.wrench)[-1])
 
     def changed(cables: tuple[Cable, ...]) -> Posture:

@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.kernels.chain_problem import chain_tangent
-from cdsm.kernels.chains import STRAIGHT
 from cdsm.posture import Posture
+from cdsm.segments import STRAIGHT
 from cdsm.support.values import Array, frozen
 
 ROUNDING = 1e-12
@@ -52,8 +52,8 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
     times the smaller. A cable always slides in holes in which it cannot stick; see :func:`holding`.
     Raises ElasticityRangeError if a tension is outside the domain of its law.
     """
-    model, segments = pose.arm._model, pose.segments
-    chains, laws, length = segments.chains, model.segment_laws, segments.lengths
+    segments = pose.segments
+    chains, laws, length = segments.chains, pose.arm._segment_laws, segments.lengths
     k = laws.stiffness(length, tension)
     # (1 + ε) of the wire: the spring in series is part of the length
     wire = length - laws.series * (tension - laws.rest)

@@ -80,7 +80,7 @@ class Stiffness(CartesianReadings):
         if self.free_length is not None:
             return self.free_length
         pose = self.posture
-        return pose.arm._model.laws.original_lengths(pose.cable_lengths, self.tension)
+        return pose.arm._laws.original_lengths(pose.cable_lengths, self.tension)
 
     @cached_property
     def residual(self) -> Array:

@@ -83,12 +83,6 @@ def distribute_tension(
         low, high = _with_fixed(pose, low, high, fixed)
     wrench = wrench_vector("wrench", wrench)
     length, certified = pose.arm.length, False
-    if solver == DEFAULT_SOLVER:
-        turned = pose.jacobian, pose.length_jacobian, pose.gravity_torque
-        smallest = tension_kernels.NO_ARM * length
-        values, certified = single_guess(
-            *pose.arm._model.blocks, *turned, wrench, low, high, smallest
-        )
     if not certified:
         torque = pose.jacobian.T @ wrench - pose.gravity_torque
         scaled = tension_kernels.scaled_balance(pose.length_jacobian, torque, low, high, length)
@@ -143,7 +137,7 @@ def checked_bounds(
     cables = arm.cables
     low = bound("minimum", minimum, len(cables), rows)
     high = bound("maximum", maximum, len(cables), rows)
-    least, most = arm._model.laws.narrowed(low, high)
+    least, most = arm._laws.narrowed(low, high)
     if least is low and _ordered(minimum, maximum):
         return low, high
     allowed = (low >= 0.0) & (low < math.inf)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.kernels.distribution import OPTIMAL, search_tensions
 from cdsm.kernels.draws import stiffness_of_draws
@@ -33,7 +34,8 @@ class DrawnArms:
     """
 
     def __init__(self, K: Stiffness, errors: Mapping[str, Array]) -> None:
-        pose, model, inputs = K.posture, K.posture.arm._model, inputs_of(K.posture.arm)
+        pose, inputs = K.posture, inputs_of(K.posture.arm)
+        model, springs = kernel_arrays(pose.arm), pose.arm._laws
         self._K, self._count = K, len(next(iter(errors.values())))
 
         def drawn(source: str, nominal: Array) -> Array:
@@ -44,8 +46,8 @@ class DrawnArms:
         self._scale = 1.0 + errors.get("rigidity", np.zeros((self._count, 1)))
         softer = np.zeros_like(self._tension)
         if "spring" in errors:  # 1/k_series of the drawn springs, less that of the nominal ones
-            softer[:, model.laws.series > 0.0] = 1.0 / (1.0 + errors["spring"]) - 1.0
-        self._softer = softer * model.laws.series
+            softer[:, springs.series > 0.0] = 1.0 / (1.0 + errors["spring"]) - 1.0
+        self._softer = softer * springs.series
         q, lead = drawn("joint_angle", pose.q), np.array([cable.lead for cable in pose.arm.cables])
         mass = np.repeat(model.masses.mass[None], self._count, axis=0)
         if "link_mass" in errors:
@@ -53,7 +55,7 @@ class DrawnArms:
         places: tuple[Any, ...] = inputs.places.moved(inputs.displaced(errors))
         self._same: tuple[Any, ...] = (
             *(model.tree, model.routing, model.masses),
-            *(inputs.first, model.laws.series, model.laws.rest, K.wrench, q),
+            *(inputs.first, springs.series, springs.rest, K.wrench, q),
         )
         self._own: tuple[Any, ...] = (
             *(drawn("lead", lead), mass),
@@ -67,7 +69,7 @@ class DrawnArms:
         locked = self._K.cable_stiffness > 0.0
         stretched = np.where(locked, rigidity * (self._scale + strain), 0.0)  # ε falls as EA rises
         # in k = 1/(l_0/EA + 1/k_series), a spring softer by c equals a wire longer by c·EA
-        laws, (lead, *own) = self._K.posture.arm._model.laws, self._own
+        laws, (lead, *own) = self._K.posture.arm._laws, self._own
         lead = lead + self._softer * (stretched - (F - laws.rest))
         count, (cables, nv) = self._count, self._K.posture.length_jacobian.shape
         found = Drawn(
@@ -120,7 +122,7 @@ def laws_at(K: Stiffness, tension: Array) -> tuple[Array, Array]:
     ``"unstrained"``. Raises ElasticityRangeError if a tension is outside the domain of its law.
     """
     arm = K.posture.arm
-    laws = arm._model.laws
+    laws = arm._laws
     rigidity, strain = np.ones_like(tension), np.zeros_like(tension)
     for law, of in laws.held:
         F = tension[..., of]

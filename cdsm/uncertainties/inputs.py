@@ -15,6 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.sparse import csr_matrix, hstack
 
+from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.errors import InvalidInput
 from cdsm.kernels.sensitivity import single_gradient
 from cdsm.manipulator import Manipulator
@@ -65,7 +66,7 @@ def rotations(pose: Posture) -> Array:
 
     Row 0 is the base.
     """
-    tree = pose.arm._model.tree
+    tree = kernel_arrays(pose.arm).tree
     found = np.tile(np.eye(3), (len(tree.parent), 1, 1))
     for i in tree.order.tolist():
         start, cosine, sine = tree.turn[i]
@@ -105,7 +106,7 @@ class Inputs:
     """
 
     def __init__(self, arm: Manipulator) -> None:
-        model = arm._model
+        model = kernel_arrays(arm)
         cables = [cable.name for cable in arm.cables]
         self.places = Places(
             model.routing.point, model.tree.translation, model.masses.centre, model.masses.point
@@ -123,7 +124,7 @@ class Inputs:
         holes = zip(sites, each, strict=True)
         self.labels: dict[str, tuple[str, ...]] = {
             "rigidity": tuple(cables),
-            "spring": tuple(cables[c] for c in np.flatnonzero(model.laws.series)),
+            "spring": tuple(cables[c] for c in np.flatnonzero(arm._laws.series)),
             "joint_angle": arm.joint_names,
             "tension": tuple(cables),
             "lead": tuple(cables),
@@ -163,7 +164,7 @@ class Inputs:
         an array for each source of uncertainty (0 for inputs of wires), and the derivatives with
         respect to the tensions F (C,) and the cable stiffnesses k (C,).
         """
-        model = pose.arm._model
+        model = kernel_arrays(pose.arm)
         arguments = model.tree, model.routing, model.masses, pose.q, self.first, motion, velocity
         _, by_q, *by_places, by_mass, by_F, by_k = single_gradient(*arguments, *given)
         by_link = {"joint_angle": by_q, "link_mass": by_mass[self.link_rows]}
@@ -213,7 +214,7 @@ class Inputs:
         Returns the columns of :attr:`map` for each source, and adds the names of the inputs to
         :attr:`labels`. ``sites`` are the names of all cable sites.
         """
-        body, (P, rows) = arm._model.body, (len(sites), arm.nv + 1)
+        body, (P, rows) = arm._body, (len(sites), arm.nv + 1)
         end, origin, centre = 3 * P + 6 * rows, 3 * P, 3 * P + 3 * rows
         found: dict[str, dict[str, Array]] = {name: {} for name in _ON_DISKS}
 
@@ -249,7 +250,7 @@ class Inputs:
             if k == len(names) - 1:
                 add("link_length", link, end, along)
             else:
-                following = int(np.flatnonzero(arm._model.tree.parent[1:] == row)[0]) + 1
+                following = int(np.flatnonzero(kernel_arrays(arm).tree.parent[1:] == row)[0]) + 1
                 add("link_length", link, origin + 3 * following, along)
         maps = {}
         for source, inputs in found.items():

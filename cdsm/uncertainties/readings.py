@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 
+from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState
@@ -164,7 +165,7 @@ def _gradient(K: Stiffness, inputs: Inputs, motion: Array, direction: Array) -> 
     K_θ⁻¹ J_vᵀ u the derivatives are those of −uᵀ C_vv u.
     """
     pose, F, k = K.posture, K.tension, K.cable_stiffness
-    laws = pose.arm._model.laws
+    laws = pose.arm._laws
     rigidity, strain = laws_at(K, F)
     stretched = rigidity * (1.0 + strain)
     wire = pose.cable_lengths - laws.series * (F - laws.rest)
@@ -189,7 +190,7 @@ def _skew_gradient(K: Stiffness, left: Array, right: Array) -> Array:
     the angular velocities of the tip for the joint motions ``left`` and ``right``. A change of
     joint angle i turns those parts of them that come from joint i and the joints after it.
     """
-    turns, chain = K.posture.jacobian[3:], K.posture.arm._model.masses.tip_joints
+    turns, chain = K.posture.jacobian[3:], K.posture.arm._body.tip_joints
     moment, found = K.wrench[3:], np.zeros(left.size)
     for n, i in enumerate(chain):
         beyond = chain[n:]
@@ -206,7 +207,8 @@ def _tip_gradient(K: Stiffness, inputs: Inputs, direction: Array) -> dict[str, A
 
     The result has an array for each source of ``inputs``.
     """
-    pose, tree, masses = K.posture, K.posture.arm._model.tree, K.posture.arm._model.masses
+    pose, model = K.posture, kernel_arrays(K.posture.arm)
+    tree, masses = model.tree, model.masses
     # a point that moves by δ in a frame of rotation R moves the tip by R δ
     along = direction @ rotations(pose)
     origin, row = np.zeros_like(tree.translation), masses.tip_joints + 1
@@ -226,6 +228,6 @@ def _stretched_slope(K: Stiffness, strain: Array) -> Array:
     """
     arm = K.posture.arm
     slope = np.zeros_like(strain)
-    for law, of in arm._model.laws.held:
+    for law, of in arm._laws.held:
         slope[of] = law.rigidity_slope(K.tension[of])
     return slope * (1.0 + strain) + float(arm.original_length == "unstrained")

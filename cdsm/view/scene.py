@@ -47,7 +47,7 @@ class Scene:
         body = scene.add_frame(_BODY, show_axes=False)
         cables = scene.add_frame("/cables", show_axes=False)
         try:
-            self._shapes = arm._model.body.visualizer(arm.urdf, server, _BODY)
+            self._shapes = arm._body.visualizer(arm.urdf, server, _BODY)
         except UrdfError as error:
             _LOG.warning("%s Sticks are drawn instead.", error)
             self._shapes = None

@@ -70,7 +70,7 @@ def test_a_slack_branch_pulls_below_the_range_of_its_law() -> None:
     plant, lengths = cdsm.MuJoCoPlant(slack), slack.cable_lengths(np.zeros(slack.nv))
     for force in (2.3, 1.5, 0.5, 0.0):
         F = np.full(6, force)
-        wire = slack._model.laws.original_lengths(lengths, F)
+        wire = slack._laws.original_lengths(lengths, F)
         command = Command(wire, F, np.zeros(6, dtype=np.bool_))
         np.testing.assert_allclose(plant._tensions(lengths, command), F, atol=1e-9)
 

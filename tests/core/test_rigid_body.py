@@ -12,7 +12,7 @@ from tests.support.arms import mixed_arm, random_posture
 from tests.support.differences import assert_second_order
 
 POSE = random_posture(mixed_arm(), 5)
-BODY = POSE.arm._model.body
+BODY = POSE.arm._body
 NAMES = BODY.joint_names
 BACKWARDS = RigidBody(to_urdf(POSE.arm.geometry), TIP, POSE.arm.gravity, tuple(reversed(NAMES)))
 

@@ -253,9 +253,9 @@ def test_derivatives_hold_whatever_the_order_of_q(tip: str, tmp_path: Path) -> N
     assert_second_order(lambda y: arm.at(y).gravity_torque, K.gravity, q)
     assert_second_order(lambda y: -arm.at(y).jacobian.T @ W, K.load, q)
     assert_second_order(lambda y: arm.at(y).tip[:3, 3], pose.jacobian[:3], q)
-    heights = np.array([arm._model.body.potential_energy(q)])
+    heights = np.array([arm._body.potential_energy(q)])
     assert_second_order(
-        lambda y: np.array([arm._model.body.potential_energy(y)]),
+        lambda y: np.array([arm._body.potential_energy(y)]),
         pose.gravity_torque[None],
         q,
         size=float(abs(heights).max()),
@@ -288,7 +288,7 @@ def test_order_of_q_changes_the_order_of_answers_and_nothing_else(tmp_path: Path
     pairs = [
         (ours.length_hessian[0], theirs.length_hessian[0]),
         (cdsm.stiffness(ours, F, wrench=W).joint, cdsm.stiffness(theirs, F, wrench=W).joint),
-        (arm._model.body.mass_matrix(q), plain._model.body.mass_matrix(q[place])),
+        (arm._body.mass_matrix(q), plain._body.mass_matrix(q[place])),
     ]
     for matrix, other in pairs:
         matrix = matrix[np.ix_(place, place)]
@@ -359,7 +359,7 @@ def test_inertia_about_the_joint_is_moved_to_the_centre(tmp_path: Path) -> None:
         folder(tmp_path, at_joint + link(2, "R_X", mass=0), cable()), elasticity=LAW
     )
     # of one link about its joint's y axis that is what the file says
-    assert arm._model.body.mass_matrix(np.zeros(2))[0, 0] == pytest.approx(0.002, rel=1e-12)
+    assert arm._body.mass_matrix(np.zeros(2))[0, 0] == pytest.approx(0.002, rel=1e-12)
 
 
 def test_stiffness_is_computed_like_that_of_any_arm(tmp_path: Path) -> None:

@@ -193,7 +193,7 @@ def test_second_slope_is_taken_on_the_side_that_belongs_to_the_place(
 
     def slopes(F: float) -> tuple[Array, Array]:
         tension = np.full(lengths.size, F)
-        return arm._model.laws.slopes(tension, arm._model.laws.stiffness(lengths, tension))
+        return arm._laws.slopes(tension, arm._laws.stiffness(lengths, tension))
 
     for there, below in zip(slopes(place), slopes(place * (1.0 - 1e-4)), strict=True):
         np.testing.assert_allclose(there, below, rtol=1e-2)

@@ -131,7 +131,7 @@ def test_stand_in_mass_is_all_that_a_massless_arm_has(kind: str) -> None:
         else cdsm.Geometry.hinged(twist=0.7, **sizes)
     )
     pose = random_posture(cdsm.Manipulator(geometry, STEEL), 1)
-    M = pose.arm._model.body.mass_matrix(pose.q)
+    M = pose.arm._body.mass_matrix(pose.q)
     np.testing.assert_allclose(_stand_in_mass(pose), M, rtol=0.0, atol=1e-14 * abs(M).max())
 
 

@@ -262,10 +262,10 @@ def test_the_scene_holds_an_arm_whose_joints_are_told_in_another_order() -> None
 @needs_viser
 def test_nothing_is_written_into_the_arm() -> None:
     arm = soft_arm()
-    before = arm._model.body._model.copy()
+    before = arm._body._model.copy()
     with serve(arm, port=0, q=np.deg2rad(DEGREES)):
         pass
-    assert arm._model.body._model == before
+    assert arm._body._model == before
 
 
 @pytest.mark.parametrize("shapes", ["none", "a mesh that is not there"])

@@ -11,16 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Self, final
 
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.kernels.stiffness import single_length_hessian
-from cdsm.kernels.tree import Frames, Indices, Routing
+from cdsm.routing import Indices, Routing, Spans, cross, dot
 from cdsm.support.format import plural
 from cdsm.support.values import Array, ReadOnlyState, frozen
+
+STRAIGHT = 1e-9
+"""Wrap angle [rad] below which a cable counts as straight in a hole: the angle is rounding."""
 
 
 @final
@@ -108,7 +111,50 @@ class Segments(ReadOnlyState):
     wrap: Array
     wrap_jacobian: Array
     _routing: Routing
-    _frames: Frames
+    _twist: Array
+    _sites: Array
+
+    @classmethod
+    def at(cls, chains: Chains, routing: Routing, twist: Array, sites: Array) -> Self:
+        """Compute the segments at a posture.
+
+        With the directions u and v before and behind a hole, φ = atan2(|u × v|, u·v) and
+
+            ∂φ/∂θ_i = −(p·d_i/ℓ_u + q·e_i/ℓ_v),  p = ((u × v) × u)/|u × v|,  q = (v × (u × v))/|u × v|.
+
+        d_i and e_i are the motions of the segments' far ends, seen from the link of the hole. Where
+        the cable goes straight through, φ has a kink; there the gradient is 0, the mean of both
+        sides.
+        """
+        spans = routing.spans(twist, sites)
+        hole, nv = chains.hole, routing.nv
+        u, v = spans.direction[:, hole], spans.direction[:, hole + 1]
+        normal = cross(u, v)
+        sine = np.sqrt(dot(normal, normal))
+        normal = normal / np.where(sine > STRAIGHT, sine, np.inf)
+        p, q = cross(normal, u) / spans.length[hole], cross(v, normal) / spans.length[hole + 1]
+        # from the end at the hole to the other one, the first site
+        along = (spans.length * spans.direction)[:, :, None]
+        back = spans.motion - cross(spans.axis, along)
+        gradient = np.zeros((hole.size, nv))
+        rows = np.arange(hole.size)[:, None]
+        np.subtract.at(gradient, (rows, routing.path[hole]), dot(p[:, :, None], back[:, hole]))
+        turned = dot(q[:, :, None], spans.motion[:, hole + 1])
+        np.subtract.at(gradient, (rows, routing.path[hole + 1]), turned)
+        return cls(
+            chains=chains,
+            lengths=frozen(spans.length),
+            length_jacobian=frozen(routing.jacobian(spans)),
+            wrap=frozen(np.arctan2(sine, dot(u, v)) + chains.wrap),
+            wrap_jacobian=frozen(gradient),
+            _routing=routing,
+            _twist=frozen(twist),
+            _sites=frozen(sites),
+        )
+
+    @cached_property
+    def _spans(self) -> Spans:
+        return self._routing.spans(self._twist, self._sites)
 
     def __repr__(self) -> str:
         return repr(self.chains)
@@ -137,7 +183,9 @@ class Segments(ReadOnlyState):
 
         It is the cable's part of the active term of K_θ. ``tension`` is T (S,) [N].
         """
-        cable, (_, _, segment, joint, _) = self.chains.cable, self._routing
-        return frozen(
-            single_length_hessian(segment, joint, *self._frames, tension, cable, int(cable[-1]) + 1)
-        )
+        cable = self.chains.cable
+        return frozen(self._routing.hessians(self._spans, tension, cable, int(cable[-1]) + 1))
+
+    def active(self, tension: Array) -> Array:
+        """Compute the active term Σ T_j ∂²l_j/∂θ² (nv, nv) [N m/rad] of all segments."""
+        return frozen(self._routing.hessian(self._spans, tension))
