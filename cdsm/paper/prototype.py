@@ -22,7 +22,9 @@ from cdsm.tension import distribute_tension
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
 
-_RIGID = LinearElasticity(1e9).scaled(1e3)  # the series stiffness is the whole stiffness of a hybrid cable
+_RIGID = LinearElasticity(1e9).scaled(
+    1e3
+)  # the series stiffness is the whole stiffness of a hybrid cable
 
 
 @final

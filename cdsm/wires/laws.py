@@ -209,7 +209,7 @@ class TabulatedElasticity(Elasticity):
 
     @cached_property
     def _table(self) -> Table:
-        from scipy.interpolate import CubicSpline
+        from scipy.interpolate import CubicHermiteSpline, CubicSpline  # import slowly
 
         F, strain = np.array(self.tensions), np.subtract(self.strains, self.strains[0])
         chords = np.diff(strain) / np.diff(F)
@@ -218,7 +218,7 @@ class TabulatedElasticity(Elasticity):
             middles = (strain[1:] + strain[:-1]) / 2.0
             ln = CubicSpline(middles, np.log(chords), bc_type="natural")(strain)
             slopes = np.exp(np.clip(ln, np.log(least / 2.0), np.log(2.5 * least)))
-        return Table.through(F, strain, slopes)
+        return Table(F, CubicHermiteSpline(F, strain, slopes).c)
 
 
 def _row(name: str, values: ArrayLike) -> tuple[float, ...]:
