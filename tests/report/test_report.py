@@ -209,6 +209,8 @@ OWN = cdsm.Elasticity.from_rigidity(lambda _: 1e5, 0.0, 500.0)
 class Contradicting(cdsm.Elasticity):
     """A law with a fault: its rigidity or its energy is 0.1 % too large."""
 
+    fault: str
+
     def __init__(self, fault: str) -> None:
         super().__init__("contradicting", {"fault": fault}, 0.0, 500.0)
         self.__dict__.update(fault=fault, _table=OWN._table)
@@ -218,7 +220,7 @@ class Contradicting(cdsm.Elasticity):
         return strain, EA * (1.001 if self.fault == "rigidity" else 1.0)
 
     def energy(self, tension: ArrayLike) -> Array:
-        return super().energy(tension) * (1.001 if self.fault == "energy" else 1.0)
+        return np.asarray(super().energy(tension) * (1.001 if self.fault == "energy" else 1.0))
 
 
 def with_one(pose: cdsm.Posture, tension: float) -> cdsm.Stiffness:
