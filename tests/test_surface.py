@@ -298,8 +298,6 @@ PLAIN: dict[str, Any] = {
         "a", POSE.arm.cables[0].sites, STEEL, lead=0.1, series_stiffness=1890.0, control="force"
     ),
     "InfeasibleSample": cdsm.InfeasibleSample(3, "rate", "too far."),
-    "LinearElasticity": STEEL,
-    "StrandElasticity": cdsm.presets.STRAND_1X19,
     "SelfCheck": K.report().self_check,
     "Sensors": cdsm.Sensors(tension_noise=0.5),
 }
