@@ -15,7 +15,7 @@ from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 
 _CELLS: Final = (200, 400, 800, 1600)  # numbers of pieces that are tried
-_ACCURACY: Final = 1e-8, 1e-11  # of EA between two knots; if its slope is known
+_ACCURACY: Final = 1e-8, 1e-11  # of EA between two knots; tried if its slope is known
 _NEAR: Final = 1.0  # distance [N] from a join within which there is no knot
 _NODES, _WEIGHTS = (leggauss(8)[0] + 1.0) / 2.0, leggauss(8)[1] / 2.0
 
@@ -96,7 +96,9 @@ def tabulate(
         piece = table.piece(test)
         slopes = c[:-1] * np.arange(5.0, 0.0, -1.0)[:, None]
         error = abs(horner(slopes, test - F[piece], piece) * _checked(rigidity, test) - 1.0)
-        if (error[away(test, 3.0 * _NEAR)] <= _ACCURACY[slope is not None]).all():
+        if (
+            error[away(test, 3.0 * _NEAR)] <= _ACCURACY[slope is not None and cells < _CELLS[-1]]
+        ).all():
             return table
     raise InvalidInput(
         "rigidity",
