@@ -47,7 +47,7 @@ STEEL_WIRE_200GPA: Final = SOLID
 ELASTIC_STAGE: Final = LinearElasticity(48e3)
 """Law with the constant EA of the strand in its elastic stage: assumed, from Eq. 19 at 600 N."""
 
-_RIGID: Final = LinearElasticity(1e12)  # the spring in series is all that stretches
+_RIGID: Final = LinearElasticity(1e9).scaled(1e3)  # the spring in series is all that stretches
 
 TEN_DEGREES: Final = np.deg2rad(10.0)
 """Angle of every joint of the virtual prototype in Sections IV-A, B and D of the paper [rad]."""

@@ -63,6 +63,106 @@ def test_measured_stiffness_is_a_central_difference_of_the_balance() -> None:
     np.testing.assert_allclose(stiffness, 1.0 / np.diag(compliance), rtol=1e-7)
 
 
+<<<<<<< HEAD
+=======
+def test_offset_is_added_to_the_reported_tension() -> None:
+    pose = START.arm().at(section_v.POSTURE)
+    moved = replace(START, tension_offset=START.tension_offset - 5.0)
+    np.testing.assert_allclose(moved.measure(pose, 15.0), START.measure(pose, 10.0), rtol=1e-12)
+
+
+def test_buckling_is_said_and_not_reported_as_a_stiffness() -> None:
+    slender = replace(START, hole_radius=0.02, tension_offset=0.0)
+    pose = slender.arm(HYBRID).at(section_v.POSTURE)
+    with pytest.raises(cdsm.SingularStiffness, match=r"buckles at 60 N.*Lower the tension"):
+        slender.measure(pose, 60.0)
+
+
+def test_residuals_are_positive_where_the_model_is_stiffer_or_changes_more() -> None:
+    predicted = START.predict()
+    residuals = predicted.residuals(TABLE_II)
+    stiffer = replace(predicted, table=2.0 * predicted.table).residuals(TABLE_II)
+    np.testing.assert_allclose(stiffer[:15] - residuals[:15], np.log(2.0), rtol=1e-12)
+    assert residuals[15] == pytest.approx(predicted.drops[0] / 0.17 - 1.0, rel=1e-12)
+    assert residuals[18] == pytest.approx(predicted.rises[1] / 12.25 - 1.0, rel=1e-12)
+
+
+def test_weights_measure_a_secant_that_tends_to_the_tangent() -> None:
+    """What Table II was measured with, were it hung: at low tension a strand stiffens under it."""
+    pose = START.arm().at(section_v.POSTURE)
+    (tangent,) = START.measure(pose, 10.0)
+    np.testing.assert_array_equal(START.weigh(pose, 10.0)[0], tangent)
+    off = []
+    for size in (0.02, 0.01, 0.005):
+        light = replace(START, weight_x=size, weight_y=size, weight_z=size)
+        off.append(light.weigh(pose, 10.0)[0] / tangent - 1.0)
+    # of first order in the weight, of either sign
+    np.testing.assert_allclose(off[0] / off[1], 2.0, rtol=0.05)
+    np.testing.assert_allclose(off[1] / off[2], 2.0, rtol=0.05)
+    # along x alone with a weight for x alone
+    one = replace(START, weight_x=1.0).weigh(pose, 10.0)[0]
+    assert abs(one[0] / tangent[0] - 1.0) > 1e-3
+    np.testing.assert_array_equal(one[1:], tangent[1:])
+
+
+# --- the identification ---------------------------------------------------------------------
+
+
+def test_identified_prototypes_are_within_their_bounds_and_say_where_they_are_on_them(
+    results: Results,
+) -> None:
+    for fit in prototype_figure(results).fits:
+        for name, value in asdict(fit.prototype).items():
+            if name not in fit.step.free:
+                assert value == getattr(fit.step.start, name)
+                continue
+            low, high = BOUNDS[name]
+            assert low <= value <= high
+            assert name in fit.at_bound or low < value < high
+    assert {"link_length", "tool_length", "hole_radius"} <= set(exchanged(results).at_bound)
+
+
+def test_no_parameter_by_itself_explains_the_numbers_better(results: Results) -> None:
+    for fit in prototype_figure(results).fits[:2]:
+        for name in fit.step.free:
+            low, high = BOUNDS[name]
+            for move in (-0.02, 0.02):
+                value = getattr(fit.prototype, name) + move * (high - low)
+                if not low <= value <= high:
+                    continue
+                try:
+                    moved = cost(replace(fit.prototype, **{name: value}), fit.step)
+                except cdsm.CdsmError:
+                    continue
+                assert moved > fit.cost - 1e-4
+
+
+def test_searches_from_elsewhere_find_nothing_better(results: Results) -> None:
+    fit = exchanged(results)
+    starts = []
+    for seed in range(200):
+        try:
+            starts.append((cost(random_prototype(seed, fit.step), fit.step), seed))
+        except cdsm.CdsmError:
+            continue
+    assert len(starts) >= 3
+    for _, seed in sorted(starts)[:3]:
+        found = paper.identify_prototype(replace(fit.step, start=random_prototype(seed, fit.step)))
+        assert found.cost > fit.cost - 1e-3
+
+
+def test_a_start_out_of_bounds_or_unable_to_hold_itself_is_refused() -> None:
+    with pytest.raises(cdsm.InvalidInput, match="not within"):
+        paper.identify_prototype(replace(STEPS[0], start=replace(START, lead=0.6)))
+    weak = replace(START, hole_radius=0.016, highest_hybrid_tension=80.0)
+    with pytest.raises(cdsm.InvalidInput, match="has no stable equilibrium"):
+        paper.identify_prototype(replace(STEPS[0], start=weak))
+
+
+# --- what comes out -------------------------------------------------------------------------
+
+
+>>>>>>> laws-w
 def test_drops_and_rises_are_explained_and_table_2_is_not(results: Results) -> None:
     drops, check = results["fig12"].claims
     (rises,) = results["fig13"].claims
