@@ -23,7 +23,6 @@ POSE = random_posture(mixed_arm(), 2)
 PULL = cdsm.distribute_tension(POSE, minimum=10.0, wrench=random_wrench(2))
 K = cdsm.stiffness(POSE, PULL)
 
-<<<<<<< HEAD
 RESULTS = (
     POSE,
     PULL,
@@ -40,22 +39,6 @@ WAYS: tuple[Callable[[Any], Any], ...] = (
     copy.copy,
     copy.deepcopy,
 )
-=======
-PLAIN: dict[str, Any] = {
-    "Geometry": POSE.arm.geometry,
-    "Joint": POSE.arm.geometry.joints[0],
-    "Link": POSE.arm.geometry.links[0],
-    "CableRoute": POSE.arm.geometry.cables[0],
-    "Site": POSE.arm.cables[0].sites[0],
-    "Cable": POSE.arm.cables[0],
-    "Cable with all options": cdsm.Cable(
-        "a", POSE.arm.cables[0].sites, STEEL, lead=0.1, series_stiffness=1890.0, control="force"
-    ),
-    "InfeasibleSample": cdsm.InfeasibleSample(3, "rate", "too far."),
-    "SelfCheck": K.report().self_check,
-    "Sensors": cdsm.Sensors(tension_noise=0.5),
-}
->>>>>>> laws-w
 
 
 @pytest.mark.parametrize("result", RESULTS, ids=lambda result: type(result).__name__)

@@ -219,11 +219,7 @@ class Contradicting(cdsm.Elasticity):
         return strain, np.asarray(EA * (1.001 if self.fault == "rigidity" else 1.0))
 
     def energy(self, tension: ArrayLike) -> Array:
-<<<<<<< HEAD
         return np.asarray(super().energy(tension)) * (1.001 if self.fault == "energy" else 1.0)
-=======
-        return np.asarray(super().energy(tension) * (1.001 if self.fault == "energy" else 1.0))
->>>>>>> laws-w
 
 
 def with_one(pose: cdsm.Posture, tension: float) -> cdsm.Stiffness:

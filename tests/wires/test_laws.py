@@ -3,7 +3,6 @@
 import math
 import pickle
 from collections.abc import Callable
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -250,31 +249,12 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
     "empty domain": (lambda: cdsm.StrandElasticity(((1.0,),), (), 1.0, 1.0), "rise"),
     "negative low": (lambda: cdsm.StrandElasticity(((1.0,),), (), -1.0, 1.0), "0 <= low"),
     "high inf": (lambda: cdsm.StrandElasticity(((1.0,),), (), 0.0, math.inf), "high"),
-<<<<<<< HEAD
-    **{
-        f"function {n}": (
-            partial(cdsm.Elasticity.from_rigidity, f, 0.0, 500.0),
-            f"rigidity.*{said}",
-        )
-        for n, (f, said) in enumerate(
-            [
-                (lambda F: F * math.nan, "is nan N at"),
-                (lambda F: 1e3 - 10.0 * F, "Narrow the domain"),
-                (lambda F: np.ones(3), "fails at .*array"),
-                (lambda F: 1.0 if F < 3.0 else 2.0, "fails at .*array"),
-                (lambda F: "stiff", "fails at"),
-                (lambda F: np.where(F < 50.0, 1e4, 1.1e4), "jumps"),
-            ]
-        )
-    },
-=======
     "function nan": (lambda: own(lambda F: F * math.nan), "is nan N at"),
     "function negative": (lambda: own(lambda F: 1e3 - 10.0 * F), "Narrow the domain"),
     "function of three": (lambda: own(lambda _: np.ones(3)), "fails at .*array"),
     "function of one": (lambda: own(lambda F: 1.0 if F < 3.0 else 2.0), "fails at .*array"),
     "function of text": (lambda: own(lambda _: "stiff"), "fails at"),
     "function jumps": (lambda: own(lambda F: np.where(F < 50.0, 1e4, 1.1e4)), "jumps"),
->>>>>>> laws-w
     "function's ends": (lambda: cdsm.Elasticity.from_rigidity(ramp, 5.0, 5.0), "low < high"),
     **{
         f"table {n}": (lambda a=a, b=b: cdsm.TabulatedElasticity(a, b), "tensions|strains")  # type: ignore[misc]
