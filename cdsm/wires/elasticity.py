@@ -142,20 +142,20 @@ class Elasticity:
         return self._with(_slack=True, low=0.0)
 
     def strain_and_rigidity(self, tension: ArrayLike) -> tuple[Array, Array]:
-        """Compute ε [-] and EA [N] at F [N] together; see :meth:`strain`, :meth:`rigidity`."""
+        """Compute ε [-] and EA [N] at F [N], any shape; see :meth:`strain`, :meth:`rigidity`."""
         strain, softness = self._evaluate(self._inside(tension))[:2]
         return np.asarray(strain / self._factor), np.asarray(self._factor / softness)
 
     def rigidity(self, tension: ArrayLike) -> Array:
-        """Compute the tangent rigidity EA [N] at F [N] (Fig. 5 of the paper)."""
+        """Compute the tangent rigidity EA [N] at F [N], any shape (Fig. 5 of the paper)."""
         return self.strain_and_rigidity(tension)[1]
 
     def strain(self, tension: ArrayLike) -> Array:
-        """Compute the strain ε = Δl/l_0 = ∫ dF/EA [-] from :attr:`rest` to F [N]."""
+        """Compute the strain ε = Δl/l_0 = ∫ dF/EA [-] from :attr:`rest` to F [N], any shape."""
         return self.strain_and_rigidity(tension)[0]
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
-        """Compute dEA/dF [-] at F [N]; zero below :attr:`rest`."""
+        """Compute dEA/dF [-] at F [N], any shape; zero below :attr:`rest`."""
         F, c = self._inside(tension), self._table.coefficients
         _, softness, x, piece = self._evaluate(F)
         powers = np.arange(len(c) - 1.0, 1.0, -1.0)[:, None]
@@ -163,7 +163,7 @@ class Elasticity:
         return np.where(self.rest > F, 0.0, -self._factor * bend / softness**2)
 
     def energy(self, tension: ArrayLike) -> Array:
-        """Compute ∫ F dε [N] = [J/m], per original length, from :attr:`rest` to F [N]."""
+        """Compute ∫ F dε [N] = [J/m], from :attr:`rest` to F [N], any shape."""
         F = self._inside(tension)
         strain, softness, x, piece = self._evaluate(F)
         below = np.minimum(F - self.rest, 0.0)
@@ -171,14 +171,14 @@ class Elasticity:
         return np.asarray((F * strain - moment) / self._factor)  # by parts
 
     def secant_rigidity(self, tension: ArrayLike) -> Array:
-        """Compute the secant rigidity (F − rest)/ε [N] of Eq. 18 at F [N]; EA at :attr:`rest`."""
+        """Compute the secant rigidity (F − rest)/ε [N] of Eq. 18 at F [N], any shape."""
         F = self._inside(tension)
         strain, secant = self.strain_and_rigidity(F)
         np.divide(F - self.rest, strain, out=secant, where=strain != 0.0)
         return secant
 
     def tension(self, strain: ArrayLike) -> Array:
-        """Compute F [N] at strains [-]: the inverse of :meth:`strain`.
+        """Compute F [N] at strains [-], any shape: the inverse of :meth:`strain`.
 
         Raises ElasticityRangeError if no tension of the law gives one of the strains.
         """

@@ -15,7 +15,7 @@ from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 
 _CELLS: Final = (200, 400, 800, 1600)  # numbers of pieces that are tried
-_ACCURACY: Final = 1e-8  # of EA between two knots
+_ACCURACY: Final = 1e-8, 1e-11  # of EA between two knots; tried if its slope is known
 _NEAR: Final = 1.0  # distance [N] from a join within which there is no knot
 _NODES, _WEIGHTS = (leggauss(8)[0] + 1.0) / 2.0, leggauss(8)[1] / 2.0
 
@@ -26,19 +26,6 @@ class Table(NamedTuple):
     knots: Array  # tensions (n + 1,) [N]
     coefficients: Array  # of ε in F − knot (k, n), highest power first
     pieces: NDArray[np.intp] | None = None  # piece of each cell, even in (F − first knot)^¼
-
-    @classmethod
-    def through(cls, knots: Array, *derivatives: Array, cells: int | None = None) -> Table:
-        """Interpolate ε, dε/dF, … (n + 1,) at knots, some of which may be missing in the cells."""
-        from scipy.interpolate import BPoly, PPoly  # imports slowly, and linear laws do without
-
-        values = np.column_stack(derivatives)
-        c = PPoly.from_bernstein_basis(BPoly.from_derivatives(knots, values)).c
-        if cells is None:
-            return cls(knots, c)
-        place = cells * ((knots - knots[0]) / (knots[-1] - knots[0])) ** 0.25
-        pieces = np.searchsorted(place[1:-1], np.arange(cells + 2) + 0.5)
-        return cls(knots, np.ascontiguousarray(c), pieces)
 
     def piece(self, tension: Array) -> Any:
         """Return the index of the piece of each tension [N]."""
@@ -78,7 +65,7 @@ def tabulate(
 
     Knots are even in (F − low)^¼: dense at the low end, where wires are soft. There is none near a
     join: a quintic bridges it, with ε, EA and dEA/dF of the knots on both sides. The knots double
-    until EA between them is right to 1e-8. Raises InvalidInput.
+    until EA between them is right to 1e-8, or 1e-11 with its slope. Raises InvalidInput.
     """
     joins = [join for join in joins if low < join < high]
 
@@ -98,20 +85,39 @@ def tabulate(
         ends = np.union1d(F, joins)  # the integral over a corner is that of its two sides
         width = np.diff(ends)[:, None]
         softness = 1.0 / _checked(rigidity, ends[:-1, None] + width * _NODES)
-        strain = np.append(0.0, np.cumsum((width * _WEIGHTS * softness).sum(axis=1)))
+        steps = (width * _WEIGHTS * softness).sum(axis=1)
+        steps = np.add.reduceat(steps, np.flatnonzero(np.isin(ends[:-1], F)))
         EA, bend = _checked(rigidity, F), (slope or difference)(F)
-        table = Table.through(F, strain[np.isin(ends, F)], 1.0 / EA, -bend / EA**2, cells=cells)
+        c = _quintics(np.diff(F), steps, 1.0 / EA, -bend / EA**2)
+        place = cells * ((F - low) / (high - low)) ** 0.25
+        pieces = np.searchsorted(place[1:-1], np.arange(cells + 2) + 0.5)
+        table = Table(F, c, pieces)
         test = F[:-1] + 0.3 * np.diff(F)
         piece = table.piece(test)
-        c = table.coefficients[:-1] * np.arange(5.0, 0.0, -1.0)[:, None]
-        error = abs(horner(c, test - F[piece], piece) * _checked(rigidity, test) - 1.0)
-        if (error[away(test, 3.0 * _NEAR)] <= _ACCURACY).all():
+        slopes = c[:-1] * np.arange(5.0, 0.0, -1.0)[:, None]
+        error = abs(horner(slopes, test - F[piece], piece) * _checked(rigidity, test) - 1.0)
+        if (
+            error[away(test, 3.0 * _NEAR)] <= _ACCURACY[slope is not None and cells < _CELLS[-1]]
+        ).all():
             return table
     raise InvalidInput(
         "rigidity",
         f"jumps or bends too sharply for {cells} pieces from {low:g} to {high:g} N. EA must be "
         "continuous; give the tensions of its corners as joins=.",
     )
+
+
+def _quintics(width: Array, step: Array, slope: Array, bend: Array) -> Array:
+    """Return the quintics (6, n) of pieces from their widths and steps (n,), ε′ and ε″ (n + 1,).
+
+    From the steps they are right near rounding; scipy's BPoly takes differences of the sums.
+    """
+    h, a, b = width, slope[:-1], bend[:-1]
+    d = (step - a * h - b * h**2 / 2.0) / h**3
+    e, f = (slope[1:] - a - b * h) / h**2, (bend[1:] - b) / h
+    c3, c4, c5 = 10.0 * d - 4.0 * e + f / 2.0, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + f / 2.0
+    before = np.append(0.0, np.cumsum(step)[:-1])
+    return np.array([c5 / h**2, c4 / h, c3, b / 2.0, a, before])
 
 
 def _checked(rigidity: Callable[[Array], ArrayLike], F: Array) -> Array:

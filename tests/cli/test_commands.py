@@ -358,7 +358,7 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
             ("stiffness", "{geometry}", "--angles", "80"),
             "joint1_1 = 80° is outside -53.13°",
         ),
-        (("stiffness", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
+        (("stiffness", "{geometry}", "--min-tension", "1"), "domain [2.2 N, 810 N]"),
         (("stiffness", "{geometry}", "--solver", "dapq"), "did you mean 'daqp'"),
         (("weigh", "{geometry}", "--force", "0,0,0"), "--force: is zero"),
         (("weigh", "{geometry}", "--mass", "0"), "--mass: is zero"),
@@ -368,7 +368,7 @@ def test_wire_file_is_the_elasticity_of_the_cables(geometry: Path, tmp_path: Pat
         (("buckle", "{geometry}", "--force", "0,0,0"), "--force: is zero"),
         (("plan", "{geometry}", "--direction", "0,0,0", "--target", "9"), "--direction: is the"),
         (("plan", "{geometry}", "--direction", "0,0,1", "--path", "no.csv"), "does not exist"),
-        (("check", "{geometry}", "--min-tension", "1"), "domain (2.2 N, 810 N]"),
+        (("check", "{geometry}", "--min-tension", "1"), "domain [2.2 N, 810 N]"),
         (("reproduce", "--out", "{geometry}"), "cannot be created as a folder"),
     ],
 )

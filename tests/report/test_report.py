@@ -216,7 +216,7 @@ class Contradicting(cdsm.Elasticity):
 
     def strain_and_rigidity(self, tension: ArrayLike) -> tuple[Array, Array]:
         strain, EA = super().strain_and_rigidity(tension)
-        return strain, EA * (1.001 if self.fault == "rigidity" else 1.0)
+        return strain, np.asarray(EA * (1.001 if self.fault == "rigidity" else 1.0))
 
     def energy(self, tension: ArrayLike) -> Array:
         return np.asarray(super().energy(tension)) * (1.001 if self.fault == "energy" else 1.0)

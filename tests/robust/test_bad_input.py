@@ -473,12 +473,12 @@ CASES |= {
     "tension beyond the elasticity": (
         lambda: cdsm.stiffness(STRAND_POSE, except_at(15, 14, 900.0, 50.0)),
         cdsm.ElasticityRangeError,
-        ("900 N", STRAND_ARM.cables[14].name, "(2.2 N, 810 N]", "maximum="),
+        ("900 N", STRAND_ARM.cables[14].name, "[2.2 N, 810 N]", "maximum="),
     ),
     "distributed tension below the elasticity": (
         lambda: cdsm.stiffness(STRAND_POSE, cdsm.distribute_tension(STRAND_POSE)),
         cdsm.ElasticityRangeError,
-        ("cable cable", "(2.2 N, 810 N]", "minimum="),
+        ("cable cable", "[2.2 N, 810 N]", "minimum="),
     ),
     # --- Stiffness
     **{

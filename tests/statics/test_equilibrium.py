@@ -437,7 +437,7 @@ def test_answer_below_a_law_names_the_cables_though_iterates_may_pass() -> None:
     soft = [replace(cable, series_stiffness=2e3) for cable in arm.cables]
     arm = cdsm.Manipulator(arm.geometry, cables=soft, gravity=(0.0, 0.0, 0.0))
     pose = arm.at([0.0])
-    with pytest.raises(cdsm.ElasticityRangeError, match=r"\(2\.2 N, 810 N\]") as caught:
+    with pytest.raises(cdsm.ElasticityRangeError, match=r"\[2\.2 N, 810 N\]") as caught:
         cdsm.equilibrium(pose, [10.0, 10.0], 1.0 * MOMENT)
     (name,) = caught.value.cables
     assert name == arm.cables[caught.value.indices[0]].name
