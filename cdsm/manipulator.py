@@ -12,15 +12,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, final, get_args
+from typing import TYPE_CHECKING, Any, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.cable import Cable, Cables, checked_cables
+from cdsm.arm_parts import ArmParts, CablesOrFile, checked_parts, doubts
+from cdsm.cable import Cables, checked_cables
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import CableError, InvalidInput, JointLimitError
-from cdsm.geometry import LONGEST, Geometry, doubts_about_units
+from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
@@ -29,7 +30,7 @@ from cdsm.segments import Chains
 from cdsm.support.directions import Direction, gravity_vector
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
-from cdsm.support.validation import flag, instance, one_of, vector
+from cdsm.support.validation import flag, instance, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.support.warning import warn
 from cdsm.tolerances import Tolerances
@@ -42,35 +43,17 @@ if TYPE_CHECKING:
 
     from cdsm.wires.catalogue import Wire
 
-CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
-"""One or more cables, or the path of their file."""
-
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
 
 LIMIT_SLACK = 1e-9
 """Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
 
-_FARTHEST = 5.0  # longest plausible lead and distance of a site [m]; or ten arm lengths, if more
-
 ANOTHER_ARM = (
     "another arm; distribute it for this one. with_cables, with_friction, with_gravity and "
     "with_tolerances return another arm."
 )
 """What is wrong with tensions of another arm, and what to do."""
-
-
-class ArmParts(NamedTuple):
-    """Everything that defines an arm; two arms are equal if these parts are equal."""
-
-    geometry: Geometry | None
-    urdf: str
-    cables: Cables
-    tip: str
-    gravity: tuple[float, ...]
-    original_length: OriginalLength
-    joint_names: tuple[str, ...] | None
-    tolerances: Tolerances = Tolerances()
 
 
 @final
@@ -103,6 +86,7 @@ class Manipulator(Printed):
     _body: RigidBody
     _routing: Routing
     _laws: CableLaws
+    _doubts: list[str]
 
     def __init__(
         self,
@@ -122,7 +106,9 @@ class Manipulator(Printed):
                 "give one of elasticity= (for the cables of the geometry) and cables=; "
                 + ("both were given." if cables is not None else "neither was."),
             )
-        self._build(_parts(described, to_urdf(described), cables, TIP, gravity, original_length))
+        self._build(
+            checked_parts(described, to_urdf(described), cables, TIP, gravity, original_length)
+        )
 
     @classmethod
     def from_urdf(
@@ -165,47 +151,30 @@ class Manipulator(Printed):
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
-        arm = cls.__new__(cls)
-        arm._build(_parts(None, text, cables, tip, gravity, original_length, joint_names))
-        return arm
+        given = None, text, cables, tip, gravity, original_length, joint_names
+        return cls.__new__(cls)._build(checked_parts(*given))
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], wire: Wire | None = None) -> Manipulator:
-        """Read an arm from an ARM.toml: robot, cables, wires, gravity.
+        """Read an arm from an ARM.toml: robot, cables, wires, gravity, tolerances.
 
-        The file has a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]``. This
-        table has ``tip``, and ``file`` (a path, relative to the folder of the ARM.toml) or ``text``
-        (the URDF). It may have ``joint_names`` and ``check_inertia`` (see :meth:`from_urdf`). All
-        other keys are optional:
-
-        - ``wire``: the wire of all cables: a name such as ``"1x19-1.2mm"``, a constant EA [N], a
-          table in the form of :meth:`Elasticity.read`, or the NAME of a table
-          ``[wires.NAME]``.
-        - ``series_stiffness`` [N/m], ``control``, ``minimum``, ``maximum`` [N]: attributes of all
-          cables, as in :class:`Cable`.
-        - ``[cables.NAME]``: the same keys for one cable of the geometry; or ``[[cables]]``: all
-          cables through any points, as in :func:`~cdsm.read_cables`.
-        - ``gravity`` [m/s²], ``original_length``: as for :class:`Manipulator`.
-        - ``[tolerances]``: the sources of :class:`Tolerances`; see :meth:`Tolerances.read`.
+        The robot is a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]`` with
+        ``tip`` and ``file`` (relative to the folder of the ARM.toml) or ``text``. ``cdsm new``
+        writes a file with a comment on every key.
 
         Args:
-            path: The file; :meth:`write` writes one, ``cdsm new`` another with comments.
+            path: The file; :meth:`write` writes one.
             wire: Wire of all cables, instead of the wires in the file: a law, a name, EA [N], or
                 the path of a file of :meth:`Elasticity.write`.
 
         Raises:
             FileError: The file cannot be read or does not describe an arm. Every fault is listed.
             MissingWire: The file has no wire for some cables, and ``wire`` is not given.
-            UrdfError: The URDF is not a supported robot; lists every fault.
-            CableError: A cable is on an unknown link.
-            UnknownName: No link is called ``tip``, or no wire has the name ``wire``.
-            InvalidInput: ``joint_names`` does not name each moving joint once.
+            UrdfError, CableError, UnknownName, InvalidInput: As :meth:`from_urdf`.
         """
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
 
-        arm = cls.__new__(cls)
-        arm._build(_parts(*read_arm(path, wire)))
-        return arm
+        return cls.__new__(cls)._build(checked_parts(*read_arm(path, wire)))
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write an ARM.toml from which :meth:`read` builds an equal arm; return its path.
@@ -420,21 +389,21 @@ class Manipulator(Printed):
             free = f"{plural(len(self.geometry.joints), 'joint')} ({free})"
         return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.6g} m long"
 
-    def _build(self, parts: ArmParts, robot: Manipulator | None = None) -> None:
-        """Set all attributes from checked parts; ``robot`` is an arm with the same rigid bodies.
-
-        :attr:`_doubts` are issued as warnings, except those of ``robot``, which the user has seen.
-        """
-        if robot is None:
-            body = RigidBody(parts.urdf, parts.tip, np.array(parts.gravity), parts.joint_names)
-        else:
-            body = robot._body
-        self._body, self._parts = body, parts._replace(joint_names=body.joint_names)
+    def _build(self, parts: ArmParts, robot: Manipulator | None = None) -> Self:
+        """Set all attributes; ``robot`` is an arm with the same rigid bodies, which are kept."""
+        self._body = body = (
+            RigidBody(parts.urdf, parts.tip, np.array(parts.gravity), parts.joint_names)
+            if robot is None
+            else robot._body
+        )
+        self._parts = parts._replace(joint_names=body.joint_names)
         self._routing = Routing.of(body, parts.cables)
         self._laws = CableLaws(parts.cables, parts.original_length)
+        self._doubts = doubts(parts, body)
         for doubt in self._doubts:
-            if robot is None or doubt not in robot._doubts:
+            if robot is None or doubt not in robot._doubts:  # which the user has seen
                 warn(f"{self.name}: {doubt}")
+        return self
 
     @cached_property
     def _chains(self) -> Chains:
@@ -451,28 +420,6 @@ class Manipulator(Printed):
         """Elasticities of the segments of :attr:`_chains`."""
         return CableLaws(self._chains.segments, self.original_length)
 
-    @cached_property
-    def _doubts(self) -> list[str]:
-        """Texts of warnings: lengths look as if not in metres, or no joint moves the tip."""
-        length = self._body.length
-        # without lengths between the joints, the frame of the robot may be as long as any arm
-        most = max(_FARTHEST, 10.0 * length) if length > 0.0 else LONGEST
-        sizes = [(f"the lead of {each.name}", each.lead, most) for each in self.cables]
-        sizes += [
-            (f"a site of {each.name}", math.hypot(*site.position), most)
-            for each in self.cables
-            for site in each.sites
-        ]
-        # a geometry warns of its own length
-        largest = max(sizes, key=lambda size: size[1])
-        doubts = doubts_about_units(0.0 if self.is_serpentine else length, [largest])
-        if not self._body.tip_joints.size:
-            doubts.append(
-                f"no joint moves its tip {self._parts.tip}, so its stiffness is infinite; give "
-                "another link as tip."
-            )
-        return doubts
-
     def __eq__(self, other: object) -> bool:
         return isinstance(other, type(self)) and self._parts == other._parts
 
@@ -486,25 +433,11 @@ class Manipulator(Printed):
         self._build(parts)
 
     def with_cables(self, cables: CablesOrFile) -> Self:
-        """Return an arm with the same robot and other cables.
-
-        Args:
-            cables: One or more cables, or the path of their file.
-
-        Raises:
-            InvalidInput: ``cables`` is empty, or not a list or tuple of cables.
-            CableError: Two cables have the same name, or a cable is on an unknown link.
-            FileError: The file cannot be read or does not describe cables.
-            MissingWire: The file names no wire for some cables.
-        """
+        """Return an arm with the same robot and other cables, given as for :class:`Manipulator`."""
         return self._replace(cables=checked_cables(cables))
 
     def with_friction(self, friction: float) -> Self:
-        """Return the same arm with one friction coefficient μ [-] in all holes.
-
-        Raises:
-            InvalidInput: ``friction`` is negative, above 2, or not a number.
-        """
+        """Return the same arm with one friction coefficient μ [-], from 0 to 2, in all holes."""
         return self._replace(cables=Cables(cable.with_friction(friction) for cable in self.cables))
 
     def with_tolerances(self, tolerances: Tolerances) -> Self:
@@ -512,48 +445,20 @@ class Manipulator(Printed):
         return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
 
     def with_gravity(self, gravity: Direction) -> Self:
-        """Return the same arm under another gravity (3,) [m/s²] in base axes.
-
-        The name of an axis, such as ``"-y"``, means 9.81 m/s² along this axis.
-
-        Raises:
-            InvalidInput: Gravity is neither an axis nor three numbers.
-        """
-        arm = type(self).__new__(type(self))
+        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis."""
         g = tuple(gravity_vector("gravity", gravity).tolist())
-        arm._build(self._parts._replace(gravity=g))
-        return arm
+        return type(self).__new__(type(self))._build(self._parts._replace(gravity=g))
 
     def _with_laws(self, laws: Sequence[Elasticity]) -> Self:
         """Return the same arm with other laws, one per cable; faster, since the rest is kept."""
         pairs = zip(self.cables, laws, strict=True)
         cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
         arm = type(self).__new__(type(self))
-        arm._body, arm._routing = self._body, self._routing
+        arm._body, arm._routing, arm._doubts = self._body, self._routing, self._doubts
         arm._parts = self._parts._replace(cables=cables)
         arm._laws = CableLaws(cables, self.original_length)
         return arm
 
     def _replace(self, **changes: Any) -> Self:
         """Return the same robot with other parts that do not concern its rigid bodies."""
-        arm = type(self).__new__(type(self))
-        arm._build(self._parts._replace(**changes), self)
-        return arm
-
-
-def _parts(
-    geometry: Geometry | None,
-    urdf: str,
-    cables: CablesOrFile,
-    tip: str,
-    gravity: Direction,
-    original_length: OriginalLength,
-    joint_names: Sequence[str] | None = None,
-    tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
-) -> ArmParts:
-    """Check the arguments of :class:`Manipulator`; ``urdf`` is a text that has been checked."""
-    one_of("original_length", original_length, get_args(OriginalLength))
-    g = tuple(gravity_vector("gravity", gravity).tolist())
-    names = None if joint_names is None else tuple(joint_names)
-    held = checked_cables(cables)
-    return ArmParts(geometry, urdf, held, tip, g, original_length, names, tolerances)
+        return type(self).__new__(type(self))._build(self._parts._replace(**changes), self)

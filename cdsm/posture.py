@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import cdsm
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.contacts import overlapping
-from cdsm.routing import Spans, cross, dot
+from cdsm.routing import Spans
 from cdsm.segments import Segments
 from cdsm.support.format import JointUnits, aligned, coordinates, plain, plural
 from cdsm.support.tidy import data_frame
@@ -221,22 +221,23 @@ class Posture(ReadOnlyState):
 def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp]) -> Array:
     """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,) at the tip, from J_X (6, nv).
 
-    The joint a is before b on the way to the tip: the entries (a, b) and (b, a) are −(f × z_a)·v_b
-    for the force f. A moment m adds −(m × z_a)·z_b to the entry (b, a) alone.
+    Let joint a be before b on the way to the tip. A force f gives −(f × z_a)·v_b in the entries
+    (a, b) and (b, a); a moment m gives −(m × z_a)·z_b in the entry (b, a) alone.
     """
-    nv = jacobian.shape[1]
-    J = jacobian[:, tip_joints]
-    v, z = J[:3], J[3:]
-    force = -dot(cross(wrench[:3, None], z)[:, :, None], v[:, None])
-    later = np.tril(np.ones(force.shape), -1)
-    load = force * (1.0 - later) + (force * (1.0 - later)).T * later
-    if wrench[3:].any():
-        load -= dot(cross(wrench[3:, None], z)[:, :, None], z[:, None]).T * later
-    if tip_joints.size == nv and (tip_joints == np.arange(nv)).all():
-        return np.asarray(load)
-    whole = np.zeros((nv, nv))
-    whole[np.ix_(tip_joints, tip_joints)] = load
-    return whole
+    load = np.zeros((jacobian.shape[1],) * 2)
+    if wrench.any():
+        J = jacobian[:, tip_joints]
+        later = np.tri(len(tip_joints), k=-1)
+        force = (1.0 - later) * (J[3:].T @ hat(wrench[:3]) @ J[:3])
+        moment = later * (J[3:].T @ hat(wrench[3:]) @ J[3:])
+        load[np.ix_(tip_joints, tip_joints)] = force + force.T * later - moment
+    return load
+
+
+def hat(a: Array) -> Array:
+    """Return the matrix (3, 3) with hat(a) b = a × b."""
+    x, y, z = a.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 @final

@@ -120,7 +120,8 @@ class Segments(ReadOnlyState):
 
         With the directions u and v before and behind a hole, φ = atan2(|u × v|, u·v) and
 
-            ∂φ/∂θ_i = −(p·d_i/ℓ_u + q·e_i/ℓ_v),  p = ((u × v) × u)/|u × v|,  q = (v × (u × v))/|u × v|.
+            ∂φ/∂θ_i = −(p·d_i/ℓ_u + q·e_i/ℓ_v),
+            p = ((u × v) × u)/|u × v|,   q = (v × (u × v))/|u × v|.
 
         d_i and e_i are the motions of the segments' far ends, seen from the link of the hole. Where
         the cable goes straight through, φ has a kink; there the gradient is 0, the mean of both

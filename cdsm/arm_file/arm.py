@@ -113,7 +113,9 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     g, length = keys.gravity, keys.original_length
     if robot is None:
         assert geometry is not None
-        return ArmParts(geometry, to_urdf(geometry), Cables(cables), TIP, g, length, None, tolerances)
+        return ArmParts(
+            geometry, to_urdf(geometry), Cables(cables), TIP, g, length, None, tolerances
+        )
     source = robot.text if robot.file is None else Path(path).parent / robot.file
     assert source is not None
     try:

@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike
 from cdsm.cable import Cable
 from cdsm.errors import InvalidInput
 from cdsm.kernels import tension as tension_kernels
-from cdsm.kernels.distribution import single_guess
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.validation import (
