@@ -235,7 +235,7 @@ def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp])
 
 
 def hat(a: Array) -> Array:
-    """Return the matrix (3, 3) with hat(a) b = a × b."""
+    """Return the matrix of the cross product with a: its product with b is a × b."""
     x, y, z = a.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 

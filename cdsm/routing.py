@@ -123,7 +123,7 @@ class Routing:
         return cls(body.nv, *map(frozen, arrays))
 
     def sites(self, placement: Array) -> Array:
-        """Compute the positions (3, P) [m] of all sites from the poses (n, 4, 4) of :attr:`used`."""
+        """Compute all sites (3, P) [m] from the poses (n, 4, 4) of the bodies in :attr:`used`."""
         return np.einsum("pxy,py->xp", placement[self._where, :3], self._homogeneous)
 
     @cached_property
@@ -163,7 +163,7 @@ class Routing:
         return J.reshape(C, self.nv, *J.shape[1:])
 
     def hessian(self, spans: Spans, weight: Array) -> Array:
-        """Compute Σ weight_s ∂²ℓ_s/∂θ² (nv, nv) for weights (S,): H_L·F for tensions of segments."""
+        """Compute Σ weight_s ∂²ℓ_s/∂θ² (nv, nv): H_L·F if the weights (S,) are tensions."""
         _, source, target = self._pairs
         pairs = self._products(spans, weight)
         H = _sum(target, pairs[source], self.nv**2)
@@ -191,7 +191,7 @@ class Routing:
 
     @cached_property
     def _pairs(self) -> tuple[Indices, Indices, Indices]:
-        """Each entry of the Hessians: its segment, its product (i before j), its place in (nv, nv)."""
+        """For each entry of a Hessian: its segment, its product, and its place in (nv, nv)."""
         S, m = self.path.shape
         real = self.sign != 0.0
         p, q = np.triu_indices(m)
