@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from cdsm.arm_model import route
 
 import cdsm
-from cdsm.arm_model import route
 from cdsm.kernels import segments, tree
 from cdsm.kernels.tree import Routing, Tree
 from cdsm.rigid_body import RigidBody
