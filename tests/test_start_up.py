@@ -39,9 +39,11 @@ for arguments in ["--version"], ["--help"], *([name, "--help"] for name in comma
             "import cdsm", NUMERICS | SOLVERS | SCREEN | OF_FILES | {"pydantic"}, id="cdsm"
         ),
         pytest.param(
-            FIRST_STIFFNESS, SOLVERS | SCREEN | OF_FILES | {"cdsm.report"}, id="stiffness"
+            FIRST_STIFFNESS,
+            SCREEN | OF_FILES | {"cdsm.report", "numba", "scipy.optimize"},
+            id="stiffness",
         ),
-        pytest.param(STRAND, SOLVERS | SCREEN | OF_FILES | {"cdsm.report"}, id="strand"),
+        pytest.param(STRAND, SOLVERS | SCREEN | OF_FILES | {"cdsm.report", "numba"}, id="strand"),
         pytest.param(HELP, NUMERICS | SOLVERS | OF_FILES | {"matplotlib"}, id="help"),
     ],
 )
