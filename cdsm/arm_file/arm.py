@@ -23,9 +23,9 @@ from cdsm.cable import Cable
 from cdsm.cable_laws import OriginalLength
 from cdsm.elasticity import LinearElasticity
 from cdsm.errors import FileError, GeometryError, UnknownName, UrdfError, counted
-from cdsm.geometry import Geometry, split_geometry
+from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
-from cdsm.geometry.tables import build, lines_of
+from cdsm.geometry.toml import build, lines_of, split_geometry
 from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
 from cdsm.support.validation import RANGES, one_of
