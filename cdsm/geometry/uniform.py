@@ -167,7 +167,7 @@ def same_angle(cables: Sequence[CableRoute]) -> list[list[int]]:
 
 
 def spread_out(cables: Sequence[CableRoute], spread: float) -> tuple[CableRoute, ...]:
-    """Return the cables, with an angle ``spread`` [rad] between those that had equal hole angles."""
+    """Return the cables, with an angle ``spread`` [rad] between those of equal hole angles."""
     moved = list(cables)
     for group in same_angle(cables) if spread else ():
         for i, c in enumerate(group):
