@@ -13,11 +13,8 @@ from cdsm.geometry.uniform import same_angle
 if TYPE_CHECKING:
     from cdsm.geometry.geometry import Geometry
 
-LONGEST = 30.0
-"""If an arm is longer than this [m], its lengths are probably in millimetres."""
-
-WIDEST = 1.0
-"""A hole radius or disk offset larger than this [m] is probably in millimetres."""
+# a longer arm, a larger hole radius or disk offset than this [m] was probably given in millimetres
+LONGEST, WIDEST = 30.0, 1.0
 
 
 def faults_of(geometry: Geometry) -> list[str]:

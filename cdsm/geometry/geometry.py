@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import update_wrapper
+from inspect import signature
 from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, ParamSpec, Self
@@ -36,6 +37,8 @@ def _from_sizes(kind: Callable[_Keywords, Universal]) -> Callable[_Keywords, Geo
         return Geometry(**fields_of(kind(*args, **keywords)))
 
     update_wrapper(build, kind, updated=())
+    shown = signature(kind).replace(return_annotation="Geometry")
+    build.__signature__ = shown  # type: ignore[attr-defined]  # of the record it would be None
     return build
 
 
@@ -52,16 +55,15 @@ class Geometry(Printed):
         name: Name of the robot: letters, digits and underscores.
         base_length: L_0: distance from the base frame to joint 1 [m].
         hole_radius: R: distance of the holes from the arm's axis [m]; a joint may have its own.
-        joints: All joints, base to tip.
-        links: One :class:`Link` per joint.
+        joints: Up to 100 joints, base to tip.
+        links: One :class:`Link` after each joint, longer than the offsets of its disks.
         cables: One :class:`CableRoute` per cable.
 
     Raises:
-        GeometryError: The geometry is invalid, e.g. a length is not positive, disks overlap, a
-            cable ends past the last joint, > 100 joints; lists every fault.
+        GeometryError: The geometry is invalid; lists every fault.
 
     Warns:
-        CdsmWarning: Cables share a hole, or lengths look like millimetres.
+        CdsmWarning: Cables share a hole, or lengths look like mm, or angles like degrees.
     """
 
     joints: Annotated[
@@ -155,10 +157,7 @@ class Geometry(Printed):
 
     @property
     def joint_limits(self) -> tuple[float, ...]:
-        """Limit of each joint [rad]: the given limit, or else 2 atan(h/r), at most 80°.
-
-        h is the ``disk_offset``; r is the ``disk_radius`` if it is given, else the hole radius.
-        """
+        """Limit of each joint [rad]: the given one, or where disks touch, as in :class:`Joint`."""
         joints = zip(self.joints, self.hole_radii, strict=True)
         touch = [2.0 * math.atan(j.disk_offset / (j.disk_radius or R)) for j, R in joints]
         most = math.radians(80.0)
@@ -200,10 +199,7 @@ class Geometry(Printed):
 
     @classmethod
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
-        """Build a geometry from TOML text, see :meth:`read`; errors begin with ``source``.
-
-        Raises GeometryError, which lists every fault, if the text is not TOML or not a geometry.
-        """
+        """Build a geometry from TOML text as :meth:`read` does; errors begin with ``source``."""
         try:
             data, rest = toml.split_geometry(read_toml(instance("text", text, str)))
             if "urdf" in rest and not data:

@@ -10,9 +10,7 @@ from pydantic import Field, model_validator
 
 from cdsm.support import records
 
-MAXIMUM_JOINTS = 100
-"""Largest number of joints, since many more would overflow the stack of the URDF parsers."""
-
+MAXIMUM_JOINTS = 100  # many more would overflow the stack of the URDF parsers
 Limit = Annotated[records.Number, Field(gt=0, le=math.pi)]
 
 

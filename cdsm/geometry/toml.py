@@ -21,10 +21,9 @@ _ARM_KEYS = (
 
 
 def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Split the parsed TOML of an arm into the keys of its geometry and all other keys.
+    """Split the parsed TOML of an arm into the keys of its geometry and all others.
 
-    The key ``cables`` belongs to the geometry if there is a key ``joints`` or ``links``, or if it
-    is the only key.
+    ``cables`` belongs to the geometry beside ``joints`` or ``links``, and if it is the only key.
     """
     others = set(_ARM_KEYS)
     if data.keys() - {"cables"} and not data.keys() & {"joints", "links"}:
@@ -41,7 +40,7 @@ class _Sections:
 
 
 def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
-    """Build a geometry from parsed TOML, see :meth:`Geometry.read`; GeometryError lists faults."""
+    """Build a geometry from parsed TOML as :meth:`Geometry.read`; GeometryError lists faults."""
     kind = next((key for key in ("sections", "universal", "hinged", "geometry") if key in data), "")
     if not kind and not data.keys() & {"joints", "links"}:
         found = ", ".join(data) or "nothing"
@@ -67,10 +66,7 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
 
 
 def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
-    """Return the TOML lines of a geometry, a table for each joint, link and cable.
-
-    ``prefix``, e.g. ``geometry.``, precedes the names of the tables.
-    """
+    """Return the TOML lines of a geometry; ``prefix``: of the names of its tables."""
     lines = toml_lines(geometry, ("name", "base_length", "hole_radius"))
     for key in ("joints", "links", "cables"):
         for part in getattr(geometry, key):

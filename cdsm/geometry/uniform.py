@@ -98,8 +98,7 @@ class Universal:
             raise records.CrossFaults(faults)
         return self
 
-    def axes_and_angles(self) -> tuple[list[Any], list[list[float]]]:
-        """Return the axes of each joint, and the usual hole angles of its cables [rad]."""
+    def _axes_and_angles(self) -> tuple[list[Any], list[list[float]]]:
         axes = [((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))] * self.joints
         return axes, evenly_spaced(self.joints, self.cables_per_joint or 1)
 
@@ -116,8 +115,7 @@ class Hinged(Universal):
 
     twist: Turn
 
-    def axes_and_angles(self) -> tuple[list[Any], list[list[float]]]:
-        """Return the axes of each joint, and the usual hole angles of its cables [rad]."""
+    def _axes_and_angles(self) -> tuple[list[Any], list[list[float]]]:
         rolls = [k * self.twist for k in range(self.joints)]
         axes = [((0.0, math.cos(roll), math.sin(roll)),) for roll in rolls]
         return axes, hinge_hole_angles(rolls, self.cables_per_joint or 2)
@@ -125,7 +123,7 @@ class Hinged(Universal):
 
 def fields_of(sizes: Universal) -> dict[str, Any]:
     """Return the fields of the :class:`~cdsm.Geometry` of such sizes by name."""
-    n, (axes, usual), own = sizes.joints, sizes.axes_and_angles(), sizes.hole_angles
+    n, (axes, usual), own = sizes.joints, sizes._axes_and_angles(), sizes.hole_angles
     given: Sequence[Any] = own or usual
     angles = given if isinstance(given[0], Sequence) else [given] * n
     values = [getattr(sizes, key) for key in _OF_JOINTS]
