@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,8 +47,6 @@ STEEL_WIRE_200GPA: Final = SOLID
 ELASTIC_STAGE: Final = LinearElasticity(48e3)
 """Law with the constant EA of the strand in its elastic stage: assumed, from Eq. 19 at 600 N."""
 
-_RIGID: Final = LinearElasticity(1e9).scaled(1e3)  # the spring in series is all that stretches
-
 TEN_DEGREES: Final = np.deg2rad(10.0)
 """Angle of every joint of the virtual prototype in Sections IV-A, B and D of the paper [rad]."""
 
@@ -58,14 +56,9 @@ def virtual_prototype_geometry(
 ) -> Geometry:
     """Build the geometry of Section IV: five universal joints, R = 30 mm, disks every 20 mm.
 
-    R is the distance of the holes from the axis. The paper gives the joints, R and the spacing of
-    the disks. The rest is assumed: three cables per joint, which end on the first disk after the
-    joint, no lead, and 0.5 kg per link.
-
-    Args:
-        link_mass: Mass of every link [kg].
-        lead: Straight cable between each actuator and the base disk [m].
-        friction: Friction coefficient in all holes; the paper has none.
+    The paper gives no more. Three cables per joint, which end on the first disk after the joint,
+    are assumed, as are the mass of every link [kg], the ``lead`` [m] before the base disk, and
+    the friction coefficient in all holes; the paper has none.
     """
     return Geometry.universal(
         name="virtual_prototype",
@@ -84,70 +77,42 @@ def virtual_prototype_geometry(
 def virtual_prototype(
     elasticity: Elasticity = STRAND_1X19,
     *,
-    link_mass: float = 0.5,
-    lead: float = 0.0,
-    friction: float = 0.0,
     gravity: ArrayLike = (0.0, -9.81, 0.0),
     original_length: OriginalLength = "unstrained",
+    **dimensions: float,
 ) -> Manipulator:
-    """Build the paper's virtual prototype (Section IV); see :func:`virtual_prototype_geometry`.
+    """Build the paper's virtual prototype (Section IV).
 
     Args:
         elasticity: Elasticity of all cables. Default: Eq. 19 with the missing digits filled in, see
             :meth:`StrandElasticity.eq19_repaired <cdsm.StrandElasticity.eq19_repaired>`.
-        link_mass: Mass of every link [kg]; assumed.
-        lead: Straight cable between each actuator and the base disk [m]; assumed.
-        friction: Friction coefficient in all holes; the paper has none.
         gravity: Gravity in base axes (3,) [m/s²]; the direction −y is assumed.
         original_length: As for :class:`~cdsm.Manipulator`; the paper uses ``"stretched"``.
+        dimensions: Keywords of :func:`virtual_prototype_geometry`.
     """
-    geometry = virtual_prototype_geometry(link_mass, lead, friction)
+    geometry = virtual_prototype_geometry(**dimensions)
     return Manipulator(geometry, elasticity, gravity=gravity, original_length=original_length)
 
 
 def experimental_prototype_geometry(
-    *,
-    link_length: float = 0.1,
-    tool_length: float | None = None,
-    base_length: float = 0.05,
-    disk_offset: float = 0.02,
-    hole_radius: float = 0.03,
-    link_mass: float = 0.3,
-    lead: float = 0.3,
-    friction: float = 0.0,
+    *, link_mass: float = 0.3, tool_length: float | None = None, **sizes: float
 ) -> Geometry:
     """Build the geometry of Section V: three hinges of ±30°, each with two antagonistic cables.
 
-    Each hinge is turned about the arm's axis by 30° from the one before. The paper gives joints,
-    limits, this twist and the pairs of cables. It gives no dimensions: all are assumed.
+    Each hinge is turned about the arm's axis by 30° from the one before. The paper gives no
+    dimensions: all are assumed. Raises GeometryError, which lists every fault.
 
     Args:
-        link_length: Length of every link [m]; assumed.
-        tool_length: Distance from the last joint to the weights [m]; None: ``link_length``.
-        base_length: Distance from the base frame to joint 1 [m]; assumed.
-        disk_offset: Distance from each joint centre to its disks [m]; assumed.
-        hole_radius: Distance of all holes from the arm's axis [m]; assumed.
-        link_mass: Mass of every link [kg]; assumed.
-        lead: Straight cable between each actuator and the base disk [m]; assumed.
-        friction: Friction coefficient in all holes; the paper has none.
-
-    Raises:
-        GeometryError: Some dimensions are invalid; lists every fault.
+        link_mass: Mass of every link [kg].
+        tool_length: Distance from the last joint to the weights [m]; None: as long as a link.
+        sizes: Other keywords of :meth:`cdsm.Geometry.hinged`: ``link_length`` (0.1 m),
+            ``base_length`` (0.05 m), ``disk_offset`` (0.02 m), ``hole_radius`` (0.03 m), ``lead``
+            (0.3 m) or ``friction`` (0; the paper has none).
     """
-    geometry = Geometry.hinged(
-        name="experimental_prototype",
-        joints=3,
-        twist=np.deg2rad(30.0),
-        cables_per_joint=2,
-        joint_limit=np.deg2rad(30.0),
-        link_length=link_length,
-        base_length=base_length,
-        disk_offset=disk_offset,
-        hole_radius=hole_radius,
-        link_mass=link_mass,
-        lead=lead,
-        friction=friction,
-    )
+    assumed = {"link_length": 0.1, "base_length": 0.05, "disk_offset": 0.02, "hole_radius": 0.03}
+    given: dict[str, Any] = assumed | {"lead": 0.3, "joint_limit": np.deg2rad(30.0)} | sizes
+    name, twist = "experimental_prototype", np.deg2rad(30.0)
+    geometry = Geometry.hinged(name=name, joints=3, twist=twist, link_mass=link_mass, **given)
     if tool_length is None:
         return geometry
     last = Link(length=tool_length, mass=link_mass)
@@ -173,16 +138,13 @@ def experimental_prototype(
             [N/m].
         gravity: Gravity in base axes (3,) [m/s²]; the direction −z is assumed.
         dimensions: Keywords of :func:`experimental_prototype_geometry`; all have assumed defaults.
-
-    Raises:
-        GeometryError: Some dimensions are invalid; lists every fault.
     """
     geometry = experimental_prototype_geometry(**dimensions)
-    cables = serpentine_cables(geometry, elasticity, series_stiffness=series_stiffness)
-    pairs = [
-        replace(cable, control="position" if cable.name.endswith("_1") else "force")
-        for cable in cables
-    ]
+    first, second = (
+        serpentine_cables(geometry, elasticity, series_stiffness=series_stiffness, control=control)
+        for control in ("position", "force")
+    )
+    pairs = [cable for pair in zip(first[::2], second[1::2], strict=True) for cable in pair]
     return Manipulator(geometry, cables=pairs, gravity=gravity)
 
 
@@ -196,15 +158,15 @@ def fitted_prototype(hybrid_stiffness: float | None = None) -> Manipulator:
     the drives; the links at their shortest. Table II is still missed by 21 %, 15 % and 33 % (root
     mean square in x, y and z). So this arm is one possible guess, not the paper's prototype.
 
-    Args:
-        hybrid_stiffness: Stiffness of every cable [N/m], where a spring replaces the elasticity of
-            the strand (Figs. 12 and 13). None: the strand, with a drive of 10 kN/mm behind it.
-
-    Raises:
-        CableError: ``hybrid_stiffness`` is not a positive number.
+    ``hybrid_stiffness`` is that of every cable [N/m], where a spring replaces the elasticity of the
+    strand (Figs. 12 and 13). None: the strand, with a drive of 10 kN/mm behind it. Raises
+    CableError if it is not a positive number.
     """
+    strand = hybrid_stiffness is None
     return experimental_prototype(
-        STRAND_1X19 if hybrid_stiffness is None else _RIGID,
+        STRAND_1X19
+        if strand
+        else LinearElasticity(1e9).scaled(1e3),  # the spring is all that stretches
         series_stiffness=1e7 if hybrid_stiffness is None else hybrid_stiffness,
         link_length=0.03,
         tool_length=0.3,

@@ -22,9 +22,9 @@ from cdsm.arm_parts import ArmParts
 from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.errors import LINES, FileError, GeometryError, UnknownName, UrdfError, listed
-from cdsm.geometry import Geometry, split_geometry
+from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
-from cdsm.geometry.tables import build, lines_of
+from cdsm.geometry.toml import build, lines_of, split_geometry
 from cdsm.manipulator import GRAVITY
 from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value

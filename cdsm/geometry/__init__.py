@@ -7,10 +7,7 @@ from cdsm.geometry.checks import LONGEST as LONGEST
 from cdsm.geometry.checks import doubts_about_units as doubts_about_units
 from cdsm.geometry.geometry import Geometry as Geometry
 from cdsm.geometry.parts import MAXIMUM_JOINTS as MAXIMUM_JOINTS
-from cdsm.geometry.parts import UNIVERSAL_AXES as UNIVERSAL_AXES
 from cdsm.geometry.parts import CableRoute as CableRoute
 from cdsm.geometry.parts import Disk as Disk
 from cdsm.geometry.parts import Joint as Joint
 from cdsm.geometry.parts import Link as Link
-from cdsm.geometry.tables import ARM_KEYS as ARM_KEYS
-from cdsm.geometry.tables import split_geometry as split_geometry

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from functools import partial
 
 from cdsm.cable import Cable, Control, Site
 from cdsm.errors import InvalidInput, listed
@@ -34,37 +34,21 @@ def serpentine_cables(
         control: Motor control of all cables, as in :class:`Cable`.
 
     Raises:
-        InvalidInput: ``elasticity`` is not a law, or the numbers of laws and of cables differ.
-        CableError: A cable is invalid.
+        InvalidInput: ``elasticity`` is not a law, or not one for each cable.
     """
-    count = len(instance("geometry", geometry, Geometry).cables)
-    if isinstance(elasticity, (list, tuple)):
-        elasticities = tuple(elasticity)
-    else:
-        elasticities = (checked_law(elasticity),) * count
-    if len(elasticities) != count:
-        raise InvalidInput(
-            "elasticity",
-            f"{len(elasticities)} laws given; give one, or one for each of {count} cables.",
-        )
+    names, n = instance("geometry", geometry, Geometry).cable_names, len(geometry.cables)
+    laws: Sequence[Elasticity]
+    laws = elasticity if isinstance(elasticity, (list, tuple)) else [checked_law(elasticity)] * n
+    if len(laws) != n:
+        raise InvalidInput("elasticity", f"{len(laws)} laws given; give 1, or 1 for each of {n}.")
+    new = partial(Cable, series_stiffness=series_stiffness, control=control)
     cables, disks = [], geometry.disks
-    for name, route, material in zip(
-        geometry.cable_names, geometry.cables, elasticities, strict=True
-    ):
-        *passed, end = disks[: 2 * route.joint]
-        sites = [Site(disk.link, disk.hole(route), route.friction) for disk in passed]
-        if route.lead == 0.0:
-            sites[0] = replace(sites[0], friction=0.0)
-        cables.append(
-            Cable(
-                name=name,
-                sites=(*sites, Site(end.link, end.hole(route))),
-                elasticity=material,
-                lead=route.lead,
-                series_stiffness=series_stiffness,
-                control=control,
-            )
-        )
+    for name, route, law in zip(names, geometry.cables, laws, strict=True):
+        mu, passed = route.friction, disks[: 2 * route.joint]
+        friction = [mu if route.lead else 0.0, *[mu] * (len(passed) - 2), 0.0]
+        holes = zip(passed, friction, strict=True)
+        sites = tuple(Site(disk.link, disk.hole(route), mu) for disk, mu in holes)
+        cables.append(new(name=name, sites=sites, elasticity=law, lead=route.lead))
     return tuple(cables)
 
 
@@ -73,24 +57,16 @@ def require_own_cables(geometry: Geometry, cables: Sequence[Cable]) -> None:
 
     What is built from values of the geometry would replace them. Raises InvalidInput.
     """
-    if tuple(cable.name for cable in cables) != geometry.cable_names:
+    routed = serpentine_cables(geometry, cables[0].elasticity)
+    own, given = {cable.name: _path(cable) for cable in routed}, {c.name: _path(c) for c in cables}
+    if list(own.items()) != list(given.items()):
+        other = listed([name for name in own | given if own.get(name) != given.get(name)])
         raise InvalidInput(
             "arm",
-            "has other cables than those of its geometry, which alone is varied. "
-            "Describe springs and wires in [cables.NAME] of the ARM.toml.",
-        )
-    routed = serpentine_cables(geometry, [cable.elasticity for cable in cables])
-    if moved := [
-        own.name
-        for own, cable in zip(cables, routed, strict=True)
-        if (own.lead, *_positions(own)) != (cable.lead, *_positions(cable))
-    ]:
-        raise InvalidInput(
-            "arm",
-            f"the lead or the holes of {listed(moved)} are not those of its geometry, which "
-            "alone is varied. Give them in the geometry.",
+            f"the lead or the holes of {other} are not those of its geometry, which alone is "
+            "varied. Describe springs and wires in [cables.NAME] of the ARM.toml.",
         )
 
 
-def _positions(cable: Cable) -> list[tuple[str, tuple[float, ...]]]:
-    return [(site.link, tuple(site.position)) for site in cable.sites]
+def _path(cable: Cable) -> tuple[float, list[tuple[str, tuple[float, ...]]]]:
+    return cable.lead, [(site.link, tuple(site.position)) for site in cable.sites]

@@ -3,132 +3,87 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from cdsm.errors import listed
-from cdsm.geometry.holes import sharing
+from cdsm.geometry.uniform import same_angle
 
 if TYPE_CHECKING:
-    from cdsm.geometry.description import GeometryFields
+    from cdsm.geometry.geometry import Geometry
 
-LONGEST = 30.0
-"""If an arm is longer than this [m], its lengths are probably in millimetres."""
-
-WIDEST = 1.0
-"""A hole radius or disk offset larger than this [m] is probably in millimetres."""
-
-_WIDEST_ANGLE = 8.0 * math.pi
-"""A larger hole angle [rad] is probably in degrees. It is the sum of an angle and a phase."""
-
-_SHORTEST = 1e-3  # an arm shorter than this [m] was probably given in metres where mm are taken
+# a longer arm, a larger hole radius or disk offset than this [m] was probably given in millimetres
+LONGEST, WIDEST = 30.0, 1.0
 
 
-def farthest_holes(geometry: GeometryFields) -> list[float]:
-    """Return, for each disk, the distance [m] of its farthest hole from the arm's axis."""
-    farthest = [R for R in geometry.hole_radii for _ in range(2)]
-    for cable in geometry.cables:
-        if cable.radius is not None:
-            for d in range(2 * cable.joint):
-                farthest[d] = max(farthest[d], cable.radius)
-    return farthest
-
-
-def faults_of(geometry: GeometryFields) -> list[str]:
+def faults_of(geometry: Geometry) -> list[str]:
     """Return the faults that concern several parts, such as too short links, one text each."""
-    count = len(geometry.joints)
-    faults = []
-    if len(geometry.links) != count:
-        faults.append(
-            f"links: {len(geometry.links)} given for {count} joints; every joint has one link "
-            "after it"
-        )
-    faults += _short_links(geometry)
+    joints, links, count = geometry.joints, geometry.links, len(geometry.joints)
+    wrong = len(links) != count
+    faults = [f"links: {len(links)} given for {count} joints; give one for each"] if wrong else []
+    offsets = [*(joint.disk_offset for joint in joints), 0.0]
+    short = [
+        f"link {k + 1} is {link.length:g} m long, its disks need more than {needed:g} m"
+        for k, link in enumerate(links)
+        if link.length <= (needed := sum(offsets[k : k + 2]))
+    ]
+    if short:
+        problem = f"too large: {listed(short, 1, '; ')}"
+        faults += [f"disk_offset: {problem}; lower disk_offset, or lengthen the links"]
     faults += [
         f"cables[{c}].joint: {cable.joint} is past the last joint, {count}; give 1 to {count}"
         for c, cable in enumerate(geometry.cables, start=1)
         if cable.joint > count
     ]
-    if faults:
-        return faults
     small = [
-        f"at joint {k} it is {joint.disk_radius:g} m, and the farthest hole is at {farthest:g} m"
-        for k, (joint, farthest) in enumerate(
-            zip(geometry.joints, farthest_holes(geometry)[::2], strict=True), start=1
-        )
-        if joint.disk_radius is not None and joint.disk_radius <= farthest
+        f"at joint {k} it is {joint.disk_radius:g} m, and the farthest hole is at {hole:g} m"
+        for k, (joint, hole) in enumerate(zip(joints, geometry._farthest_holes, strict=True), 1)
+        if joint.disk_radius is not None and joint.disk_radius <= hole
     ]
     if small:
-        faults.append(
-            f"disk_radius: too small: {listed(small, 1, '; ')}; give more, or leave it out"
-        )
+        faults += [f"disk_radius: too small: {listed(small, 1, '; ')}; give more"]
     return faults
 
 
-def _short_links(geometry: GeometryFields) -> list[str]:
-    """Return a list with one text on all links too short for their disks; empty if none is."""
-    offsets = [joint.disk_offset for joint in geometry.joints]
-    short = [
-        f"link {k} is {link.length:g} m long, its {'disks need' if after else 'disk needs'} "
-        f"more than {before + after:g} m"
-        for k, (link, before, after) in enumerate(
-            zip(geometry.links, offsets, [*offsets[1:], 0.0], strict=False), start=1
-        )
-        if link.length <= before + after
-    ]
-    if not short:
-        return []
-    names = listed(short, 1, "; ")
-    return [f"disk_offset: too large: {names}; lower disk_offset, or lengthen the links"]
-
-
 def doubts_about_units(length: float, sizes: Iterable[tuple[str, float, float]] = ()) -> list[str]:
-    """Return one warning text if lengths look as if they are not in metres, else an empty list.
+    """Return a warning text if lengths [m] look as if they are not in metres, else an empty list.
 
-    ``length`` is the length of the arm [m]. Each of ``sizes`` is a name for the text, a size [m]
-    and the largest plausible value of this size [m].
+    ``length`` is that of the arm; ``sizes`` are names, values and their largest plausible values.
     """
-    if 0.0 < length < _SHORTEST:
-        return [
-            f"the arm is {length:.4g} m long: it looks as if lengths are in another unit; give "
-            "them in metres, or in mm as options of the command line."
-        ]
+    if 0.0 < length < 1e-3:
+        unit = "another unit; give them in metres, or in mm as options of the command line."
+        return [f"the arm is {length:.4g} m long: it looks as if lengths are in {unit}"]
     every = [("the arm", length, LONGEST), *sizes]
-    large = [f"{what} is {size:.4g} m" for what, size, most in every if size > most]
-    if not large:
-        return []
-    return [f"{', '.join(large)}: it looks as if lengths are in mm; give them in metres."]
+    large = ", ".join(f"{what} is {size:.4g} m" for what, size, most in every if size > most)
+    return [f"{large}: it looks as if lengths are in mm; give them in metres."] if large else []
 
 
 def doubts_about_angle(what: str, angle: float, most: float) -> list[str]:
-    """Return one warning text if ``angle`` [rad] looks as if it is in degrees, else an empty list.
-
-    The text begins with ``what``, such as "a hole angle is"; ``most`` is the largest plausible
-    magnitude [rad].
-    """
-    if abs(angle) <= most:
-        return []
-    return [f"{what} {angle:g} rad: it looks as if it is in degrees; give rad."]
+    """Return a warning text if ``angle`` [rad] is larger than any plausible one, ``most`` [rad]."""
+    doubt = f"{what} {angle:g} rad: it looks as if it is in degrees; give rad."
+    return [doubt] if abs(angle) > most else []
 
 
-def doubts_about(geometry: GeometryFields) -> list[str]:
+def doubts_about(geometry: Geometry) -> list[str]:
     """Return warning texts, e.g. if lengths look like millimetres, or if cables share holes."""
-    sizes = [
-        ("hole_radius", max(geometry.hole_radii), WIDEST),
-        ("disk_offset", max(joint.disk_offset for joint in geometry.joints), WIDEST),
-    ]
-    doubts = doubts_about_units(geometry.length, sizes)
-    names = geometry.cable_names
-    widest = max(geometry.cables, key=lambda cable: abs(cable.angle))
+    cables, disks, names = geometry.cables, geometry.disks, geometry.cable_names
+    offset = max(joint.disk_offset for joint in geometry.joints)
+    sizes = [("hole_radius", max(geometry.hole_radii), WIDEST), ("disk_offset", offset, WIDEST)]
     # the angles of hinges grow by the twist, up to half a turn, from one to the next
-    most = max(_WIDEST_ANGLE, math.pi * (len(geometry.joints) + 4))
-    doubts += doubts_about_angle("a hole angle is", widest.angle, most)
-    groups = [
-        " and ".join(names[c] for c in each) for each in sharing(geometry.cables, geometry.disks)
-    ]
-    if groups:
-        doubts.append(
-            f"cables share holes: {listed(groups, 4, '; ')}. Two cables in one hole rub, and "
-            "few disks are built so. Set them apart by spread=, phase= or hole_angles=."
-        )
+    most = math.pi * max(8, len(geometry.joints) + 4)
+    widest = max((cable.angle for cable in cables), key=abs)
+    doubts = doubts_about_units(geometry.length, sizes)
+    doubts += doubts_about_angle("a hole angle is", widest, most)
+    holes = defaultdict(list)
+    for i, group in enumerate(same_angle(cables)):
+        for c in group:
+            for d, disk in enumerate(disks[: 2 * cables[c].joint]):
+                holes[i, d, disk.radius_of(cables[c])].append(c)
+    shared = {tuple(hole) for hole in holes.values() if len(hole) > 1}
+    whole = sorted(hole for hole in shared if not any(set(hole) < set(each) for each in shared))
+    if whole:
+        groups = listed([" and ".join(names[c] for c in hole) for hole in whole], 4, "; ")
+        remedy = "Cables in one hole rub: set them apart by spread=, phase= or hole_angles=."
+        doubts.append(f"cables share holes: {groups}. {remedy}")
     return doubts

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 
@@ -19,38 +18,28 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
 
     The body of a link is the cylinder from its first disk to its last, with the largest radius of
     these disks; ``poses`` has the pose (4, 4) of each link, translation in m. A point is projected
-    alternately onto the two cylinders of a pair. Both are convex, so the distance between the last
-    two projections converges to the gap between the cylinders.
+    alternately onto the two convex cylinders of a pair: the distance between the last two
+    projections converges to the gap.
     """
-    links = list(poses)
-    apart = [(i, j) for i, j in combinations(range(len(links)), 2) if j - i > 1]
-    pairs = np.array(apart, dtype=np.intp).reshape(-1, 2)
-    ends = [[disk.x for disk in disks if disk.link == link] for link in links]
-    half = np.array([(max(x) - min(x)) / 2.0 for x in ends])
-    radius = np.array([max(disk.radius for disk in disks if disk.link == link) for link in links])
-    pose = np.array([poses[link] for link in links])
-    axis = pose[:, :3, 0]
-    centre = pose[:, :3, 3] + axis * [[(max(x) + min(x)) / 2.0] for x in ends]
-    reach = np.hypot(half, radius)
-    distance = np.linalg.norm(centre[pairs[:, 0]] - centre[pairs[:, 1]], axis=1)
-    pairs = pairs[distance < reach[pairs].sum(axis=1)]
-    if not len(pairs):
-        return []
-    one, other = pairs.T
+    links, pose = list(poses), np.array(list(poses.values()))
+    own = [[(disk.x, disk.radius) for disk in disks if disk.link == link] for link in links]
+    (first, _), (last, radius) = (np.array([end(each) for each in own]).T for end in (min, max))
+    half, axis = (last - first) / 2.0, pose[:, :3, 0]
+    centre = pose[:, :3, 3] + axis * ((last + first) / 2.0)[:, None]
+    one, other = np.triu_indices(len(links), 2)
+    reach, distance = np.hypot(half, radius), np.linalg.norm(centre[one] - centre[other], axis=1)
+    near = distance < reach[one] + reach[other]
+    one, other = one[near], other[near]
     there = centre[other]
     for _ in range(_ROUNDS):
         here = _projected(there, centre[one], axis[one], half[one], radius[one])
         there = _projected(here, centre[other], axis[other], half[other], radius[other])
-    gap = np.linalg.norm(there - here, axis=1)
-    return [(links[i], links[j]) for i, j in pairs[gap <= _TOUCHING * radius[one]].tolist()]
+    meet = np.linalg.norm(there - here, axis=1) <= _TOUCHING * radius[one]
+    return [(links[i], links[j]) for i, j in zip(one[meet], other[meet], strict=True)]
 
 
 def _projected(points: Array, centre: Array, axis: Array, half: Array, radius: Array) -> Array:
-    """Return, for each of n ``points``, the nearest point of its solid cylinder (n, 3) [m].
-
-    Row i of all arguments belongs to cylinder i: its ``centre`` (n, 3) [m], unit vector ``axis``
-    (n, 3), half of its length ``half`` (n,) [m], ``radius`` (n,) [m].
-    """
+    """Return the nearest point of each of n solid cylinders of length 2 ``half`` (n, 3) [m]."""
     offset = points - centre
     along = np.einsum("ni,ni->n", offset, axis)
     across = offset - along[:, None] * axis

@@ -1,4 +1,4 @@
-"""Parts of a geometry: joints, links, routes of cables, disks."""
+"""Parts of a geometry: joints, links, routes of cables, disks. GeometryError lists all faults."""
 
 from __future__ import annotations
 
@@ -6,83 +6,49 @@ import math
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from cdsm.support.records import (
-    CrossFaults,
-    Direction,
-    Friction,
-    Integer,
-    Length,
-    LengthOrZero,
-    Mass,
-    Number,
-    record,
-)
+from cdsm.support import records
 
-MAXIMUM_JOINTS = 100
-"""Largest number of joints, since many more would overflow the stack of the URDF parsers."""
-
-UNIVERSAL_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+MAXIMUM_JOINTS = 100  # many more would overflow the stack of the URDF parsers
+Limit = Annotated[records.Number, Field(gt=0, le=math.pi)]
 
 
-def _in_radians(value: float) -> float:
-    if abs(value) > 2.0 * math.pi:
-        raise ValueError(
-            f"{value:g} rad given; at most one turn, 6.28 rad, is allowed; convert degrees to "
-            "radians"
-        )
-    return value
-
-
-Turn = Annotated[Number, AfterValidator(_in_radians)]
-Limit = Annotated[Number, Field(gt=0, le=math.pi)]
-
-
-@record
+@records.record
 class Joint:
-    """One joint of the arm and the two disks next to it.
+    """One joint of the arm and the two disks next to it; GeometryError lists every fault.
 
     Attributes:
         axes: One axis (hinge), or the first and the second axis (universal joint), in the frame of
             the previous link. Any length; no axis is zero, and two axes are not parallel.
         disk_offset: h: distance from the joint centre to the disk on each side [m].
-        limit: Largest angle about each axis in both directions [rad]; None: the angle at which
-            disks of radius r touch, at most 80°; r is ``disk_radius``, or the hole radius if that
-            is None.
+        limit: Largest angle about each axis in both directions [rad]; None: the angle 2 atan(h/r)
+            at which disks of radius r touch, at most 80°; r is ``disk_radius``, or else R.
         hole_radius: R: distance of the holes of its two disks from the arm's axis [m]; None: the
             ``hole_radius`` of the :class:`Geometry`.
         disk_radius: Outer radius of the two disks [m]; None: 1.1 times the distance of the farthest
             hole from the axis.
-
-    Raises:
-        GeometryError: Some attributes are invalid; lists every fault.
     """
 
-    axes: Annotated[tuple[Direction, ...], Field(strict=False, min_length=1, max_length=2)]
-    disk_offset: Length
+    axes: Annotated[tuple[records.Direction, ...], Field(strict=False, min_length=1, max_length=2)]
+    disk_offset: records.Length
     limit: Limit | None = None
-    hole_radius: Length | None = None
-    disk_radius: Length | None = None
+    hole_radius: records.Length | None = None
+    disk_radius: records.Length | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         lengths = [math.hypot(*axis) for axis in self.axes]
-        faults = [
-            f"axes[{i + 1}]: {axis} has no usable length; give a direction"
-            for i, (axis, length) in enumerate(zip(self.axes, lengths, strict=True))
-            if not 1e-6 < length < 1e6
-        ]
-        if not faults and len(self.axes) == 2:
-            sine = math.hypot(*np.cross(*self.axes)) / (lengths[0] * lengths[1])
-            if sine < 1e-6:
-                faults.append(f"axes: the two axes {self.axes} are parallel; one would do")
-        if faults:
-            raise CrossFaults(faults)
+        if 0.0 in lengths:
+            fault = f"axes[{lengths.index(0.0) + 1}]: has no length; give a direction"
+            raise records.CrossFaults([fault])
+        units = np.array(self.axes) / np.array(lengths)[:, None]
+        if len(units) == 2 and np.linalg.norm(np.cross(*units)) < 1e-6:
+            raise records.CrossFaults([f"axes: {self.axes} are parallel; one would do"])
         return self
 
 
-@record
+@records.record
 class Link:
     """One link: from its joint centre to the next joint centre, or to the tip.
 
@@ -90,16 +56,13 @@ class Link:
         length: Length [m].
         mass: Mass [kg] of a solid cylinder with the hole radius of its first disk, centred at
             mid-link.
-
-    Raises:
-        GeometryError: Some attributes are invalid; lists every fault.
     """
 
-    length: Length
-    mass: Mass
+    length: records.Length
+    mass: records.Mass
 
 
-@record
+@records.record
 class CableRoute:
     """Path of one cable: a hole at the same angle on every disk, from the base to its last disk.
 
@@ -112,27 +75,20 @@ class CableRoute:
             a lead, the actuator is at the base disk, and there is no friction there.
         radius: Distance of its holes from the arm's axis on every disk [m], e.g. of an inner ring;
             None: the hole radius of each disk.
-
-    Raises:
-        GeometryError: Some attributes are invalid; lists every fault.
     """
 
-    joint: Annotated[Integer, Field(ge=1)]
-    angle: Number
-    lead: LengthOrZero = 0.0
-    friction: Friction = 0.0
-    radius: Length | None = None
+    joint: Annotated[records.Integer, Field(ge=1)]
+    angle: records.Number
+    lead: records.LengthOrZero = 0.0
+    friction: records.Friction = 0.0
+    radius: records.Length | None = None
 
 
 class Disk(NamedTuple):
     """One disk of an arm.
 
-    Attributes:
-        link: Name in the URDF of the link that carries it.
-        x: Position along x of the link [m].
-        joint: Number of the joint next to the disk, from 1.
-        hole_radius: R: distance of its holes from the axis [m].
-        radius: Outer radius [m].
+    ``link`` is the link in the URDF that carries it at ``x`` [m] along the link, ``joint`` the
+    number of the joint next to it, ``hole_radius`` the R [m], ``radius`` the outer radius [m].
     """
 
     link: str
@@ -143,9 +99,9 @@ class Disk(NamedTuple):
 
     def radius_of(self, route: CableRoute) -> float:
         """Return the distance of the hole of a cable ``route`` from the axis of the disk [m]."""
-        return self.hole_radius if route.radius is None else route.radius
+        return route.radius or self.hole_radius
 
     def hole(self, route: CableRoute) -> tuple[float, float, float]:
         """Return the position (x, R cos φ, R sin φ) [m] of a cable's hole, in the link's frame."""
-        radius = self.radius_of(route)
-        return self.x, radius * math.cos(route.angle), radius * math.sin(route.angle)
+        R = self.radius_of(route)
+        return self.x, R * math.cos(route.angle), R * math.sin(route.angle)

@@ -1,122 +1,174 @@
-"""Build joints, links and cables of arms whose joints are alike.
-
-A size of these arms is one number for all joints, or a list with one for each joint.
-"""
+"""Arms whose joints are alike: one record of their sizes, and the angles of their holes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, Any, Self
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from cdsm.errors import GeometryError
-from cdsm.geometry.holes import spread_out
-from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Link
-from cdsm.support.records import EACH, ONE, Integer, Number, one_or_each
-
-JointCount = Annotated[Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
-
-_MOST_CABLES = 64
-
-CablesPerJoint = Annotated[Integer, Field(ge=1, le=_MOST_CABLES)]
-
-_Angles = Annotated[Sequence[Number], Field(max_length=_MOST_CABLES)]
+from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Limit, Link
+from cdsm.support import records
+from cdsm.support.records import EACH, ONE, PerJoint
 
 
-def _of_all_or_each(value: object) -> str:
-    first = next(iter(value), None) if isinstance(value, (list, tuple)) else value
-    return one_or_each(first)
+def _in_radians(value: float) -> float:
+    if abs(value) > 2.0 * math.pi:
+        raise ValueError(f"{value:g} rad given; at most one turn; convert degrees to radians")
+    return value
 
 
-HoleAngles = Annotated[
+def _one_or_each_list(value: object) -> str:
+    return records.one_or_each(value[0]) if isinstance(value, (list, tuple)) and value else ONE
+
+
+Turn = Annotated[records.Number, AfterValidator(_in_radians)]
+_Angles = Annotated[Sequence[records.Number], Field(min_length=1, max_length=64)]
+_HoleAngles = Annotated[
     Annotated[_Angles, Tag(ONE)] | Annotated[Sequence[_Angles], Tag(EACH)],
-    Discriminator(_of_all_or_each),
+    Discriminator(_one_or_each_list),
 ]
-"""Hole angles [rad]: one list for all joints, or a list of lists, one per joint."""
-
-
-_SIZES = (
-    *("link_length", "disk_offset", "hole_radius", "link_mass", "lead", "friction"),
-    *("joint_limit", "disk_radius", "cable_radius", "phase"),
+_OF_JOINTS = (
+    *("disk_offset", "hole_radius", "disk_radius", "joint_limit", "link_length", "link_mass"),
+    *("lead", "friction", "cable_radius", "phase"),
 )
-"""Keywords whose value is one number for all joints, or a list with one per joint."""
 
 
-def uniform(
-    axes: Sequence[tuple[tuple[float, float, float], ...]],
-    usual_angles: Callable[[int], list[list[float]]],
-    keywords: Mapping[str, Any],
-) -> dict[str, Any]:
-    """Return the attributes of a Geometry of universal joints or hinges, by name.
+@records.record
+class Universal:
+    """Build an arm of n universal joints with m cables each.
 
-    ``axes`` has the axes of each joint. ``keywords`` are the arguments of
-    :meth:`Geometry.universal` by name. ``usual_angles`` maps the number of cables per joint to the
-    default hole angles [rad], a list for each joint. Raises GeometryError if an argument is
-    invalid.
+    Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m) + phase_k, or at
+    φ = hole_angles[k][j] + phase_k. If ``hole_angles`` and ``phase`` are not given, all holes of
+    the base disk are evenly spaced. A size is one number for all joints, or a list with one for
+    each joint, base to tip. Errors and warnings are those of :class:`Geometry`.
+
+    Args:
+        joints: n, 1 to 100.
+        cables_per_joint: m; not needed with ``hole_angles``.
+        link_length: Length of every link [m], more than two ``disk_offset``.
+        base_length: L_0: distance from the base frame to joint 1 [m].
+        disk_offset: h: distance from each joint centre to the disk on each side [m].
+        hole_radius: R: distance of the holes from the axis, on both disks of a joint [m].
+        link_mass: Mass of every link [kg].
+        lead: Straight cable between each actuator and the base disk [m].
+        friction: Friction coefficient μ of the cables [-], as in :class:`CableRoute`.
+        joint_limit: Largest angle about each axis [rad], as ``limit`` of :class:`Joint`.
+        disk_radius: Outer radius of the disks [m], as in :class:`Joint`.
+        cable_radius: As ``radius`` of :class:`CableRoute`, for the cables of each joint [m].
+        hole_angles: φ of the cables of a joint [rad]: one list for all joints, or one for each.
+        phase: Added to φ of the cables of each joint [rad].
+        spread: Angle [rad] between the holes of g cables whose angles φ are equal: the hole of
+            cable i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: not turned.
+        name: Name of the robot.
     """
-    cables_per_joint, hole_angles = keywords["cables_per_joint"], keywords["hole_angles"]
-    sizes = {key: keywords[key] for key in _SIZES}
-    n = len(axes)
-    faults = [
-        f"{key}: {len(value)} values given for {n} joints; give one, or one for each joint"
-        for key, value in sizes.items()
-        if isinstance(value, Sequence) and len(value) != n
-    ]
-    if (cables_per_joint is None) == (hole_angles is None):
-        given = "is missing" if hole_angles is None else "is given beside hole_angles"
-        faults.append(f"cables_per_joint: {given}; give cables_per_joint or hole_angles")
-    elif hole_angles is not None and (empty := _without_angles(hole_angles)):
-        faults.append(
-            f"{empty}: has no angle; give one for each cable of a joint, at least one. Cables with "
-            "other paths replace these: give them in a file of cables (--cables CABLES.toml)"
-        )
-    elif hole_angles is not None and isinstance(hole_angles[0], Sequence) and len(hole_angles) != n:
-        faults.append(
-            f"hole_angles: {len(hole_angles)} lists given for {n} joints; give one list of angles, "
-            "or one for each joint"
-        )
-    if faults:
-        raise GeometryError(faults)
-    if hole_angles is None:
-        angles: Sequence[Sequence[float]] = usual_angles(cables_per_joint or 0)
-    else:
-        angles = hole_angles if isinstance(hole_angles[0], Sequence) else (hole_angles,) * n
-    rows = [value if isinstance(value, Sequence) else (value,) * n for value in sizes.values()]
-    each = [dict(zip(_SIZES, row, strict=True)) for row in zip(*rows, strict=True)]
-    hole_radius = each[0]["hole_radius"]
-    joints, links = [], []
-    cables: list[CableRoute] = []
-    for k, size in enumerate(each):
-        R, phase = size["hole_radius"], size["phase"]
-        joints.append(
-            Joint(
-                axes=axes[k],
-                disk_offset=size["disk_offset"],
-                limit=size["joint_limit"],
-                hole_radius=None if hole_radius == R else R,
-                disk_radius=size["disk_radius"],
-            )
-        )
-        links.append(Link(length=size["link_length"], mass=size["link_mass"]))
-        kept = {"lead": size["lead"], "friction": size["friction"], "radius": size["cable_radius"]}
-        cables += [
-            CableRoute(joint=k + 1, angle=angle + phase if phase else angle, **kept)
-            for angle in angles[k]
+
+    joints: Annotated[records.Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
+    cables_per_joint: Annotated[records.Integer, Field(ge=1, le=64)] | None = None
+    link_length: PerJoint[records.Length]
+    base_length: records.LengthOrZero
+    disk_offset: PerJoint[records.Length]
+    hole_radius: PerJoint[records.Length]
+    link_mass: PerJoint[records.Mass]
+    lead: PerJoint[records.LengthOrZero] = 0.0
+    friction: PerJoint[records.Friction] = 0.0
+    joint_limit: PerJoint[Limit] | None = None
+    disk_radius: PerJoint[records.Length] | None = None
+    cable_radius: PerJoint[records.Length] | None = None
+    hole_angles: _HoleAngles | None = None
+    phase: PerJoint[records.Number] = 0.0
+    spread: Turn = 0.0
+    name: records.Name = "arm"
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        n, angles, count = self.joints, self.hole_angles, self.cables_per_joint
+        faults = [
+            f"{key}: {len(value)} values given for {n} joints; give one, or one for each"
+            for key, value in vars(self).items()
+            if isinstance(value, (list, tuple)) and len(value) != n
+            if key != "hole_angles" or isinstance(value[0], Sequence)
         ]
-    return {
-        "name": keywords["name"],
-        "base_length": keywords["base_length"],
-        "hole_radius": hole_radius,
-        "joints": tuple(joints),
-        "links": tuple(links),
-        "cables": spread_out(cables, keywords["spread"]),
-    }
+        if (angles is None) == (count is None) and (count or type(self) is Universal):
+            faults.append("cables_per_joint: give it, or hole_angles, and not both")
+        if faults:
+            raise records.CrossFaults(faults)
+        return self
+
+    def _axes_and_angles(self) -> tuple[list[Any], list[list[float]]]:
+        axes = [((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))] * self.joints
+        return axes, evenly_spaced(self.joints, self.cables_per_joint or 1)
 
 
-def _without_angles(hole_angles: Sequence[float | Sequence[float]]) -> str:
-    """Return a text that names empty lists of hole angles; an empty text if there are none."""
-    lists = [each for each in hole_angles if isinstance(each, Sequence)]
-    if not hole_angles or (lists and not any(lists)):
-        return "hole_angles"
-    return ", ".join(f"hole_angles[{k}]" for k, each in enumerate(lists, start=1) if not each)
+@records.record
+class Hinged(Universal):
+    """Build an arm of n hinges; ``twist`` [rad] turns each axis about x from the previous one.
+
+    Hinge k has the axis cos ψ_k y + sin ψ_k z with ψ_k = (k−1)·twist. The link frames are not
+    twisted. Cable j = 0…m−1 of hinge k has its holes at φ = ψ_k + 90° + 2πj/m + phase_k: by default
+    (m = 2) an antagonistic pair at ψ_k ± 90°. Cables of parallel hinges share holes; ``spread``
+    separates them. All other arguments are those of :meth:`Geometry.universal`.
+    """
+
+    twist: Turn
+
+    def _axes_and_angles(self) -> tuple[list[Any], list[list[float]]]:
+        rolls = [k * self.twist for k in range(self.joints)]
+        axes = [((0.0, math.cos(roll), math.sin(roll)),) for roll in rolls]
+        return axes, hinge_hole_angles(rolls, self.cables_per_joint or 2)
+
+
+def fields_of(sizes: Universal) -> dict[str, Any]:
+    """Return the fields of the :class:`~cdsm.Geometry` of such sizes by name."""
+    n, (axes, usual), own = sizes.joints, sizes._axes_and_angles(), sizes.hole_angles
+    given: Sequence[Any] = own or usual
+    angles = given if isinstance(given[0], Sequence) else [given] * n
+    values = [getattr(sizes, key) for key in _OF_JOINTS]
+    each = [value if isinstance(value, Sequence) else [value] * n for value in values]
+    joints, links, cables, common = [], [], [], each[1][0]
+    rows = zip(axes, angles, *each, strict=True)
+    for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase in rows:
+        R = None if common == R else R
+        joints += [Joint(axes=axis, disk_offset=h, limit=top, hole_radius=R, disk_radius=r)]
+        links += [Link(length=length, mass=mass)]
+        kept = {"joint": len(joints), "lead": lead, "friction": mu, "radius": ring}
+        cables += [CableRoute(angle=phi + phase, **kept) for phi in phis]
+    whole = {"name": sizes.name, "base_length": sizes.base_length, "hole_radius": common}
+    parts = {"joints": joints, "links": links, "cables": spread_out(cables, sizes.spread)}
+    return whole | parts
+
+
+def evenly_spaced(joints: int, cables: int) -> list[list[float]]:
+    """Return φ = 2π((k−1) + n j)/(n m) [rad] of cables j = 0…m−1 of each of n ``joints`` k."""
+    n, m = joints, cables
+    return [[2.0 * math.pi * (k + n * j) / (n * m) for j in range(m)] for k in range(n)]
+
+
+def hinge_hole_angles(rolls: Sequence[float], cables: int) -> list[list[float]]:
+    """Return φ = ψ + 90° + 2πj/m [rad] of cables j = 0…m−1 of each hinge; ``rolls``: ψ [rad]."""
+    turns = [2.0 * math.pi * j / cables for j in range(cables)]
+    return [[roll + math.pi / 2 + turn for turn in turns] for roll in rolls]
+
+
+_STEPS = 14_515_200  # of a turn, to compare angles; whole degrees and 2π/n are within a step
+
+
+def same_angle(cables: Sequence[CableRoute]) -> list[list[int]]:
+    """Return groups of cables with the same hole angle, each as two or more ascending indices."""
+    groups = defaultdict(list)
+    for c, cable in enumerate(cables):
+        groups[round(cable.angle / (2.0 * math.pi) * _STEPS) % _STEPS].append(c)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def spread_out(cables: Sequence[CableRoute], spread: float) -> tuple[CableRoute, ...]:
+    """Return the cables, with an angle ``spread`` [rad] between those of equal hole angles."""
+    moved = list(cables)
+    for group in same_angle(cables) if spread else ():
+        for i, c in enumerate(group):
+            turn = (i - (len(group) - 1) / 2.0) * spread
+            moved[c] = replace(cables[c], angle=cables[c].angle + turn)
+    return tuple(moved)

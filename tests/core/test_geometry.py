@@ -23,6 +23,7 @@ SIZES: dict[str, Any] = {
     "link_mass": 0.5,
 }
 UNIVERSAL: dict[str, Any] = {"joints": 5, "cables_per_joint": 3, **SIZES}
+ANGLES: dict[str, Any] = {"cables_per_joint": None}
 HINGED: dict[str, Any] = {"joints": 3, "twist": math.radians(30.0), **SIZES}
 
 
@@ -215,123 +216,93 @@ def test_integers_stand_for_lengths_in_toml() -> None:
 
 # --- faults ---------------------------------------------------------------------------------
 
-# what is replaced in a universal arm, and what the message must say: key, value, what is allowed
-FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
-    "hole radius zero": ({"hole_radius": 0.0}, ["hole_radius", "0 m given", "1e-06 to 10000 m"]),
-    "hole radius negative": (
-        {"hole_radius": -0.03},
-        ["hole_radius", "-0.03 m given", "1e-06 to"],
-    ),
-    "zero-length link": ({"link_length": 0.0}, ["link_length", "0 m given", "1e-06 to 10000 m"]),
-    "negative mass": ({"link_mass": -0.5}, ["link_mass", "-0.5 kg given", "0, or 1e-09 to"]),
-    "negative lead": ({"lead": -1.0}, ["lead", "-1 m given", "0, or 1e-06 to 10000 m"]),
-    "negative base": ({"base_length": -1.0}, ["base_length", "-1 m given", "0, or 1e-06 to"]),
-    "no disk offset": ({"disk_offset": 0.0}, ["disk_offset", "0 m given", "1e-06 to 10000 m"]),
-    "101 joints": ({"joints": 101}, ["joints", "less than or equal to 100", "101"]),
-    "no joints": ({"joints": 0}, ["joints", "greater than or equal to 1", "0"]),
-    "no cables": ({"cables_per_joint": 0}, ["cables_per_joint", "greater than or equal to 1"]),
-    "65 cables": ({"cables_per_joint": 65}, ["cables_per_joint", "less than or equal to 64"]),
-    "friction negative": ({"friction": -0.1}, ["friction", "-0.1 given", "0, or 1e-06 to 2 is"]),
-    "friction above 2": ({"friction": 2.5}, ["friction", "2.5 given", "0, or 1e-06 to 2 is"]),
-    "friction NaN": ({"friction": math.nan}, ["friction", "finite", "nan"]),
-    "friction per joint": ({"friction": [0.1, 0.2]}, ["friction: 2 values given for 5"]),
-    "NaN": ({"link_length": math.nan}, ["link_length", "finite", "nan"]),
-    "infinite": ({"link_mass": math.inf}, ["link_mass", "finite", "inf"]),
-    "text for a number": ({"link_length": "0.04"}, ["link_length", "valid number", "'0.04'"]),
-    "bool for a number": ({"link_mass": True}, ["link_mass", "valid number", "True"]),
-    "fraction for a count": ({"joints": 2.5}, ["joints", "valid integer", "2.5"]),
-    "list for a number": ({"base_length": [1.0]}, ["base_length", "valid number", "[1.0]"]),
-    "no number": ({"base_length": None}, ["base_length", "valid number", "None"]),
-    "limit zero": ({"joint_limit": 0.0}, ["joint_limit", "greater than 0", "0.0"]),
-    "limit above pi": ({"joint_limit": 4.0}, ["joint_limit", "less than or equal to 3.14", "4.0"]),
-    "bad name": ({"name": "my arm"}, ["name", "letter first", "'my arm'"]),
-    "number for a name": ({"name": 3}, ["name", "valid string", "3"]),
-    "overlapping disks": (
-        {"link_length": 0.019},
-        ["disk_offset: too large", "0.019 m", "0.02 m; and 3 more; lower disk_offset"],
-    ),
-    "touching disks": (
-        {"link_length": 0.02},
-        ["disk_offset: too large: link 1", "more than 0.02 m"],
-    ),
-    "last disk beyond the tip": (
-        {"joints": 1, "link_length": 0.01},
-        ["disk_offset: too large: link 1", "its disk needs more than 0.01 m"],
-    ),
-}
 
-
-@pytest.mark.parametrize("case", FAULTS)
-def test_fault_names_key_value_and_what_is_allowed(case: str) -> None:
-    changes, expected = FAULTS[case]
+def raises(said: str, make: Any, *args: Any, **keywords: Any) -> None:
     with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.universal(**{**UNIVERSAL, **changes})
-    for part in expected:
-        assert part in str(caught.value)
-    assert caught.value.__context__ is None  # a cluster pickles it too; pydantic's error cannot be
-
-
-GENERAL_FAULTS: dict[str, tuple[dict[str, Any], list[str]]] = {
-    "cable past the last link": (
-        {"cables": (cdsm.CableRoute(joint=3, angle=0.0),)},
-        ["cables[1].joint", "3 is past the last joint", "give 1 to 2"],
-    ),
-    "links for joints": (
-        {"links": (cdsm.Link(length=0.04, mass=0.5),)},
-        ["links: 1 given for 2 joints"],
-    ),
-    "101 joints": (
-        {"joints": (cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01),) * 101},
-        ["joints", "100", "101"],
-    ),
-    "no joints": ({"joints": (), "links": ()}, ["joints", "at least 1"]),
-    "no cables": ({"cables": ()}, ["cables", "at least 1"]),
-    "not a joint": ({"joints": (1, 2)}, ["joints[1]", "joints[2]", "Joint"]),
-    "not a list": ({"links": 3}, ["links", "3"]),
-    "unknown key": ({"hole_radious": 0.1}, ["hole_radious", "did you mean hole_radius?"]),
-    "second link too short": (
-        {"links": (cdsm.Link(length=0.04, mass=0.5), cdsm.Link(length=0.005, mass=0.0))},
-        ["link 2 is 0.005 m long, its disk needs more than 0.005 m"],
-    ),
-}
-
-
-@pytest.mark.parametrize("case", GENERAL_FAULTS)
-def test_general_constructor_names_the_fault(case: str) -> None:
-    changes, expected = GENERAL_FAULTS[case]
-    with pytest.raises(cdsm.GeometryError) as caught:
-        general(**changes)
-    for part in expected:
-        assert part in str(caught.value)
+        make(*args, **keywords)
+    assert said in str(caught.value)
+    # a cluster pickles the context too, which pydantic's error cannot be
+    assert isinstance(caught.value.__context__, cdsm.GeometryError | None)
 
 
 @pytest.mark.parametrize(
-    ("axes", "expected"),
+    ("changes", "said"),
     [
-        (((0.0, 0.0, 0.0),), "axes[1]: (0.0, 0.0, 0.0) has no usable length"),
-        (((0.0, 0.0, 1.0), (0.0, 0.0, -2.0)), "parallel"),
+        ({"hole_radius": 0.0}, "hole_radius: 0 m given; 1e-06 to 10000 m is needed"),
+        ({"link_length": -0.04}, "link_length: -0.04 m given"),
+        ({"link_mass": -0.5}, "link_mass: -0.5 kg given; 0, or 1e-09 to"),
+        ({"friction": 2.5}, "friction: 2.5 given; 0, or 1e-06 to 2 is needed"),
+        ({"link_length": math.nan}, "link_length: input should be a finite number, but is nan"),
+        ({"link_length": "0.04"}, "link_length: input should be a valid number, but is '0.04'"),
+        ({"link_mass": True}, "link_mass: input should be a valid number, but is True"),
+        ({"base_length": [1.0]}, "base_length: input should be a valid number, but is [1.0]"),
+        ({"joints": 101}, "joints: input should be less than or equal to 100, but is 101"),
+        ({"joints": 2.5}, "joints: input should be a valid integer, but is 2.5"),
+        ({"cables_per_joint": 65}, "cables_per_joint: input should be less than or equal to 64"),
+        ({"joint_limit": 4.0}, "joint_limit: input should be less than or equal to 3.14"),
+        ({"spread": 15.0}, "spread: 15 rad given; at most one turn; convert degrees to radians"),
+        ({"name": "my arm"}, "name: 'my arm' given; up to 64 of"),
+        ({"hole_radious": 0.03}, "hole_radious: is not a key that is known here; did you mean"),
+        ({"link_length": 0.019}, "disk_offset: too large: link 1 is 0.019 m long, its disks need"),
+        ({"link_length": 0.02}, "more than 0.02 m; and 3 links more; lower disk_offset"),
+        ({"joints": 1, "link_length": 0.01}, "link 1 is 0.01 m long, its disks need more than"),
+        ({"hole_radius": [0.02, 0.01]}, "hole_radius: 2 values given for 5 joints; give one"),
+        ({"hole_radius": []}, "hole_radius: 0 values given for 5 joints"),
+        ({"link_mass": [0.1, 0.1, -0.1, 0.1, 0.1]}, "link_mass[3]: -0.1 kg given"),
+        ({"phase": [0.1, "b", 0.1, 0.1, 0.1]}, "phase[2]: input should be a valid number"),
+        ({"cables_per_joint": None}, "cables_per_joint: give it, or hole_angles, and not both"),
+        ({"hole_angles": [0.1]}, "cables_per_joint: give it, or hole_angles, and not both"),
+        ({**ANGLES, "hole_angles": [[0.1], [0.2]]}, "hole_angles: 2 values given for 5 joints"),
+        ({**ANGLES, "hole_angles": [[0.1], 0.2]}, "hole_angles[2]: input should be"),
+        ({**ANGLES, "hole_angles": [[0.1], []]}, "hole_angles[2]: value should have at least 1"),
+        ({**ANGLES, "hole_angles": []}, "hole_angles: value should have at least 1 item"),
+        ({**ANGLES, "hole_angles": 0.5}, "hole_angles: input should be"),
+        ({"disk_radius": 0.03}, "disk_radius: too small: at joint 1 it is 0.03 m"),
+        ({"cable_radius": 0.04, "disk_radius": 0.035}, "the farthest hole is at 0.04 m"),
+    ],
+)
+def test_faults_of_uniform_arms_are_named(changes: dict[str, Any], said: str) -> None:
+    raises(said, cdsm.Geometry.universal, **{**UNIVERSAL, **changes})
+
+
+ONE = cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"cables": (cdsm.CableRoute(joint=3, angle=0.0),)}, "cables[1].joint: 3 is past the last"),
+        ({"links": (cdsm.Link(length=0.04, mass=0.5),)}, "links: 1 given for 2 joints"),
+        ({"joints": (ONE,) * 101}, "joints: tuple should have at most 100 items"),
+        ({"joints": (), "links": ()}, "joints: tuple should have at least 1 item"),
+        ({"joints": (1, 2)}, "joints[2]: input should be"),
+        ({"links": 3}, "links: input should be a valid tuple, but is 3"),
+    ],
+)
+def test_faults_of_the_general_constructor_are_named(changes: dict[str, Any], said: str) -> None:
+    raises(said, general, **changes)
+
+
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        (((0.0, 1.0, 0.0), (0.0, 0.0, 0.0)), "axes[2]: has no length; give a direction"),
+        (((0.0, 0.0, 1.0), (0.0, 0.0, -2.0)), "are parallel"),
         (((0.0, 1.0),), "axes[1][3]"),
         (((0.0, math.nan, 1.0),), "axes[1][2]"),
         (((0.0, 0.0, 1.0),) * 3, "at most 2"),
         ((), "at least 1"),
     ],
 )
-def test_joint_axes_must_be_one_or_two_independent_directions(axes: Any, expected: str) -> None:
-    with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Joint(axes=axes, disk_offset=0.01)
-    assert expected in str(caught.value)
+def test_joint_axes_must_be_one_or_two_independent_directions(axes: Any, said: str) -> None:
+    raises(said, cdsm.Joint, axes=axes, disk_offset=0.01)
 
 
-def test_every_fault_is_listed_at_once() -> None:
+def test_all_faults_are_listed_at_once() -> None:
     faulty = {"joints": 101, "link_length": 0, "hole_radius": -1, "link_mass": -1, "lead": math.nan}
-    with pytest.raises(cdsm.GeometryError) as caught:
+    with pytest.raises(cdsm.GeometryError, match="5 faults") as caught:
         cdsm.Geometry.universal(**{**UNIVERSAL, **faulty})
     assert [fault.split(":")[0] for fault in caught.value.faults] == list(faulty)
-    assert len(caught.value.faults) == 5
-    assert all(fault in str(caught.value) for fault in caught.value.faults)
-
-
-def test_faults_between_fields_are_listed_together() -> None:
     with pytest.raises(cdsm.GeometryError) as caught:
         general(
             links=(cdsm.Link(length=0.001, mass=0.5), cdsm.Link(length=0.002, mass=0.0)),
@@ -341,154 +312,64 @@ def test_faults_between_fields_are_listed_together() -> None:
     assert starts == ["disk_offset", "cables[2].joint"]
 
 
+def test_values_without_keywords_are_told_to_have_them() -> None:
+    raises(
+        "write joints=8, cables_per_joint=3, link_length=0.06", cdsm.Geometry.universal, 8, 3, 0.06
+    )
+    raises("write joint=8, angle=3, lead=0.06", cdsm.CableRoute, 8, 3, 0.06)
+
+
 # what is replaced in a TOML text, and what the message must say
-TOML_FAULTS: dict[str, tuple[str, str, list[str]]] = {
-    "unknown key": ("hole_radius", "hole_radious", ["hole_radious", "did you mean hole_radius?"]),
-    "unknown key far off": ("hole_radius", "zzz", ["zzz: is not a key", "hole_radius: is missing"]),
-    "NaN": ("base_length = 0.02", "base_length = nan", ["base_length", "finite", "nan"]),
-    "overflow": ("base_length = 0.02", "base_length = 1e999", ["base_length", "finite", "inf"]),
-    "text": ("base_length = 0.02", 'base_length = "x"', ["base_length", "valid number", "'x'"]),
-    "date": ("base_length = 0.02", "base_length = 1979-05-27", ["base_length", "number"]),
-    "bool": ("base_length = 0.02", "base_length = true", ["base_length", "number", "True"]),
-    "two numbers": ("[[0.0, 0.0, 1.0]]", "[[0.0, 0.0]]", ["joints[2].axes[1][3]", "missing"]),
-    "parallel": (
-        "[[0.0, 0.0, 1.0]]",
-        "[[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]",
-        ["joints[2].axes", "parallel"],
-    ),
-    "past the last joint": ("joint = 2", "joint = 7", ["cables[1].joint", "7", "1 to 2"]),
-    "fraction": ("joint = 2", "joint = 2.5", ["cables[1].joint", "integer", "2.5"]),
-    "huge integer": ("joint = 2", f"joint = 1{'0' * 40}", ["cables[1].joint", "1 to 2"]),
-}
-
-
-@pytest.mark.parametrize("case", TOML_FAULTS)
-def test_toml_fault_names_key_value_and_what_is_allowed(case: str) -> None:
-    old, new, expected = TOML_FAULTS[case]
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("hole_radius", "hole_radious", "hole_radious: is not a key that is known here; did you"),
+        ("hole_radius", "zzz", "hole_radius: is missing"),
+        ("angle = 0.1", "angel = 0.1", "cables[1].angel: is not a key"),
+        ("base_length = 0.02", "base_length = 1e999", "base_length: input should be a finite"),
+        ("base_length = 0.02", "base_length = 1979-05-27", "base_length: input should be a valid"),
+        ("[[0.0, 0.0, 1.0]]", "[[0.0, 0.0]]", "joints[2].axes[1][3]: is missing"),
+        ("[[0.0, 0.0, 1.0]]", "[[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]", "joints[2].axes: "),
+        ("joint = 2", "joint = 7", "cables[1].joint: 7 is past the last joint, 2; give 1 to 2"),
+        ("joint = 2", f"joint = 1{'0' * 40}", "give 1 to 2"),
+        ("name =", "b = = 3\nname =", "is not TOML: "),
+    ],
+)
+def test_faults_of_toml_are_named(old: str, new: str, said: str) -> None:
     text = general().to_toml()
     assert old in text
-    with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.from_toml(text.replace(old, new, 1))
-    for part in expected:
-        assert part in str(caught.value)
-
-
-def test_unknown_key_inside_a_table_has_a_near_match() -> None:
-    text = general().to_toml().replace("angle = 0.1", "angel = 0.1")
-    with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.from_toml(text)
-    assert "cables[1].angel" in str(caught.value)
-    assert "did you mean angle?" in str(caught.value)
-
-
-def test_unknown_key_in_the_short_form_has_a_near_match() -> None:
-    lines = ["[universal]", *(f"{key} = {value!r}" for key, value in UNIVERSAL.items())]
-    with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.from_toml("\n".join(lines).replace("link_length", "link_lenght"))
-    assert "link_lenght" in str(caught.value)
-    assert "did you mean link_length?" in str(caught.value)
+    raises(said, cdsm.Geometry.from_toml, text.replace(old, new, 1))
 
 
 NOT_A_GEOMETRY = {
-    "empty": "",
-    "not TOML": "joints = [[",
-    "twice the same key": "name = 'a'\nname = 'b'",
-    "NUL": 'name = "a\x00"',
-    "nested 100 000 deep": "a = " + "[" * 100_000,
-    "nested 100 000 deep, closed": "a = " + "[" * 100_000 + "]" * 100_000,
-    "nested 300 deep": "joints = " + "[" * 300 + "]" * 300,
-    "nested tables": "\n".join(f"[{'.'.join(['a'] * n)}]" for n in range(1, 400)),
-    "short form that is no table": "universal = 3",
-    "outside the table": 'name = "a"\n[universal]\njoints = 3\n',
-    "a file of cables": '[[cables]]\nname = "a"\n',
-    "two short forms": "[universal]\n[hinged]\n",
-    "short form empty": "[hinged]",
-    "joints a number": "joints = 3",
-    "joints a table": "[joints]\na = 1",
+    "": "holds nothing; give [universal], ",
+    "joints = [[": "is not TOML",
+    "name = 'a'\nname = 'b'": "is not TOML",
+    "a = " + "[" * 100_000: "is not TOML",
+    "joints = " + "[" * 300 + "]" * 300: "",
+    "\n".join(f"[{'.'.join(['a'] * n)}]" for n in range(1, 400)): "",
+    "universal = 3": "universal: is 3; give a table [universal]",
+    'name = "a"\n[universal]\njoints = 3\n': "name: stands outside [universal]",
+    '[[cables]]\nname = "a"\n': "holds cables; give [universal], ",
+    "[universal]\n[hinged]\n": "stands outside [universal]",
+    "[hinged]": "joints: is missing",
+    "[joints]\na = 1": "joints: input should be",
 }
 
 
-@pytest.mark.parametrize("case", NOT_A_GEOMETRY)
-def test_text_that_is_no_geometry_is_a_geometry_error(case: str) -> None:
+@pytest.mark.parametrize("text", NOT_A_GEOMETRY)
+def test_text_that_is_no_geometry_is_a_geometry_error(text: str) -> None:
     with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.from_toml(NOT_A_GEOMETRY[case], source="arm.toml")
+        cdsm.Geometry.from_toml(text, source="arm.toml")
     assert str(caught.value).startswith("arm.toml: ")
-    assert caught.value.source == "arm.toml"
+    assert NOT_A_GEOMETRY[text] in str(caught.value)
     assert len(str(caught.value)) < 2000
-
-
-def test_what_is_no_geometry_says_what_to_do() -> None:
-    for case, said in (
-        ("outside the table", r"name: stands outside \[universal\].*move it in"),
-        ("a file of cables", "holds cables but no joints"),
-    ):
-        with pytest.raises(cdsm.GeometryError, match=said):
-            cdsm.Geometry.from_toml(NOT_A_GEOMETRY[case])
-
-
-def test_broken_toml_says_where() -> None:
-    with pytest.raises(cdsm.GeometryError, match=r"not TOML.*line 2"):
-        cdsm.Geometry.from_toml("name = 'a'\nb = = 3\n")
 
 
 @pytest.mark.parametrize("text", [3, None, b"name = 'a'"])
 def test_from_toml_refuses_what_is_not_text(text: Any) -> None:
-    with pytest.raises(cdsm.CdsmError):
+    with pytest.raises(cdsm.InvalidInput):
         cdsm.Geometry.from_toml(text)
-
-
-# --- files ----------------------------------------------------------------------------------
-
-
-def test_missing_file_says_where_it_was_looked_for(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match="does not exist") as caught:
-        cdsm.Geometry.read(tmp_path / "arm.toml")
-    assert caught.value.path == str(tmp_path / "arm.toml")
-    assert str(Path.cwd()) in str(caught.value)
-
-
-def test_folder_is_not_read(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match="directory"):
-        cdsm.Geometry.read(tmp_path)
-
-
-def test_file_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "arm.toml"
-    path.write_bytes(b"name = '\xff'")
-    with pytest.raises(cdsm.FileError, match=r"not UTF-8 text \(byte 8\)"):
-        cdsm.Geometry.read(path)
-    path.write_text("name = 'arm'", encoding="utf-16")
-    with pytest.raises(cdsm.FileError, match=r"not UTF-8 text \(byte 0\); save it as UTF-8"):
-        cdsm.Geometry.read(path)
-
-
-def test_picture_is_refused_as_binary(tmp_path: Path) -> None:
-    path = tmp_path / "arm.png"
-    path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
-    with pytest.raises(cdsm.FileError, match="is a binary file; a text file is needed"):
-        cdsm.Manipulator.read(path)
-
-
-def test_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "arm.toml"
-    with path.open("wb") as file:
-        file.truncate(MAXIMUM_BYTES + 1)
-    with pytest.raises(cdsm.FileError, match=f"larger than the {MAXIMUM_BYTES} bytes"):
-        cdsm.Geometry.read(path)
-
-
-@pytest.mark.parametrize("path", ["a\0b", "x" * 5000, ""])
-def test_path_that_cannot_be_is_a_file_error(path: str) -> None:
-    with pytest.raises(cdsm.FileError):
-        cdsm.Geometry.read(path)
-
-
-@pytest.mark.parametrize("path", [3, None, 2.5])
-def test_path_of_the_wrong_type_is_a_cdsm_error(path: Any) -> None:
-    with pytest.raises(cdsm.CdsmError):
-        cdsm.Geometry.read(path)
-    with pytest.raises(cdsm.CdsmError):
-        general().write(path)
 
 
 def test_faults_of_a_file_name_the_file(tmp_path: Path) -> None:
@@ -501,14 +382,41 @@ def test_faults_of_a_file_name_the_file(tmp_path: Path) -> None:
     assert len(caught.value.faults) == 6
 
 
-def test_writing_into_a_missing_folder_says_so(tmp_path: Path) -> None:
-    folder = tmp_path / "nowhere"
+# --- files ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, r"does not exist.*looked in"),
+        (b"name = '\xff'", r"not UTF-8 text \(byte 8\)"),
+        ("name = 'arm'".encode("utf-16"), r"not UTF-8 text \(byte 0\); save it as UTF-8"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "is a binary file; a text file is needed"),
+        (b" " * (MAXIMUM_BYTES + 1), f"larger than the {MAXIMUM_BYTES} bytes"),
+    ],
+)
+def test_file_that_cannot_be_read_is_a_file_error(
+    content: bytes | None, said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "arm.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(cdsm.FileError, match=said) as caught:
+        cdsm.Geometry.read(path)
+    assert caught.value.path == str(path)
+
+
+@pytest.mark.parametrize("path", ["a\0b", "x" * 5000, "", ".", 3, None])
+def test_path_that_cannot_be_is_a_cdsm_error(path: Any) -> None:
+    with pytest.raises(cdsm.CdsmError):
+        cdsm.Geometry.read(path)
+    with pytest.raises(cdsm.CdsmError):
+        general().write(path)
+
+
+def test_nothing_is_written_into_a_missing_folder_or_onto_a_folder(tmp_path: Path) -> None:
     with pytest.raises(cdsm.FileError, match="does not exist; create it"):
-        general().write(folder / "arm.toml")
-    assert not folder.exists()
-
-
-def test_writing_onto_a_folder_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
+        general().write(tmp_path / "nowhere" / "arm.toml")
     (tmp_path / "arm.toml").mkdir()
     with pytest.raises(cdsm.FileError, match="not a regular file"):
         general().write(tmp_path / "arm.toml")
@@ -531,9 +439,3 @@ def test_failed_write_leaves_the_earlier_file_and_nothing_beside_it(
         mixed_arm().geometry.write(path)
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["arm.toml"]
-
-
-def test_written_file_has_the_mode_of_a_plain_open(tmp_path: Path) -> None:
-    (tmp_path / "plain").touch()
-    path = general().write(tmp_path / "arm.toml")
-    assert path.stat().st_mode == (tmp_path / "plain").stat().st_mode

@@ -110,46 +110,6 @@ def test_disks_and_inertias_of_the_urdf_have_the_radii_of_their_joints() -> None
         assert float(inertia["iyy"]) == pytest.approx(mass * (3.0 * R**2 + length**2) / 12.0)
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"hole_radius": [0.02, 0.01]}, "hole_radius: 2 values given for 3 joints"),
-        ({"hole_radius": []}, "hole_radius: 0 values given for 3 joints"),
-        ({"hole_radius": [0.02, -0.01, 0.02]}, "hole_radius[2]: -0.01 m given"),
-        ({"hole_radius": [0.02, "b", 0.02]}, "hole_radius[2]: input should be a valid number"),
-        ({"link_mass": [[1.0], 1.0, 1.0]}, "link_mass[1]: input should be a valid number"),
-        ({"phase": [0.1, math.nan, 0.1]}, "phase[2]"),
-        ({"spread": [0.1, 0.1, 0.1]}, "spread: input should be a valid number"),
-        ({"hole_angles": [[0.1], [0.2]]}, "hole_angles: 2 lists given for 3 joints"),
-        ({"hole_angles": [[0.1], [0.2], []]}, "hole_angles[3]"),
-        ({"hole_angles": [[0.1], 0.2, [0.3]]}, "hole_angles[2]"),
-        ({"hole_angles": []}, "hole_angles: has no angle"),
-        ({"hole_angles": [[], [], []]}, "hole_angles: has no angle"),
-        ({"hole_angles": [[], [0.1], []]}, "hole_angles[1], hole_angles[3]: has no angle"),
-        ({"hole_angles": 0.5}, "hole_angles"),
-        ({"hole_angles": [0.1], "cables_per_joint": 1}, "is given beside hole_angles"),
-        ({"cables_per_joint": None}, "cables_per_joint: is missing; give cables_per_joint or hole"),
-        ({"disk_radius": 0.02}, "disk_radius: too small: at joint 1 it is 0.02 m"),
-        ({"cable_radius": 0.03, "disk_radius": 0.025}, "the farthest hole is at 0.03 m"),
-        ({"disk_offset": 0.031}, "disk_offset: too large: link 1 is 0.06 m long"),
-    ],
-)
-def test_faults_are_named(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(cdsm.GeometryError) as caught:
-        universal(**changes)
-    assert said in str(caught.value)
-    assert len(caught.value.faults) == 1
-
-
-def test_values_without_keywords_are_told_to_have_them() -> None:
-    universal: Any = cdsm.Geometry.universal
-    route: Any = cdsm.CableRoute
-    with pytest.raises(cdsm.GeometryError, match=r"write joints=8, cables_per_joint=3, link_le"):
-        universal(8, 3, 0.06)
-    with pytest.raises(cdsm.GeometryError, match=r"takes keywords only: write joint=8, angle=3, l"):
-        route(8, 3, 0.06)
-
-
 def test_replace_checks_what_it_changes() -> None:
     geometry = universal()
     wider = geometry.replace(hole_radius=0.025)
@@ -369,14 +329,6 @@ def test_faults_in_toml_are_named(before: str, after: str, said: str) -> None:
     with pytest.raises(cdsm.GeometryError) as caught:
         cdsm.Geometry.from_toml(TWO.replace(before, after, 1))
     assert said in str(caught.value)
-
-
-@pytest.mark.parametrize("name", ["virtual", "experimental"])
-def test_generated_files_of_the_paper_keep_every_byte(name: str) -> None:
-    geometry = getattr(presets, f"{name}_prototype_geometry")()
-    folder = Path(__file__).parents[2] / "urdf"
-    assert cdsm.to_urdf(geometry).encode() == (folder / f"{name}_prototype.urdf").read_bytes()
-    assert geometry.to_toml().encode() == (folder / f"{name}_prototype.toml").read_bytes()
 
 
 def test_disks_of_a_picture_stand_where_the_cables_pass() -> None:
