@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm.arm_facts import ANOTHER_ARM
 from cdsm.errors import InvalidInput
@@ -44,22 +44,19 @@ def checked_tension(
     arm = instance("pose", pose, Posture).arm
     if isinstance(tension, Tension):
         if not np.array_equal(tension.posture.q, pose.q):
-            raise InvalidInput(
-                "tension", "was distributed at another posture; distribute it at this one."
-            )
+            other = "was distributed at another posture; distribute it at this one."
+            raise InvalidInput("tension", other)
         if not tension.posture._equals(pose):
             raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
         if wrench is not None:
             raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
-        F, W = tension.values, tension.wrench
-    else:
-        F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
-        W = wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
-        if np.count_nonzero(F < 0.0):
-            c = int(F.argmin())
-            raise InvalidInput(
-                "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
-            )
+        return tension.values, tension.wrench
+    F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
+    W = wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
+    c = int(F.argmin())
+    if F[c] < 0.0:
+        said = f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
+        raise InvalidInput("tension", said)
     return F, W
 
 
@@ -71,11 +68,7 @@ def assemble(
     distribution: Tension | None = None,
     free_length: Array | None = None,
 ) -> Stiffness:
-    """Compute K_θ (Eq. 16) from arguments that are checked, and arrays that are read-only.
-
-    ``tension`` is F (C,) [N], ``wrench`` W (6,) and ``cable_stiffness`` the diagonal of K_L (C,)
-    [N/m]. ``distribution`` and ``free_length`` are stored in the result; see :class:`Stiffness`.
-    """
+    """Compute K_θ (Eq. 16) from checked, read-only arrays; :class:`Stiffness` explains them."""
     active, passive, load, parts, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
     return Stiffness(
         posture=pose,
@@ -91,3 +84,25 @@ def assemble(
         free_length=free_length,
         distribution=distribution,
     )
+
+
+def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp]) -> Array:
+    """Compute −∂(J_Xᵀ W)/∂θ (nv, nv), the load term of Eq. 16; row torque, column angle.
+
+    J_X (6, nv) has columns (v_i, z_i), W (6,) is (f, m), and ``tip_joints`` are the joints that
+    move the tip, base first. With a at or before b on the way to the tip, ∂v_b/∂θ_a = ∂v_a/∂θ_b =
+    z_a × v_b. Only a joint before b turns its axis: ∂z_b/∂θ_a = z_a × z_b.
+    """
+    v, z = jacobian[:3, tip_joints], jacobian[3:, tip_joints]
+    later = np.tri(len(tip_joints), k=-1)  # 1 where the row is the later joint
+    force = z.T @ hat(wrench[:3]) @ v  # [a, b] = −(f × z_a)·v_b
+    turned = z.T @ hat(wrench[3:]) @ z  # [b, a] = (m × z_a)·z_b
+    load = np.zeros((jacobian.shape[1],) * 2)
+    load[np.ix_(tip_joints, tip_joints)] = np.where(later, force.T, force) - later * turned
+    return load
+
+
+def hat(a: Array) -> Array:
+    """Return the matrix (3, 3) that maps x to a × x."""
+    x, y, z = a.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
