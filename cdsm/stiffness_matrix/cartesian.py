@@ -24,15 +24,9 @@ from cdsm.support.values import Array, frozen
 
 Term = Literal["active", "passive", "gravity", "load", "joint"]
 
-REGULAR = 1e-8
-"""Smallest relative singular value of K_θ at which its inverse still has 6 correct digits."""
-
-FLAT = 1e-6
-"""Smallest relative singular value of J_v at which a 3×3 stiffness still has 4 correct digits."""
-
-UNMOVED = 1e-10
-"""The tip cannot move along u if no entry of J_vᵀ u is above this part of the largest of J_v."""
-
+REGULAR = 1e-8  # least relative singular value of K_θ; its inverse has 6 correct digits there
+FLAT = 1e-6  # least relative singular value of J_v; a 3×3 stiffness has 4 correct digits there
+UNMOVED = 1e-10  # the tip cannot move along u if all entries of J_vᵀ u are below this part of J_v's
 _ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
 
 _SQUARE = unit("joint stiffness", "joint", "joint_column")
@@ -79,9 +73,7 @@ class CartesianReadings(Result):
         """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in some directions only.
 
         Use it for planar arms: their tip cannot leave a plane, so :attr:`cartesian` does not exist.
-
-        Args:
-            directions: U, n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3).
+        U are n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3).
 
         Raises:
             InvalidInput: The directions are not finite numbers, not orthogonal, or one is zero.
@@ -97,12 +89,10 @@ class CartesianReadings(Result):
         """Compute 1/(uᵀ C_vv u) [N/m], the tangent stiffness that a tip weight measures (Eq. 20).
 
         A weight that is not small beside the tensions measures a secant: :func:`~cdsm.weight_test`.
+        It is inf if the tip cannot move along u, and may be negative if the arm is unstable.
 
         Args:
             direction: u: an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length.
-
-        Returns:
-            The stiffness; inf if the tip cannot move along u. It may be negative if unstable.
 
         Raises:
             InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
@@ -124,11 +114,10 @@ class CartesianReadings(Result):
     @cached_property
     def _inverse(self) -> Array:
         """K_θ⁻¹ (nv, nv), or SingularStiffness with the joint motion."""
-        diagonal = self._parts.diagonal()
-        if not diagonal.min() > 0.0:
-            free = np.eye(diagonal.size)[diagonal.argmin()]
-            raise _singular("next to nothing holds the arm", free)
-        scale = 1.0 / np.sqrt(diagonal)
+        D = self._parts.diagonal()
+        if not D.min() > 0.0:
+            raise _singular("next to nothing holds the arm", np.eye(D.size)[D.argmin()])
+        scale = 1.0 / np.sqrt(D)
         both = scale * scale[:, None]
         scaled, least = self.joint * both, REGULAR * float((self._parts * both).max())
         try:
@@ -153,11 +142,9 @@ class CartesianReadings(Result):
         # two joints cannot move the tip in three directions
         if len(S) < len(U) or not S[-1] > FLAT * np.linalg.norm(rows, 2):
             u = frozen(B[:, -1] @ U)
-            raise SingularStiffness(
-                f"the tip cannot move along {axis_of(u)}, where the stiffness is infinite or "
-                "nearly so. Use along(direction), other directions, or bend the arm.",
-                u,
-            )
+            said = f"the tip cannot move along {axis_of(u)}, where the stiffness is infinite or "
+            said += "nearly so. Use along(direction), other directions, or bend the arm."
+            raise SingularStiffness(said, u)
         return B / S, V[: len(U)]
 
     def _moves(self, torque: Array) -> bool:
@@ -167,11 +154,9 @@ class CartesianReadings(Result):
     def _require_mobile(self, u: Array) -> None:
         """Raise SingularStiffness if a tip force along a unit vector u (3,) moves no joint."""
         if not self._moves(u @ self.posture.jacobian[:3]):
-            raise SingularStiffness(
-                f"the tip cannot move along {coordinates(u)}: the stiffness there "
-                "is infinite under any tension. Choose another direction, or bend the arm.",
-                u,
-            )
+            said = f"the tip cannot move along {coordinates(u)}: the stiffness there is infinite "
+            said += "under any tension. Choose another direction, or bend the arm."
+            raise SingularStiffness(said, u)
 
     def _along(self, u: Array) -> tuple[float, Array]:
         """Return stiffness along a unit vector u [N/m] and joint motion per force along u (nv,)."""

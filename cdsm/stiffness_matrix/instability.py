@@ -14,21 +14,13 @@ from typing import TYPE_CHECKING, Final, Literal, final
 import numpy as np
 
 from cdsm.errors import CdsmError
-from cdsm.support.format import rounded, span
-from cdsm.support.values import Array
+from cdsm.support.format import rounded
 from cdsm.tension import distribute_tension
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
 
-Change = Literal["wire", "spring", "tension"]
-
-_SAID: Final = {
-    "wire": ("wires {times} times as stiff{bound}: EA {new} kN, now {old} kN", 1e3),
-    "spring": ("series springs of {new} N/mm{bound}, now {old} N/mm", 1e3),
-    "tension": ("a least tension of {new} N{bound}, now {old} N", 1.0),
-}
-
+_QUANTITIES: Final = {"wire": "EA of wires", "spring": "k_series", "tension": "lower bounds"}
 _STIFFER: Final = ((10.0, 100.0, 1000.0),)  # few, since λ rises with s
 _MORE_OR_LESS: Final = np.geomspace(1.0, 100.0, 21)[1:], np.geomspace(1.0, 1e-3, 31)[1:]
 """Factors s that are tried, from 1 away, each row up to the first that makes the arm stable."""
@@ -40,37 +32,27 @@ class Remedy:
     """Change of one quantity of an unstable arm; made by :attr:`Stiffness.remedies`.
 
     Attributes:
-        change: ``"wire"`` (EA of all wires), ``"spring"`` (all series springs) or ``"tension"``
-            (the lower bounds of the tensions).
-        factor: Factor [-] nearest to 1 that makes the arm stable if the quantity is multiplied by
-            it; None if no factor that was tried does.
-        text: The change in words, with the new and the present values.
+        change: ``"wire"``: EA of all wires; ``"spring"``: all k_series; ``"tension"``: the lower
+            bounds of the tensions.
+        factor: Factor [-] nearest to 1 at which the arm becomes stable; None if none was found.
     """
 
-    change: Change
+    change: Literal["wire", "spring", "tension"]
     factor: float | None
-    text: str
 
     def __str__(self) -> str:
-        return self.text
+        if self.factor is None:
+            return f"no other {_QUANTITIES[self.change]} alone would hold it"
+        up = self.factor > 1.0
+        bound = f"{rounded(self.factor, up=up)} times as high, or {'more' if up else 'less'}"
+        return f"it would hold with {_QUANTITIES[self.change]} {bound}"
 
 
 def verdict(K: Stiffness) -> str:
     """Return a sentence about an unstable arm: which joint buckles most, and the margin."""
-    arm, motion = K.posture.arm, abs(K.critical_direction)
-    return (
-        f"UNSTABLE: the arm buckles, {arm.joint_names[int(motion.argmax())]} most; the smallest "
-        f"eigenvalue of K_θ is {K.margin:.4g} {arm.stiffness_unit()}"
-    )
-
-
-def advice(K: Stiffness) -> tuple[str, ...]:
-    """Return lines of text about an unstable arm: the changes that would make it stable."""
-    holding = [f"  {each}" for each in K.remedies if each.factor is not None]
-    if holding:
-        return "it would hold, by each of these alone, with", *holding
-    tried = ", ".join(each.change for each in K.remedies)
-    return (f"no other {tried} alone would hold it: change the posture, the load or the arm",)
+    arm, worst = K.posture.arm, int(abs(K.critical_direction).argmax())
+    margin = f"the smallest eigenvalue of K_θ is {K.margin:.4g} {arm.stiffness_unit()}"
+    return f"UNSTABLE: the arm buckles, {arm.joint_names[worst]} most; {margin}"
 
 
 def find_remedies(K: Stiffness) -> Iterator[Remedy]:
@@ -94,10 +76,9 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
     if stiffness(pose, K.tension, K.wrench).margin > 0.0:
         return
     if held:
-        EA = [float(cables[c].elasticity.rigidity(K.tension[c])) for c in held]
-        yield _remedy("wire", np.array(EA), stiffer, _STIFFER)
-    if springs := [k for c in held if math.isfinite(k := cables[c].series_stiffness)]:
-        yield _remedy("spring", np.array(springs), lambda s: stiffer(spring=s), _STIFFER)
+        yield Remedy("wire", _factor(stiffer, _STIFFER))
+    if any(math.isfinite(cables[c].series_stiffness) for c in held):
+        yield Remedy("spring", _factor(lambda s: stiffer(spring=s), _STIFFER))
     if given is not None and given.least and given.minimum.any():
         low, high = given.minimum, given.maximum
 
@@ -106,33 +87,22 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
             pull = distribute_tension(pose, least, high, K.wrench, given.solver)
             return stiffness(pose, pull).margin
 
-        yield _remedy("tension", low, tension, _MORE_OR_LESS)
+        yield Remedy("tension", _factor(tension, _MORE_OR_LESS))
 
 
-def _remedy(
-    change: Change, now: Array, margin: Callable[[float], float], rows: Iterable[Iterable[float]]
-) -> Remedy:
-    """Find the factor nearest to 1 and put it into words; ``now`` are the present values."""
-    found = [s for row in rows if (s := _first_zero(margin, row)) is not None]
-    if not found:
-        return Remedy(change, None, f"no other {change} holds the arm")
-    s = min(found, key=lambda s: abs(math.log(s)))
-    up, (form, unit) = s > 1.0, _SAID[change]
-    new = span(s * now / unit, lambda value: rounded(value, up=up))
-    words = {"times": rounded(s, up=up), "bound": " or more" if up else " or less"}
-    return Remedy(change, s, form.format(**words, new=new, old=span(now / unit)))
-
-
-def _first_zero(margin: Callable[[float], float], factors: Iterable[float]) -> float | None:
-    """Return a factor s before the first with a positive margin, at which margin(s) is zero."""
+def _factor(margin: Callable[[float], float], rows: Iterable[Iterable[float]]) -> float | None:
+    """Return the factor nearest to 1 at which ``margin``, which is negative at 1, is zero."""
     from scipy.optimize import brentq  # slow to import
 
-    before = 1.0
-    for s in factors:
+    found: list[float] = []
+    for row in rows:
+        before = 1.0
         try:
-            if margin(s) > 0.0:
-                return float(brentq(margin, before, s, xtol=1e-300, rtol=1e-12))
+            for s in row:
+                if margin(s) > 0.0:
+                    found.append(brentq(margin, before, s, xtol=1e-300, rtol=1e-12))
+                    break
+                before = s
         except CdsmError:  # beyond what the arm, its laws or its bounds allow
-            return None
-        before = s
-    return None
+            continue
+    return min(found, key=lambda s: abs(math.log(s)), default=None)

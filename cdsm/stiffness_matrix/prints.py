@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,12 +17,10 @@ from cdsm.support.format import MODEL
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix.value import Stiffness
 
-_T = TypeVar("_T")
-
 _PARTS = ("passive", "active", "gravity", "load")
 
 
-def existing(read: Callable[[], _T]) -> _T | None:
+def existing(read: Callable[[], object]) -> object:
     """Return a reading of a stiffness, or None if it does not exist."""
     with suppress(SingularStiffness):
         return read()

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, final
 
+import numpy as np
+
 import cdsm
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.instability import verdict
 from cdsm.stiffness_matrix.prints import model_of
-from cdsm.support.format import aligned, coordinates
+from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, Named, frozen
@@ -18,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdsm.stiffness_matrix import Stiffness
-
-_ROUNDING = 1e-15  # contributions below this fraction of the total are printed as zero
 
 
 @final
@@ -51,8 +51,7 @@ class Shares(Result, Named):
 
     def __getitem__(self, cable: str) -> float:
         """Return passive + active contribution of a cable [N/m], or raise UnknownName."""
-        names = self.keys()
-        return float(self.cables[names.index(one_of("cable", cable, names))])
+        return float(self.cables[self.keys().index(one_of("cable", cable, self.keys()))])
 
     def keys(self) -> tuple[str, ...]:
         """Return the names of the cables."""
@@ -78,15 +77,13 @@ class Shares(Result, Named):
         return cdsm.plots.plot_shares(self)
 
     def __str__(self) -> str:
-        def line(name: str, whole: float, *parts: float) -> list[str]:
-            seen = [x * (abs(x) > _ROUNDING * abs(total)) for x in (*parts, whole)]
-            numbers = [f"{x / 1e3:z.4g}" for x in seen]
-            return [name, *[""] * (3 - len(numbers)), *numbers, f"{whole / total:z.1%}"]
-
-        total = self.total
-        rows = [["cable", "passive", "active", "sum [N/mm]", "share"]]
-        rows += map(line, self.keys(), self.cables, self.passive, self.active)
-        rows += [line("gravity", self.gravity), line("load", self.load), line("total", total)]
-        first = [] if self.is_stable else [f"{verdict(self.stiffness)}; its shares mean nothing"]
+        K, names = self.stiffness, [*self.keys(), "gravity", "load", "total"]
+        whole = without_rounding(np.array([*self.cables, self.gravity, self.load, self.total]))
+        pairs = zip(names, whole, strict=True)
+        rows = [[name, "", "", f"{k / 1e3:z.4g}", f"{k / self.total:z.1%}"] for name, k in pairs]
+        for row, passive, active in zip(rows, self.passive, self.active, strict=False):
+            row[1:3] = f"{passive / 1e3:z.4g}", f"{active / 1e3:z.4g}"
+        rows = [["cable", "passive", "active", "sum [N/mm]", "share"], *rows]
+        first = [] if K.is_stable else [f"{verdict(K)}; its shares mean nothing"]
         along = f"stiffness along {coordinates(self.direction)}"
-        return "\n".join([*first, along, *aligned(rows), f"({model_of(self.stiffness)})"])
+        return "\n".join([*first, along, *aligned(rows), f"({model_of(K)})"])

@@ -12,7 +12,7 @@ import numpy as np
 from cdsm.errors import InvalidInput
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.cartesian import CartesianReadings
-from cdsm.stiffness_matrix.instability import Remedy, advice, find_remedies, verdict
+from cdsm.stiffness_matrix.instability import Remedy, find_remedies, verdict
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import plain
@@ -81,12 +81,10 @@ class Stiffness(CartesianReadings):
     @quantity("torque", "joint")
     def residual(self) -> Array:
         """J_Lᵀ F − (J_Xᵀ W − g) (nv,) [N m]; zero if the tensions balance the arm (Eq. 13)."""
-        pose, T = self.posture, self.segment_tension
-        if T is None:
-            cables = self.tension @ pose.length_jacobian
-        else:
-            cables = T @ pose.segments.length_jacobian
-        return frozen(cables - self.wrench @ pose.jacobian + pose.gravity_torque)
+        pose, F, J = self.posture, self.tension, self.posture.length_jacobian
+        if self.segment_tension is not None:
+            F, J = self.segment_tension, pose.segments.length_jacobian
+        return frozen(F @ J - self.wrench @ pose.jacobian + pose.gravity_torque)
 
     @quantity("joint stiffness")
     def margin(self) -> float:
@@ -122,10 +120,10 @@ class Stiffness(CartesianReadings):
             passive = self.cable_stiffness * (pose.length_jacobian @ motion) ** 2
             active = self.tension * (pose.length_hessian @ motion @ motion)
         else:
-            segments = pose.segments
-            each = (segments.length_jacobian @ motion) * (self.tension_gradient @ motion)
-            passive = np.asarray(np.bincount(segments.chains.cable, each), dtype=np.float64)
-            active = segments.tension_stiffness(self.segment_tension) @ motion @ motion
+            of = pose.segments
+            each = (of.length_jacobian @ motion) * (self.tension_gradient @ motion)
+            passive = np.bincount(of.chains.cable, each).astype(np.float64)
+            active = of.tension_stiffness(self.segment_tension) @ motion @ motion
         return Shares(
             stiffness=self,
             direction=u,
@@ -147,7 +145,7 @@ class Stiffness(CartesianReadings):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Lines that say that the arm is UNSTABLE, with its remedies; empty for a stable arm."""
-        return () if self.is_stable else (verdict(self), *advice(self))
+        return () if self.is_stable else (verdict(self), *map(str, self.remedies))
 
     def report(self) -> Report:
         """Check this stiffness; return facts, warnings and a second derivation of K_θ.
@@ -185,7 +183,7 @@ class Stiffness(CartesianReadings):
             "pseudoinverse_N_per_m": prints.existing(self.pseudoinverse),
             "compliance": prints.existing(lambda: self.compliance),
             "stable": self.is_stable,
-            "remedies": [vars(each) for each in self.remedies],
+            "remedies": {each.change: each.factor for each in self.remedies},
         }
         return super().to_dict() | plain(more)
 

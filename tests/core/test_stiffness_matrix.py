@@ -205,9 +205,9 @@ def test_load_term_is_the_derivative_of_the_torques_of_the_load(
     for i, row in enumerate(step * np.eye(pose.arm.nv)):
         after, before = (pose.arm.at(q, check_limits=False) for q in (pose.q + row, pose.q - row))
         change = wrench @ (before.jacobian - after.jacobian) / (2.0 * step)
-        np.testing.assert_allclose(load[:, i], change, atol=1e-9 * np.linalg.norm(wrench))
+        np.testing.assert_allclose(load[:, i], change, atol=1e-9 * float(np.linalg.norm(wrench)))
     K = cdsm.stiffness(pose, np.full(len(pose.arm.cables), 5.0), wrench)
-    np.testing.assert_allclose(load, K.load, atol=1e-14 * np.linalg.norm(wrench))
+    np.testing.assert_allclose(load, K.load, atol=1e-14 * float(np.linalg.norm(wrench)))
     if not wrench[3:].any():
         np.testing.assert_array_equal(load, load.T)
 
