@@ -83,13 +83,6 @@ def read(
     return found
 
 
-def read_margin(K: Array) -> float:
-    """Compute the smallest eigenvalue of the symmetric part of one K (nv, nv)."""
-    margin = np.empty((1, 1))
-    kernels.set_margins(K[None, :, :, None], margin, None)
-    return float(margin[0, 0])
-
-
 def _find_singular(K: Array, scale: Array, peak: Array, status: Indices) -> None:
     """Set ``status`` to SINGULAR where K_θ may be singular and its singular values confirm it.
 

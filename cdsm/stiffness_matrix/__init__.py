@@ -3,10 +3,9 @@
     K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ                          (Eq. 16)
           active   passive       gravity   load
 
-The module ``assembly`` computes K_θ, and ``value`` defines the result. ``cartesian`` computes the
-stiffness at the tip, ``shares`` the contribution of each cable, ``instability`` the changes that
-would make an unstable arm stable, and ``sticking`` how the tensions of cables that stick or slide
-in holes change with the joint angles. ``prints`` writes tables and JSON.
+``assembly`` computes K_θ, ``value`` is the result, ``cartesian`` the stiffness at its tip,
+``shares`` the contribution of each cable, ``instability`` what would make an unstable arm stable,
+``prints`` its text, and ``sticking`` the tensions of cables that stick in holes.
 """
 
 from cdsm.stiffness_matrix.assembly import assemble as assemble

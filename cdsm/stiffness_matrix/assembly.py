@@ -22,14 +22,13 @@ def stiffness(
     Args:
         pose: The posture.
         tension: The result of :func:`~cdsm.distribute_tension` at this posture, or your own
-            tensions (C,) [N], not negative. These may be out of balance; see
-            :attr:`Stiffness.residual`.
+            tensions (C,) [N], not negative, balanced or not; see :attr:`Stiffness.residual`.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; default zero. Only
-            for your own tensions, since a :class:`~cdsm.Tension` has its own wrench.
+            for your own tensions, since a :class:`~cdsm.Tension` has its own.
 
     Raises:
-        InvalidInput: An argument has the wrong shape or is not numbers, a tension is negative, the
-            tensions are of another posture or arm, or a wrench is given with a ``Tension``.
+        InvalidInput: A shape is wrong, a tension negative or of another posture or arm, or a wrench
+            is given with a ``Tension``.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     F, W = checked_tension(pose, tension, wrench)
@@ -42,25 +41,22 @@ def checked_tension(
 ) -> tuple[Array, Array]:
     """Check the arguments of :func:`stiffness`; return tensions F (C,) [N] and wrench W (6,)."""
     arm = instance("pose", pose, Posture).arm
-    if isinstance(tension, Tension):
-        if not np.array_equal(tension.posture.q, pose.q):
-            raise InvalidInput(
-                "tension", "was distributed at another posture; distribute it at this one."
-            )
-        if not tension.posture._equals(pose):
-            raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
-        if wrench is not None:
-            raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
-        F, W = tension.values, tension.wrench
-    else:
+    if not isinstance(tension, Tension):
         F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
         W = wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
-        if np.count_nonzero(F < 0.0):
-            c = int(F.argmin())
-            raise InvalidInput(
-                "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
-            )
-    return F, W
+        c = int(F.argmin())
+        if F[c] < 0.0:
+            said = f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
+            raise InvalidInput("tension", said)
+        return F, W
+    if not np.array_equal(tension.posture.q, pose.q):
+        said = "was distributed at another posture; distribute it at this one."
+        raise InvalidInput("tension", said)
+    if not tension.posture._equals(pose):
+        raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
+    if wrench is not None:
+        raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
+    return tension.values, tension.wrench
 
 
 def assemble(
@@ -71,11 +67,7 @@ def assemble(
     distribution: Tension | None = None,
     free_length: Array | None = None,
 ) -> Stiffness:
-    """Compute K_θ (Eq. 16) from arguments that are checked, and arrays that are read-only.
-
-    ``tension`` is F (C,) [N], ``wrench`` W (6,) and ``cable_stiffness`` the diagonal of K_L (C,)
-    [N/m]. ``distribution`` and ``free_length`` are stored in the result; see :class:`Stiffness`.
-    """
+    """Compute K_θ (Eq. 16) from checked, read-only arrays; :class:`Stiffness` explains them."""
     active, passive, load, parts, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
     return Stiffness(
         posture=pose,

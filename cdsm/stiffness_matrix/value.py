@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Literal, final, get_args
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 
 from cdsm.errors import InvalidInput
-from cdsm.kernels.read import read_margin
 from cdsm.stiffness_matrix import prints
-from cdsm.stiffness_matrix.cartesian import CartesianReadings, Term
-from cdsm.stiffness_matrix.instability import Remedy, advice, find_remedies, verdict
+from cdsm.stiffness_matrix.cartesian import CartesianReadings
+from cdsm.stiffness_matrix.instability import Remedy, find_remedies, verdict
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.directions import Direction, unit_direction
-from cdsm.support.markup import element, row
-from cdsm.support.tidy import dataset
+from cdsm.support.format import plain
+from cdsm.support.result import quantity, unit
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.figure import Figure
 
     from cdsm.report import Report
@@ -30,7 +29,7 @@ Friction = Literal["frictionless", "stuck", "sliding"]
 
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Stiffness(CartesianReadings):
     """Joint and Cartesian stiffness with their posture, tensions and wrench.
 
@@ -38,31 +37,29 @@ class Stiffness(CartesianReadings):
 
     Attributes:
         posture: The posture.
-        tension: F (C,) [N].
-        wrench: W (6,): force [N], then moment [N m].
-        cable_stiffness: Diagonal of K_L (C,) [N/m]; 0 for force-controlled cables. Even with
-            friction, it is the stiffness of whole cables that slide freely.
         active: H_L·F (nv, nv) [N m/rad]; also called geometric.
         passive: J_Lᵀ K_L J_L (nv, nv) [N m/rad]; also called material or elastic. With friction it
-            is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the segments j of length l_j and tension T_j; it is not
-            symmetric if cables slide.
+            is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the cable segments j, not symmetric if cables slide.
         gravity: ∂g/∂θ (nv, nv) [N m/rad].
         load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
         joint: K_θ, sum of the four terms (nv, nv) [N m/rad]: row torque, column angle.
-        free_length: l_0 (C,) [m] of an :class:`~cdsm.Equilibrium`, with motors locked at its
-            reference posture; None if the motors are locked at this posture.
-        distribution: The :class:`~cdsm.Tension` that gave the tensions; None for tensions as an
-            array.
+        tension: F (C,) [N].
+        wrench: W (6,): force [N], then moment [N m].
+        cable_stiffness: Diagonal of K_L (C,) [N/m], of cables without friction; 0 for
+            force-controlled ones.
+        free_length: l_0 (C,) [m] held since another posture; None if motors are locked at this one.
+        distribution: The :class:`~cdsm.Tension` that gave the tensions; None for your own.
         friction: ``"frictionless"``; ``"stuck"``: the cables stick in all holes with friction;
             ``"sliding"``: they slide in some of them.
-        segment_tension: T (S,) [N] of the segments of :attr:`Posture.segments`; None if
-            frictionless.
+        segment_tension: T (S,) [N] of :attr:`Posture.segments`; None if frictionless.
         tension_gradient: ∂T/∂θ (S, nv) [N/rad] of these segments; None if frictionless.
     """
 
-    tension: Array
-    wrench: Array
-    cable_stiffness: Array
+    _headline, _rows = "margin", "cable"
+
+    tension: Array = field(metadata=unit("N", "cable"))
+    wrench: Array = field(metadata=unit("N and N m", "component"))
+    cable_stiffness: Array = field(metadata=unit("N/m", "cable"))
     free_length: Array | None = None
     distribution: Tension | None = None
     friction: Friction = "frictionless"
@@ -73,33 +70,29 @@ class Stiffness(CartesianReadings):
     def free_lengths(self) -> Array:
         """Original lengths l_0 (C,) [m] of the wires, as used in :attr:`cable_stiffness`.
 
-        A locked motor keeps l_0 = (L − ΔF/k_series)/(1 + ε(F)) constant; :class:`Cable` explains
-        the symbols. For a force-controlled cable l_0 is its length L. l_0 is negative if the series
-        spring stretches by more than the length of the cable; ``print`` says so.
+        A locked motor keeps l_0 = (L − ΔF/k_series)/(1 + ε(F)), see :class:`Cable`. For a
+        force-controlled cable it is L. Negative if the spring stretches by more than the cable.
         """
         if self.free_length is not None:
             return self.free_length
         pose = self.posture
         return pose.arm._laws.original_lengths(pose.cable_lengths, self.tension)
 
-    @cached_property
+    @quantity("torque", "joint")
     def residual(self) -> Array:
         """J_Lᵀ F − (J_Xᵀ W − g) (nv,) [N m]; zero if the tensions balance the arm (Eq. 13)."""
-        pose = self.posture
-        if self.segment_tension is None:
-            cables = self.tension @ pose.length_jacobian
-        else:
-            cables = self.segment_tension @ pose.segments.length_jacobian
-        return frozen(cables - self.wrench @ pose.jacobian + pose.gravity_torque)
+        pose, F, J = self.posture, self.tension, self.posture.length_jacobian
+        if self.segment_tension is not None:
+            F, J = self.segment_tension, pose.segments.length_jacobian
+        return frozen(F @ J - self.wrench @ pose.jacobian + pose.gravity_torque)
 
-    @cached_property
+    @quantity("joint stiffness")
     def margin(self) -> float:
         """Smallest eigenvalue of the symmetric part of K_θ [N m/rad]; if negative, the arm buckles.
 
-        If an arm has both prismatic and revolute joints, the value depends on the unit of length;
-        its sign does not.
+        With prismatic and revolute joints, the value depends on the unit of length, not its sign.
         """
-        return read_margin(self.joint)
+        return float(np.linalg.eigvalsh((self.joint + self.joint.T) / 2.0)[0])
 
     @cached_property
     def critical_direction(self) -> Array:
@@ -116,23 +109,21 @@ class Stiffness(CartesianReadings):
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
         If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity and load, and so is along(u). ``direction`` is u, an axis or (3,),
-        as for :meth:`along`. Raises the errors of :meth:`along`, and SingularStiffness also if the
-        stiffness along u is infinite.
+        sum over cables, gravity and load, and so is along(u). ``direction`` and errors are those of
+        :meth:`along`; SingularStiffness also if the stiffness along u is infinite.
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)
-        stiffness, motion = self._along(u)
-        motion = motion * stiffness
-        pose = self.posture
+        stiffness, moved = self._along(u)
+        pose, motion = self.posture, moved * stiffness
         if self.segment_tension is None or self.tension_gradient is None:
             passive = self.cable_stiffness * (pose.length_jacobian @ motion) ** 2
             active = self.tension * (pose.length_hessian @ motion @ motion)
         else:
-            segments = pose.segments
-            each = (segments.length_jacobian @ motion) * (self.tension_gradient @ motion)
-            passive = np.asarray(np.bincount(segments.chains.cable, each), dtype=np.float64)
-            active = segments.tension_stiffness(self.segment_tension) @ motion @ motion
+            of = pose.segments
+            each = (of.length_jacobian @ motion) * (self.tension_gradient @ motion)
+            passive = np.bincount(of.chains.cable, each).astype(np.float64)
+            active = of.tension_stiffness(self.segment_tension) @ motion @ motion
         return Shares(
             stiffness=self,
             direction=u,
@@ -146,29 +137,21 @@ class Stiffness(CartesianReadings):
     def remedies(self) -> tuple[Remedy, ...]:
         """Changes that would make an unstable arm stable, each alone; empty for a stable arm.
 
-        Stiffer wires, stiffer series springs, other lower bounds of the tensions and other disk
-        offsets are tried. For each, a root search finds the factor at which the smallest eigenvalue
-        of K_θ is zero. The posture and the wrench stay the same. Tensions of your own are not
-        distributed again: for them only wires and springs are tried. This takes a few tenths of a
-        second.
+        Stiffer wires, stiffer series springs and, if the tensions were distributed, other lower
+        bounds are tried at the same posture and wrench. This takes a few tenths of a second.
         """
         return () if self.is_stable else tuple(find_remedies(self))
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Lines that say that the arm is UNSTABLE, with its remedies; empty for a stable arm."""
-        return () if self.is_stable else (verdict(self), *advice(self))
+        return () if self.is_stable else (verdict(self), *map(str, self.remedies))
 
     def report(self) -> Report:
         """Check this stiffness; return facts, warnings and a second derivation of K_θ.
 
-        The second derivation uses central differences of the potential and the torque at this
-        posture. The check takes a few tenths of a second. Problems are not raised as errors; the
-        report lists them.
-
-        Raises:
-            InvalidInput: The stiffness is not frictionless.
-            SolverError: The linear program for the tension factor, a fact of the report, fails.
+        Problems are not raised but listed. InvalidInput if the stiffness is not frictionless,
+        SolverError if the linear program for the tension factor, a fact of the report, fails.
         """
         from cdsm.report import report_on  # here, since a stiffness does not need it
 
@@ -177,53 +160,37 @@ class Stiffness(CartesianReadings):
     def require_frictionless(self) -> Stiffness:
         """Return this stiffness; InvalidInput if its cables stick or slide."""
         if self.friction != "frictionless":
-            raise InvalidInput(
-                "stiffness", f"the cables are {self.friction}; give a frictionless K of stiffness."
-            )
+            said = f"the cables are {self.friction}; give a frictionless K of stiffness."
+            raise InvalidInput("stiffness", said)
         return self
 
     def plot(self) -> Figure:
         """Plot the arm in mm and, if it is stable, the compliance at its tip as an ellipsoid.
 
-        Cables are coloured by tension if :attr:`distribution` is given.
-
-        Raises:
-            SingularStiffness: K_θ is singular.
+        Cables are coloured by tension if :attr:`distribution` is given. SingularStiffness if K_θ is
+        singular.
         """
         return self.posture.plot(self.distribution, self)
 
     def to_dict(self) -> dict[str, object]:
-        """Return the stiffness in SI for JSON, with units in the keys.
-
-        Lists of three numbers are for x, y and z. A number that does not exist is None.
-        """
-        return prints.numbers(self)
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return K_θ, its terms, F and k as a labelled Dataset; needs xarray (MissingExtra)."""
-        arm, square = self.posture.arm, ("joint", "joint_column")
-        unit = arm.stiffness_unit()
-        terms = {name: (square, getattr(self, name), unit) for name in get_args(Term)}
-        # a variable must not have the name of a dimension
-        terms["joint_stiffness"] = terms.pop("joint")
-        of_cables = {
-            "tension": (("cable",), self.tension, "N"),
-            "cable_stiffness": (("cable",), self.cable_stiffness, "N/m"),
+        """Return the stiffness in SI for JSON, units in the keys; None for what does not exist."""
+        more = {
+            "tip_position_m": self.posture.tip[:3, 3],
+            "cable_length_m": self.posture.cable_lengths,
+            "model": prints.model_of(self),
+            "along_N_per_m": [prints.existing(partial(self.along, u)) for u in np.eye(3)],
+            "cartesian_N_per_m": prints.existing(lambda: self.cartesian),
+            "pseudoinverse_N_per_m": prints.existing(self.pseudoinverse),
+            "compliance": prints.existing(lambda: self.compliance),
+            "stable": self.is_stable,
+            "remedies": {each.change: each.factor for each in self.remedies},
         }
-        labels = {"cable": arm.cables.names, **dict.fromkeys(square, arm.joint_names)}
-        return dataset({**terms, **of_cables}, labels, title=f"stiffness of {arm.name}")
+        return super().to_dict() | plain(more)
 
-    def __repr__(self) -> str:
-        state = "stable" if self.is_stable else "UNSTABLE"
-        return f"<Stiffness of {self.posture.arm.name}, {state}>"
+    def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
+        # a variable must not have the name of a dimension
+        for name, *rest in super()._quantities():
+            yield ("joint_stiffness" if name == "joint" else name, *rest)
 
     def __str__(self) -> str:
-        rows = prints.table(self)
-        lines = [f"{name:<24}{''.join(f'{cell:>12}' for cell in cells)}" for name, *cells in rows]
-        return "\n".join([*self.warnings, *lines, *prints.notes(self)])
-
-    def _repr_html_(self) -> str:
-        head, *rows = prints.table(self)
-        table = element("table", row("th", head), *(row("td", cells) for cells in rows))
-        warning = element("pre", "\n".join(self.warnings)) if self.warnings else ""
-        return warning + table + "".join(element("p", note) for note in prints.notes(self))
+        return "\n".join([*self.warnings, *prints.table(self), *prints.notes(self)])

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm.kernels.readings import REGULAR
+from cdsm.stiffness_matrix.cartesian import REGULAR
 from cdsm.support.values import Array
 from tests.support.differences import EPSILON
 

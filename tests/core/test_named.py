@@ -101,7 +101,7 @@ def test_shares_of_an_unstable_arm_say_so_first() -> None:
     shares = cdsm.stiffness(loose, np.full(9, 300.0)).shares("z")
     assert str(shares).startswith("UNSTABLE: the arm buckles, ")
     assert repr(shares).endswith(", UNSTABLE>")
-    assert shares.to_dict()["stable"] is False
+    assert shares.to_dict()["is_stable"] is False
 
 
 def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
