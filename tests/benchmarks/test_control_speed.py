@@ -17,7 +17,7 @@ def test_control_step_takes_less_than_half_of_single_solutions(
 ) -> None:
     plan = circle(0.1)
     arm, low, high = plan.arm, np.full(15, 10.0), np.full(15, 250.0)
-    run = cdsm.track(plan, "stiffness", steps=2, bands=0, minimum=10.0, maximum=250.0)
+    run = cdsm.track(plan, "stiffness", steps=2, minimum=10.0, maximum=250.0)
     observer = Observer(arm, cdsm.Sensors(tension_noise=0.5))
     truth = [state.true for state in run.states]
     loop = StiffnessLoop(arm, run.directions, low, high, np.full(15, 10.0))

@@ -226,7 +226,7 @@ def test_law_of_a_cable_without_friction_is_not_asked_where_its_motor_holds_the_
         mixed = arm.with_cables([replace(free, elasticity=law), *others])
         pose = mixed.at(np.full(10, presets.TEN_DEGREES))
         load = cdsm.breakaway(pose, F, "z").load
-        band = cdsm.rest_band(pose, F, "z").first_order
+        band = cdsm.rest_band(pose, F, "z").high
         found.append([load, band, *cdsm.stuck_stiffness(pose, F).joint.ravel()])
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-9)
     # with friction beyond the motor, segments of this cable are springs, and its law is asked
