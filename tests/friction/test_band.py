@@ -18,10 +18,10 @@ LAW = cdsm.LinearElasticity(EA)
 Posed = tuple[cdsm.Posture, Array]
 
 
-def prototype(friction: float, minimum: float = 50.0) -> Posed:
-    arm = presets.virtual_prototype(LAW, lead=0.3, friction=friction)
+def prototype(friction: float, lead: float = 0.3) -> Posed:
+    arm = presets.virtual_prototype(LAW, lead=lead, friction=friction)
     pose = arm.at(np.full(10, presets.TEN_DEGREES))
-    return pose, cdsm.distribute_tension(pose, minimum).values
+    return pose, cdsm.distribute_tension(pose, 50.0).values
 
 
 def two_hinges(friction: float) -> Posed:

@@ -10,18 +10,10 @@ from scipy.optimize import brentq, root
 import cdsm
 from cdsm import presets
 from cdsm.support.values import Array
+from tests.friction.test_band import EA, LAW, prototype
 from tests.support import arms
 from tests.support.locked import hinge
 from tests.support.rough import rough
-
-EA = 48e3
-LAW = cdsm.LinearElasticity(EA)
-
-
-def prototype(friction: float, lead: float = 0.3) -> tuple[cdsm.Posture, Array]:
-    arm = presets.virtual_prototype(LAW, lead=lead, friction=friction)
-    pose = arm.at(np.full(10, presets.TEN_DEGREES))
-    return pose, cdsm.distribute_tension(pose, 50.0).values
 
 
 def first_slip(pose: cdsm.Posture, F: Array, u: Array, guess: float) -> tuple[float, int]:
