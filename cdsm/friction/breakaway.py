@@ -76,8 +76,8 @@ def breakaway(
         W_i = μ φ_i/(|x_i| − y_i),   x_i = d(ln T_{j+1} − ln T_j)/dW,   y_i = μ dφ_i/dW,
 
     with the friction coefficient μ, the wrap angle φ_i and the joint motion dθ/dW = K_θ⁻¹ J_vᵀ u of
-    the stuck arm. On random arms
-    the exact load is within 2 % of this at μ ≤ 0.1, and within 6 % at μ = 0.3.
+    the stuck arm. On random arms the exact load is within 2 % of this at μ ≤ 0.1, and within 6 % at
+    μ = 0.3.
 
     Args:
         pose: The posture.
