@@ -98,13 +98,13 @@ def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[s
     """Compute the load in each direction of ``along`` at which a cable begins to slide in a hole.
 
     The result is by name of the direction, and empty if the arm has no friction. A direction has
-    no entry in these cases: a cable slides already without a load; none slides at any load; the arm
-    buckles before; or a tension leaves the domain of its law before.
+    no entry in these cases: a cable slides already without a load; none slides at any load; the
+    stuck arm is about to buckle; or a tension is outside the domain of its law.
     """
     found = {}
     if tension.posture.arm.has_friction:
         for name, u in along.items():
-            with contextlib.suppress(cdsm.CdsmError):  # it buckles before, or leaves its law EA(F)
+            with contextlib.suppress(cdsm.CdsmError):
                 first = cdsm.breakaway(tension.posture, tension, u)
                 if 0.0 < first.load < math.inf:
                     found[name] = first

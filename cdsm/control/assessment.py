@@ -5,9 +5,8 @@ true stiffness of a state is the frictionless K_θ at the equilibrium that the a
 friction, with the same wire in every cable and the same load. Small weights measure the stuck arm,
 which is several times stiffer.
 
-The band is the interval around this equilibrium in which friction can let the tip rest, whatever
-loads came before. Linear programs prove it (:func:`cdsm.friction.band.rest_band`); if they cannot,
-the band is NaN.
+Around this equilibrium lies the first-order band (:func:`cdsm.rest_band`) in which friction can let
+the tip rest, whatever loads came before.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ import numpy as np
 
 from cdsm.control.plant import PlantState
 from cdsm.errors import CdsmError, SingularStiffness
-from cdsm.friction.band import rest_band
+from cdsm.friction.band import half_width
 from cdsm.statics.locked_motors import LoadedArm, lengths_with
 from cdsm.statics.rest_search import no_rest
 from cdsm.statics.trust_region import find_rest
@@ -36,26 +35,22 @@ class Assessment(NamedTuple):
     tip: Array  # tip (3,) [m] at the equilibrium without friction
     stiffness: list[float]  # stiffness along each direction (D,) [N/m] there
     margin: float  # smallest eigenvalue of K_θ [N m/rad] there
-    # least and largest proved displacement from ``tip`` along the first direction [m]
-    band: tuple[float, float]
+    band: float  # half-width [m] of the first-order band along the first direction
 
 
-def assess(state: PlantState, wrench: Array, directions: Array, *, banded: bool) -> Assessment:
+def assess(state: PlantState, wrench: Array, directions: Array) -> Assessment:
     """Compute the true stiffness [N/m] of a state along each of ``directions`` (D, 3).
 
-    ``wrench`` (6,) is the load. If ``banded`` is True, also compute the proved band of the tip
-    along the first direction.
+    ``wrench`` (6,) is the load.
     """
     nan = math.nan
     try:
         K = frictionless_stiffness(state, wrench)
     except CdsmError:
-        return Assessment(np.full(3, nan), [nan] * len(directions), nan, (nan, nan))
-    ends = nan, nan
-    if banded and K.is_stable:
-        band = rest_band(K.posture, K.tension, directions[0], K.wrench)
-        ends = (band.low, band.high) if band.proved else ends
-    return Assessment(K.posture.tip[:3, 3], [_along(K, u) for u in directions], K.margin, ends)
+        return Assessment(np.full(3, nan), [nan] * len(directions), nan, nan)
+    rough = K.posture.arm.has_friction and K.is_stable
+    band = half_width(K, directions[0]) if rough else nan
+    return Assessment(K.posture.tip[:3, 3], [_along(K, u) for u in directions], K.margin, band)
 
 
 def _along(K: Stiffness, u: Array) -> float:

@@ -31,7 +31,6 @@ def labelled(run: TrackingRun) -> xarray.Dataset:
         "component": [f"{kind}{axis}" for kind in "fm" for axis in names],
         "joint": arm.joint_names,
         "cable": arm.cables.names,
-        "end": ["low", "high"],
     }
     angle, of_cable = "rad, or m where a joint slides", ("time", "cable")
     variables: dict[str, tuple[tuple[str, ...], NDArray[Any], str]] = {
@@ -51,9 +50,7 @@ def labelled(run: TrackingRun) -> xarray.Dataset:
         "tension": (of_cable, run.tension, "N"),
         "saturated": (of_cable, run.saturated, "1"),
         "out_of_reach": (("time",), run.short, "1"),
-        "band_sought": (("time",), run.banded, "1"),
-        "band_proved": (("time",), run.proved, "1"),
-        "band": (("time", "end"), run.band, "m"),
+        "first_order_band": (("time",), run.band, "m"),
         "displacement": (("time",), run.displacement, "m"),
         "wrench": (("time", "component"), run.wrench, "N, N m"),
         "estimated_force": (("time", "axis"), run.estimated_force, "N"),
@@ -102,8 +99,7 @@ def numbers(run: TrackingRun) -> dict[str, Any]:
         "steps_not_planned": len(run.refused),
         "steps_out_of_reach": np.count_nonzero(run.short),
         "steps_with_band": len(run.inside),
-        "steps_without_proof": np.count_nonzero(run.banded) - len(run.inside),
-        "share_inside_band": _mean(run.inside.astype(float)),
+        "share_inside_first_order_band": _mean(run.inside.astype(float)),
         "estimated_rigidity": float(run.rigidity[-1]) if len(run.rigidity) else math.nan,
     }
 
@@ -126,7 +122,7 @@ def rows(run: TrackingRun) -> list[tuple[str, str]]:
         ("motors clamped at a tension bound",
          _names_or_count(run.saturated_motors, run.tension.shape[1])),
         ("rigidity of the wires, as estimated", f"{100.0 * n['estimated_rigidity']:.4g} %"),
-        ("inside the proved band", _inside(run)),
+        ("inside the first-order band", _inside(run)),
     ]  # fmt: skip
 
 
@@ -136,13 +132,9 @@ def _names_or_count(names: tuple[str, ...], count: int) -> str:
 
 
 def _inside(run: TrackingRun) -> str:
-    proved, sought = int(run.proved.sum()), int(run.banded.sum())
-    if not sought:
-        return "no band was sought"
-    left = f"{sought - proved} not proved"
-    if not proved:
-        return f"no band of {sought} was proved"
-    return f"{100.0 * run.inside.mean():.4g} % of {plural(proved, 'proved step')} ({left})"
+    if not run.inside.size:
+        return "no step has a band"
+    return f"{100.0 * run.inside.mean():.4g} % of {plural(len(run.inside), 'step')}"
 
 
 def _mean(values: Array) -> float:

@@ -39,8 +39,9 @@ class TrackingRun(ReadOnlyState):
 
     There are n steps, C cables and D wanted directions. With friction, the true stiffness of a
     state is the frictionless stiffness at the equilibrium that the arm would have without friction,
-    with the same wire and load. It is NaN if there is no such equilibrium. The band is the interval
-    around this equilibrium in which friction can let the tip rest, whatever loads came before.
+    with the same wire and load. It is NaN if there is no such equilibrium. Around this equilibrium
+    lies the first-order band in which friction can let the tip rest, whatever loads came before:
+    see :func:`~cdsm.rest_band`.
 
     Attributes:
         plan: The plan that was followed.
@@ -62,8 +63,8 @@ class TrackingRun(ReadOnlyState):
             bounds (n, C).
         stiffness: True stiffness along each direction (n, D) [N/m].
         margin: Smallest eigenvalue of the true K_θ (n,) [N m/rad].
-        banded: Whether a band was computed (n,).
-        band: Proved bounds of ``displacement`` (n, 2) [m]; NaN where none were computed or proved.
+        band: Half-width of the first-order band of ``displacement`` (n,) [m]; NaN without friction,
+            and where there is no stable equilibrium.
         displacement: Displacement of the tip from the equilibrium without friction along the first
             direction (n,) [m].
         wrench: Load (n, 6): force [N], then moment [N m].
@@ -96,7 +97,6 @@ class TrackingRun(ReadOnlyState):
     saturated: NDArray[np.bool_]
     stiffness: Array
     margin: Array
-    banded: NDArray[np.bool_]
     band: Array
     displacement: Array
     wrench: Array
@@ -130,16 +130,10 @@ class TrackingRun(ReadOnlyState):
         return frozen(self.stiffness / self.target - 1.0)
 
     @cached_property
-    def proved(self) -> NDArray[np.bool_]:
-        """Whether a band was computed (``banded``) and proved (n,)."""
-        return frozen(np.isfinite(self.band[:, 0]))
-
-    @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """Whether the tip is inside the band (B,), for the B steps that have a proved band."""
-        low, high = self.band[self.proved].T
-        moved = self.displacement[self.proved]
-        return frozen(np.asarray((low - _ROUNDING <= moved) & (moved <= high + _ROUNDING)))
+        """Whether the tip is inside the first-order band (B,), for the B steps that have a band."""
+        known = np.isfinite(self.band)
+        return frozen(abs(self.displacement[known]) <= self.band[known] + _ROUNDING)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -159,8 +153,6 @@ class TrackingRun(ReadOnlyState):
                 f"OUT OF REACH {self._at(short)}: within the bounds no tensions were found that "
                 "give the target"
             )
-        if not self.inside.all():
-            said.append(f"OUTSIDE ITS BAND at {np.count_nonzero(~self.inside)} steps")
         return tuple(said)
 
     def _at(self, steps: Sequence[int]) -> str:
@@ -203,7 +195,7 @@ class TrackingRun(ReadOnlyState):
         return tuple(names[c] for c in np.flatnonzero(self.saturated.any(axis=0)))
 
     def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
-        """Plot tip error, stiffness, tensions and the proved band over time.
+        """Plot tip error, stiffness, tensions and the first-order band over time.
 
         ``animate`` is the path of a ``.gif`` to write as well; for errors see :meth:`animate`.
         """

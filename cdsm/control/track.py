@@ -47,7 +47,6 @@ def track(
     rate: ArrayLike = 10.0,
     replan: bool | None = None,
     tension_controlled: Sequence[str] | None = None,
-    bands: int = 1,
     seed: int = 0,
 ) -> TrackingRun:
     """Follow a planned path in closed loop, with a plant that may differ from the plan's arm.
@@ -80,8 +79,6 @@ def track(
         replan: Whether the outer loop runs; default: for ``"stiffness"`` only.
         tension_controlled: Names of the cables whose tension a mixed law controls. Default: C − nv
             cables, chosen so that the lengths of the others determine the posture best.
-        bands: A proved band is computed every ``bands`` steps, which takes about 20 ms; 0: never.
-            An arm without friction has no band.
         seed: Seed of the noise; the same seed gives the same run, bit for bit.
 
     Raises:
@@ -115,7 +112,6 @@ def track(
         outer = StiffnessLoop(arm, schedule.directions, low, high, limit)
     forced = choose_cables(plan, tension_controlled)
     random = np.random.default_rng(whole_number("seed", seed, 0))
-    every = whole_number("bands", bands, 0)
     observer = Observer(arm, sensors)
 
     reference = schedule.references[0]
@@ -145,9 +141,8 @@ def track(
             outcome, reason = _stopped(error), str(error)
             break
         truth.append(state.true)
-        banded = every > 0 and k % every == 0 and plant.arm.has_friction
-        judged = assess(state, wrenches[k], schedule.directions, banded=banded)
-        records.append(_Step(wanted, short, reading, estimate, command, state, judged, banded))
+        judged = assess(state, wrenches[k], schedule.directions)
+        records.append(_Step(wanted, short, reading, estimate, command, state, judged))
         if refusal:
             refused[k] = refusal
         before, last, wire = wanted, reading, command.wire
@@ -189,7 +184,6 @@ class _Step(NamedTuple):
     command: Command
     state: PlantState
     judged: Assessment
-    banded: bool
 
 
 def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[str, Any]:
@@ -219,8 +213,7 @@ def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[
         "stiffness": rows([record.judged.stiffness for record in records], len(u)),
         "margin": rows([record.judged.margin for record in records]),
         "short": frozen(np.array([record.short for record in records], dtype=np.bool_)),
-        "banded": frozen(np.array([record.banded for record in records], dtype=np.bool_)),
-        "band": rows([record.judged.band for record in records], 2),
+        "band": rows([record.judged.band for record in records]),
         "displacement": frozen((tips - rests) @ u[0]),
         "estimated_force": rows([record.estimate.force for record in records], 3),
         "rigidity": rows([1.0 / record.estimate.softness for record in records]),

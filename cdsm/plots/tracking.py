@@ -37,7 +37,8 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     """Plot a closed loop over time: tip error, stiffness, displacement of the tip, tensions.
 
     The third panel shows the displacement of the tip from the frictionless equilibrium, along the
-    first direction of the plan. Friction can hold the tip at rest only within the shaded band.
+    first direction of the plan. To first order, friction can hold the tip at rest only within the
+    shaded band.
 
     Raises InvalidInput if ``run`` is not a result of :func:`~cdsm.track`.
     """
@@ -56,10 +57,9 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     stiffness.set(ylabel="frictionless\nstiffness [N/mm]")
     if np.nanmin(run.stiffness / run.target, initial=1.0) < _HALF:  # else no percent is seen
         from_zero(stiffness, N_PER_MM * run.target, N_PER_MM * run.stiffness)
-    low, high = MM * run.band.T
-    at = run.banded  # steps with a computed band; the area has a gap where it was not proved
-    if np.isfinite(low[at]).any():
-        band.fill_between(t[at], low[at], high[at], color=SKY, alpha=0.4, label="proved band")
+    half = MM * run.band
+    if np.isfinite(half).any():
+        band.fill_between(t, -half, half, color=SKY, alpha=0.4, label="first-order band")
     moved = MM * run.displacement
     band.plot(t, moved, color=VERMILLION, label="tip")
     band.set(ylabel="off the rest\nwithout friction [mm]")

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
 
 from cdsm.support.values import Array
 
@@ -33,24 +30,3 @@ def least(cost: Array, **constraints: Any) -> OptimizeResult:
     if found.status not in (OPTIMAL, INFEASIBLE, UNBOUNDED):
         found = linprog(cost, **constraints, method="highs-ipm", options=tight)
     return found
-
-
-def proved_largest(
-    cost: Array, G: Any, h: Array, A: Any, b: Array, low: Array, high: Array, rounding: float = 0.0
-) -> tuple[OptimizeResult, float]:
-    """Maximise cost · x with G x ≤ h, A x = b and low ≤ x ≤ high, and prove an upper bound.
-
-    By weak duality the maximum is at most y·b + z·h + Σ max(r low, r high), r = cost − Aᵀ y − Gᵀ z,
-    for all multipliers y of the equations and z ≥ 0 of the inequalities. So the bound holds even if
-    the solver's y and z are inexact. Magnitudes of r below ``rounding`` are taken as 0. Returns
-    scipy's result and the bound, which is NaN if the solver finds no optimum.
-    """
-    from scipy.optimize import linprog  # slow to import
-
-    found = linprog(-cost, G, h, A, b, np.c_[low, high], method="highs-ds")
-    if found.status != OPTIMAL:
-        return found, math.nan
-    y, z = -found.eqlin.marginals, np.maximum(-found.ineqlin.marginals, 0.0)
-    r = cost - A.T @ y - G.T @ z
-    r[abs(r) < rounding] = 0.0
-    return found, float(y @ b + z @ h + np.maximum(r * low, r * high).sum())

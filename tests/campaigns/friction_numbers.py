@@ -124,7 +124,7 @@ def weights(length: OriginalLength) -> Iterator[Number]:
     for mu in (0.1, 0.2):
         pose, pull = prototype(length, 0.3, mu, 50.0, WIRE)
         for axis in "xyz":
-            half = 1e3 * cdsm.rest_band(pose, pull, axis).first_order
+            half = 1e3 * cdsm.rest_band(pose, pull, axis).high
             yield f"band μ {mu}, to first order: {axis} [mm]", half
 
 

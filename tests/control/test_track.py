@@ -32,7 +32,7 @@ def test_feedforward_on_the_arm_it_believes_in_follows_to_rounding() -> None:
 def test_same_seed_same_bits() -> None:
     def run(seed: int) -> cdsm.TrackingRun:
         sensors = cdsm.Sensors(tension_noise=0.5)
-        return cdsm.track(small_path(0.1), sensors=sensors, steps=2, bands=0, seed=seed, **BOUNDS)
+        return cdsm.track(small_path(0.1), sensors=sensors, steps=2, seed=seed, **BOUNDS)
 
     one, again, other = run(3), run(3), run(4)
     for field in dataclasses.fields(one):
@@ -48,7 +48,7 @@ def test_stiffness_loop_calibrates_its_wire_and_holds_the_stiffness() -> None:
     plant = cdsm.SlowPlant(control.with_rigidity(plan.arm, 0.9))
     sensors = cdsm.Sensors(tension_noise=0.5)
     runs = {
-        law: cdsm.track(plan, law, plant, sensors, steps=8, bands=0, **BOUNDS)
+        law: cdsm.track(plan, law, plant, sensors, steps=8, **BOUNDS)
         for law in ("feedforward", "stiffness")
     }
     held = runs["stiffness"]
@@ -59,7 +59,7 @@ def test_stiffness_loop_calibrates_its_wire_and_holds_the_stiffness() -> None:
 
 
 def test_payload_that_nobody_told_of_is_felt() -> None:
-    run = cdsm.track(small_path(), payload=0.2, payload_from=0.5, steps=10, bands=0, **BOUNDS)
+    run = cdsm.track(small_path(), payload=0.2, payload_from=0.5, steps=10, **BOUNDS)
     loaded = run.wrench[:, 2] != 0.0
     assert loaded.sum() == 11
     assert run.wrench[-1, 2] == pytest.approx(-0.2 * 9.81)
@@ -76,7 +76,7 @@ def test_own_law_is_called_with_what_is_wanted_and_measured() -> None:
         seen.append(moment)
         return control.limited(moment, moment.reading.wire)
 
-    run = cdsm.track(small_path(), patient, steps=2, bands=0, **BOUNDS)
+    run = cdsm.track(small_path(), patient, steps=2, **BOUNDS)
     assert run.law == "patient"
     assert len(seen) == 5
     np.testing.assert_array_equal(seen[-1].reference.angles, small_path().angles[-1])
@@ -102,7 +102,7 @@ def test_own_law_is_called_with_what_is_wanted_and_measured() -> None:
 )
 def test_own_law_that_motors_cannot_follow_is_refused(law: Any, said: str) -> None:
     with pytest.raises(cdsm.InvalidInput, match=said):
-        cdsm.track(small_path(), law, bands=0, **BOUNDS)
+        cdsm.track(small_path(), law, **BOUNDS)
 
 
 # --- loops that fail ------------------------------------------------------------------------
@@ -118,7 +118,6 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
         cdsm.SlowPlant(cdsm.Manipulator(plan.arm.geometry, wire)),
         cdsm.Sensors(delay=4),
         steps=12,
-        bands=0,
         payload=0.3,
         **BOUNDS,
     )
@@ -131,7 +130,7 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
 
 
 def test_payload_that_is_too_heavy_is_named() -> None:
-    run = cdsm.track(small_path(), payload=40.0, steps=4, bands=0, **BOUNDS)
+    run = cdsm.track(small_path(), payload=40.0, steps=4, **BOUNDS)
     assert run.outcome in ("lost", "no rest", "wire")
     assert run.warnings
     assert run.reason
@@ -163,9 +162,9 @@ def test_tensions_beyond_the_law_of_the_plant_end_the_loop() -> None:
     weak = cdsm.TabulatedElasticity((0.0, 50.0), (0.0, 0.0015))
     assert plan.tensions.max() < 50.0
     plant = cdsm.SlowPlant(cdsm.Manipulator(plan.arm.geometry, weak).with_friction(0.1))
-    run = cdsm.track(plan, "feedforward", plant, bands=0, **BOUNDS)
+    run = cdsm.track(plan, "feedforward", plant, **BOUNDS)
     assert run.outcome == "completed"
-    run = cdsm.track(plan, "feedforward", plant, bands=0, payload=2.0, **BOUNDS)
+    run = cdsm.track(plan, "feedforward", plant, payload=2.0, **BOUNDS)
     assert run.outcome == "wire"
     assert "after the step" in run.reason
     assert run.tension.max() <= 50.0
@@ -173,7 +172,7 @@ def test_tensions_beyond_the_law_of_the_plant_end_the_loop() -> None:
 
 def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() -> None:
     plan = small_path()
-    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, bands=0, rate=20.0)
+    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, rate=20.0)
     assert (run.commanded_tension <= 60.0).all()
     assert run.saturated.any()
     assert abs(run.stiffness_error).max() > 0.05
@@ -187,7 +186,7 @@ def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() 
 
 
 def test_a_step_that_was_not_planned_may_be_the_one_that_failed() -> None:
-    run = cdsm.track(small_path(), "feedforward", steps=2, bands=0, **BOUNDS)
+    run = cdsm.track(small_path(), "feedforward", steps=2, **BOUNDS)
     count = len(run.time)
     cut = dataclasses.replace(run, refused={count: "no tensions"})
     assert cut.warnings == (
@@ -206,7 +205,6 @@ def test_a_step_that_was_not_planned_may_be_the_one_that_failed() -> None:
         ({"rate": -1.0}, "rate"),
         ({"tension_controlled": ["cable9"]}, "cable9"),
         ({"seed": -1}, "seed"),
-        ({"bands": -1}, "bands"),
         ({"payload": float("nan")}, "payload"),
         ({"plant": small_path().arm}, r"plant: .* such as SlowPlant"),
     ],
@@ -227,7 +225,7 @@ def test_plan_with_gaps_is_refused() -> None:
 
 def test_payload_that_no_tensions_within_the_bounds_balance_is_named() -> None:
     plan = small_path()
-    run = cdsm.track(plan, payload=3.0, steps=6, bands=0, minimum=10.0, maximum=150.0)
+    run = cdsm.track(plan, payload=3.0, steps=6, minimum=10.0, maximum=150.0)
     assert run.refused
     assert any(text.startswith("NOT PLANNED at ") for text in run.warnings)
     assert (run.commanded_tension <= 150.0).all()
@@ -249,23 +247,9 @@ def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
         assert again.attrs["outcome"] == "completed"
     with pytest.raises(cdsm.InvalidInput, match=r"\.nc"):
         run.write(tmp_path / "run.txt")
-    assert run.to_dict()["share_inside_band"] == 1.0
-    assert "100 % of 5 proved steps (0 not proved)" in str(run)
-
-
-def test_steps_whose_band_is_not_proved_are_told() -> None:
-    """A long lead and much friction: the law bends too much for a proof at some steps."""
-    plan = small_path(0.3, lead=0.5, target=(1e3, 2e3, 4e3))
-    run = cdsm.track(plan, "feedforward", steps=2, **BOUNDS)
-    numbers = run.to_dict()
-    missing = int((run.banded & ~run.proved).sum())
-    assert run.banded.all()
-    assert 0 < missing < 5
-    assert numbers["steps_without_proof"] == missing
-    assert numbers["share_inside_band"] == 1.0
-    assert f"({missing} not proved)" in str(run)
-    few = cdsm.track(plan, "feedforward", steps=1, bands=2, **BOUNDS)
-    np.testing.assert_array_equal(few.banded, [True, False, True])
+    assert run.to_dict()["share_inside_first_order_band"] == 1.0
+    assert "100 % of 5 steps" in str(run)
+    assert data["first_order_band"].attrs["units"] == "m"
 
 
 def test_table_over_time_is_a_path_that_can_be_played(tmp_path: Path) -> None:
@@ -276,7 +260,7 @@ def test_table_over_time_is_a_path_that_can_be_played(tmp_path: Path) -> None:
 
 
 def test_figure_and_animation_are_drawn(tmp_path: Path) -> None:
-    run = cdsm.track(small_path(0.1), steps=2, bands=2, **BOUNDS)
+    run = cdsm.track(small_path(0.1), steps=2, **BOUNDS)
     figure = run.plot(tmp_path / "run.gif")
     assert (tmp_path / "run.gif").read_bytes()[:3] == b"GIF"
     assert [axes.get_ylabel() for axes in figure.axes] == [
@@ -296,23 +280,20 @@ def test_figure_and_animation_are_drawn(tmp_path: Path) -> None:
 def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() -> None:
     """10 % wrong EA, μ = 0.1, 0.5 N of noise, and 200 g hung on it half-way.
 
-    Feed-forward alone has a fifth of the wanted stiffness, tension control up to 13 % less. The
-    bands that are not proved are those of the slack arm of feed-forward.
+    Feed-forward alone has a fifth of the wanted stiffness, tension control up to 13 % less.
     """
     plan = circle(0.1)
     plant = cdsm.SlowPlant(control.with_rigidity(plan.arm, 0.9))
     sensors = cdsm.Sensors(encoder=1e-5, tension_noise=0.5)
     worst = {}
     for law in ("feedforward", "tension", "stiffness"):
-        run = cdsm.track(plan, law, plant, sensors, payload=0.2, bands=5, **BOUNDS)
+        run = cdsm.track(plan, law, plant, sensors, payload=0.2, **BOUNDS)
         worst[law] = abs(run.stiffness_error[::6]).max()
         assert run.outcome == "completed"
         assert (run.commanded_tension >= 10.0).all()
         assert (run.commanded_tension <= 250.0).all()
         assert run.inside.all()
-        assert run.banded.sum() == 13
-        assert run.proved.any()
-        assert run.proved[run.banded].all() or law == "feedforward"
+        assert len(run.inside) == len(run.time)
         if law == "stiffness":
             assert run.tip_error.max() < 1e-3
     assert worst["stiffness"] < 0.05

@@ -3,7 +3,7 @@
 import itertools
 import math
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import clarabel
 import numpy as np
@@ -14,7 +14,7 @@ from scipy.sparse import csc_matrix
 
 import cdsm
 from cdsm.friction.chain_problem import ChainProblem
-from cdsm.kernels.chain_problem import Wire, chain_tangent, solve_chains
+from cdsm.kernels.chain_problem import Wire, solve_chains
 from cdsm.support.values import Array
 
 ROUNDING = 8.0 * np.finfo(float).eps
@@ -30,12 +30,6 @@ class Chains(NamedTuple):
 
     def solve(self) -> tuple[Array, Array, NDArray[np.bool_]]:
         return solve_chains(self.start, self.forced, *self.wire, self.near)
-
-    def part(self, c: int) -> "Chains":
-        """One of the chains."""
-        own = slice(self.start[c], self.start[c + 1])
-        wire = Wire(*(each[own] for each in self.wire))
-        return Chains(np.array([0, wire.length.size]), self.forced[c : c + 1], wire, self.near[own])
 
     def lengths_left(self, T: Array) -> tuple[Array, Array]:
         """D' = a − A(T) [m] and its derivative by T [m/N]."""
@@ -122,47 +116,6 @@ def test_random_chains_meet_the_optimality_conditions() -> None:
 @pytest.mark.parametrize("seed", range(1, 26))
 def test_a_hundred_thousand_chains_meet_the_optimality_conditions(seed: int) -> None:
     check_optimality(random_chains(seed, 4000, most=24))
-
-
-def test_every_pattern_of_sliding_holes_was_tried_and_one_fits() -> None:
-    # independent: for each pattern of stuck, forward and backward holes, roots of the blocks
-    chains, found = random_chains(77, 150, most=5), 0
-    for c in range(150):
-        one = chains.part(c)
-        T = one.solve()[0]
-        if not np.isnan(one.forced[0]) or T[0] < 1e-3:
-            continue
-        grip, size = np.log(one.wire.ratio[:-1]), T.size
-        fits = []
-        for pattern in itertools.product((0, 1, -1), repeat=size - 1):
-            trial = np.empty(size)
-            edges = [0, *(i + 1 for i, s in enumerate(pattern) if not s), size]
-            for i, k in itertools.pairwise(edges):
-                rise = np.concatenate([[0.0], np.cumsum((pattern * grip)[i : k - 1])])
-
-                def lacking(
-                    y: float, i: int = i, k: int = k, rise: Array = rise, one: Chains = one
-                ) -> float:
-                    full = np.zeros(one.near.size)
-                    full[i:k] = np.exp(y + rise)
-                    return float(one.lengths_left(full)[0][i:k].sum())
-
-                if lacking(-40.0) > 0.0 or lacking(25.0) < 0.0:
-                    break
-                trial[i:k] = np.exp(brentq(lacking, -40.0, 25.0, xtol=1e-15, rtol=1e-15) + rise)
-            else:
-                slip = np.cumsum(one.lengths_left(trial)[0])[:-1]
-                step = np.diff(np.log(trial))
-                noise = 1e-15
-                if (abs(step) <= grip + 1e-9).all() and (np.array(pattern) * slip >= -noise).all():
-                    fits.append(trial)
-        assert fits
-        # noise of the lengths, as a tension: rounding times EA
-        tolerance = 1e-9 * T.max() + 32.0 * ROUNDING / one.wire.softness[0]
-        for fit in fits:
-            np.testing.assert_allclose(fit, T, rtol=0.0, atol=tolerance)
-        found += 1
-    assert found > 60
 
 
 def test_interior_point_solver_comes_to_the_same_tensions() -> None:
@@ -252,46 +205,6 @@ def test_without_friction_the_tension_is_one_and_does_not_depend_on_the_holes() 
     assert T[0] == pytest.approx(1000.0 * (0.201 / (2 * 0.1 / 1.05) - 1.0), rel=1e-12)
 
 
-# --- derivatives ----------------------------------------------------------------------------
-
-
-def test_tangent_is_the_derivative_of_the_tensions() -> None:
-    rng, tried = np.random.default_rng(3), 0
-    for seed in range(120):
-        chains = random_chains(100 + seed, 1, most=9)
-        T, _, slides = chains.solve()
-        if T[0] < 1.0:
-            continue
-        w, size = chains.wire, T.size
-        g, gripped = rng.normal(size=(size, 1)), 0.1 * rng.normal(size=(size, 1))
-        gripped[w.ratio == 1.0] = 0.0
-        stretch = w.base + w.softness * T
-        slope = chain_tangent(
-            chains.start,
-            chains.forced,
-            stretch,
-            chains.lengths_left(T)[1],
-            T,
-            slides,
-            g,
-            gripped,
-        )[:, 0]
-        step, moved = 1e-6 * T.max() * w.softness[0] * w.length.min(), []
-        for sign in (1.0, -1.0):
-            turned = w._replace(
-                length=w.length + sign * step * g[:, 0],
-                ratio=w.ratio * np.exp(sign * step * gripped[:, 0]),
-            )
-            moved.append(chains._replace(wire=turned).solve())
-        if any((each[2] != slides).any() or each[0][0] == 0.0 for each in moved):
-            continue  # a hole begins to slide within the step
-        numerical = (moved[0][0] - moved[1][0]) / (2.0 * step)
-        noise = 4e-16 / w.softness[0] / step
-        np.testing.assert_allclose(slope, numerical, rtol=1e-5, atol=8.0 * noise + 1e-6)
-        tried += 1
-    assert tried > 50
-
-
 # --- laws -----------------------------------------------------------------------------------
 
 LAWS = (
@@ -313,57 +226,6 @@ def test_laws_keep_their_tension_where_nothing_moves(
     np.testing.assert_allclose(chain.tension, F, rtol=1e-9)
     if not unstrained:
         np.testing.assert_allclose(natural[1:], lengths[1:], rtol=1e-15)
-
-
-@pytest.mark.parametrize("law", LAWS, ids=["linear", "strand", "table"])
-def test_any_law_conserves_wire_and_balances_its_energy(law: cdsm.Elasticity) -> None:
-    # lengths change slowly: work of the lengths = stored + dissipated, to second order of the step
-    errors = []
-    for steps in (50, 100, 200):
-        problem, lengths, F = one_cable(law, True)
-        T, ratio = np.full(6, F), np.full(6, math.exp(0.03))
-        natural = problem.natural(lengths, T)
-        total, begin = natural.sum(), problem.stored(natural, T)
-        way, worked, lost = np.array([0, 1, -1, 2, 0, 1]) * 1e-4, 0.0, 0.0
-        for s in range(1, steps + 1):
-            at = lengths + way * math.sin(3.0 * s / steps)
-            before, P = T, problem.potential(T)
-            chain = problem.settle(at, natural, ratio, np.array([np.nan]), T)
-            T, natural = chain.tension, chain.natural
-            assert natural.sum() == pytest.approx(total, rel=1e-15)
-            change = way * (math.sin(3.0 * s / steps) - math.sin(3.0 * (s - 1) / steps))
-            worked += float((before + T) @ change) / 2.0
-            P = (P + problem.potential(T)) / 2.0
-            lost += float(chain.slip[:-1] @ np.diff(problem.potential(T)))
-            assert (chain.slip[:-1] * np.diff(problem.potential(T)) >= 0.0).all()
-        errors.append(worked - (problem.stored(natural, T) - begin) - lost)
-        assert lost > 1e-5
-    assert abs(errors[-1]) < 0.02 * lost
-    assert abs(errors[-1]) < 0.6 * abs(errors[0])
-
-
-def test_newtons_method_ends_where_rounding_moves_the_tensions(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    steps = list[int]()
-
-    def counted(*arguments: Any) -> Any:
-        steps.append(1)
-        return solve_chains(*arguments)
-
-    monkeypatch.setattr("cdsm.friction.chain_problem.solve_chains", counted)
-    # EA/T is 30 000, so tensions round to 1e-11
-    problem, lengths, F = one_cable(LAWS[1].scaled(100.0), True)
-    T, ratio = np.full(6, F), np.full(6, math.exp(0.03))
-    natural = problem.natural(lengths, T)
-    rng = np.random.default_rng(5)
-    for _ in range(50):
-        steps.clear()
-        near = problem.settle(
-            lengths + 1e-6 * rng.normal(size=6), natural, ratio, np.array([np.nan]), T
-        )
-        assert len(steps) <= 6
-        T = near.tension
 
 
 @pytest.mark.parametrize("shorter", [0.9955, 0.99575, 0.996])

@@ -106,18 +106,6 @@ def test_without_friction_it_is_the_frictionless_stiffness(name: str, control: s
         assert found.along("z") == pytest.approx(expected.along("z"), rel=1e-10)
 
 
-def test_without_friction_nonlinear_laws_give_the_frictionless_stiffness() -> None:
-    arm = presets.virtual_prototype(lead=0.2)
-    for original in ("unstrained", "stretched"):
-        cables = [replace(cable, series_stiffness=5e4) for cable in arm.cables]
-        arm = cdsm.Manipulator(arm.geometry, cables=cables, original_length=original)
-        pose = arms.random_posture(arm, 3)
-        F = np.linspace(10.0, 200.0, len(arm.cables))
-        expected, found = cdsm.stiffness(pose, F), cdsm.stuck_stiffness(pose, F)
-        size = abs(expected.joint).max()
-        np.testing.assert_allclose(found.joint, expected.joint, rtol=0, atol=1e-13 * size)
-
-
 @pytest.mark.parametrize("control", ["position", "force"])
 @pytest.mark.parametrize("name", ["universal-3", "hinged-4", "mixed"])
 def test_sliding_stiffness_is_the_derivative_of_the_torque(name: str, control: str) -> None:
@@ -184,17 +172,6 @@ def test_stuck_arms_are_never_softer_a_hundred_thousand(part: int) -> None:
         assert order.least(seed) >= -order.ROUNDING, seed
 
 
-def test_slack_cables_are_springs_as_without_friction() -> None:
-    pose, F, _ = posed("mixed", 0.1)
-    plain, _, _ = posed("mixed", 0.0)
-    F[::2] = 0.0
-    stuck = cdsm.stuck_stiffness(pose, F)
-    assert stuck.tension_gradient is not None
-    assert (abs(stuck.tension_gradient).max(axis=1) > 0.0).sum() == 19  # all that move
-    free = cdsm.stiffness(pose, F).joint
-    np.testing.assert_allclose(cdsm.stuck_stiffness(plain, F).joint, free, rtol=1e-11)
-
-
 def test_lead_and_motor_control_do_not_count_while_cables_stick() -> None:
     q = np.full(10, np.deg2rad(10.0))
     F = np.linspace(40.0, 120.0, 15)
@@ -209,31 +186,6 @@ def test_lead_and_motor_control_do_not_count_while_cables_stick() -> None:
     K.append(cdsm.stuck_stiffness(presets.virtual_prototype(LAW, friction=0.1).at(q), F).joint)
     for other in K[1:]:
         np.testing.assert_allclose(other, K[0], rtol=1e-12, atol=1e-12 * abs(K[0]).max())
-
-
-@pytest.mark.parametrize("held", [0.0, 1.0, 900.0])
-def test_law_of_a_cable_without_friction_is_not_asked_where_its_motor_holds_the_force(
-    held: float,
-) -> None:
-    """Such a cable may have any tension: Eq. 19 is defined from 2.2 to 810 N only."""
-    arm = presets.virtual_prototype(lead=0.3, friction=0.1)
-    first, *others = arm.cables
-    smooth = tuple(replace(site, friction=0.0) for site in first.sites)
-    free = replace(first, sites=smooth, control="force")
-    F = np.append(held, np.full(14, 50.0))
-    found = []
-    for law in (presets.STRAND_1X19, LAW):
-        mixed = arm.with_cables([replace(free, elasticity=law), *others])
-        pose = mixed.at(np.full(10, presets.TEN_DEGREES))
-        load = cdsm.breakaway(pose, F, "z").load
-        band = cdsm.rest_band(pose, F, "z").first_order
-        found.append([load, band, *cdsm.stuck_stiffness(pose, F).joint.ravel()])
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-9)
-    # with friction beyond the motor, segments of this cable are springs, and its law is asked
-    rough_arm = arm.with_cables([replace(first, control="force"), *others])
-    if held != 0.0:
-        with pytest.raises(cdsm.ElasticityRangeError, match="cable1_1"):
-            cdsm.stuck_stiffness(rough_arm.at(pose.q), F)
 
 
 def test_straight_arm_does_not_stick() -> None:
