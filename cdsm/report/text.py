@@ -1,0 +1,83 @@
+"""The report as text and as HTML, both by rich."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from io import StringIO
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from cdsm.report.report import Report
+
+
+def to_text(report: Report) -> str:
+    """Return the report as wrapped text with aligned columns."""
+    lines = _printed(report, "").export_text().splitlines()
+    return "\n".join(map(str.rstrip, lines))
+
+
+def to_html(report: Report, about: str) -> str:
+    """Return the report as a self-contained HTML page; ``about`` is text below the title."""
+    return _printed(report, about).export_html()
+
+
+def _printed(report: Report, about: str) -> Console:
+    from rich.console import Console  # slow to import
+    from rich.table import Table
+
+    plain = {"markup": False, "emoji": False, "highlight": False}
+    console = Console(record=True, file=StringIO(), width=100, **plain)
+    console.print(f"Stiffness check: {report.stiffness.posture.arm.name}", style="bold")
+    if about:
+        console.print(about)
+    if report.passed:
+        said = "PASS: agrees with finite differences, tensions balance the arm, arm is stable."
+        console.print(said, style="bold green")
+    else:
+        console.print("FAIL: do not use this stiffness as it is.", style="bold red")
+    for fault in report.faults:
+        console.print(f"! {fault}", style="red")
+    for note in report.notes:
+        console.print(f"- {note}")
+    console.print(f"\n{report.stiffness}\n")
+    for head, *rows in _tables(report):
+        table = Table(box=None, header_style="bold", pad_edge=False)
+        for i, title in enumerate(head):
+            table.add_column(title, justify="right" if i else "left", no_wrap=True)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table, end="\n\n")
+    said = "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
+    console.print(f"{said}torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes.")
+    return console
+
+
+def _tables(report: Report) -> Iterator[list[tuple[str, ...]]]:
+    """Yield the rows of each table; the first has the titles of its columns."""
+    K, arm = report.stiffness, report.stiffness.posture.arm
+    rows = [("against finite differences", "largest entry", "off by", "error bound", "verdict")]
+    for each in report.comparisons:
+        size = each.largest or 1.0
+        off = ("-", "-") if each.reason else (f"{each.off / size:.0e}", f"{each.error / size:.0e}")
+        name = "cdsm.evaluate, all terms" if each.name == "batch" else each.name
+        rows.append((name, f"{each.largest:.4g} {each.unit}", *off, each.verdict))
+    yield rows
+    facts = {
+        "residual of Eq. 13": f"{report.residual:.1e} N m at {report.residual_joint}",
+        "residual per torque": f"{report.imbalance:.1e}",
+        "violation of bounds": report.bound_violation,
+        "KKT residual (recomputed multipliers)": report.kkt_residual,
+        "smallest eigenvalue of K_θ": f"{K.margin:.4g} {arm.stiffness_unit()}",
+        "condition of K_θ": f"{report.condition:.3g}",
+    }
+    yield [("balance, optimality, stability", "")] + [
+        (name, f"{value:.1e}" if isinstance(value, float) else value or "-")
+        for name, value in facts.items()
+    ]
+    cables = zip(arm.cables, K.tension, K.cable_stiffness, strict=True)
+    yield [("cable", "F [N]", "k [N/mm]", "law")] + [
+        (cable.name, f"{F:.4g}", f"{k / 1e3:.4g}", f"{cable.elasticity.domain}")
+        for cable, F, k in cables
+    ]
