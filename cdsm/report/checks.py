@@ -1,4 +1,4 @@
-"""Check K_θ against finite differences and the batch, balance (Eq. 13), and optimality (Eq. 17).
+"""Check the terms of K_θ, balance (Eq. 13), and optimality of the tensions (Eq. 17).
 
 The torques J_Lᵀ F, g and −J_Xᵀ W are compared with ∂U/∂θ of the potentials of cables, weight and
 load, and the terms of K_θ with the derivatives of these torques: together, K_θ = ∂²U/∂θ². A moment
@@ -24,36 +24,35 @@ from cdsm.support.values import Array
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
 
+Verdict = Literal["agrees", "DIFFERS", "not possible"]
+
 TERMS = ("active", "passive", "gravity", "load", "joint")
 TORQUES = ("cable torque", "gravity torque", "load torque")
 
-BALANCED = 1e-6
-"""Tensions balance an arm if the residual is at most this fraction of the torques."""
+TOLERANCE = 1e-6
+"""Largest residual of balance, KKT residual and error of a term, relative to what they are of."""
 
-_RESOLVED = 1e-6  # differences agree if they are off by at most this fraction of the largest entry
 _SMALL = 1e-3  # a term below this fraction of the whole is compared to this fraction of it
 _SAME = 1e-10  # K and the batch agree to this fraction of the largest entry of K_θ
 _EDGE = 0.01  # no derivative is taken within this fraction of F of an end of a law
 _STEP = 1e-3  # largest step [rad], or in arm lengths
 _CHANGE = 4e-3  # largest change of a tension in a step, as a fraction of the tension
-_AT_BOUND = 1e-6  # distance to a bound that counts as zero, as a fraction of the largest tension
 
 
 @final
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Comparison:
-    """A term of K_θ or a torque against finite differences, or K_θ and its terms against the batch.
-
-    Entries of prismatic joints are multiplied by the arm's length, so that all have one unit.
+    """A term of K_θ or a torque against finite differences, or all terms against the batch.
 
     Attributes:
         name: Name of the term or torque, or ``"batch"``; ``"joint"`` is K_θ.
-        unit: ``"N m/rad"`` or, for a torque, ``"N m"``.
+        unit: ``"N m/rad"`` or, for a torque, ``"N m"``; prismatic joints count with the arm's
+            length as lever.
         largest: Largest magnitude of an entry.
         off: Largest magnitude of the difference.
         error: Error estimate of the finite differences; 0 for the batch.
-        verdict: ``"not possible"`` if the differences decide nothing; ``reason`` says why.
-        reason: Empty if the check is possible.
+        verdict: ``"not possible"`` if the differences decide nothing.
+        reason: Why the check is not possible; else empty.
     """
 
     name: str
@@ -61,27 +60,19 @@ class Comparison:
     largest: float
     off: float
     error: float
-    verdict: Literal["agrees", "DIFFERS", "not possible"]
-    reason: str = ""
+    verdict: Verdict
+    reason: str
 
 
 def balance_error(K: Stiffness) -> tuple[float, str, float]:
-    """Return the largest residual of Eq. 13 [N m], its joint, and the residual per torque [-].
-
-    The force at a prismatic joint is multiplied by the arm's length.
-    """
+    """Return the largest residual of Eq. 13 [N m], its joint, and the residual per torque [-]."""
     left = abs(K.residual * joint_unit(K))
-    worst = int(left.argmax())
-    part = float(left[worst]) / (float(_torque_sizes(K).sum()) or 1.0)
-    return float(left[worst]), K.posture.arm.joint_names[worst], part
+    worst, most = int(left.argmax()), float(left.max())
+    return most, K.posture.arm.joint_names[worst], most / (float(_torque_sizes(K).sum()) or 1.0)
 
 
 def optimality(K: Stiffness) -> tuple[float | None, float | None]:
-    """Return violation of bounds per largest tension, and KKT residual of Eq. 17 per ‖F‖ [-].
-
-    The multipliers are found anew: min ‖F + J_L λ − μ + ν‖ over λ, and μ, ν ≥ 0 at lower and upper
-    bounds. None where tensions have no bounds, or need not be the least.
-    """
+    """Return ``bound_violation`` and ``kkt_residual`` of :class:`Report`."""
     F, tension = K.tension, K.distribution
     if tension is None:
         return None, None
@@ -90,7 +81,7 @@ def optimality(K: Stiffness) -> tuple[float | None, float | None]:
     if not tension.least:
         return violation, None
     free = null_space((K.posture.length_jacobian * joint_unit(K)).T).T  # where J_L λ has no part
-    low, high = below >= -_AT_BOUND * size, above >= -_AT_BOUND * size
+    low, high = below >= -TOLERANCE * size, above >= -TOLERANCE * size
     bounds = np.hstack([-free[:, low], free[:, high]])
     left = nnls(bounds, -free @ F)[1] if bounds.size else np.linalg.norm(free @ F)
     return violation, float(left / (np.linalg.norm(F) or 1.0))
@@ -128,7 +119,7 @@ def compared(K: Stiffness) -> tuple[Comparison, ...]:
     sizes, largest = sizes + _SMALL * sizes.sum(), largest + _SMALL * largest[4]
     scale = np.concatenate([sizes, np.repeat(largest[:4], nv)])
     scale[scale == 0.0] = 1.0
-    tolerances, failure = {"atol": _RESOLVED / 10.0, "rtol": 0.0}, ""
+    tolerances, failure = {"atol": TOLERANCE / 10.0, "rtol": 0.0}, ""
     options = {"initial_step": _step(K, moved), "order": 4, "maxiter": 6}
     try:
         found = jacobian(derived, np.zeros(nv), tolerances=tolerances, **options)
@@ -139,8 +130,8 @@ def compared(K: Stiffness) -> tuple[Comparison, ...]:
     matrices = np.concatenate([matrices, matrices.sum(axis=1, keepdims=True)], axis=1)
     why = [failure or (edge if name in ("passive", "joint") else "") for name in TERMS]
     return (
-        *map(_compare, TERMS, terms, *matrices, _RESOLVED * largest, why),
-        *map(_compare, TORQUES, torques * unit, *both[:, :3], _RESOLVED * sizes, [failure] * 3),
+        *map(_compare, TERMS, terms, *matrices, TOLERANCE * largest, why),
+        *map(_compare, TORQUES, torques * unit, *both[:, :3], TOLERANCE * sizes, [failure] * 3),
         _compare("batch", terms, _batch(K) * unit[:, None] * unit, 0.0, _SAME * largest[4], ""),
     )
 
@@ -152,15 +143,9 @@ def _compare(
     off, bound = float(abs(given - value).max()), float(np.max(error))
     if not reason and most < off <= 3.0 * bound:
         reason = "the finite differences do not converge"
-    return Comparison(
-        name=name,
-        unit="N m" if name in TORQUES else "N m/rad",
-        largest=float(abs(given).max()),
-        off=off,
-        error=bound,
-        verdict="not possible" if reason else "agrees" if off <= most else "DIFFERS",
-        reason=reason,
-    )
+    unit = "N m" if name in TORQUES else "N m/rad"
+    verdict: Verdict = "not possible" if reason else "agrees" if off <= most else "DIFFERS"
+    return Comparison(name, unit, float(abs(given).max()), off, bound, verdict, reason)
 
 
 def _batch(K: Stiffness) -> Array:
@@ -180,8 +165,6 @@ def _edges(K: Stiffness, c: int) -> list[str]:
     domain = cable.elasticity.domain
     if F == 0.0:
         return [f"{cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
-    if K.free_lengths[c] <= 0.0:
-        return [f"{cable.name} is shorter than its series spring stretches"]
     if min(abs(F - domain.low), abs(F - domain.high)) > _EDGE * F:
         return []
     return [f"{cable.name} at {F:.4g} N is within {_EDGE:.0%} of an end of its law, {domain}"]
@@ -189,11 +172,9 @@ def _edges(K: Stiffness, c: int) -> list[str]:
 
 def _step(K: Stiffness, moved: list[int]) -> float:
     """Return the first step of the differences: small enough for all tensions."""
-    F, rise = (
-        K.tension,
-        K.cable_stiffness * abs(K.posture.length_jacobian * joint_unit(K)).max(axis=1),
-    )
-    return float(min([_STEP, *(_CHANGE * F[c] / rise[c] for c in moved if F[c] * rise[c] > 0.0)]))
+    rise = K.cable_stiffness * abs(K.posture.length_jacobian * joint_unit(K)).max(axis=1)
+    taut = [c for c in moved if K.tension[c] * rise[c] > 0.0]
+    return float(min([_STEP, *(_CHANGE * K.tension[taut] / rise[taut])]))
 
 
 def joint_unit(K: Stiffness) -> Array:
@@ -205,5 +186,5 @@ def _torque_sizes(K: Stiffness) -> Array:
     """Return the largest entries (3,) [N m] of |J_L|ᵀ F, |g| and |J_X|ᵀ |W|."""
     pose = K.posture
     pulled, loaded = K.tension @ abs(pose.length_jacobian), abs(K.wrench) @ abs(pose.jacobian)
-    torques = np.array([pulled, abs(pose.gravity_torque), loaded])
-    return np.asarray((torques * joint_unit(K)).max(axis=1))
+    torques = np.array([pulled, abs(pose.gravity_torque), loaded]) * joint_unit(K)
+    return np.asarray(torques.max(axis=1))

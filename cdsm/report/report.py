@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import cdsm
 from cdsm.errors import CdsmError, SingularStiffness, named
@@ -21,28 +20,23 @@ from cdsm.support.result import Result, quantity, unit
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
 
-_OPTIMAL = 1e-6  # largest KKT residual and violation of bounds of optimal tensions
-_SINGULAR = 1e-12  # an eigenvalue of at most this part of the norm of K_θ is rounding
-_DIGITS = 1e10  # condition number of K_θ above which K_θ⁻¹ has less than six digits
-_APART = 0.1  # readings of the tip stiffness that differ by more are remarked
-_CLOSE = 0.05  # tensions closer than this part of F to an end of their law are remarked
+_SINGULAR = 1e12  # condition number of a matrix that is singular but for rounding
 
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Report(Result):
     """Whether a stiffness is right, balanced and stable; made by :meth:`Stiffness.report`.
 
     Attributes:
         stiffness: The stiffness that was checked.
-        comparisons: The terms of K_θ and the torques against finite differences, and all terms
-            against :func:`evaluate`.
+        comparisons: Terms of K_θ and torques against finite differences and the batch.
         residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a prismatic
             joint is multiplied by the arm's length.
         residual_joint: Name of the joint with the largest residual.
-        imbalance: ``residual`` per largest torque of cables, weight and load [-].
-        bound_violation: Largest violation of the bounds of distributed tensions, per largest
-            tension [-]; None for tensions that were given.
+        imbalance: ``residual`` per torque of cables, weight and load [-].
+        bound_violation: Violation of the bounds of distributed tensions per largest tension [-];
+            None for tensions that were given.
         kkt_residual: min ‖F + J_L λ − μ + ν‖/‖F‖ [-] of Eq. 17 over the multipliers λ of the
             balance, μ ≥ 0 and ν ≥ 0 of the bounds; None if the tensions need not be the least.
     """
@@ -83,8 +77,8 @@ class Report(Result):
     def to_dict(self) -> dict[str, object]:
         """Return the report and :meth:`Stiffness.to_dict` in SI for JSON, units in the keys."""
         said = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
-        said["comparisons"] = [asdict(each) for each in self.comparisons]
-        return plain(said) | self.stiffness.to_dict() | super().to_dict()
+        checked = {"comparisons": [asdict(each) for each in self.comparisons]}
+        return plain(said | checked) | super().to_dict() | self.stiffness.to_dict()
 
     def to_html(self, about: str = "") -> str:
         """Return the report as an HTML page; ``about`` is text below the title."""
@@ -100,49 +94,34 @@ class Report(Result):
 
 def report_on(K: Stiffness) -> Report:
     """Compute the report on a stiffness."""
-    residual, joint, imbalance = checks.balance_error(K)
-    violation, kkt = checks.optimality(K)
-    return Report(
-        stiffness=K,
-        comparisons=checks.compared(K),
-        residual=residual,
-        residual_joint=joint,
-        imbalance=imbalance,
-        bound_violation=violation,
-        kkt_residual=kkt,
-    )
+    return Report(K, checks.compared(K), *checks.balance_error(K), *checks.optimality(K))
 
 
 def _faults(report: Report) -> Iterator[str]:
     """Yield the reasons not to use the stiffness of ``report``."""
     K = report.stiffness
-    unchecked: dict[str, list[str]] = {}
     for each in report.comparisons:
         if each.verdict == "DIFFERS":
             yield (
                 f"{each.name}: off by {each.off:.2g} {each.unit}, where the largest entry is "
                 f"{each.largest:.4g} {each.unit}. Do not use this stiffness."
             )
-        elif each.reason:
-            unchecked.setdefault(each.reason, []).append(each.name)
-    for reason, names in unchecked.items():
+    for reason in dict.fromkeys(each.reason for each in report.comparisons if each.reason):
+        names = [each.name for each in report.comparisons if each.reason == reason]
         yield f"check not possible for {' and '.join(names)}: {reason}."
-    if report.imbalance > checks.BALANCED:
+    if report.imbalance > checks.TOLERANCE:
         yield (
             f"the tensions do not balance the arm: the residual is {report.residual:.3g} N m at "
-            f"{report.residual_joint}, {report.imbalance:.1e} of the torques. K_θ is right only if "
-            "another load balances the arm here; distribute_tension finds tensions that do."
+            f"{report.residual_joint}, {report.imbalance:.1e} of the torques; distribute_tension "
+            "finds tensions that do."
         )
     if not K.is_stable:
         yield " ".join(map(str.strip, K.warnings))
-    elif K.margin <= _SINGULAR * np.linalg.norm(K.joint, 2):
-        yield f"the arm is about to buckle: the smallest eigenvalue of K_θ is {K.margin:.2g}."
+    elif report.condition > _SINGULAR:
+        yield f"the arm is about to buckle: K_θ has the condition number {report.condition:.2g}."
     violation, kkt = report.bound_violation or 0.0, report.kkt_residual or 0.0
-    if max(violation, kkt) > _OPTIMAL:
-        yield (
-            f"the tensions are not optimal: bounds are violated by {violation:.1e} of the largest "
-            f"tension, the KKT residual is {kkt:.1e}."
-        )
+    if max(violation, kkt) > checks.TOLERANCE:
+        yield f"the tensions are not optimal: bounds violated by {violation:.1e}, KKT {kkt:.1e}."
 
 
 def _notes(report: Report) -> Iterator[str]:
@@ -158,10 +137,7 @@ def _notes(report: Report) -> Iterator[str]:
         yield f"the cables have friction; this K is frictionless, as after shaking. {_stuck(K)}"
     if K.wrench[3:].any():
         yield "with a moment at the tip K_θ is not symmetric: its symmetric part decides stability."
-    yield from _of_cables(K)
-    room, span = np.minimum(pose.q - arm.lower, arm.upper - pose.q), arm.upper - arm.lower
-    if (near := np.isfinite(span) & (room < 0.01 * span)).any():
-        yield f"at a joint limit, to 1 % of the range: {_chosen(arm.joint_names, near)}."
+    yield from _of_limits(K)
     unit = checks.joint_unit(K)
     for matrix, full, what in (
         (pose.length_jacobian, arm.nv, "the cables give {} of {} joint torques."),
@@ -169,38 +145,35 @@ def _notes(report: Report) -> Iterator[str]:
     ):
         if (rank := np.linalg.matrix_rank(matrix * unit, rtol=1e-9)) < full:
             yield what.format(rank, full)
-    if report.condition > _DIGITS:
-        yield f"K_θ has the condition number {report.condition:.1g}: the compliance loses digits."
     try:
         along = [K.along(axis) for axis in np.eye(3)]
         apart = np.diag(K.pseudoinverse()) / along, np.diag(K.cartesian) / along
     except SingularStiffness:
         return
-    if (abs(np.array(apart) - 1.0) > _APART).any():
+    if (abs(np.array(apart) - 1.0) > 0.1).any():
         yield (
             "along, cartesian and pseudoinverse differ: use along, which a small weight measures; "
             "cartesian locks the other two translations, pseudoinverse is the paper's reading."
         )
 
 
-def _of_cables(K: Stiffness) -> Iterator[str]:
-    """Yield which cables are slack, under force control, near an end of their law, or too short."""
-    cables, F = K.posture.arm.cables, K.tension
-    low, high = np.array([(b.elasticity.domain.low, b.elasticity.domain.high) for b in cables]).T
-    locked, slack = cables.position_controlled, F == 0.0
-    for what, chosen in (
-        ("slack, 0 N; they stiffen one direction, raise minimum=", locked & slack),
-        ("force-controlled, no passive stiffness", ~locked),
-        ("within 5 % of the low end of their law", locked & ~slack & (F - low <= _CLOSE * F)),
-        ("within 5 % of the high end of their law", locked & (high - F <= _CLOSE * F)),
-        ("shorter than their series spring, give a longer lead", locked & (K.free_lengths <= 0.0)),
+def _of_limits(K: Stiffness) -> Iterator[str]:
+    """Yield which cables are slack, hold a force, or are near an end of their law; joints alike."""
+    arm, q, F = K.posture.arm, K.posture.q, K.tension
+    low, high = np.array(
+        [(c.elasticity.domain.low, c.elasticity.domain.high) for c in arm.cables]
+    ).T
+    locked, slack, cables = arm.cables.position_controlled, F == 0.0, arm.cables.names
+    near = np.minimum(q - arm.lower, arm.upper - q) < 0.01 * (arm.upper - arm.lower)
+    for what, names, chosen in (
+        ("slack, 0 N; they stiffen one direction, raise minimum=", cables, locked & slack),
+        ("force-controlled, no passive stiffness", cables, ~locked),
+        ("within 5 % of the low end of their law", cables, locked & ~slack & (low >= 0.95 * F)),
+        ("within 5 % of the high end of their law", cables, locked & (high <= 1.05 * F)),
+        ("within 1 % of their range from a joint limit", arm.joint_names, near),
     ):
         if chosen.any():
-            yield f"{what}: {_chosen(cables.names, chosen)}."
-
-
-def _chosen(names: Sequence[str], chosen: NDArray[np.bool_]) -> str:
-    return named([names[i] for i in np.flatnonzero(chosen)])
+            yield f"{what}: {named(np.array(names)[chosen].tolist())}."
 
 
 def _stuck(K: Stiffness) -> str:

@@ -27,16 +27,15 @@ def _printed(report: Report, about: str) -> Console:
     from rich.console import Console  # slow to import
     from rich.table import Table
 
-    plain = {"markup": False, "emoji": False, "highlight": False}
-    console = Console(record=True, file=StringIO(), width=100, **plain)
+    console = Console(
+        record=True, file=StringIO(), width=100, markup=False, emoji=False, highlight=False
+    )
     console.print(f"Stiffness check: {report.stiffness.posture.arm.name}", style="bold")
     if about:
         console.print(about)
-    if report.passed:
-        said = "PASS: agrees with finite differences, tensions balance the arm, arm is stable."
-        console.print(said, style="bold green")
-    else:
-        console.print("FAIL: do not use this stiffness as it is.", style="bold red")
+    good = "PASS: agrees with finite differences, tensions balance the arm, arm is stable."
+    bad = "FAIL: do not use this stiffness as it is."
+    console.print(good if report.passed else bad, style="bold")
     for fault in report.faults:
         console.print(f"! {fault}", style="red")
     for note in report.notes:
@@ -48,22 +47,23 @@ def _printed(report: Report, about: str) -> Console:
             table.add_column(title, justify="right" if i else "left", no_wrap=True)
         for row in rows:
             table.add_row(*row)
-        console.print(table, end="\n\n")
+        console.print(table)
+        console.print()
     said = "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
     console.print(f"{said}torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes.")
     return console
 
 
-def _tables(report: Report) -> Iterator[list[tuple[str, ...]]]:
+def _tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
     """Yield the rows of each table; the first has the titles of its columns."""
     K, arm = report.stiffness, report.stiffness.posture.arm
-    rows = [("against finite differences", "largest entry", "off by", "error bound", "verdict")]
+    rows = []
     for each in report.comparisons:
         size = each.largest or 1.0
         off = ("-", "-") if each.reason else (f"{each.off / size:.0e}", f"{each.error / size:.0e}")
         name = "cdsm.evaluate, all terms" if each.name == "batch" else each.name
         rows.append((name, f"{each.largest:.4g} {each.unit}", *off, each.verdict))
-    yield rows
+    yield ("against finite differences", "largest entry", "off by", "error bound", "verdict"), *rows
     facts = {
         "residual of Eq. 13": f"{report.residual:.1e} N m at {report.residual_joint}",
         "residual per torque": f"{report.imbalance:.1e}",
@@ -72,12 +72,5 @@ def _tables(report: Report) -> Iterator[list[tuple[str, ...]]]:
         "smallest eigenvalue of K_θ": f"{K.margin:.4g} {arm.stiffness_unit()}",
         "condition of K_θ": f"{report.condition:.3g}",
     }
-    yield [("balance, optimality, stability", "")] + [
-        (name, f"{value:.1e}" if isinstance(value, float) else value or "-")
-        for name, value in facts.items()
-    ]
-    cables = zip(arm.cables, K.tension, K.cable_stiffness, strict=True)
-    yield [("cable", "F [N]", "k [N/mm]", "law")] + [
-        (cable.name, f"{F:.4g}", f"{k / 1e3:.4g}", f"{cable.elasticity.domain}")
-        for cable, F, k in cables
-    ]
+    texts = {k: f"{v:.1e}" if isinstance(v, float) else v or "-" for k, v in facts.items()}
+    yield ("balance, optimality, stability", ""), *texts.items()

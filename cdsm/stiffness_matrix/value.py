@@ -160,15 +160,13 @@ class Stiffness(CartesianReadings):
         return () if self.is_stable else (verdict(self), *advice(self))
 
     def report(self) -> Report:
-        """Check this stiffness; return facts, warnings and a second derivation of K_θ.
+        """Check this stiffness: is it right, balanced and stable, and how to read it.
 
-        The second derivation uses central differences of the potential and the torque at this
-        posture. The check takes a few tenths of a second. Problems are not raised as errors; the
-        report lists them.
+        Each term is compared with finite differences and with :func:`evaluate`. Problems are not
+        raised as errors; the report lists them.
 
         Raises:
             InvalidInput: The stiffness is not frictionless.
-            SolverError: The linear program for the tension factor, a fact of the report, fails.
         """
         from cdsm.report import report_on  # here, since a stiffness does not need it
 
