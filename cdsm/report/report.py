@@ -184,4 +184,6 @@ def _stuck(K: Stiffness) -> str:
         stuck = ", ".join(f"{each.stiffness.along(u) / 1e3:.4g}" for u, each in found)
     except CdsmError as error:  # the stuck arm is singular, or a tension outside its law
         return f"The load below which they stick is not known: {error}"
+    if not any(each.load for _, each in found):
+        return "Here no cable sticks."
     return f"Below {loads} N along x, y, z they stick, and a load measures {stuck} N/mm."

@@ -162,4 +162,4 @@ def test_spring_longer_than_its_cable_is_told() -> None:
         arm = cdsm.Manipulator(geometry, cables=cables)
         K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), F)
         assert ("longer lead" in str(K)) == lost
-        assert any("longer lead" in line for line in K.report().notes) == lost
+        assert ("longer lead" in str(K.report())) == lost
