@@ -13,14 +13,12 @@ import cdsm
 from cdsm.errors import CdsmError, SingularStiffness, named
 from cdsm.report import checks
 from cdsm.report.checks import Comparison
-from cdsm.report.text import to_html, to_text
+from cdsm.report.text import printed
 from cdsm.support.format import plain
 from cdsm.support.result import Result, quantity, unit
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
-
-_SINGULAR = 1e12  # condition number of a matrix that is singular but for rounding
 
 
 @final
@@ -81,15 +79,15 @@ class Report(Result):
         return plain(said | checked) | super().to_dict() | self.stiffness.to_dict()
 
     def to_html(self, about: str = "") -> str:
-        """Return the report as an HTML page; ``about`` is text below the title."""
-        return to_html(self, about)
+        """Return the report as a self-contained HTML page; ``about`` is text below the title."""
+        return printed(self, about).export_html()
 
     def __repr__(self) -> str:
         name = self._posture.arm.name
         return f"<Report on the stiffness of {name}: {'PASS' if self.passed else 'FAIL'}>"
 
     def __str__(self) -> str:
-        return to_text(self)
+        return "\n".join(map(str.rstrip, printed(self).export_text().splitlines()))
 
 
 def report_on(K: Stiffness) -> Report:
@@ -117,7 +115,7 @@ def _faults(report: Report) -> Iterator[str]:
         )
     if not K.is_stable:
         yield " ".join(map(str.strip, K.warnings))
-    elif report.condition > _SINGULAR:
+    elif report.condition > 1e12:  # singular but for rounding
         yield f"the arm is about to buckle: K_θ has the condition number {report.condition:.2g}."
     violation, kkt = report.bound_violation or 0.0, report.kkt_residual or 0.0
     if max(violation, kkt) > checks.TOLERANCE:
@@ -160,9 +158,8 @@ def _notes(report: Report) -> Iterator[str]:
 def _of_limits(K: Stiffness) -> Iterator[str]:
     """Yield which cables are slack, hold a force, or are near an end of their law; joints alike."""
     arm, q, F = K.posture.arm, K.posture.q, K.tension
-    low, high = np.array(
-        [(c.elasticity.domain.low, c.elasticity.domain.high) for c in arm.cables]
-    ).T
+    domains = [cable.elasticity.domain for cable in arm.cables]
+    low, high = np.array([(each.low, each.high) for each in domains]).T
     locked, slack, cables = arm.cables.position_controlled, F == 0.0, arm.cables.names
     near = np.minimum(q - arm.lower, arm.upper - q) < 0.01 * (arm.upper - arm.lower)
     for what, names, chosen in (
@@ -180,10 +177,10 @@ def _stuck(K: Stiffness) -> str:
     """Return below which load friction holds all cables, and the stiffness there."""
     try:
         found = [(axis, cdsm.breakaway(K.posture, K.tension, axis, K.wrench)) for axis in "xyz"]
-        loads = ", ".join(f"{each.load:.2g}" for _, each in found)
         stuck = ", ".join(f"{each.stiffness.along(u) / 1e3:.4g}" for u, each in found)
     except CdsmError as error:  # the stuck arm is singular, or a tension outside its law
         return f"The load below which they stick is not known: {error}"
     if not any(each.load for _, each in found):
         return "Here no cable sticks."
+    loads = ", ".join(f"{each.load:.2g}" for _, each in found)
     return f"Below {loads} N along x, y, z they stick, and a load measures {stuck} N/mm."

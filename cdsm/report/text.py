@@ -12,18 +12,8 @@ if TYPE_CHECKING:
     from cdsm.report.report import Report
 
 
-def to_text(report: Report) -> str:
-    """Return the report as wrapped text with aligned columns."""
-    lines = _printed(report, "").export_text().splitlines()
-    return "\n".join(map(str.rstrip, lines))
-
-
-def to_html(report: Report, about: str) -> str:
-    """Return the report as a self-contained HTML page; ``about`` is text below the title."""
-    return _printed(report, about).export_html()
-
-
-def _printed(report: Report, about: str) -> Console:
+def printed(report: Report, about: str = "") -> Console:
+    """Return a console that has recorded the report; ``about`` is text below the title."""
     from rich.console import Console  # slow to import
     from rich.table import Table
 
@@ -56,7 +46,6 @@ def _printed(report: Report, about: str) -> Console:
 
 def _tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
     """Yield the rows of each table; the first has the titles of its columns."""
-    K, arm = report.stiffness, report.stiffness.posture.arm
     rows = []
     for each in report.comparisons:
         size = each.largest or 1.0
@@ -69,7 +58,6 @@ def _tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
         "residual per torque": f"{report.imbalance:.1e}",
         "violation of bounds": report.bound_violation,
         "KKT residual (recomputed multipliers)": report.kkt_residual,
-        "smallest eigenvalue of K_θ": f"{K.margin:.4g} {arm.stiffness_unit()}",
         "condition of K_θ": f"{report.condition:.3g}",
     }
     texts = {k: f"{v:.1e}" if isinstance(v, float) else v or "-" for k, v in facts.items()}
