@@ -41,6 +41,10 @@ def printed(report: Report, about: str = "") -> Console:
         console.print()
     said = "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
     console.print(f"{said}torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes.")
+    if (arm := report.stiffness.posture.arm).slides.any():
+        console.print(
+            f"Joints that slide count with the arm's length, {arm.length:.4g} m, as lever."
+        )
     return console
 
 
