@@ -101,7 +101,6 @@ from cdsm.planning.tension_growth import saturation as saturation
 from cdsm.posture import MomentArms as MomentArms
 from cdsm.posture import Posture as Posture
 from cdsm.report import Report as Report
-from cdsm.report import SelfCheck as SelfCheck
 from cdsm.statics.buckling import critical_load as critical_load
 from cdsm.statics.buckling import critical_tension as critical_tension
 from cdsm.statics.buckling_results import CriticalLoad as CriticalLoad

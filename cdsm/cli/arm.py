@@ -194,9 +194,9 @@ def check(
     tolerances: _Given = None,
     as_json: AsJson = False,
 ) -> None:
-    """Check a stiffness: compare it with finite differences, and report every problem.
+    """Check a stiffness: is it right, balanced and stable, and how to read it.
 
-    Exit code 0: it can be trusted; 3: it cannot, and the report says why.
+    Exit code 0: it passes; 3: it fails, and the report says why.
     """
     from cdsm.support.files import write_text
 
@@ -206,7 +206,7 @@ def check(
     conditions = tensions.conditions(pose)
     about = f"{arm.arm}\n{conditions}\ncdsm {cdsm.__version__}"
     write(out, lambda file: write_text(file, report.to_html(about)))
-    warnings = () if report.trustworthy else ("NOT to be trusted: the report says why.",)
+    warnings = () if report.passed else ("FAIL: the report says why.",)
     tables, sure = _uncertainty(tension, tolerances)
     parts = [conditions, report, *tables]
     answer(as_json, lambda: report.to_dict() | sure, *parts, warnings=warnings)

@@ -34,8 +34,8 @@ FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
 """Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
 
 UNMET is the exit code of every answer with a warning: the arm is unstable or has left its
-reference, some samples cannot be planned, no entry of a sweep is ok, or the report is not
-trustworthy. It is also the exit code of errors that say what the arm cannot do.
+reference, some samples cannot be planned, no entry of a sweep is ok, or a report
+fails. It is also the exit code of errors that say what the arm cannot do.
 """
 
 _LIST = re.compile(r"(?<=\[)\n[^][{}\"]*\n\s*(?=\])")

@@ -25,8 +25,7 @@ from cdsm.interchange.mjcf_bodies import add_bodies, row
 from cdsm.interchange.mjcf_motion import Motion, choose_motion
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.report.facts import balance_error
-from cdsm.report.remarks import BALANCED
+from cdsm.report.checks import TOLERANCE, balance_error
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.instability import verdict
 from cdsm.support.files import write_text
@@ -225,7 +224,7 @@ def _missing(K: Stiffness) -> Iterator[str]:
         load = f"{coordinates(K.wrench[:3])} N, {coordinates(K.wrench[3:])} N m"
         yield f"load       {load} is not in the model: apply it to {K.posture.arm.tip_link}"
     left, joint, part = balance_error(K)
-    if part > BALANCED:
+    if part > TOLERANCE:
         yield f"balance    {left:.4g} N m are missing, most at {joint}: the arm leaves the posture"
 
 

@@ -1,216 +1,186 @@
-"""The report on a stiffness: every check, and whether the stiffness can be trusted."""
+"""The report on a stiffness: is it right, balanced and stable, and how to read it."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from cdsm.errors import SolverError
-from cdsm.report import facts, remarks
-from cdsm.report.facts import CableState, Rank, Readings, Sticking
-from cdsm.report.optimality import Optimality, optimality
-from cdsm.report.page import to_document, to_fragment, to_text
-from cdsm.report.potential import joint_unit
-from cdsm.report.self_check import SelfCheck, self_check
-from cdsm.support.format import JointUnits, key, plain
-from cdsm.support.values import Array, ReadOnlyState
-from cdsm.tension import tension_ratio
+import cdsm
+from cdsm.errors import CdsmError, SingularStiffness, listed
+from cdsm.report import checks
+from cdsm.report.checks import Comparison
+from cdsm.report.text import printed
+from cdsm.support.format import plain
+from cdsm.support.result import Result, quantity, unit
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
 
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Report(ReadOnlyState):
-    """Report that shows whether a stiffness can be trusted; made by :meth:`Stiffness.report`.
+@dataclass(frozen=True, eq=False, repr=False)
+class Report(Result):
+    """Whether a stiffness is right, balanced and stable; made by :meth:`Stiffness.report`.
 
     Attributes:
-        stiffness: The stiffness to check.
-        self_check: Comparison of K_θ and its terms with central differences at this posture.
+        stiffness: The stiffness that was checked.
+        comparisons: Terms of K_θ and torques against finite differences and the batch.
         residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a prismatic
             joint is multiplied by the arm's length.
         residual_joint: Name of the joint with the largest residual.
-        imbalance: ``residual`` divided by the largest entry of |J_L|ᵀ F + |J_X|ᵀ |W| + |g| [-].
-        optimality: Optimality conditions of Eq. 17; None if the tensions were not distributed.
-        cables: Tension, stiffness and domain of each cable.
-        jacobian_rank: Rank and condition number of J_X.
-        translation_rank: Rank and condition number of the linear rows of J_X.
-        cable_rank: Rank and condition number of J_Lᵀ; full if cables can give every joint torque.
-        closure: Largest ratio min(n)/max(n) [-] of tensions n that cause no joint torque; zero if
-            the arm cannot be pretensioned with all cables, NaN if HiGHS fails.
-        readings: The three tip stiffnesses along the base axes; None if K_θ is singular.
-        sticking: Tip stiffnesses under loads too small to make a cable slide; None if no cable
-            sticks, K_θ is singular, or a tension is outside the domain of its law.
+        imbalance: ``residual`` per torque of cables, weight and load [-].
+        bound_violation: Violation of the bounds of distributed tensions per largest tension [-];
+            None for tensions that were given.
+        kkt_residual: min ‖F + J_L λ − μ + ν‖/‖F‖ [-] of Eq. 17 over the multipliers λ of the
+            balance, μ ≥ 0 and ν ≥ 0 of the bounds; None if the tensions need not be the least.
     """
 
     stiffness: Stiffness
-    self_check: SelfCheck
-    residual: float
-    residual_joint: str
-    imbalance: float
-    optimality: Optimality | None
-    cables: tuple[CableState, ...]
-    jacobian_rank: Rank
-    translation_rank: Rank
-    cable_rank: Rank
-    closure: float
-    readings: Readings | None
-    sticking: Sticking | None
+    comparisons: tuple[Comparison, ...]
+    residual: float = field(metadata=unit("N m"))
+    residual_joint: str = field(metadata=unit("1"))
+    imbalance: float = field(metadata=unit("1"))
+    bound_violation: float | None = field(metadata=unit("1"))
+    kkt_residual: float | None = field(metadata=unit("1"))
+
+    @property
+    def _posture(self) -> Any:
+        return self.stiffness.posture
+
+    @quantity("1")
+    def condition(self) -> float:
+        """Condition number of K_θ [-], made dimensionless with the arm's length."""
+        scale = checks.joint_unit(self.stiffness)
+        return float(np.linalg.cond(self.stiffness.joint * scale[:, None] * scale))
+
+    @property
+    def passed(self) -> bool:
+        """Whether there are no faults: all comparisons agree, the arm is in balance and stable."""
+        return not self.faults
 
     @cached_property
     def faults(self) -> tuple[str, ...]:
-        """Return the reasons not to trust the stiffness, a text for each; empty if none."""
-        return tuple(remarks.faults(self))
+        """Reasons not to use the stiffness, one text each; empty if there are none."""
+        return tuple(_faults(self))
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Return notes on how to read the stiffness, one text each, e.g. that a cable is slack."""
-        return tuple(remarks.notes(self))
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Return :attr:`faults`, then :attr:`notes`."""
-        return (*self.faults, *self.notes)
-
-    @property
-    def trustworthy(self) -> bool:
-        """Return whether there are no faults.
-
-        Without faults, the self-check agrees for every term, their sum and the torque; the residual
-        of the balance is at most 1e-6 of the torques; K_θ is positive definite by more than
-        rounding; and distributed tensions are the least within their bounds. Notes are ignored:
-        they say how to read the stiffness.
-        """
-        return not self.faults
-
-    @property
-    def margin(self) -> float:
-        """Smallest eigenvalue of K_θ's symmetric part [N m/rad], [N/m] for prismatic joints."""
-        return self.stiffness.margin
-
-    @property
-    def critical_direction(self) -> Array:
-        """Return the unit eigenvector (nv,) of :attr:`margin`: the softest joint motion."""
-        return self.stiffness.critical_direction
-
-    @cached_property
-    def condition(self) -> float:
-        """Return the condition number of K_θ [-], made dimensionless with the arm's length."""
-        unit = joint_unit(self.stiffness.posture.arm)
-        values = np.linalg.svd(self.stiffness.joint * unit[:, None] * unit, compute_uv=False)
-        return float(values[0] / values[-1]) if values[-1] > 0.0 else math.inf
+        """Notes on how to read the stiffness, one text each, e.g. that a cable is slack."""
+        return tuple(_notes(self))
 
     def to_dict(self) -> dict[str, object]:
-        """Return the report as plain SI numbers for strict JSON; None for infinity and NaN."""
-        K = self.stiffness
-        arm = K.posture.arm
-        numbers = {
-            "arm": arm.name,
-            "trustworthy": self.trustworthy,
-            "faults": self.faults,
-            "notes": self.notes,
-            "conventions": {
-                "units": "SI: m, rad, N",
-                "frame": "base",
-                "tip": arm.tip_link,
-                "gravity_m_per_s2": arm.gravity,
-                "wrench_N_Nm": K.wrench,
-                **JointUnits(arm.slides).to_dict(arm.joint_names, K.posture.q),
-            },
-            "self_check": {
-                "passed": self.self_check.passed,
-                "terms": [asdict(each) for each in self.self_check.compared],
-            },
-            "statics": {"residual_Nm": self.residual, "relative": self.imbalance},
-            "optimality": None
-            if self.optimality is None
-            else {**asdict(self.optimality), "optimal": self.optimality.optimal},
-            "stability": {
-                "stable": K.is_stable,
-                key("margin", arm.stiffness_unit()): self.margin,
-                "critical_direction": self.critical_direction,
-                "condition": self.condition,
-            },
-            "cables": [_cable_to_json(each) for each in self.cables],
-            "rank": {
-                name: {**asdict(rank), "condition": rank.condition}
-                for name, rank in (
-                    ("jacobian", self.jacobian_rank),
-                    ("translation", self.translation_rank),
-                    ("cables", self.cable_rank),
-                )
-            },
-            "closure": self.closure,
-            "readings_N_per_m": None if self.readings is None else asdict(self.readings),
-            "sticking": None
-            if self.sticking is None
-            else {"along_N_per_m": self.sticking.along, "below_N": self.sticking.below},
-        }
-        return plain(numbers)
+        """Return the report and :meth:`Stiffness.to_dict` in SI for JSON, units in the keys."""
+        said = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
+        checked = {"comparisons": [asdict(each) for each in self.comparisons]}
+        return plain(said | checked) | super().to_dict() | self.stiffness.to_dict()
 
     def to_html(self, about: str = "") -> str:
-        """Return the report as a self-contained HTML file.
-
-        Args:
-            about: Lines below the title, such as the file of the arm and the assumptions.
-        """
-        return to_document(self, about)
+        """Return the report as a self-contained HTML page; ``about`` is text below the title."""
+        return printed(self, about).export_html()
 
     def __repr__(self) -> str:
-        state = "trustworthy" if self.trustworthy else "NOT TO BE TRUSTED"
-        return f"<Report on the stiffness of {self.stiffness.posture.arm.name}, {state}>"
+        name = self._posture.arm.name
+        return f"<Report on the stiffness of {name}: {'PASS' if self.passed else 'FAIL'}>"
 
     def __str__(self) -> str:
-        return to_text(self)
-
-    def _repr_html_(self) -> str:
-        return to_fragment(self)
+        return "\n".join(map(str.rstrip, printed(self).export_text().splitlines()))
 
 
 def report_on(K: Stiffness) -> Report:
     """Compute the report on a stiffness."""
-    residual, joint, imbalance = facts.balance_error(K)
-    tip, translation, cables = facts.ranks(K)
-    tension, readings = K.distribution, facts.readings(K)
-    return Report(
-        stiffness=K,
-        self_check=self_check(K),
-        residual=residual,
-        residual_joint=joint,
-        imbalance=imbalance,
-        optimality=None if tension is None else optimality(K, tension),
-        cables=facts.cable_states(K),
-        jacobian_rank=tip,
-        translation_rank=translation,
-        cable_rank=cables,
-        closure=_closure(K),
-        readings=readings,
-        sticking=facts.sticking(K, readings),
-    )
+    return Report(K, checks.compared(K), *checks.balance_error(K), *checks.optimality(K))
 
 
-def _closure(K: Stiffness) -> float:
+def _faults(report: Report) -> Iterator[str]:
+    """Yield the reasons not to use the stiffness of ``report``."""
+    K = report.stiffness
+    for each in report.comparisons:
+        if each.verdict == "DIFFERS":
+            yield (
+                f"{each.name}: off by {each.off:.2g} {each.unit}, where the largest entry is "
+                f"{each.largest:.4g} {each.unit}. Do not use this stiffness."
+            )
+    for reason in dict.fromkeys(each.reason for each in report.comparisons if each.reason):
+        names = [each.name for each in report.comparisons if each.reason == reason]
+        yield f"check not possible for {' and '.join(names)}: {reason}."
+    if report.imbalance > checks.TOLERANCE:
+        yield (
+            f"the tensions do not balance the arm: the residual is {report.residual:.3g} N m at "
+            f"{report.residual_joint}, {report.imbalance:.1e} of the torques; distribute_tension "
+            "finds tensions that do."
+        )
+    if not K.is_stable:
+        yield " ".join(map(str.strip, K.warnings))
+    elif report.condition > 1e12:  # singular but for rounding
+        yield f"the arm is about to buckle: K_θ has the condition number {report.condition:.2g}."
+    violation, kkt = report.bound_violation or 0.0, report.kkt_residual or 0.0
+    if max(violation, kkt) > checks.TOLERANCE:
+        yield f"the tensions are not optimal: bounds violated by {violation:.1e}, KKT {kkt:.1e}."
+
+
+def _notes(report: Report) -> Iterator[str]:
+    """Yield what a user of the stiffness should know; none of it means that it is wrong."""
+    K, pose, arm = report.stiffness, report.stiffness.posture, report.stiffness.posture.arm
+    yield from pose.remarks
+    if report.bound_violation is None:
+        came = "were given" if K.free_length is None else "follow from an equilibrium"
+        yield f"the tensions {came}, not distributed: they need not be the least."
+    elif report.kkt_residual is None:
+        yield "the tensions were chosen for a stiffness: they are not the least."
+    if arm.has_friction:
+        yield f"the cables have friction; this K is frictionless, as after shaking. {_stuck(K)}"
+    if K.wrench[3:].any():
+        yield "with a moment at the tip K_θ is not symmetric: its symmetric part decides stability."
+    yield from _of_limits(K)
+    unit = checks.joint_unit(K)
+    for matrix, full, what in (
+        (pose.length_jacobian, arm.nv, "the cables give {} of {} joint torques."),
+        (pose.jacobian[:3], 3, "the tip moves in {} of {} directions; in the others it is rigid."),
+    ):
+        if (rank := np.linalg.matrix_rank(matrix * unit, rtol=1e-9)) < full:
+            yield what.format(rank, full)
     try:
-        return tension_ratio(K.posture.length_jacobian * joint_unit(K.posture.arm))
-    except SolverError:
-        return math.nan
+        along = [K.along(axis) for axis in np.eye(3)]
+        apart = np.diag(K.pseudoinverse()) / along, np.diag(K.cartesian) / along
+    except SingularStiffness:
+        return
+    if (abs(np.array(apart) - 1.0) > 0.1).any():
+        yield (
+            "along, cartesian and pseudoinverse differ: use along, which a small weight measures; "
+            "cartesian locks the other two translations, pseudoinverse is the paper's reading."
+        )
 
 
-def _cable_to_json(each: CableState) -> dict[str, object]:
-    return {
-        "name": each.name,
-        "control": each.control,
-        "slack": each.is_slack,
-        "tension_N": each.tension,
-        "stiffness_N_per_m": each.stiffness,
-        "tangent_rigidity_N": each.tangent,
-        "secant_rigidity_N": each.secant,
-        "law_N": (each.low, each.high),
-        "may_fall_N": each.below,
-        "may_rise_N": each.above,
-    }
+def _of_limits(K: Stiffness) -> Iterator[str]:
+    """Yield which cables are slack, hold a force, or are near an end of their law; joints alike."""
+    arm, q, F = K.posture.arm, K.posture.q, K.tension
+    domains = [cable.elasticity.domain for cable in arm.cables]
+    low, high = np.array([(each.low, each.high) for each in domains]).T
+    locked, slack, cables = arm.cables.position_controlled, F == 0.0, arm.cables.names
+    near = np.minimum(q - arm.lower, arm.upper - q) < 0.01 * (arm.upper - arm.lower)
+    for what, names, chosen in (
+        ("slack, 0 N; they stiffen one direction, raise minimum=", cables, locked & slack),
+        ("force-controlled, no passive stiffness", cables, ~locked),
+        ("within 5 % of the low end of their law", cables, locked & ~slack & (low >= 0.95 * F)),
+        ("within 5 % of the high end of their law", cables, locked & (high <= 1.05 * F)),
+        ("within 1 % of their range from a joint limit", arm.joint_names, near),
+    ):
+        if chosen.any():
+            yield f"{what}: {listed(np.array(names)[chosen].tolist())}."
+
+
+def _stuck(K: Stiffness) -> str:
+    """Return below which load friction holds all cables, and the stiffness there."""
+    try:
+        found = [(axis, cdsm.breakaway(K.posture, K.tension, axis, K.wrench)) for axis in "xyz"]
+        stuck = ", ".join(f"{each.stiffness.along(u) / 1e3:.4g}" for u, each in found)
+    except CdsmError as error:  # the stuck arm is singular, or a tension outside its law
+        return f"The load below which they stick is not known: {error}"
+    if not any(each.load for _, each in found):
+        return "Here no cable sticks."
+    loads = ", ".join(f"{each.load:.2g}" for _, each in found)
+    return f"Below {loads} N along x, y, z they stick, and a load measures {stuck} N/mm."

@@ -148,10 +148,10 @@ class Stiffness(CartesianReadings):
         return () if self.is_stable else (verdict(self), *map(str, self.remedies))
 
     def report(self) -> Report:
-        """Check this stiffness; return facts, warnings and a second derivation of K_θ.
+        """Check this stiffness: is it right, balanced and stable, and how to read it.
 
-        Problems are not raised but listed. InvalidInput if the stiffness is not frictionless,
-        SolverError if the linear program for the tension factor, a fact of the report, fails.
+        Each term is compared with finite differences and with :func:`evaluate`. Problems are not
+        raised as errors; the report lists them. InvalidInput if the stiffness is not frictionless.
         """
         from cdsm.report import report_on  # here, since a stiffness does not need it
 

@@ -40,7 +40,7 @@ def first_arm(nb: Shown) -> None:
     assert np.all(nb.ratio[1] > nb.ratio[0])
     assert np.isclose(nb.shares.total, K.along("z"), rtol=1e-12)
     assert nb.arm.cables[int(nb.shares.cables.argmax())].name == "cable6_1"
-    assert nb.report.trustworthy
+    assert nb.report.passed
     assert 170 < nb.minima[nb.best] < 190
     assert 210 < nb.edge < 225
     assert not nb.stable["strand (Eq. 19)"][0]
