@@ -18,7 +18,6 @@ from cdsm.report.potential import joint_unit
 from cdsm.report.self_check import SelfCheck, self_check
 from cdsm.support.format import JointUnits, key, plain
 from cdsm.support.values import Array, ReadOnlyState
-from cdsm.tension import tension_ratio
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
@@ -195,6 +194,8 @@ def report_on(K: Stiffness) -> Report:
 
 
 def _closure(K: Stiffness) -> float:
+    from cdsm.measures.closure import tension_ratio  # measures import the stiffness matrix
+
     try:
         return tension_ratio(K.posture.length_jacobian * joint_unit(K.posture.arm))
     except SolverError:

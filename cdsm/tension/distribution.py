@@ -1,27 +1,14 @@
-"""Tension distribution: the smallest cable tensions that balance the arm.
-
-The balance (Eq. 17) does not determine the tensions of a redundant arm. As usual, the smallest are
-chosen:
-
-    min ½‖F‖²   subject to   J_Lᵀ F = J_Xᵀ W − g   and   minimum ≤ F ≤ maximum.
-
-First, :mod:`cdsm.kernels.serpentine_guess` guesses the tensions. If the guess meets the optimality
-conditions, as it usually does, it is the solution. Otherwise a solver solves the dimensionless
-problem. If it finds no solution, :mod:`cdsm.tension.infeasibility` finds the reason.
-"""
+"""Tension distribution: the smallest cable tensions that balance the arm, and their bounds."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.cable import Cable
 from cdsm.errors import InvalidInput
-from cdsm.kernels import tension as tension_kernels
-from cdsm.kernels.distribution import single_guess
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.validation import (
@@ -35,7 +22,7 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array, frozen
 from cdsm.tension.infeasibility import explain
-from cdsm.tension.solvers import DEFAULT_SOLVER, solve
+from cdsm.tension.solvers import DEFAULT_SOLVER, nondimensional, solve
 from cdsm.tension.value import Tension
 
 
@@ -49,7 +36,7 @@ def distribute_tension(
     fixed: Mapping[str, float] | None = None,
     worst_friction: bool = False,
 ) -> Tension:
-    """Compute the smallest tensions in balance: min ‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
+    """Compute the smallest tensions in balance: min ½‖F‖² with J_Lᵀ F = J_Xᵀ W − g (Eqs. 13, 17).
 
     Args:
         pose: The posture.
@@ -59,7 +46,7 @@ def distribute_tension(
             also apply.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
-            The default is called only if a first guess does not meet the optimality conditions.
+            The optimality conditions of every solution are verified.
         fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
             computed. A fixed tension replaces the bounds of its cable.
         worst_friction: Keep the tension of each segment of each cable within the bounds, for any
@@ -77,34 +64,55 @@ def distribute_tension(
         SolverError: The solver's solution does not meet the optimality conditions.
     """
     instance("pose", pose, Posture)
+    names, fixed = pose.arm.cables.names, {} if fixed is None else fixed
     low, high = bounds_at(pose, minimum, maximum, worst_friction)
-    fixed = {} if fixed is None else fixed
-    if fixed:
-        low, high = _with_fixed(pose, low, high, fixed)
+    if not isinstance(fixed, Mapping):
+        raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
+    for name, value in fixed.items():
+        c = names.index(one_of("cable", name, names))
+        F = quantity(f"fixed[{name!r}]", value, "tension", zero=True)
+        low, high = (frozen(np.r_[each[:c], F, each[c + 1 :]]) for each in (low, high))
     wrench = wrench_vector("wrench", wrench)
-    length, certified = pose.arm.length, False
-    if solver == DEFAULT_SOLVER:
-        turned = pose.jacobian, pose.length_jacobian, pose.gravity_torque
-        smallest = tension_kernels.NO_ARM * length
-        values, certified = single_guess(
-            *pose.arm._model.blocks, *turned, wrench, low, high, smallest
-        )
-    if not certified:
-        torque = pose.jacobian.T @ wrench - pose.gravity_torque
-        scaled = tension_kernels.scaled_balance(pose.length_jacobian, torque, low, high, length)
-        problem = tension_kernels.Scaled(*scaled)
-        solution = solve(problem, solver)
-        if isinstance(solution, str):
-            free = np.array([cable.name not in fixed for cable in pose.arm.cables])
-            explain(pose, problem, solver, solution, free)
-        values = solution * problem.force
+    torque = pose.jacobian.T @ wrench - pose.gravity_torque
+    problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
+    solution = solve(problem, solver)
+    if isinstance(solution, str):
+        free = np.array([name not in fixed for name in names])
+        explain(pose, problem, solver, solution, free)
+    values = frozen(solution * problem.force)
     return Tension(
-        posture=pose,
-        values=frozen(values),
-        wrench=wrench,
-        minimum=low,
-        maximum=high,
-        solver=solver,
+        posture=pose, values=values, wrench=wrench, minimum=low, maximum=high, solver=solver
+    )
+
+
+def checked_bounds(
+    arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
+) -> tuple[Array, Array]:
+    """Check ``minimum`` and ``maximum``, narrow them to the bounds that cables define, return both.
+
+    Each is (C,) [N]. With ``rows``, a bound may also have the shape (rows, C): one row per posture.
+    Invalid bounds raise InvalidInput.
+    """
+    count = len(arm.cables)
+    low, high = bound("minimum", minimum, count, rows), bound("maximum", maximum, count, rows)
+    least, most = arm._model.laws.narrowed(low, high)
+    allowed = (low >= 0.0) & (low < math.inf) & (least <= most)
+    if allowed.all():
+        return least, most
+    at = tuple(np.argwhere(~allowed)[0].tolist())
+    given, floor, ceiling, limit = (
+        float(np.broadcast_to(each, allowed.shape)[at]) for each in (low, least, most, high)
+    )
+    cable = arm.cables[at[-1]].name + (f" in row {at[0]}" if len(at) > 1 else "")
+    if not 0.0 <= given < math.inf:
+        only = "cables only pull, so it must be finite and not negative"
+        raise InvalidInput("minimum", f"{given:g} N given for {cable}; {only}.")
+    lower = "the cable's own minimum" if floor > given else "minimum="
+    upper = "the cable's own maximum" if ceiling < limit else "maximum="
+    raise InvalidInput(
+        "maximum",
+        f"{ceiling:g} N ({upper}) for {cable} is below {floor:g} N ({lower}); raise the one or "
+        "lower the other.",
     )
 
 
@@ -118,7 +126,14 @@ def bounds_at(
     low, high = checked_bounds(pose.arm, minimum, maximum)
     if flag("worst_friction", worst_friction):
         loss = np.exp(grip(pose))
-        low, high = checked_bounds(pose.arm, low * loss, high / loss)
+        low, high = frozen(low * loss), frozen(high / loss)
+        for cable, least, most in zip(pose.arm.cables.names, low, high, strict=True):
+            if least > most:
+                raise InvalidInput(
+                    "worst_friction",
+                    f"{cable} would need {least:.4g} N or more and {most:.4g} N or less at its "
+                    "motor; raise maximum= or lower minimum=.",
+                )
     return low, high
 
 
@@ -130,68 +145,3 @@ def grip(pose: Posture) -> Array:
     chains, count = pose.segments.chains, len(pose.arm.cables)
     total = np.bincount(chains.cable[chains.hole], pose.segments.grip, minlength=count)
     return np.asarray(total, dtype=np.float64)
-
-
-def checked_bounds(
-    arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
-) -> tuple[Array, Array]:
-    """Check ``minimum`` and ``maximum``, narrow them to the bounds that cables define, return both.
-
-    Each is (C,) [N]. With ``rows``, a bound may also have the shape (rows, C): one row per posture.
-    Invalid bounds raise InvalidInput.
-    """
-    cables = arm.cables
-    low = bound("minimum", minimum, len(cables), rows)
-    high = bound("maximum", maximum, len(cables), rows)
-    least, most = arm._model.laws.narrowed(low, high)
-    if least is low and _ordered(minimum, maximum):
-        return low, high
-    allowed = (low >= 0.0) & (low < math.inf)
-    if np.count_nonzero(allowed) < low.size:
-        *row, c = np.argwhere(~allowed)[0].tolist()
-        raise InvalidInput(
-            "minimum",
-            f"{low[(*row, c)]:g} N given for {_named(cables[c], row)}; cables only pull, so it "
-            "must be finite and not negative.",
-        )
-    ordered = least <= most
-    if np.count_nonzero(ordered) < ordered.size:
-        at = tuple(np.argwhere(~ordered)[0].tolist())
-        l0, l1, h0, h1 = (
-            np.broadcast_to(each, ordered.shape)[at] for each in (low, least, high, most)
-        )
-        given, own = "given" if h1 == h0 else "of its own", l1 > l0
-        raise InvalidInput(
-            "maximum",
-            f"{h1:g} N {given} for {_named(cables[at[-1]], at[:-1])}, below "
-            f"{'its own' if own else 'its'} minimum of {l1:g} N; raise maximum or lower minimum.",
-        )
-    return least, most
-
-
-def _ordered(minimum: object, maximum: object) -> bool:
-    """Return whether both bounds are floats with 0 ≤ minimum ≤ maximum, minimum finite.
-
-    In this usual case :func:`checked_bounds` skips its slower checks.
-    """
-    if not isinstance(minimum, float) or not isinstance(maximum, float):
-        return False
-    return 0.0 <= minimum <= maximum and minimum < math.inf
-
-
-def _named(cable: Cable, row: Sequence[int]) -> str:
-    return f"{cable.name} in row {row[0]}" if row else cable.name
-
-
-def _with_fixed(
-    pose: Posture, low: Array, high: Array, fixed: Mapping[str, float]
-) -> tuple[Array, Array]:
-    """Return the bounds (C,) [N]; for cables in ``fixed``, both are equal to the fixed tension."""
-    if not isinstance(fixed, Mapping):
-        raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
-    names = [cable.name for cable in pose.arm.cables]
-    low, high = low.copy(), high.copy()
-    for name, value in fixed.items():
-        c = names.index(one_of("cable", name, names))
-        low[c] = high[c] = quantity(f"fixed[{name!r}]", value, "tension", zero=True)
-    return frozen(low), frozen(high)

@@ -449,7 +449,7 @@ def test_report_says_that_a_closure_is_not_known(monkeypatch: pytest.MonkeyPatch
     def failed(*given: Any, **options: Any) -> OptimizeResult:
         return OptimizeResult(status=4, message="numerical difficulties")
 
-    monkeypatch.setattr("cdsm.tension.ratio.least", failed)
+    monkeypatch.setattr("cdsm.measures.closure.least", failed)
     report = cdsm.stiffness(locked.hinge().at([0.0]), [20.0, 20.0]).report()
     assert "grow without a torque is not known: HiGHS failed" in str(report)
     assert report.to_dict()["closure"] is None
