@@ -41,25 +41,20 @@ def distribute_tension(
     Args:
         pose: The posture.
         minimum: Lower bound [N], for all cables or (C,); not negative, since cables only pull.
-            The default of the command line is 10 N, since a strand has no rigidity at 0 N.
-        maximum: Upper bound [N], for all cables or (C,); inf: no bound. Bounds that a cable defines
-            also apply.
+        maximum: Upper bound [N], for all cables or (C,); inf: no bound. A cable's own also apply.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
-        solver: ``"daqp"`` (exact), ``"osqp"``, or another solver that qpsolvers finds installed.
-            The optimality conditions of every solution are verified.
-        fixed: Tensions [N] by cable name, e.g. of motors that control force. The other tensions are
-            computed. A fixed tension replaces the bounds of its cable.
-        worst_friction: Keep the tension of each segment of each cable within the bounds, for any
-            earlier loads. With the friction coefficients μ and wrap angles φ of the holes of a
-            cable, its tensions lie between F exp(−Σ μ φ) and F exp(Σ μ φ). The bounds narrow by
-            these factors.
+        solver: Any solver that qpsolvers finds installed; every solution is verified.
+        fixed: Tensions [N] by cable name, e.g. of motors that control force. They replace the
+            bounds of their cables; the other tensions are computed.
+        worst_friction: Keep the tension of each segment within the bounds, for any earlier loads:
+            between F exp(−Σ μ φ) and F exp(Σ μ φ), with the friction coefficients μ and wrap angles
+            φ of the holes of its cable. The bounds of F narrow by these factors.
 
     Raises:
-        InvalidInput: A bound, a fixed tension or the wrench has the wrong shape or is not a number,
-            or a minimum is above its maximum, possibly after ``worst_friction`` has narrowed them.
+        InvalidInput: An argument has the wrong shape or is not a number, or a minimum is above its
+            maximum, possibly after ``worst_friction`` has narrowed them.
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
-            missing torque. If wider bounds help, it says how far the bounds of cables without a
-            fixed tension must widen.
+            missing torque, and how far the bounds of cables without a fixed tension must widen.
         UnknownName: The solver is not installed, or a fixed cable does not exist.
         SolverError: The solver's solution does not meet the optimality conditions.
     """
@@ -70,30 +65,26 @@ def distribute_tension(
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     for name, value in fixed.items():
         c = names.index(one_of("cable", name, names))
-        F = quantity(f"fixed[{name!r}]", value, "tension", zero=True)
-        low, high = (frozen(np.r_[each[:c], F, each[c + 1 :]]) for each in (low, high))
+        held = quantity(f"fixed[{name!r}]", value, "tension", zero=True)
+        low, high = (frozen(np.r_[each[:c], held, each[c + 1 :]]) for each in (low, high))
     wrench = wrench_vector("wrench", wrench)
     torque = pose.jacobian.T @ wrench - pose.gravity_torque
     problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
     solution = solve(problem, solver)
     if isinstance(solution, str):
-        free = np.array([name not in fixed for name in names])
-        explain(pose, problem, solver, solution, free)
-    values = frozen(solution * problem.force)
-    return Tension(
-        posture=pose, values=values, wrench=wrench, minimum=low, maximum=high, solver=solver
-    )
+        explain(pose, problem, solver, solution, np.array([name not in fixed for name in names]))
+    F = frozen(solution * problem.force)
+    return Tension(posture=pose, values=F, wrench=wrench, minimum=low, maximum=high, solver=solver)
 
 
 def checked_bounds(
     arm: Manipulator, minimum: ArrayLike, maximum: ArrayLike, rows: int | None = None
 ) -> tuple[Array, Array]:
-    """Check ``minimum`` and ``maximum``, narrow them to the bounds that cables define, return both.
+    """Check both bounds, (C,) [N] each, and narrow them to those that the cables define.
 
-    Each is (C,) [N]. With ``rows``, a bound may also have the shape (rows, C): one row per posture.
-    Invalid bounds raise InvalidInput.
+    With ``rows``, a bound may also have the shape (rows, C). Invalid bounds raise InvalidInput.
     """
-    count = len(arm.cables)
+    count, own = len(arm.cables), "the cable's own "
     low, high = bound("minimum", minimum, count, rows), bound("maximum", maximum, count, rows)
     least, most = arm._model.laws.narrowed(low, high)
     allowed = (low >= 0.0) & (low < math.inf) & (least <= most)
@@ -107,41 +98,34 @@ def checked_bounds(
     if not 0.0 <= given < math.inf:
         only = "cables only pull, so it must be finite and not negative"
         raise InvalidInput("minimum", f"{given:g} N given for {cable}; {only}.")
-    lower = "the cable's own minimum" if floor > given else "minimum="
-    upper = "the cable's own maximum" if ceiling < limit else "maximum="
     raise InvalidInput(
         "maximum",
-        f"{ceiling:g} N ({upper}) for {cable} is below {floor:g} N ({lower}); raise the one or "
-        "lower the other.",
+        f"{ceiling:g} N ({own * (ceiling < limit)}maximum) for {cable} is below {floor:g} N "
+        f"({own * (floor > given)}minimum); raise the one or lower the other.",
     )
 
 
 def bounds_at(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, worst_friction: bool
 ) -> tuple[Array, Array]:
-    """Check the bounds of the tensions at a posture; return lower and upper ones, (C,) [N] each.
-
-    If ``worst_friction`` is True, they are narrowed as in :func:`distribute_tension`.
-    """
+    """Check the bounds, (C,) [N] each, and narrow them as :func:`distribute_tension` does."""
     low, high = checked_bounds(pose.arm, minimum, maximum)
-    if flag("worst_friction", worst_friction):
-        loss = np.exp(grip(pose))
-        low, high = frozen(low * loss), frozen(high / loss)
-        for cable, least, most in zip(pose.arm.cables.names, low, high, strict=True):
-            if least > most:
-                raise InvalidInput(
-                    "worst_friction",
-                    f"{cable} would need {least:.4g} N or more and {most:.4g} N or less at its "
-                    "motor; raise maximum= or lower minimum=.",
-                )
+    if not flag("worst_friction", worst_friction):
+        return low, high
+    loss = np.exp(grip(pose))
+    low, high = frozen(low * loss), frozen(high / loss)
+    c = int(np.argmax(low - high))
+    if low[c] > high[c]:
+        raise InvalidInput(
+            "worst_friction",
+            f"{pose.arm.cables[c].name} would need {low[c]:.4g} N or more and {high[c]:.4g} N or "
+            "less at its motor; raise maximum= or lower minimum=.",
+        )
     return low, high
 
 
 def grip(pose: Posture) -> Array:
-    """Compute Σ μ φ (C,) [-] over the holes of each cable: ln of its largest ratio of tensions.
-
-    μ is the friction coefficient of a hole and φ its wrap angle.
-    """
+    """Compute Σ μ φ (C,) [-] over the holes of each cable, with the friction μ and wrap angle φ."""
     chains, count = pose.segments.chains, len(pose.arm.cables)
     total = np.bincount(chains.cable[chains.hole], pose.segments.grip, minlength=count)
     return np.asarray(total, dtype=np.float64)

@@ -21,8 +21,7 @@ def explain(
     """Find by linear programs why ``solver`` did not solve ``problem``; raise that as an error.
 
     ``free`` (C,) marks the cables without a fixed tension; only their bounds may widen. ``fault``
-    says what the solver returned. The error is InfeasibleTension if no tensions within the bounds
-    balance the arm, else SolverError.
+    says what the solver returned. Raises InfeasibleTension, or SolverError if tensions exist.
     """
     A, b, low, high, arm, force = problem
     nv, count = A.shape
@@ -40,20 +39,18 @@ def explain(
         raise SolverError("highs", f"cannot tell whether tensions exist: {nearest.message}")
     F = nearest.x[:count] / lever
     if nearest.fun <= OPTIMALITY:
-        raise SolverError(
-            solver,
-            f"{fault}, though one exists with tensions of up to {F.max() * force:.2g} N: the arm "
-            f"is at the edge of what its cables can balance. {HINT}",
-        )
+        exists = f"{fault}, though one exists with tensions of up to {F.max() * force:.2g} N"
+        edge = "the arm may be at the edge of what its cables can balance"
+        raise SolverError(solver, f"{exists}: {edge}. {HINT}")
     widening = _widening(problem, free)
     blocked = math.isinf(widening) and _widening(problem, np.ones_like(free)) < math.inf
     names, missing = pose.arm.cables.names, (b - A @ F) * arm * force
     tight = free & (np.minimum(F - low, high - F) <= OPTIMALITY)
     worst = int(abs(missing).argmax())
     raise InfeasibleTension(
-        missing=frozen(missing),
-        joint=pose.arm.joint_names[worst],
-        relaxation=widening,
+        frozen(missing),
+        pose.arm.joint_names[worst],
+        widening,
         binding=[names[c] for c in np.flatnonzero(tight)],
         fixed=[names[c] for c in np.flatnonzero(~free)] if blocked else (),
         units=(pose.arm.torque_unit(), pose.arm.torque_unit(worst)),
@@ -68,12 +65,6 @@ def _widening(problem: Problem, free: NDArray[np.bool_]) -> float:
     rows = np.column_stack([np.vstack([-np.eye(count), np.eye(count)]), -1.0 * np.tile(free, 2)])
     sides = np.concatenate([-low, high])
     finite = np.isfinite(sides)
-    found = least(
-        np.append(np.zeros(count), 1.0),
-        A_ub=rows[finite],
-        b_ub=sides[finite],
-        A_eq=np.column_stack([A, np.zeros(nv)]),
-        b_eq=b,
-        bounds=(0.0, None),
-    )
+    balance, widest = np.column_stack([A, np.zeros(nv)]), np.append(np.zeros(count), 1.0)
+    found = least(widest, A_ub=rows[finite], b_ub=sides[finite], A_eq=balance, b_eq=b)
     return float(found.x[-1]) * force if found.status == OPTIMAL else math.inf

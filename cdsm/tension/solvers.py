@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from contextlib import nullcontext
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -29,10 +30,9 @@ _NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are ro
 
 # DAQP is three times as fast with 60 cables if it eliminates the balance first; OSQP misses bounds
 # by newtons with its defaults, and its polishing can spoil a solution
-_OSQP = {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 10**5, "polish": False, "raise_error": False}
-_SETTINGS: dict[str, dict[str, Any]] = {
+_SETTINGS: Final[dict[str, dict[str, Any]]] = {
     "daqp": {"primal_tol": 1e-10, "eq_reduction": 1},
-    "osqp": _OSQP,
+    "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 100_000, "polish": False},
 }
 
 
@@ -73,20 +73,16 @@ def solve(problem: Problem, solver: str) -> Array | str:
     one_of("installed solver", solver, qpsolvers.available_solvers)
     A, b, low, high, *_ = problem
     qp = qpsolvers.Problem(np.eye(low.size), np.zeros(low.size), A=A, b=b, lb=low, ub=high)
-    settings = _SETTINGS.get(solver, {})
+    # others warn of dense matrices, and of failures that are reported below; this takes 20 µs
+    quiet = nullcontext() if solver == DEFAULT_SOLVER else warnings.catch_warnings(action="ignore")
     try:
-        if solver == DEFAULT_SOLVER:
-            found = qpsolvers.solve_problem(qp, solver, **settings)
-        else:  # others warn of dense matrices, and of failures that are reported below
-            with warnings.catch_warnings(action="ignore"):
-                found = qpsolvers.solve_problem(qp, solver, **settings)
+        with quiet:
+            found = qpsolvers.solve_problem(qp, solver, **_SETTINGS.get(solver, {}))
     except Exception as error:  # each solver has its own error types
         raise SolverError(solver, f"failed: {error}. {HINT}") from error
-    x, y = found.x, found.y
-    if not found.found or x is None:
-        return "found no solution"
-    if y is None:
-        raise SolverError(solver, f"returns no multipliers to verify it by. {HINT}")
+    if not found.found or found.x is None or found.y is None:
+        return "found no solution with multipliers"
+    x, y = np.asarray(found.x), np.asarray(found.y)
     if not np.isfinite([x.sum(), y.sum()]).all():
         return "calls numbers optimal that are not finite"
     least = -(y @ A)  # the optimum but for the bounds

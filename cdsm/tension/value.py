@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 class Tension(Result, Named):
     """Cable tensions that balance an arm, with the posture, load and bounds they were computed for.
 
-    The keys are the names of the cables: ``tension["cable1_1"]`` [N], ``"cable1_1" in tension``,
-    ``dict(tension)``. To index by number, use the array :attr:`values`, equal to
-    ``np.array(tension)``.
+    The keys are the names of the cables: ``tension["cable1_1"]`` [N], ``dict(tension)``. Use the
+    array :attr:`values`, equal to ``np.array(tension)``, to index by number.
 
     Attributes:
         posture: The posture.
@@ -52,9 +51,9 @@ class Tension(Result, Named):
     @quantity("torque", "joint")
     def residual(self) -> Array:
         """Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m]."""
-        pose = self.posture
-        torque = pose.jacobian.T @ self.wrench - pose.gravity_torque
-        return frozen(self.values @ pose.length_jacobian - torque)
+        at = self.posture
+        torque = at.jacobian.T @ self.wrench - at.gravity_torque
+        return frozen(self.values @ at.length_jacobian - torque)
 
     def keys(self) -> tuple[str, ...]:
         """Return the names of the cables, in the order of :attr:`values`."""
