@@ -281,7 +281,7 @@ def test_every_optimality_condition_is_checked() -> None:
     x = cdsm.distribute_tension(POSE, low, high, (0.0, 0.0, 9.0, 0.0, 0.0, 0.0)).values
     x = x / problem.force
     free = (problem.low < x) & (x < problem.high)
-    y = np.linalg.lstsq(problem.A[:, free].T, -x[free])[0]
+    y = np.asarray(np.linalg.lstsq(problem.A[:, free].T, -x[free])[0], dtype=np.float64)
     assert violation(problem, x, y) < 1e-12
     null = np.linalg.svd(problem.A)[2][-1]
     one = np.eye(C)[int(x.argmax())]
@@ -299,7 +299,7 @@ def test_every_optimality_condition_is_checked() -> None:
 def lie(solution: qpsolvers.Solution, how: str) -> qpsolvers.Solution:
     """Spoil a solution; the solver calls it found."""
     x = np.array(solution.x, dtype=np.float64)
-    null = np.linalg.svd(solution.problem.A)[2][-1]
+    null = np.linalg.svd(POSE.length_jacobian.T)[2][-1]
     spoiled = {
         "balance is broken": x * 1.001,
         "not the least": x + 1e-3 * null,
@@ -310,7 +310,7 @@ def lie(solution: qpsolvers.Solution, how: str) -> qpsolvers.Solution:
     solution.found = True
     solution.x = spoiled.get(how, x)
     if how == "multipliers of another point":
-        solution.y = solution.y[::-1].copy()
+        solution.y = np.asarray(solution.y)[::-1].copy()
     if how == "no multipliers":
         solution.y = None
     return solution
