@@ -3,7 +3,6 @@
 import math
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -366,8 +365,3 @@ def test_the_rule_that_is_too_narrow_is_named() -> None:
         cdsm.distribute_tension(POSE, 5.0, 3.0)
     with pytest.raises(cdsm.InvalidInput, match=r"minimum: -1 N given for .*; cables only pull"):
         cdsm.distribute_tension(POSE, -1.0)
-
-
-def test_no_kernel_is_needed() -> None:
-    folder = Path(cdsm.tension.__file__).parent
-    assert not any("kernels" in file.read_text("utf-8") for file in folder.glob("*.py"))
