@@ -126,6 +126,6 @@ def bounds_at(
 
 def grip(pose: Posture) -> Array:
     """Compute Σ μ φ (C,) [-] over the holes of each cable, with the friction μ and wrap angle φ."""
-    chains, count = pose.segments.chains, len(pose.arm.cables)
-    total = np.bincount(chains.cable[chains.hole], pose.segments.grip, minlength=count)
+    chains, friction = pose.segments.chains, pose.segments.grip
+    total = np.bincount(chains.cable[chains.hole], friction, len(pose.arm.cables))
     return np.asarray(total, dtype=np.float64)

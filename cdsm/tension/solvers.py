@@ -18,12 +18,8 @@ from cdsm.errors import SolverError
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array
 
-DEFAULT_SOLVER: Final = "daqp"
-"""Default solver of all tension distributions: exact, and the fastest in measurements."""
-
-OPTIMALITY: Final = 1e-9
-"""Largest accepted violation of an optimality condition, relative to the largest force."""
-
+DEFAULT_SOLVER: Final = "daqp"  # exact, and the fastest in measurements
+OPTIMALITY: Final = 1e-9  # largest accepted violation, relative to the largest force
 HINT: Final = "Try 'daqp' or 'osqp', or change the posture, the load or the bounds a little."
 _ROUNDING: Final = 1e-12  # a solution with a larger violation is corrected
 _NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are rounding
@@ -31,6 +27,7 @@ _NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are ro
 # DAQP is three times as fast with 60 cables if it eliminates the balance first; OSQP misses bounds
 # by newtons with its defaults, and its polishing can spoil a solution
 _SETTINGS: Final[dict[str, dict[str, Any]]] = {
+    "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
     "daqp": {"primal_tol": 1e-10, "eq_reduction": 1},
     "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 100_000, "polish": False},
 }
