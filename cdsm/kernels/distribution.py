@@ -15,7 +15,6 @@ from cdsm.kernels.compiling import (
     WIDTH,
     Index,
     Width,
-    compiled,
     inlined,
     inner,
     lanes,
@@ -23,7 +22,7 @@ from cdsm.kernels.compiling import (
     upwards,
 )
 from cdsm.kernels.records import fetch
-from cdsm.kernels.serpentine_guess import Blocks, Guess, empty_guess, guess_tensions
+from cdsm.kernels.serpentine_guess import Blocks, Guess, guess_tensions
 from cdsm.kernels.serpentine_multipliers import set_multipliers
 from cdsm.kernels.tension import Balance, Certificate, certificate, set_infeasible, set_optimal
 from cdsm.kernels.tree import Indices
@@ -98,40 +97,6 @@ def distribute(
     for c in upwards(0, tension.shape[0]):  # rounding may have moved F slightly beyond the bounds
         for w in lanes(width):
             tension[c, w] = min(max(guess.F[c, w], low[c, w]), high[c, w])
-
-
-@compiled
-def single_guess(
-    row: Indices,
-    row_start: Indices,
-    cable: Indices,
-    cable_start: Indices,
-    jacobian: Array,
-    length_jacobian: Array,
-    gravity_torque: Array,
-    wrench: Array,
-    low: Array,
-    high: Array,
-    smallest: float,
-) -> tuple[Array, bool]:
-    """Guess the least tensions (C,) [N] of one posture, and say whether they are optimal.
-
-    The first four arguments are the fields of :class:`Blocks`. J_X (6, nv), J_L (C, nv), g (nv,),
-    W (6,) and the bounds (C,) follow. Moment arms below ``smallest`` [m] become zero. The result
-    has the same bits as in a block of postures.
-    """
-    count, nv = length_jacobian.shape
-    blocks = Blocks(row, row_start, cable, cable_start)
-    JX, J = jacobian.reshape(6, nv, 1), length_jacobian.reshape(count, nv, 1)
-    g, W = gravity_torque.reshape(nv, 1), wrench.reshape(6, 1)
-    torque, arms, tension = np.empty((nv, 1)), np.empty((count, nv, 1)), np.empty((count, 1))
-    # copies are writable like the scratch, so one compilation serves both
-    least, most = low.copy().reshape(count, 1), high.copy().reshape(count, 1)
-    guess, check = empty_guess(blocks, nv, count, 1), certificate(nv, count, 1)
-    set_torque(JX, W, g, torque, None)
-    set_arms(J, smallest, arms, None)
-    distribute(blocks, arms, torque, least, most, guess, check, tension, None)
-    return tension.reshape(count), check.certified[0] == 1.0 and guess.failed[0] < 0.0
 
 
 @threaded

@@ -22,7 +22,6 @@ from cdsm.measures.simplex import single_largest
 from cdsm.posture import Posture
 from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least
 from cdsm.support.values import Array
-from cdsm.tension import tension_ratio
 
 
 class Loads(NamedTuple):
@@ -90,8 +89,3 @@ class Loads(NamedTuple):
             best = found.x
         x = best[count:] / loads * self.force
         return float(along @ x), x
-
-
-def tension_factor_of(J: Array) -> float:
-    """Compute the tension factor [-] of J_L (C, nv); see :func:`cdsm.tension_factor`."""
-    return tension_ratio(J) if np.linalg.matrix_rank(J) == J.shape[1] else 0.0

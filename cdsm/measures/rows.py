@@ -17,10 +17,11 @@ from cdsm.kernels.chains import grip_rows
 from cdsm.kernels.tree import Routing
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS, clearances
+from cdsm.measures.closure import tension_factor_of
 from cdsm.measures.forces import directions_of
 from cdsm.measures.hull import hull_of
 from cdsm.measures.payload import largest_force
-from cdsm.measures.program import Loads, tension_factor_of
+from cdsm.measures.program import Loads
 from cdsm.measures.simplex import payload_rows
 from cdsm.support.validation import flag, quantity
 from cdsm.support.values import Array

@@ -17,16 +17,8 @@ _TIGHT: Final = 1e-10
 
 
 def least(cost: Array, **constraints: Any) -> OptimizeResult:
-    """Minimise cost · x by scipy's ``linprog``, and return its result.
-
-    ``constraints`` are keywords of ``linprog``. If the simplex method ends undecided (as in scipy
-    1.14), the interior-point method follows.
-    """
+    """Minimise cost · x by scipy's ``linprog``, whose keywords are ``constraints``."""
     from scipy.optimize import linprog  # slow to import
 
     names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
-    tight = dict.fromkeys(names, _TIGHT)
-    found = linprog(cost, **constraints, method="highs", options=tight)
-    if found.status not in (OPTIMAL, INFEASIBLE, UNBOUNDED):
-        found = linprog(cost, **constraints, method="highs-ipm", options=tight)
-    return found
+    return linprog(cost, **constraints, method="highs", options=dict.fromkeys(names, _TIGHT))

@@ -25,15 +25,15 @@ AXES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
-def unit(unit: str, *dims: str) -> Mapping[str, Any]:
+def unit(unit: str, *dims: str, name: str = "") -> Mapping[str, Any]:
     """Return the metadata of a field: ``field(metadata=unit("N", "cable"))``.
 
     ``unit`` is an SI unit, "1" for a plain number, or "torque", "joint stiffness" or "joint" for a
     unit that depends on whether joints turn or slide. ``dims`` name the axes of an array: "joint",
     "cable", "axis", "component", or any other; a field that is called like its own and only
-    dimension is the coordinate of this dimension.
+    dimension is the coordinate of this dimension. ``name`` replaces the field's in the export.
     """
-    return {"unit": unit, "dims": dims}
+    return {"unit": unit, "dims": dims, "name": name}
 
 
 class _Quantity(cached_property[_T]):
@@ -142,7 +142,8 @@ class Result(ReadOnlyState):
         units = self._units()
         for name, metadata in told.items():
             of = metadata["unit"]
-            yield name, getattr(self, name), units.get(of, of), metadata["dims"]
+            value = getattr(self, name)
+            yield metadata["name"] or name, value, units.get(of, of), metadata["dims"]
 
     def _units(self) -> dict[str, str]:
         """Return the units that depend on the joints of the arm."""

@@ -1,11 +1,9 @@
-"""Cable tensions that balance an arm: distribution, solvers, result, reasons of failure."""
+"""Cable tensions that balance an arm: bounds, distribution, solvers, reasons of failure."""
 
 from cdsm.tension.distribution import bounds_at as bounds_at
 from cdsm.tension.distribution import checked_bounds as checked_bounds
 from cdsm.tension.distribution import distribute_tension as distribute_tension
 from cdsm.tension.distribution import grip as grip
-from cdsm.tension.ratio import tension_ratio as tension_ratio
 from cdsm.tension.solvers import DEFAULT_SOLVER as DEFAULT_SOLVER
-from cdsm.tension.solvers import installed_solver as installed_solver
 from cdsm.tension.solvers import installed_solvers as installed_solvers
 from cdsm.tension.value import Tension as Tension

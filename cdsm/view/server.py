@@ -16,9 +16,9 @@ from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
 from cdsm.support.extras import need
-from cdsm.support.validation import flag, instance, quantity, vector, whole_number
+from cdsm.support.validation import flag, instance, one_of, quantity, vector, whole_number
 from cdsm.support.values import Array
-from cdsm.tension import DEFAULT_SOLVER, installed_solver
+from cdsm.tension import DEFAULT_SOLVER, installed_solvers
 from cdsm.view.live_view import View, quiet
 from cdsm.view.state import Setting
 
@@ -88,7 +88,7 @@ def serve(
         maximum=quantity("maximum", maximum, "tension", infinite=True),
         force=vector("force", force, 3, "force at the tip [N], base axes"),
         sag=flag("sag", sag),
-        solver=installed_solver(solver),
+        solver=one_of("installed solver", solver, installed_solvers()),
     )
     tension = quantity("largest_tension", largest_tension, "tension")
     push = max(quantity("largest_force", largest_force, "force"), float(abs(start.force).max()))

@@ -701,7 +701,7 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
     ),
     "maximum below minimum": (
         lambda: cdsm.distribute_tensions(ARM, Q, 5.0, changed(10.0 + 0.0 * F, 1, 2, 4.0)),
-        ("maximum: 4 N", ARM.cables[2].name, "in row 1", "minimum of 5 N", "raise maximum"),
+        ("maximum: 4 N", ARM.cables[2].name, "in row 1", "below 5 N", "raise the one"),
     ),
 }
 

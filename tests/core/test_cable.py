@@ -266,20 +266,6 @@ def test_fixed_tensions_are_not_blamed_for_a_torque_that_no_cable_exerts() -> No
     assert caught.value.fixed == ()
 
 
-def test_own_bound_of_a_cable_is_called_its_own() -> None:
-    arm = presets.experimental_prototype()
-    assert arm.geometry is not None
-    cases: tuple[tuple[dict[str, Any], tuple[float, float], str], ...] = (
-        ({"maximum": 30.0}, (40.0, math.inf), "30 N of its own for cable1_1, below its minimum of"),
-        ({"minimum": 50.0}, (0.0, 40.0), "40 N given for cable1_1, below its own minimum of 50 N"),
-    )
-    for own, asked, said in cases:
-        cables = [dataclasses.replace(arm.cables[0], **own), *arm.cables[1:]]
-        pose = cdsm.Manipulator(arm.geometry, cables=cables).at(np.zeros(3))
-        with pytest.raises(cdsm.InvalidInput, match=said):
-            cdsm.distribute_tension(pose, *asked)
-
-
 def test_summary_counts_the_cables_there_are() -> None:
     arm = presets.experimental_prototype()
     assert arm.geometry is not None

@@ -20,7 +20,7 @@ NAMES = [cable.name for cable in POSE.arm.cables]
 
 def test_tension_is_indexed_by_cable_and_its_values_are_an_array() -> None:
     assert dict(PULL) == dict(zip(NAMES, PULL.values.tolist(), strict=True))
-    assert dict(PULL.items()) == {**PULL}
+    assert dict(PULL) == {**PULL}
     assert list(PULL) == NAMES
     assert len(PULL) == len(NAMES)
     assert PULL[NAMES[3]] == PULL.values[3]

@@ -7,7 +7,6 @@ import numpy as np
 
 from cdsm.kernels import tension as tension_kernels
 from cdsm.support.values import Array, frozen
-from cdsm.tension.solvers import onto_bounds
 from tests.support.kernels import block, from_python
 
 
@@ -36,31 +35,6 @@ def test_balance_is_scaled_by_powers_of_two_and_so_without_rounding() -> None:
         np.zeros((2, 1)), np.zeros(1), np.zeros(2), np.ones(2), 1.0
     )
     assert nothing[4:] == (1.0, 1.0)
-
-
-def test_only_what_is_pressed_against_a_bound_or_outside_is_set_onto_it() -> None:
-    low, high, r = 1.0, 3.0, 1e-9
-    cases = (
-        # x, multiplier, where it is set
-        (low + 0.9 * r, -0.5, low),
-        (low + 1.1 * r, -0.5, low + 1.1 * r),  # further away than rounding
-        (low + 0.9 * r, 0.0, low + 0.9 * r),  # nothing presses it
-        (low + 0.9 * r, 0.5, low + 0.9 * r),  # pressed the other way
-        (low - 0.5, 0.0, low),
-        (low - 0.5, 0.5, low),
-        (low, 0.0, low),
-        (2.0, -9.0, 2.0),
-        (high, 0.0, high),
-        (high + 0.5, 0.0, high),
-        (high + 0.5, -0.5, high),
-        (high - 0.9 * r, -0.5, high - 0.9 * r),
-        (high - 0.9 * r, 0.0, high - 0.9 * r),
-        (high - 1.1 * r, 0.5, high - 1.1 * r),
-        (high - 0.9 * r, 0.5, high),
-    )
-    x, z, expected = np.array(cases).T
-    bounds = np.full(x.size, low), np.full(x.size, high)
-    np.testing.assert_array_equal(onto_bounds(x, z, *bounds, r), expected)
 
 
 # --- certificates ---------------------------------------------------------------------------

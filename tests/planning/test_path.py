@@ -205,7 +205,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"rate": math.nan}, "rate"),
     ({"rate": [1.0, 2.0]}, "rate: shape"),
     ({"wrench": np.zeros((3, 6))}, "wrench: shape"),
-    ({"minimum": 80.0, "maximum": 70.0}, "maximum: 70 N given"),
+    ({"minimum": 80.0, "maximum": 70.0}, "maximum: 70 N"),
     ({"minimum": -1.0}, "minimum"),
     ({"margin": 0.0}, "margin"),
     ({"starts": 0}, "starts"),
@@ -217,7 +217,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"minimum": 5.0, "maximum": 1.0}, "maximum: 1 N given"),
+        ({"minimum": 5.0, "maximum": 1.0}, "maximum: 1 N"),
         ({"minimum": -1.0}, "minimum: -1 N given"),
         ({"margin": 2.0}, "margin: 2 given"),
     ],

@@ -261,7 +261,7 @@ def test_domain_of_a_force_controlled_cable_bounds_nothing() -> None:
 BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
     ({"direction": (0.0, 0.0, 0.0)}, cdsm.InvalidInput, "direction: is the zero vector"),
     ({"direction": (0.0, 1.0)}, cdsm.InvalidInput, "direction"),
-    ({"minimum": 80.0, "maximum": 70.0}, cdsm.InvalidInput, "maximum: 70 N given"),
+    ({"minimum": 80.0, "maximum": 70.0}, cdsm.InvalidInput, "maximum: 70 N"),
     ({"minimum": -1.0}, cdsm.InvalidInput, "minimum"),
     ({"minimum": math.nan}, cdsm.InvalidInput, "minimum"),
     ({"wrench": (1.0, 2.0)}, cdsm.InvalidInput, "wrench"),

@@ -266,7 +266,7 @@ BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
     ({"direction": (0.0, 0.0, 0.0)}, cdsm.InvalidInput, "zero vector"),
     ({"minimum": -1.0}, cdsm.InvalidInput, "minimum"),
     ({"minimum": [1.0, 2.0]}, cdsm.InvalidInput, "minimum: shape"),
-    ({"minimum": 60.0, "maximum": 50.0}, cdsm.InvalidInput, "maximum: 50 N given"),
+    ({"minimum": 60.0, "maximum": 50.0}, cdsm.InvalidInput, "maximum: 50 N"),
     ({"maximum": math.nan}, cdsm.InvalidInput, "maximum"),
     ({"maximum": [1.0, 2.0]}, cdsm.InvalidInput, "maximum: shape"),
     ({"wrench": (1.0, 2.0)}, cdsm.InvalidInput, "wrench"),

@@ -1,7 +1,6 @@
 """The report: it passes where K_θ is right, fails where it is not, and says where it cannot."""
 
 import json
-import math
 from dataclasses import replace
 
 import numpy as np

@@ -359,12 +359,12 @@ CASES |= {
     "maximum minus infinite": (
         lambda: cdsm.distribute_tension(POSE, maximum=-INF),
         cdsm.InvalidInput,
-        ("maximum: -inf N", "below its minimum"),
+        ("maximum: -inf N", "below 0 N (minimum)"),
     ),
     "maximum below minimum": (
         lambda: cdsm.distribute_tension(POSE, minimum=5.0, maximum=except_at(C, 2, 3.0, 9.0)),
         cdsm.InvalidInput,
-        ("maximum: 3 N", ARM.cables[2].name, "minimum of 5 N", "raise maximum or lower minimum"),
+        ("maximum: 3 N", ARM.cables[2].name, "below 5 N", "raise the one or lower the other"),
     ),
     "minimum too short": (
         lambda: cdsm.distribute_tension(POSE, minimum=[1.0, 2.0]),
