@@ -124,7 +124,8 @@ class Routing:
 
     def sites(self, placement: Array) -> Array:
         """Compute all sites (3, P) [m] from the poses (n, 4, 4) of the bodies in :attr:`used`."""
-        return np.einsum("pxy,py->xp", placement[self._where, :3], self._homogeneous)
+        sites = np.einsum("pxy,py->xp", placement[self._where, :3], self._homogeneous)
+        return np.asarray(sites)
 
     @cached_property
     def used(self) -> tuple[int, ...]:

@@ -167,9 +167,8 @@ def _edges(K: Stiffness, c: int) -> list[str]:
         return [f"{cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
     if min(abs(F - law.low), abs(F - law.high)) > _EDGE * F:
         return []
-    return [
-        f"{cable.name} at {F:.4g} N is within {_EDGE:.0%} of an end of its law, {law.low:g} to {law.high:g} N"
-    ]
+    ends = f"an end of its law, {law.low:g} to {law.high:g} N"
+    return [f"{cable.name} at {F:.4g} N is within {_EDGE:.0%} of {ends}"]
 
 
 def _step(K: Stiffness, moved: list[int]) -> float:

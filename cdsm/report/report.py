@@ -158,8 +158,8 @@ def _notes(report: Report) -> Iterator[str]:
 def _of_limits(K: Stiffness) -> Iterator[str]:
     """Yield which cables are slack, hold a force, or are near an end of their law; joints alike."""
     arm, q, F = K.posture.arm, K.posture.q, K.tension
-    domains = [cable.elasticity.domain for cable in arm.cables]
-    low, high = np.array([(each.low, each.high) for each in domains]).T
+    laws = [cable.elasticity for cable in arm.cables]
+    low, high = np.array([(law.low, law.high) for law in laws]).T
     locked, slack, cables = arm.cables.position_controlled, F == 0.0, arm.cables.names
     near = np.minimum(q - arm.lower, arm.upper - q) < 0.01 * (arm.upper - arm.lower)
     for what, names, chosen in (
