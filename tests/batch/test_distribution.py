@@ -9,6 +9,7 @@ import pytest
 
 import cdsm
 from cdsm.batch import evaluator
+from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.kernels import active_set, serpentine_guess, serpentine_multipliers, tension
 from cdsm.kernels.distribution import UNDECIDED, search_tensions
@@ -327,7 +328,7 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
     set_proof = from_python(serpentine_multipliers.set_proof)
     empty_guess = from_python(serpentine_guess.empty_guess)
     arm = shallow_arm(5)
-    parts = serpentine_guess.find_blocks(arm._model.routing, arm.nv)
+    parts = kernel_arrays(arm).blocks
     count, nv = len(arm.cables), arm.nv
     assert parts.row_start.tolist() == [0, 2, 4, 6, 8, 10]
     low, high = np.full(count, 5.0), np.full(count, np.inf)
@@ -360,13 +361,12 @@ def test_guess_is_mostly_the_optimum_and_what_it_proves_is_so() -> None:
 
 
 def test_blocks_are_those_of_the_geometry() -> None:
-    parts = serpentine_guess.find_blocks(mixed_arm()._model.routing, 5)
+    parts = kernel_arrays(mixed_arm()).blocks
     assert parts.row.tolist() == [0, 1, 2, 3, 4]
     assert parts.row_start.tolist() == [0, 2, 3, 5]
     assert parts.cable_start.tolist() == [0, 3, 5, 9]
     # from anywhere to anywhere there are none
-    own = custom_arm()
-    assert not serpentine_guess.find_blocks(own._model.routing, own.nv).row.size
+    assert not kernel_arrays(custom_arm()).blocks.row.size
 
 
 def test_rounding_on_a_joint_that_no_cable_turns_is_no_missing_torque() -> None:

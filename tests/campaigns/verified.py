@@ -118,7 +118,7 @@ def derivatives(pose: cdsm.Posture, rng: np.random.Generator) -> bool:
 
 def weight(arm: cdsm.Manipulator) -> float:
     """Of all links [N]."""
-    return float(sum(arm._model.masses.mass) * np.linalg.norm(arm.gravity))
+    return float(arm._body.arrays().mass.sum() * np.linalg.norm(arm.gravity))
 
 
 def reach(arm: cdsm.Manipulator) -> float:

@@ -200,7 +200,7 @@ def test_cartesian_stiffness_is_accurate_up_to_where_it_is_refused() -> None:
 def test_load_term_is_the_derivative_of_the_torques_of_the_load(
     pose: cdsm.Posture, wrench: Array
 ) -> None:
-    load = load_stiffness(pose.jacobian, wrench, pose.arm._model.masses.tip_joints)
+    load = load_stiffness(pose.jacobian, wrench, pose.arm._body.tip_joints)
     step = 1e-5
     for i, row in enumerate(step * np.eye(pose.arm.nv)):
         after, before = (pose.arm.at(q, check_limits=False) for q in (pose.q + row, pose.q - row))

@@ -128,19 +128,6 @@ def test_worst_friction_narrows_the_bounds() -> None:
     np.testing.assert_array_equal(same, plain)
 
 
-def test_report_names_the_same_loads() -> None:
-    pose, F = prototype(0.1)
-    report = cdsm.stiffness(pose, F).report()
-    assert report.sticking is not None
-    found = [cdsm.breakaway(pose, F, axis) for axis in "xyz"]
-    stuck = [each.stiffness.along(axis) for each, axis in zip(found, "xyz", strict=True)]
-    np.testing.assert_allclose(report.sticking.below, [each.load for each in found], rtol=1e-10)
-    np.testing.assert_allclose(report.sticking.along, stuck, rtol=1e-10)
-    straight = pose.arm.at(np.zeros(10))
-    none = cdsm.stiffness(straight, cdsm.distribute_tension(straight, 50.0)).report()
-    assert none.sticking is None
-
-
 def test_bad_input_is_named() -> None:
     pose, F = prototype(0.1)
     with pytest.raises(cdsm.InvalidInput, match="direction: is the zero vector"):
