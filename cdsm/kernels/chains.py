@@ -17,18 +17,16 @@ the gradient is set to 0, the mean of both sides.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from cdsm.kernels.compiling import compiled, inner, threaded
+from cdsm.kernels.compiling import inner, threaded
 from cdsm.kernels.motion import cross, dot
 from cdsm.kernels.segments import (
     Segments,
     segment_scratch,
     set_derivative,
     set_direction,
-    set_lengths,
 )
 from cdsm.kernels.tree import Frames, Indices, Routing, Tree, empty_frames, forward_kinematics
 from cdsm.support.values import Array
@@ -77,41 +75,6 @@ def _set_wraps(
                 d, j = scratch.derivative, joint[t]
                 set_derivative(frames, 1.0 if t >= span[row, 1] else -1.0, far, j, d, None)
                 gradient[h, j - 1] -= dot(arm, d.reshape(3))
-
-
-@compiled
-def single_chains(
-    arm: tuple[Any, ...], chains: tuple[Any, ...], q: Array
-) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
-    """Compute the segments and wrap angles of one posture at q (nv,).
-
-    ``arm`` holds the fields of :class:`Tree`. ``chains`` holds the fields of a :class:`Routing` in
-    which each segment is a cable, then ``span``, ``hole`` and ``own`` of :func:`_set_wraps`.
-
-    Returns:
-        l (S,) [m], ∂l/∂θ (S, nv), φ (P,) [rad], ∂φ/∂θ (P, nv), and the fields of :class:`Frames`,
-        all without the axis of postures.
-    """
-    tree, routing, (span, hole, own) = Tree(*arm), Routing(*chains[:5]), chains[5:]
-    nv, rows, count = q.shape[0], tree.parent.shape[0], routing.fixed.shape[0]
-    before, after = segment_scratch(nv, 1), segment_scratch(nv, 1)
-    frames = empty_frames(tree, routing, 1)
-    length, J, shortest = np.empty((count, 1)), np.empty((count, nv, 1)), np.empty(1)
-    wrap, gradient = np.empty(hole.shape[0]), np.zeros((hole.shape[0], nv))
-    rotation = np.empty((rows, 3, 3, 1))
-    forward_kinematics(tree, routing, q.reshape(nv, 1), np.empty((2, 1)), rotation, frames, None)
-    set_lengths(routing, frames, before, length, J, shortest, None)
-    _set_wraps(span, routing.joint, hole, own, frames, before, after, wrap, gradient)
-    return (
-        length.reshape(count),
-        J.reshape(count, nv),
-        wrap,
-        gradient,
-        frames.origin.reshape(rows, 3),
-        frames.axis.reshape(rows, 3),
-        frames.slide.reshape(tree.slide.shape[0], 3),
-        frames.site.reshape(routing.row.shape[0], 3),
-    )
 
 
 @threaded

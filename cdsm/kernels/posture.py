@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from cdsm.kernels.bodies import Masses, gravity_torque, set_gravity_stiffness, tip_jacobian
-from cdsm.kernels.compiling import compiled, inner
+from cdsm.kernels.compiling import inner
 from cdsm.kernels.records import mirror
 from cdsm.kernels.segments import segment_scratch, set_lengths
 from cdsm.kernels.tree import Routing, Tree, empty_frames, forward_kinematics
@@ -50,13 +48,3 @@ def compute_pose(tree: Tree, routing: Routing, masses: Masses, q: Array) -> _Pos
         frames.site.reshape(routing.row.shape[0], 3),
         shortest[0],
     )
-
-
-@compiled
-def single_pose(arm: tuple[Any, ...], q: Array) -> _Pose:
-    """Compute a posture at q (nv,), as :func:`compute_pose` does.
-
-    ``arm`` has the fields of :class:`Tree`, then of :class:`Routing`, then of :class:`Masses`.
-    Python passes and receives plain arrays: to pass named tuples takes a third of the total time.
-    """
-    return compute_pose(Tree(*arm[:6]), Routing(*arm[6:11]), Masses(*arm[11:]), q)

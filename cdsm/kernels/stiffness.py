@@ -202,41 +202,6 @@ def single_stiffness(
 
 
 @compiled
-def single_length_hessian(
-    segment: Indices,
-    joint: Indices,
-    origin: Array,
-    axis: Array,
-    slide: Array,
-    site: Array,
-    weight: Array,
-    slot: Indices,
-    slots: int,
-) -> Array:
-    """Compute Σ w_c ∂²L_c/∂θ_i∂θ_j (slots, nv, nv) of one posture over the cables of each slot.
-
-    ``weight`` w and ``slot`` are (C,). For the tensor H_L, cable c has the weight 1 and the slot c.
-    ``segment``, ``joint`` and the next four arguments are as for :func:`single_stiffness`.
-    """
-    nv, F = origin.shape[0] - 1, weight.reshape(weight.shape[0], 1)
-    hessian, frames = np.zeros((slots, nv, nv, 1)), one_frames(origin, axis, slide, site)
-    add_length_hessian(segment, joint, frames, F, slot, segment_scratch(nv, 1), hessian, None)
-    for s in range(slots):
-        mirror(hessian[s], None)
-    return hessian.reshape(slots, nv, nv)
-
-
-@compiled
-def single_load_stiffness(jacobian: Array, wrench: Array, tip_joints: Indices) -> Array:
-    """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of one posture; see :func:`set_load_stiffness`."""
-    nv = jacobian.shape[1]
-    load = np.zeros((nv, nv, 1))
-    JX, W = jacobian.reshape(6, nv, 1), wrench.reshape(6, 1)
-    set_load_stiffness(JX, W, tip_joints, load, np.empty((6, 1)), None)
-    return load.reshape(nv, nv)
-
-
-@compiled
 def single_cable_stiffness(
     length: Array, tension: Array, rigidity: Array, linear: Array, series: Array, rest: Array
 ) -> Array:

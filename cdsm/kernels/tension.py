@@ -36,26 +36,6 @@ _ROUNDING = 1e-11
 """J_c v below this fraction of the largest is rounding, for a cable c without upper bound."""
 
 
-class Scaled(NamedTuple):
-    """Balance of an arm, J_Lᵀ F = J_Xᵀ W − g with low ≤ F ≤ high, in dimensionless form.
-
-    Attributes:
-        A: J_Lᵀ divided by ``arm`` (nv, C).
-        b: Torque divided by ``arm`` and ``force`` (nv,).
-        low: Lower bounds divided by ``force`` (C,).
-        high: Upper bounds divided by ``force`` (C,).
-        arm: Largest moment arm [m], rounded up to a power of two, so that scaling is exact.
-        force: Largest of the lower bounds and of torque divided by moment arm [N], also rounded up.
-    """
-
-    A: Array
-    b: Array
-    low: Array
-    high: Array
-    arm: float
-    force: float
-
-
 class Balance(NamedTuple):
     """Balance J_Lᵀ F = τ of r postures for which a search must find the tensions."""
 
@@ -118,24 +98,6 @@ def scaled_balance(
 def _power_of_two(value: float) -> float:
     """Return the smallest power of two that is not below ``value``; 1 if ``value`` is zero."""
     return 2.0 ** math.ceil(math.log2(value)) if value > 0.0 else 1.0
-
-
-@compiled
-def single_optimality(
-    A: Array, b: Array, low: Array, high: Array, x: Array, y: Array, z: Array
-) -> tuple[float, float, float]:
-    """Measure how far x is from the optimum of one posture; see :func:`set_violations`.
-
-    A is Jᵀ (m, n). No array has an axis of postures. Returns the largest violation of balance and
-    bounds, the largest violation of stationarity, and the duality gap.
-    """
-    m, n = A.shape
-    J, violations = np.ascontiguousarray(A.T).reshape(n, m, 1), np.empty((5, 1))
-    # copies are writable like the blocks of a batch, so one compilation serves both
-    bounds = low.copy().reshape(n, 1), high.copy().reshape(n, 1)
-    point = x.copy().reshape(n, 1), y.copy().reshape(m, 1), z.copy().reshape(n, 1)
-    set_violations(J, b.copy().reshape(m, 1), *bounds, *point, violations, None)
-    return violations[0, 0], violations[1, 0], violations[2, 0]
 
 
 @inner

@@ -22,7 +22,6 @@ from pydantic import (
     Tag,
     TypeAdapter,
     ValidationError,
-    validate_call,
 )
 from pydantic.dataclasses import dataclass
 
@@ -122,11 +121,6 @@ def record(cls: type[_Record]) -> type[_Record]:
     made: Any = dataclass(frozen=True, kw_only=True, config=_STRICT)(cls)
     made.__init__ = _reporting(made.__init__, made)
     return made  # type: ignore[no-any-return]
-
-
-def checked_keywords(function: _Function) -> _Function:
-    """Decorate a function: its keywords are checked like the fields of a :func:`record`."""
-    return _reporting(validate_call(config=_STRICT)(function), function)
 
 
 def _reporting(validated: _Function, kind: Callable[..., Any]) -> _Function:

@@ -32,30 +32,6 @@ _CacheLocator.ensure_cache_path = refuse
 """
 
 
-FIRST = """
-import sys
-import numpy as np
-import cdsm
-from cdsm.kernels import compiling
-from cdsm.kernels.posture import single_pose
-from cdsm.kernels.stiffness import single_stiffness
-compiling._NEW = compiling._KEPT = float(sys.argv[1]), 2**15
-arm = cdsm.presets.virtual_prototype()
-for q in np.random.default_rng(5).uniform(-0.15, 0.15, (3, arm.nv)):
-    pose = arm.at(q)
-    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 40.0))
-    numbers = (pose.tip, pose.length_hessian, K.joint, K.compliance, K.cartesian, K.pseudoinverse())
-    print(*(each.tobytes().hex() for each in numbers), K.along("z"), K.margin)
-searched = cdsm.distribute_tensions(arm, [q, -q], 40.0, 40.0 + 1e3 * abs(q).max())
-print(searched.values.tobytes().hex(), searched.status, cdsm.evaluate(
-    arm, [q, -q], minimum=40.0, direction="z", outputs=("along", "cartesian", "margin")
-)["along"].tobytes().hex())
-narrow = cdsm.distribute_tensions(arm, [q, -q], 40.0, 40.0)
-print(narrow.values.tobytes().hex(), narrow.status)
-print(len(single_pose.signatures), len(single_stiffness.signatures), file=sys.stderr)
-"""
-
-
 def run(program: str, *arguments: str, cwd: Path = ROOT, **environment: str) -> tuple[str, str]:
     """What a process prints, and what it writes to its error stream."""
     done = subprocess.run(
@@ -94,13 +70,3 @@ def test_where_no_cache_folder_is_writable_kernels_are_kept_with_temporary_files
     assert folder.stat().st_mode & 0o777 == 0o700
     folder.chmod(0o777)  # others could put their code there
     assert run(READ_ONLY + CACHED, str(tmp_path), TMPDIR=str(tmp_path))[0] == "0"
-
-
-def test_first_calls_compile_nothing_and_give_the_same_bits(tmp_path: Path) -> None:
-    """A change of one bit between two runs of a script would look like a fault of the user's."""
-    cache = str(tmp_path / "empty")
-    first, said = run(FIRST, "60", NUMBA_CACHE_DIR=cache)
-    assert said.split() == ["0", "0"]
-    compiled, said = run(FIRST, "0")
-    assert said.split()[-2:] == ["1", "1"]
-    assert first == compiled
