@@ -119,6 +119,17 @@ def empty_frames(tree: Tree, routing: Routing, width: int) -> Frames:
 
 
 @inlined
+def one_frames(origin: Array, axis: Array, slide: Array, site: Array) -> Frames:
+    """Return the :class:`Frames` of one posture from arrays that lack the axis of postures."""
+    return Frames(
+        origin.reshape(origin.shape[0], 3, 1),
+        axis.reshape(axis.shape[0], 3, 1),
+        slide.reshape(slide.shape[0], 3, 1),
+        site.reshape(site.shape[0], 3, 1),
+    )
+
+
+@inlined
 def turned(rotation: Array, i: Index, r: Index, x: float, y: float, z: float, w: Index) -> float:
     """Compute component r, in base axes, of a vector (x, y, z) given in the frame of joint i.
 
