@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple, get_args
 
-from cdsm.cable import Cable, Cables, checked_cables
+from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import OriginalLength
+from cdsm.errors import CableError, InvalidInput
 from cdsm.geometry import LONGEST, Geometry, doubts_about_units
 from cdsm.rigid_body import RigidBody
 from cdsm.support.directions import Direction, gravity_vector
-from cdsm.support.validation import one_of
+from cdsm.support.validation import one_of, sequence_of
 from cdsm.tolerances import Tolerances
 
 CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
@@ -50,6 +52,23 @@ def checked_parts(
     names = None if joint_names is None else tuple(joint_names)
     held = checked_cables(cables)
     return ArmParts(geometry, urdf, held, tip, g, original_length, names, tolerances)
+
+
+def checked_cables(cables: CablesOrFile) -> Cables:
+    """Return cables, given as such or as the path of their file; each needs a name of its own."""
+    if isinstance(cables, (str, os.PathLike)):
+        from cdsm.arm_file.cables import read_cables
+
+        return Cables(read_cables(cables))
+    given = [cables] if isinstance(cables, Cable) else cables
+    cables = Cables(sequence_of("cables", given, Cable))
+    if not cables:
+        raise InvalidInput("cables", "none given; an arm needs at least one.")
+    counts = Counter(cable.name for cable in cables)
+    for name, count in counts.items():
+        if count > 1:
+            raise CableError(name, "the name is used twice; every cable needs its own.")
+    return cables
 
 
 def doubts(parts: ArmParts, body: RigidBody) -> list[str]:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, SupportsIndex, final, get_args, overload
 
@@ -248,20 +245,3 @@ def _length(value: float) -> float:
     if length <= 0.0:
         raise InvalidInput("free_length", f"{length:g} m given; it must be positive.")
     return length
-
-
-def checked_cables(cables: Cable | Sequence[Cable] | str | os.PathLike[str]) -> Cables:
-    """Return cables, given as such or as the path of their file; each needs a name of its own."""
-    if isinstance(cables, (str, os.PathLike)):
-        from cdsm.arm_file.cables import read_cables
-
-        return Cables(read_cables(cables))
-    given = [cables] if isinstance(cables, Cable) else cables
-    cables = Cables(sequence_of("cables", given, Cable))
-    if not cables:
-        raise InvalidInput("cables", "none given; an arm needs at least one.")
-    counts = Counter(cable.name for cable in cables)
-    for name, count in counts.items():
-        if count > 1:
-            raise CableError(name, "the name is used twice; every cable needs its own.")
-    return cables

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, Self, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.arm_parts import ArmParts, CablesOrFile, checked_parts, doubts
-from cdsm.cable import Cables, checked_cables
+from cdsm.arm_parts import ArmParts, CablesOrFile, checked_cables, checked_parts, doubts
+from cdsm.cable import Cables
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import CableError, InvalidInput, JointLimitError
 from cdsm.geometry import Geometry
