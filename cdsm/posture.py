@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, final
 
@@ -15,13 +15,12 @@ from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.contacts import overlapping
 from cdsm.routing import Spans
 from cdsm.segments import Segments
-from cdsm.support.format import JointUnits, aligned, coordinates, plain, plural
-from cdsm.support.tidy import data_frame
+from cdsm.support.format import JointUnits, aligned, coordinates, plain
+from cdsm.support.result import Result, unit
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 if TYPE_CHECKING:
-    import pandas
     from matplotlib.figure import Figure
 
     from cdsm.manipulator import Manipulator
@@ -63,23 +62,17 @@ class Posture(ReadOnlyState):
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
 
     def plot(self, tension: Tension | None = None, stiffness: Stiffness | None = None) -> Figure:
-        """Plot the arm in mm; ``tension`` colours its cables, ``stiffness`` adds tip compliance.
-
-        Arguments and errors are those of :func:`cdsm.plots.plot_arm`.
-        """
+        """Plot the arm in mm; ``tension`` colours its cables, ``stiffness`` adds tip compliance."""
         return cdsm.plots.plot_arm(self, tension, stiffness)
 
     def to_dict(self) -> dict[str, object]:
         """Return angles, tip, cable lengths and moment arms for JSON; keys name the SI units."""
-        lengths = dict(zip(self.arm.cables.names, self.cable_lengths, strict=True))
         numbers = {
-            **self._coordinates,
             "tip_position_m": self.tip[:3, 3],
             "tip_rotation": self.tip[:3, :3],
-            "cable_length_m": lengths,
-            **self.moment_arms.to_dict(),
+            "cable_length_m": dict(zip(self.arm.cables.names, self.cable_lengths, strict=True)),
         }
-        return plain(numbers)
+        return {**plain(numbers), **self.moment_arms.to_dict()}
 
     @property
     def _coordinates(self) -> dict[str, object]:
@@ -88,10 +81,7 @@ class Posture(ReadOnlyState):
     @cached_property
     def moment_arms(self) -> MomentArms:
         """Moment arm of each cable about each joint, found by their names."""
-        arm, values = self.arm, frozen(0.0 - self.length_jacobian)  # no zero is negative
-        return MomentArms(
-            values=values, cables=arm.cables.names, joints=arm.joint_names, slides=arm.slides
-        )
+        return MomentArms(posture=self, values=frozen(0.0 - self.length_jacobian))  # no -0.0
 
     @cached_property
     def _spans(self) -> Spans:
@@ -206,11 +196,7 @@ class Posture(ReadOnlyState):
         return load_stiffness(self.jacobian, wrench, self.arm._body.tip_joints)
 
     def _joint_stiffness(self, tension: Array, cable_stiffness: Array, wrench: Array) -> Array:
-        """Compute five matrices (5, nv, nv) [N m/rad]: active, passive and load term, P, and K_θ.
-
-        P is the entrywise sum of the magnitudes of the four terms of K_θ. ``tension`` (C,) [N],
-        ``cable_stiffness`` (C,) [N/m] and ``wrench`` (6,) must be checked.
-        """
+        """Compute active, passive and load term, Σ|terms|, and K_θ (5, nv, nv) [N m/rad]."""
         J = self.length_jacobian
         active, load = self._active(tension), self._load(wrench)
         passive, gravity = (J.T * cable_stiffness) @ J, self.gravity_stiffness
@@ -242,73 +228,41 @@ def hat(a: Array) -> Array:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class MomentArms(ReadOnlyState):
+class MomentArms(Result):
     """Moment arm of each cable about each joint, −J_L: torque per tension, τ = −J_Lᵀ F (Eq. 13).
 
     A cable with a positive moment arm turns the joint to positive angles. The moment arm of one
     cable about one joint is ``arms["cable1_1", "joint1_1"]``.
 
     Attributes:
+        posture: The posture.
         values: Moment arms (C, nv) [m]; force per tension [-] for prismatic joints.
-        cables: Names of the cables.
-        joints: Names of the joints.
-        slides: Whether each joint is prismatic (nv,).
     """
 
-    values: Array
-    cables: tuple[str, ...]
-    joints: tuple[str, ...]
-    slides: NDArray[np.bool_]
+    _rows = "cable"
+
+    posture: Posture
+    values: Array = field(metadata=unit("m", "cable", "joint", name="moment_arm"))
 
     def __getitem__(self, names: tuple[str, str]) -> float:
-        """Return the moment arm of a cable about a joint [m], or [-] for a prismatic joint.
-
-        Raises InvalidInput if there are not two names, UnknownName for an unknown name.
-        """
+        """Return the moment arm of a cable about a joint; InvalidInput or UnknownName if wrong."""
+        cables, joints = self.posture.arm.cables.names, self.posture.arm.joint_names
+        said = f'give a cable and a joint, such as moment_arms["{cables[0]}", "{joints[0]}"].'
         if not isinstance(names, tuple) or len(names) != 2:
-            raise InvalidInput(
-                "moment_arms",
-                f"{names!r} given; give a cable and a joint, such as "
-                f'moment_arms["{self.cables[0]}", "{self.joints[0]}"].',
-            )
-        cable, joint = names
-        row = self.cables.index(one_of("cable", cable, self.cables))
-        return float(self.values[row, self.joints.index(one_of("joint", joint, self.joints))])
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the moment arms by cable and joint for JSON; the keys name the SI units."""
-        found: dict[str, object] = {}
-        for name, chosen in (("moment_arm_m", ~self.slides), ("force_per_tension", self.slides)):
-            columns = np.flatnonzero(chosen).tolist()
-            if columns:
-                found[name] = {
-                    cable: {self.joints[i]: float(row[i]) for i in columns}
-                    for cable, row in zip(self.cables, self.values, strict=True)
-                }
-        return found
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return a pandas table in SI: a row for each cable, a column for each joint.
-
-        Raises MissingExtra if pandas is not installed.
-        """
-        units = np.where(self.slides, "-", "m").tolist()
-        names = [f"{joint} [{unit}]" for joint, unit in zip(self.joints, units, strict=True)]
-        return data_frame(dict(zip(names, self.values.T, strict=True)), "cable", self.cables)
-
-    def __repr__(self) -> str:
-        cables, joints = plural(len(self.cables), "cable"), plural(len(self.joints), "joint")
-        return f"<MomentArms of {cables} about {joints}>"
+            raise InvalidInput("moment_arms", f"{names!r} given; {said}")
+        row = cables.index(one_of("cable", names[0], cables))
+        return float(self.values[row, joints.index(one_of("joint", names[1], joints))])
 
     def __str__(self) -> str:
-        scale = np.where(self.slides, 1.0, 1e3)
+        arm = self.posture.arm
+        scale = np.where(arm.slides, 1.0, 1e3)
         rows = [
-            [cable, *(f"{arm:z.2f}" for arm in scale * row)]
-            for cable, row in zip(self.cables, self.values, strict=True)
+            [cable, *(f"{value:z.2f}" for value in scale * row)]
+            for cable, row in zip(arm.cables.names, self.values, strict=True)
         ]
-        slide = " [-] where the joint slides;" if self.slides.any() else ""
+        slide = " [-] where the joint slides;" if arm.slides.any() else ""
         note = f"moment arms [mm],{slide} positive: the cable turns the joint to positive angles"
-        return "\n".join([*aligned([["", *self.joints], *rows]), note])
+        return "\n".join([*aligned([["", *arm.joint_names], *rows]), note])
 
 
 def foot(point: Array, line: Array) -> Array:

@@ -76,10 +76,8 @@ class Result(ReadOnlyState):
         labels = self._labels()
         found = dict(self._posture._coordinates) if self._posture else {}
         for name, value, of, dims in self._quantities():
-            named = len(dims) == 1 and dims[0] in ("joint", "cable")
-            found[key(name, of)] = (
-                dict(zip(labels[dims[0]], value, strict=True)) if named else value
-            )
+            named = bool(dims) and set(dims) <= {"joint", "cable"}
+            found[key(name, of)] = _by_name(value, dims, labels) if named else value
         return plain(found)
 
     def to_xarray(self) -> xarray.Dataset:
@@ -164,3 +162,11 @@ class Result(ReadOnlyState):
             labels |= {"joint": arm.joint_names, "joint_column": arm.joint_names}
             labels["cable"] = arm.cables.names
         return labels
+
+
+def _by_name(value: Any, dims: Sequence[str], labels: Mapping[str, Sequence[object]]) -> Any:
+    """Return an array as nested dictionaries by the labels of its dimensions."""
+    if not dims:
+        return value
+    pairs = zip(labels[dims[0]], value, strict=True)
+    return {label: _by_name(each, dims[1:], labels) for label, each in pairs}
