@@ -111,7 +111,7 @@ CASES |= {
     "elasticity a function": (
         lambda: cdsm.Manipulator(GEOMETRY, lambda F: 5e4),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("elasticity: <function", "an object of your own subclass"),
+        ("elasticity: <function", "Elasticity.from_rigidity(EA, low, high)"),
     ),
     "elasticity a name": (
         lambda: cdsm.Manipulator(GEOMETRY, "1x19-1.2mm"),  # type: ignore[arg-type]
@@ -121,7 +121,7 @@ CASES |= {
     "too few elasticities": (
         lambda: cdsm.Manipulator(GEOMETRY, [STEEL]),
         cdsm.InvalidInput,
-        ("elasticity", f"one for each of {C}"),
+        ("elasticity", f"1 for each of {C}"),
     ),
     "elasticities that are none": (
         lambda: cdsm.Manipulator(GEOMETRY, [1.0] * C),  # type: ignore[list-item]
@@ -166,12 +166,12 @@ CASES |= {
     "no text of a URDF": (
         lambda: cdsm.Manipulator.from_urdf("", ARM.cables, tip="tool0"),
         cdsm.InvalidInput,
-        ("urdf: '' given", "the path of a URDF is needed, or its text"),
+        ("urdf: '' given", "the path of a URDF or its text needed"),
     ),
     "a URDF of bytes": (
         lambda: cdsm.Manipulator.from_urdf(ARM.urdf.encode(), ARM.cables, tip="tool0"),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("urdf: b'<?xml", "its text as str"),
+        ("urdf: b'<?xml", "the path of a URDF or its text needed"),
     ),
     "duplicate cable names": (
         lambda: cdsm.Manipulator(GEOMETRY, cables=[cdsm.Cable("a", (BASE, END), STEEL)] * 2),
@@ -298,7 +298,7 @@ CASES |= {
     "cables of too few elasticities": (
         lambda: cdsm.serpentine_cables(GEOMETRY, [STEEL] * (C - 1)),
         cdsm.InvalidInput,
-        ("elasticity", f"one for each of {C}"),
+        ("elasticity", f"1 for each of {C}"),
     ),
     "cables of unknown control": (
         lambda: cdsm.serpentine_cables(GEOMETRY, STEEL, control="forces"),  # type: ignore[arg-type]

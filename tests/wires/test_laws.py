@@ -120,7 +120,12 @@ def test_tension_outside_the_law_is_an_error_with_data(method: str) -> None:
         getattr(STRAND, method)([[50.0, 2.1], [900.0, 31.0]])
     assert caught.value.tension == (2.1, 900.0)
     assert caught.value.indices == (1, 2)
-    for part in ("2.1, 900 N", "[2.2 N, 810 N]", "minimum=", "slack_below() continues one to 0 N"):
+    for part in (
+        "2.1 N, 900 N",
+        "[2.2 N, 810 N]",
+        "minimum=",
+        "slack_below() continues one to 0 N",
+    ):
         assert part in str(caught.value)
     with pytest.raises(cdsm.ElasticityRangeError, match=r"\[0 N, inf N\)"):
         getattr(STEEL, method)(-1.0)
@@ -128,7 +133,7 @@ def test_tension_outside_the_law_is_an_error_with_data(method: str) -> None:
 
 
 def test_long_list_of_offenders_is_cut_in_the_message_not_in_the_data() -> None:
-    with pytest.raises(cdsm.ElasticityRangeError, match=r", … N") as caught:
+    with pytest.raises(cdsm.ElasticityRangeError, match="and 996 more") as caught:
         STRAND.rigidity(np.full(1000, 900.0))
     assert len(caught.value.tension) == 1000
     assert len(str(caught.value)) < 400
