@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.errors import CableError, CdsmError, InvalidInput, listed
 from cdsm.support.format import plural
 from cdsm.support.validation import (
+    instance,
     number_array,
     one_of,
     quantity,
@@ -24,7 +25,7 @@ from cdsm.support.validation import (
     vector,
 )
 from cdsm.support.values import Array
-from cdsm.wires.elasticity import Elasticity, checked_law
+from cdsm.wires.elasticity import Elasticity
 
 Control = Literal["position", "force"]
 
@@ -102,7 +103,7 @@ class Cable:
     def __post_init__(self) -> None:
         try:
             text("name", self.name)
-            checked_law(self.elasticity)
+            instance("elasticity", self.elasticity, Elasticity)
             sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
             lead = quantity("lead", self.lead, "length", zero=True)
@@ -203,7 +204,7 @@ class Cable:
             InvalidInput: ``elongation`` is not numbers, or ``free_length`` is not positive.
             ElasticityRangeError: No tension in the domain gives one of the elongations.
         """
-        return self.elasticity._tension_at(
+        return self.elasticity._tension_of(
             number_array("elongation", elongation),
             "elongation",
             _length(free_length),

@@ -211,11 +211,11 @@ class Contradicting(cdsm.Elasticity):
     fault: str
 
     def __init__(self, fault: str) -> None:
-        super().__init__("contradicting", {"fault": fault}, 0.0, 500.0)
-        self.__dict__.update(fault=fault, _table=OWN._table)
+        super().__init__(0.0, 500.0, 0.0, "", {"fault": fault}, 1.0, OWN._table)
+        self.fault = fault
 
-    def strain_and_rigidity(self, tension: ArrayLike) -> tuple[Array, Array]:
-        strain, EA = super().strain_and_rigidity(tension)
+    def _evaluate(self, F: Array) -> tuple[Array, Array]:
+        strain, EA = super()._evaluate(F)
         return strain, np.asarray(EA * (1.001 if self.fault == "rigidity" else 1.0))
 
     def energy(self, tension: ArrayLike) -> Array:

@@ -106,7 +106,7 @@ CASES |= {
     "elasticity a number": (
         lambda: cdsm.Manipulator(GEOMETRY, 2e5),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("elasticity: 200000.0", "an Elasticity is needed: LinearElasticity(EA)"),
+        ("elasticity: 200000.0", "Elasticity is needed"),
     ),
     "elasticity a function": (
         lambda: cdsm.Manipulator(GEOMETRY, lambda F: 5e4),  # type: ignore[arg-type]
@@ -293,7 +293,7 @@ CASES |= {
     "cables of no elasticity": (
         lambda: cdsm.serpentine_cables(GEOMETRY, None),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("elasticity: None", "an Elasticity is needed"),
+        ("elasticity: None", "Elasticity is needed"),
     ),
     "cables of too few elasticities": (
         lambda: cdsm.serpentine_cables(GEOMETRY, [STEEL] * (C - 1)),
