@@ -125,7 +125,7 @@ class CableLaws:
             wire[held] -= self.series[held] * (F - self.rest[held])
             if self._unstrained:
                 try:
-                    wire[held] /= 1.0 + law.strain(F)
+                    wire[held] /= 1.0 + law._evaluate(law._inside(F))[0]
                 except ElasticityRangeError as error:
                     raise self.naming(error, held) from None
         return frozen(wire)

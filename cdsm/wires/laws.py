@@ -75,10 +75,12 @@ class StrandElasticity(Elasticity):
         high: Largest tension [N].
 
     Raises:
-        InvalidInput: A number is invalid, the numbers of ranges and joins do not fit, ``low``,
-            ``joins`` and ``high`` do not rise from 0 or more, two ranges do not meet, or EA is not
-            positive.
+        InvalidInput: Numbers are invalid, do not fit or do not rise from 0 or more; two ranges do
+            not meet; or EA is not positive.
     """
+
+    coefficients = property(lambda law: law._given["coefficients"], doc="As given, in tuples.")
+    joins = property(lambda law: law._given["joins"], doc="As given [N], in a tuple.")
 
     def __init__(
         self,
@@ -90,45 +92,35 @@ class StrandElasticity(Elasticity):
         if not isinstance(coefficients, (list, tuple)):
             raise InvalidInput("coefficients", f"{coefficients!r} given; give a tuple per range.")
         rows, joins = tuple(_row("coefficients", row) for row in coefficients), _row("joins", joins)
-        edges = scalar("low", low), *joins, scalar("high", high)
+        low, high = scalar("low", low), scalar("high", high)
         if not rows or not all(rows):
             raise InvalidInput("coefficients", "need at least one range with one coefficient.")
-        if (needed := len(rows) - 1) != len(joins):
-            raise InvalidInput(
-                "joins", f"{len(joins)} given, one fewer than ranges, {needed}, needed."
-            )
-        if edges[0] < 0.0 or any(a >= b for a, b in pairwise(edges)):
-            raise InvalidInput("joins", f"0 <= low < joins < high must rise, but are {edges} N.")
+        if len(joins) != len(rows) - 1:
+            raise InvalidInput("joins", f"{len(joins)} given for {len(rows)} ranges; one fewer.")
+        if low < 0.0 or any(a >= b for a, b in pairwise((low, *joins, high))):
+            found = f"{low:g}, {joins}, {high:g} N"
+            raise InvalidInput("joins", f"0 <= low < joins < high must rise, but are {found}.")
         for join, (before, after) in zip(joins, pairwise(rows), strict=True):
             below, above = polyval(join, before), polyval(join, after)
             if abs(above - below) > _MEET * abs(below):
-                raise InvalidInput(
-                    "coefficients",
-                    f"the ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} N "
-                    "above. Choose digits with which they meet, or use a TabulatedElasticity.",
-                )
-        given = {"coefficients": rows, "joins": joins, "low": edges[0], "high": edges[-1]}
-        table = tabulate(lambda F: _piecewise(F, rows, joins), edges[0], edges[-1], joins)
-        super().__init__(edges[0], edges[-1], edges[0], "strand", given, 1.0, table)
+                problem = f"the ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} "
+                raise InvalidInput("coefficients", f"{problem}N above. Give more digits.")
+        given = {"coefficients": rows, "joins": joins, "low": low, "high": high}
+        table = tabulate(lambda F: _piecewise(F, rows, joins), low, high, joins)
+        super().__init__(low, high, low, "strand", given, 1.0, table)
 
     @classmethod
     def eq19_repaired(cls) -> StrandElasticity:
         """Return Eq. 19 of a 1×19 strand of 1.2 mm, with the digits missing in print filled in.
 
-        −1e-3 is read as −1e-4. The digits leave EA(31 N) uncertain by 6 kN and EA(810 N) by 35 kN.
-        Within them, the upper polynomial is as flat as possible from 400 to 810 N, and the lower one
-        as near to the printed one as possible (linear programs in ``tests/laws/test_errata.py``).
+        −1e-3 is read as −1e-4. The digits leave EA(31 N) uncertain by 6 kN, EA(810 N) by 35 kN.
+        Within them, the upper polynomial is as flat as possible from 400 to 810 N, the lower one as
+        near to the printed one as possible (linear programs in ``tests/laws/test_errata.py``).
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
-    coefficients = property(lambda law: law._given["coefficients"], doc="As given, in tuples.")
-    joins = property(lambda law: law._given["joins"], doc="As given [N], in a tuple.")
-
     def polynomial(self, tension: ArrayLike) -> Array:
-        """Evaluate the polynomials EA(F) [N] at F of any shape, even beyond the law.
-
-        Raises InvalidInput if ``tension`` is not finite numbers.
-        """
+        """Evaluate the polynomials EA(F) [N] at F of any shape, even beyond the law."""
         return _piecewise(number_array("tension", tension), self.coefficients, self.joins)
 
 
@@ -148,37 +140,37 @@ class TabulatedElasticity(Elasticity):
         InvalidInput: There are fewer than two points, or they are not ascending.
     """
 
+    tensions = property(lambda law: law._given["tensions"], doc="As given [N], in a tuple.")
+    strains = property(lambda law: law._given["strains"], doc="As given [-], in a tuple.")
+
     def __init__(self, tensions: Sequence[float], strains: Sequence[float]) -> None:
         from scipy.interpolate import CubicHermiteSpline, CubicSpline  # import slowly
 
         given = {"tensions": _row("tensions", tensions), "strains": _row("strains", strains)}
         F, strain = np.array(given["tensions"]), np.array(given["strains"])
+        if F.size != strain.size or F.size < 2:
+            raise InvalidInput("strains", f"{strain.size} given for {F.size} tensions; 2 or more.")
         for name, row, least in (("tensions", F, SMALLEST), ("strains", strain, 0.0)):
-            if row.size != F.size or row.size < 2:
-                raise InvalidInput(
-                    name, f"{row.size} given; as many tensions as strains, 2 or more, are needed."
-                )
-            if not np.diff(row).min() > least:
-                at = int(np.diff(row).argmin())
-                raise InvalidInput(
-                    name, f"entry [{at + 1}] is {row[at + 1]:g} after {row[at]:g}; they must rise."
-                )
+            if (steps := np.diff(row)).min() <= least:
+                at = int(steps.argmin()) + 1
+                rise = f"entry [{at}] is {row[at]:g} after {row[at - 1]:g}; they must rise."
+                raise InvalidInput(name, rise)
         if F[0] < 0.0:
             raise InvalidInput("tensions", f"{F[0]:g} N is negative; cables only pull.")
-        chords = np.diff(strain) / np.diff(F)
+        chords, strain = np.diff(strain) / np.diff(F), strain - strain[0]
         if not 1.0 / LARGEST < chords.min() <= chords.max() < LARGEST:
             raise InvalidInput("strains", "rise so steeply, or so little, that EA is no rigidity.")
-        strain = strain - strain[0]
         slopes = least = np.minimum(np.append(chords[0], chords), np.append(chords, chords[-1]))
         if chords.size > 1:
             middles = (strain[1:] + strain[:-1]) / 2.0
             ln = CubicSpline(middles, np.log(chords), bc_type="natural")(strain)
             slopes = np.exp(np.clip(ln, np.log(least / 2.0), np.log(2.5 * least)))
-        table = Table(F, CubicHermiteSpline(F, strain, slopes).c)
-        super().__init__(float(F[0]), float(F[-1]), float(F[0]), "tabulated", given, 1.0, table)
-
-    tensions = property(lambda law: law._given["tensions"], doc="As given [N], in a tuple.")
-    strains = property(lambda law: law._given["strains"], doc="As given [-], in a tuple.")
+        low, high, table = (
+            float(F[0]),
+            float(F[-1]),
+            Table(F, CubicHermiteSpline(F, strain, slopes).c),
+        )
+        super().__init__(low, high, low, "tabulated", given, 1.0, table)
 
 
 def _piecewise(F: Array, rows: Sequence[Sequence[float]], joins: Sequence[float]) -> Array:
@@ -186,7 +178,6 @@ def _piecewise(F: Array, rows: Sequence[Sequence[float]], joins: Sequence[float]
 
 
 def _row(name: str, values: ArrayLike) -> tuple[float, ...]:
-    numbers = number_array(name, values)
-    if numbers.ndim != 1:
+    if (numbers := number_array(name, values)).ndim != 1:
         raise InvalidInput(name, f"{values!r} given; a sequence of numbers is needed.")
     return tuple(numbers.tolist())

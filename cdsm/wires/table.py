@@ -14,7 +14,7 @@ from cdsm.support.format import span
 from cdsm.support.validation import RANGES
 from cdsm.support.values import Array
 
-_CELLS: Final = 800  # pieces of a function EA(F), to 1e-10 of Eq. 19
+_CELLS: Final = 800  # pieces of a function EA(F), to 1e-9 of Eq. 19
 _ACCURACY: Final = 1e-8  # of EA between two knots
 _NEAR: Final = 1.0  # distance [N] from a join within which there is no knot
 _NODES, _WEIGHTS = (leggauss(8)[0] + 1.0) / 2.0, leggauss(8)[1] / 2.0
@@ -26,21 +26,15 @@ class Table(NamedTuple):
     knots: Array  # tensions (n + 1,) [N]
     coefficients: Array  # of ε in F − knot (k, n), highest power first
     cells: NDArray[np.intp] | None = None  # piece of each cell, even in (F − first knot)^¼
-    scale: float = 0.0  # number of cells⁴ over last − first knot [1/N]
 
     def place(self, F: Array) -> tuple[Any, Array]:
         """Return the piece of each tension [N] and the distance from the knot before it."""
         if self.cells is None:
             piece = self.knots[1:-1].searchsorted(F)
         else:
-            cell = np.sqrt(np.sqrt((F - self.knots[0]) * self.scale)).astype(np.intp)
-            piece = self.cells.take(cell)
+            share = (F - self.knots[0]) * (_CELLS**4 / (self.knots[-1] - self.knots[0]))
+            piece = self.cells.take(np.sqrt(np.sqrt(share)).astype(np.intp))
         return piece, F - self.knots.take(piece)
-
-    def strains(self) -> Array:
-        """Return ε at the knots (n + 1,)."""
-        end = horner(self.coefficients, -1, self.knots[-1] - self.knots[-2])
-        return np.append(self.coefficients[-1], end)
 
     def moments(self) -> Array:
         """Return the polynomials of ∫ε dF from the first knot (k + 1, n), highest power first."""
@@ -67,27 +61,30 @@ def tabulate(
     join, so that a quintic bridges it. Raises InvalidInput.
     """
     joins = [join for join in joins if low < join < high]
-
-    def away(F: Array, distance: float) -> NDArray[np.bool_]:
-        return np.asarray(np.all([abs(F - join) > distance for join in joins] + [low <= F], axis=0))
-
     F = low + (high - low) * np.linspace(0.0, 1.0, _CELLS + 1) ** 4
     F[-1] = high
-    F = F[away(F, _NEAR) | (low == F) | (high == F)]
+    near = np.min([abs(F - join) for join in joins], axis=0, initial=np.inf)
+    F = F[(near > _NEAR) | (low == F) | (high == F)]
     ends = np.union1d(F, joins)  # the integral over a corner is that of its two sides
     width = np.diff(ends)[:, None]
     steps = (width * _WEIGHTS / _checked(rigidity, ends[:-1, None] + width * _NODES)).sum(axis=1)
     steps = np.add.reduceat(steps, np.flatnonzero(np.isin(ends[:-1], F)))
     before, after = np.maximum(F - 1e-5 * (F + 1.0), low), np.minimum(F + 1e-5 * (F + 1.0), high)
     slope = (_checked(rigidity, after) - _checked(rigidity, before)) / (after - before)
-    EA = _checked(rigidity, F)
-    c = _quintics(np.diff(F), steps, 1.0 / EA, -slope / EA**2)
+    EA, h = _checked(rigidity, F), np.diff(F)
+    # a quintic has the step of ε, and ε′ and ε″ at both ends
+    a, b = 1.0 / EA, -slope / EA**2
+    d = (steps - a[:-1] * h - b[:-1] * h**2 / 2.0) / h**3
+    e, f = (np.diff(a) - b[:-1] * h) / h**2, np.diff(b) / h
+    c5, c4 = (6.0 * d - 3.0 * e + f / 2.0) / h**2, (-15.0 * d + 7.0 * e - f) / h
+    c3, strain = 10.0 * d - 4.0 * e + f / 2.0, np.append(0.0, np.cumsum(steps)[:-1])
+    c = np.array([c5, c4, c3, b[:-1] / 2.0, a[:-1], strain])
     places = _CELLS * ((F - low) / (high - low)) ** 0.25
-    cells = np.searchsorted(places[1:-1], np.arange(_CELLS + 2) + 0.5)
-    table = Table(F, c, cells, _CELLS**4 / (high - low))
-    test = (F[:-1] + 0.3 * np.diff(F))[away(F[:-1], 3.0 * _NEAR) & away(F[1:], 3.0 * _NEAR)]
+    table = Table(F, c, np.searchsorted(places[1:-1], np.arange(_CELLS + 2) + 0.5))
+    test = F[:-1] + 0.3 * h
     softness = horner(c[:-1] * np.arange(5.0, 0.0, -1.0)[:, None], *table.place(test))
-    if (abs(softness * _checked(rigidity, test) - 1.0) > _ACCURACY).any():
+    bridge = np.min([abs(test - join) for join in joins], axis=0, initial=np.inf) < 3.0 * _NEAR
+    if (~bridge & (abs(softness * _checked(rigidity, test) - 1.0) > _ACCURACY)).any():
         raise InvalidInput(
             "rigidity",
             f"jumps or bends too sharply for {_CELLS} pieces from {low:g} to {high:g} N. EA must "
@@ -96,32 +93,15 @@ def tabulate(
     return table
 
 
-def _quintics(h: Array, step: Array, slope: Array, bend: Array) -> Array:
-    """Return the quintics (6, n) of pieces from their widths and steps (n,), ε′ and ε″ (n + 1,)."""
-    a, b = slope[:-1], bend[:-1]
-    d = (step - a * h - b * h**2 / 2.0) / h**3
-    e, f = (slope[1:] - a - b * h) / h**2, (bend[1:] - b) / h
-    c3, c4, c5 = 10.0 * d - 4.0 * e + f / 2.0, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + f / 2.0
-    strain = np.append(0.0, np.cumsum(step)[:-1])
-    return np.array([c5 / h**2, c4 / h, c3, b / 2.0, a, strain])
-
-
 def _checked(rigidity: Callable[[Array], ArrayLike], F: Array) -> Array:
     """Return EA [N] of a function; InvalidInput if it fails or gives anything but rigidities."""
+    _, least, most = RANGES["rigidity"]
     try:
         values = np.broadcast_to(np.asarray(rigidity(F), dtype=np.float64), F.shape)
     except Exception as error:
-        raise InvalidInput(
-            "rigidity",
-            f"the function fails at {span(F)} N: {error!r}. It gets an array of tensions [N] and "
-            "must return an array of the same shape, or a number.",
-        ) from error
-    _, least, most = RANGES["rigidity"]
-    bad = ~((values >= least) & (values <= most))
-    if bad.any():
-        raise InvalidInput(
-            "rigidity",
-            f"is {values[bad][0]:.6g} N at {F[bad][0]:.6g} N; {least:g} to {most:g} N is needed "
-            "on the whole domain. Narrow the domain, or correct the law.",
-        )
+        problem = f"the function fails at {span(F)} N: {error!r}. It must return an array of the "
+        raise InvalidInput("rigidity", f"{problem}shape of the tensions it gets.") from error
+    if (bad := ~((values >= least) & (values <= most))).any():
+        problem = f"is {values[bad][0]:.6g} N at {F[bad][0]:.6g} N, not {least:g} to {most:g} N. "
+        raise InvalidInput("rigidity", f"{problem}Narrow the domain, or correct the law.")
     return values
