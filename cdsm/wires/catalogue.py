@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from pydantic import Field
 
-from cdsm.errors import GeometryError, InvalidInput, UnknownName
+from cdsm.errors import GeometryError, InvalidInput
 from cdsm.support.records import Number, Rigidity, parse, record, toml_lines
+from cdsm.support.validation import one_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity, StrandElasticity, TabulatedElasticity
 
@@ -65,9 +66,9 @@ def as_wire(wire: Wire) -> Elasticity:
     if isinstance(wire, os.PathLike) or (isinstance(wire, str) and wire.endswith(_FILES)):
         return Elasticity.read(wire)
     if isinstance(wire, str):
-        if wire not in WIRES:
-            raise UnknownName("wire", wire, WIRES, "Or give a rigidity EA in N, or a WIRE.toml.")
-        return WIRES[wire]
+        return WIRES[
+            one_of("wire", wire, WIRES, "Or give a rigidity EA in N, or a file WIRE.toml.")
+        ]
     if isinstance(wire, bool) or not isinstance(wire, (int, float)):
         raise InvalidInput("wire", f"{wire!r} given; give a name, a rigidity EA in N, or a file.")
     return LinearElasticity(wire)
@@ -112,7 +113,7 @@ def label(law: Elasticity) -> str:
     """Return a short text for a law: the name of its wire, its EA, or its kind and tensions."""
     if law._constant is not None:
         return name_of(law) or f"EA {law._constant:.6g} N"
-    kind = "table" if law._kind == "tabulated" else law._kind
+    kind = {"tabulated": "table", "": "function"}.get(law._kind, law._kind)
     text = f"{kind}, {law.rest:.4g} to {law.high:.4g} N"
     text = "1x19-1.2mm" if law._given == STRAND._given else text
     text += f", EA times {law._factor:.6g}" if law._factor != 1.0 else ""

@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
 _SHORTEST: Final = 0.5  # length of a slack wire over that at the low end of its law
 _UNITS: Final = "# Elasticity of a wire: tensions and rigidity in N, strains without unit"
-_MEASURED = re.compile(r'^"?[-+]?\d[\d.,eE+-]*"?\s*[;,\t]\s*"?[-+]?\d', re.MULTILINE)
-"""Pattern of a line that begins with two numbers; such a file is a CSV, not a TOML."""
+_MEASURED = re.compile(r'^"?[-+]?\d[\d.,eE+-]*"?\s*[;,\t]\s*"?[-+]?\d', re.MULTILINE)  # of a CSV
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,20 +60,15 @@ class Elasticity:
     ) -> Elasticity:
         """Make a law from a function EA(F), which is sampled once, to 1e-8 of EA between samples.
 
-        Args:
-            rigidity: Function that returns EA [N] at an array of tensions [N].
-            low: Smallest tension [N], 0 or more.
-            high: Largest tension [N].
-            joins: Tensions [N] of corners of EA(F); these are rounded off within about 1 N.
-
-        Raises:
-            InvalidInput: EA fails, is not positive, jumps or bends sharply, or low >= high.
+        ``rigidity`` returns EA [N] at an array of tensions from ``low`` to ``high`` [N]; corners of
+        EA(F), at the tensions ``joins`` [N], are rounded off within about 1 N. Raises InvalidInput
+        if the function fails, is not positive, jumps or has other corners, or not 0 <= low < high.
         """
         low, high = quantity("low", low, "tension", zero=True), quantity("high", high, "tension")
         if not low < high:
             raise InvalidInput("low", f"low < high needed, but are {low:g} and {high:g} N.")
         table = tabulate(rigidity, low, high, joins)
-        digest = hashlib.sha256(table.coefficients.tobytes()).hexdigest()[:16]
+        digest = hashlib.sha256(table.coefficients).hexdigest()[:16]
         given = {"low": low, "high": high, "digest": digest}
         return Elasticity(low, high, low, "", given, 1.0, table)
 
@@ -177,7 +171,7 @@ class Elasticity:
         return self._tension_of(number_array("strain", strain), "strain")
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Elasticity) and self._key == other._key
+        return isinstance(other, Elasticity) and repr(self) == repr(other)
 
     def __hash__(self) -> int:
         return hash((self._kind, self._factor, self.low, self.high))
@@ -188,10 +182,6 @@ class Elasticity:
         scaled = f".scaled({factor!r})" if given is self._given and factor != 1.0 else ""
         text = ", ".join(f"{name}={value!r}" for name, value in given.items())
         return f"{kind}Elasticity({text}){scaled}" + ".slack_below()" * self._slack
-
-    @property
-    def _key(self) -> tuple[object, ...]:
-        return self._kind, self._given, self._factor, self.low
 
     @property
     def _constant(self) -> float | None:
@@ -208,8 +198,8 @@ class Elasticity:
         return f"[{self.low:g} N, {self.high:g} N{')' if math.isinf(self.high) else ']'}"
 
     def _changed(self, low: float, factor: float) -> Elasticity:
-        given = self._kind, self._given
-        return Elasticity(low, self.high, self.rest, *given, factor, self._table)
+        same = self.high, self.rest, self._kind, self._given
+        return Elasticity(low, *same, factor, self._table)
 
     def _inside(self, F: Array) -> Array:
         """Return the tensions F [N], or raise ElasticityRangeError."""
@@ -240,21 +230,19 @@ class Elasticity:
         return (strain, EA) if inside is F else (strain + (F - inside) / EA, EA)
 
     def _tension_of(
-        self, wanted: Array, name: str, length: float = 1.0, series: float = 0.0
+        self, wanted: Array, name: str, length: float = 1.0, series: float = 0
     ) -> Array:
         """Return F [N] at which ``length`` · ε + ``series`` · (F − rest) is ``wanted``."""
         knots = np.append(0.0, self._table.knots) if self._slack else self._table.knots
         reached = length * self._evaluate(knots)[0] + series * (knots - self.rest)
-        outside = (wanted < reached[0]) | (wanted > reached[-1] * (1.0 + 1e-15))
-        if outside.any():
+        if (outside := (wanted < reached[0]) | (wanted > reached[-1] * (1.0 + 1e-15))).any():
             raise ElasticityRangeError(
                 f"no tension of the domain {self._span} gives the {name} "
                 f"{wanted[outside][0]:.6g}; it reaches {reached[-1]:.6g}.",
                 indices=np.flatnonzero(outside).tolist(),
             )
         after = np.searchsorted(reached, wanted).clip(1, len(knots) - 1)
-        low, high = knots[after - 1], knots[after]
-        F = np.interp(wanted, reached, knots)
+        low, high, F = knots[after - 1], knots[after], np.interp(wanted, reached, knots)
         for _ in range(50):  # Newton's method in a shrinking bracket
             strain, EA = self._evaluate(F)
             error = length * strain + series * (F - self.rest) - wanted

@@ -23,7 +23,6 @@ EQ19: Final = (
     (-1924.5, 493.34505, -2.26495, 5.38168e-3, -6.93505e-6, 4.58495e-9, -1.21505e-12),
 )
 """Coefficients of Eq. 19 with more digits, so that the branches meet; see eq19_repaired."""
-
 _USUAL: Final = 1e3, 1e9  # EA [N] of real wires
 _MEET: Final = 1e-9  # relative difference of two polynomials at their join that is rounding
 _LINE: Final = Table(np.array([0.0, RANGES["tension"].high]), np.array([[1.0], [0.0]]))
@@ -33,11 +32,8 @@ _LINE: Final = Table(np.array([0.0, RANGES["tension"].high]), np.array([[1.0], [
 class LinearElasticity(Elasticity):
     """Elasticity with constant EA: a solid wire, or a strand in its elastic stage.
 
-    Args:
-        rigidity: EA [N]. A CdsmWarning doubts it below 1 kN and above 1e9 N.
-
-    Raises:
-        InvalidInput: EA is not a number, or is outside its range.
+    ``rigidity`` is EA [N]. A CdsmWarning doubts it below 1 kN and above 1e9 N. Raises InvalidInput
+    if it is not a number, or outside its range.
     """
 
     def __init__(self, rigidity: float) -> None:
@@ -49,10 +45,7 @@ class LinearElasticity(Elasticity):
 
     @classmethod
     def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
-        """Return the law EA = E π d²/4 of a solid wire, with E [Pa] and the diameter d [m].
-
-        Raises InvalidInput if one of them is not positive.
-        """
+        """Return EA = E π d²/4 of a solid wire, E [Pa] and d [m] positive, else InvalidInput."""
         for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
             if scalar(name, value) <= 0.0:
                 raise InvalidInput(name, f"{value:g} given; it must be positive.")
@@ -68,15 +61,9 @@ class StrandElasticity(Elasticity):
     elsewhere by 1e-8 at most. They give the *tangent* rigidity: if they gave the secant S of
     Eq. 18, the tangent S²/(S − F S') would be negative up to 31 N.
 
-    Args:
-        coefficients: One tuple per range, lowest power first [N, 1, 1/N, …].
-        joins: Tensions [N] at which one range ends and the next begins, one fewer than ranges.
-        low: Smallest tension [N].
-        high: Largest tension [N].
-
-    Raises:
-        InvalidInput: Numbers are invalid, do not fit or do not rise from 0 or more; two ranges do
-            not meet; or EA is not positive.
+    ``coefficients`` are one tuple per range, lowest power first [N, 1, 1/N, …]; ``joins`` are the
+    tensions [N] at which one range ends and the next begins. Raises InvalidInput if a number is
+    invalid, 0 <= low < joins < high does not hold, two ranges do not meet, or EA is not positive.
     """
 
     coefficients = property(lambda law: law._given["coefficients"], doc="As given, in tuples.")
@@ -132,12 +119,8 @@ class TabulatedElasticity(Elasticity):
     of the chords over the middles of their strains, limited to ½ and 2½ times the chords beside.
     The error of EA is largest in the first steps from a soft low end: give more points there.
 
-    Args:
-        tensions: Tensions F of the points [N], ascending from 0 or more.
-        strains: Strains ε of the points [-], ascending. Only their differences matter.
-
-    Raises:
-        InvalidInput: There are fewer than two points, or they are not ascending.
+    ``tensions`` [N] and ``strains`` [-] of two or more points must rise, tensions from 0 or more,
+    or InvalidInput is raised. Only differences of strains matter.
     """
 
     tensions = property(lambda law: law._given["tensions"], doc="As given [N], in a tuple.")
