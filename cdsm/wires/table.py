@@ -26,14 +26,15 @@ class Table(NamedTuple):
     knots: Array  # tensions (n + 1,) [N]
     coefficients: Array  # of ε in F − knot (k, n), highest power first
     cells: NDArray[np.intp] | None = None  # piece of each cell, even in (F − first knot)^¼
+    scale: float = 0.0  # number of cells⁴ over the width of all [1/N]
 
     def place(self, F: Array) -> tuple[Any, Array]:
         """Return the piece of each tension [N] and the distance from the knot before it."""
         if self.cells is None:
             piece = self.knots[1:-1].searchsorted(F)
         else:
-            share = (F - self.knots[0]) * (_CELLS**4 / (self.knots[-1] - self.knots[0]))
-            piece = self.cells.take(np.sqrt(np.sqrt(share)).astype(np.intp))
+            cell = np.sqrt(np.sqrt((F - self.knots[0]) * self.scale))
+            piece = self.cells.take(cell.astype(np.intp))
         return piece, F - self.knots.take(piece)
 
     def moments(self) -> Array:
@@ -80,7 +81,8 @@ def tabulate(
     c3, strain = 10.0 * d - 4.0 * e + f / 2.0, np.append(0.0, np.cumsum(steps)[:-1])
     c = np.array([c5, c4, c3, b[:-1] / 2.0, a[:-1], strain])
     places = _CELLS * ((F - low) / (high - low)) ** 0.25
-    table = Table(F, c, np.searchsorted(places[1:-1], np.arange(_CELLS + 2) + 0.5))
+    cells = np.searchsorted(places[1:-1], np.arange(_CELLS + 2) + 0.5)
+    table = Table(F, c, cells, _CELLS**4 / (high - low))
     test = F[:-1] + 0.3 * h
     softness = horner(c[:-1] * np.arange(5.0, 0.0, -1.0)[:, None], *table.place(test))
     bridge = np.min([abs(test - join) for join in joins], axis=0, initial=np.inf) < 3.0 * _NEAR
