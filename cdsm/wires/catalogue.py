@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 from pydantic import Field
 
 from cdsm.errors import GeometryError, InvalidInput
-from cdsm.support.records import Number, Rigidity, parse, record, toml_lines
+from cdsm.support.records import Number, Rigidity, parse, record, toml_value
 from cdsm.support.validation import one_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity, StrandElasticity, TabulatedElasticity
@@ -66,9 +66,7 @@ def as_wire(wire: Wire) -> Elasticity:
     if isinstance(wire, os.PathLike) or (isinstance(wire, str) and wire.endswith(_FILES)):
         return Elasticity.read(wire)
     if isinstance(wire, str):
-        return WIRES[
-            one_of("wire", wire, WIRES, "Or give a rigidity EA in N, or a file WIRE.toml.")
-        ]
+        return WIRES[one_of("wire", wire, WIRES, "Or give EA in N, or a file WIRE.toml.")]
     if isinstance(wire, bool) or not isinstance(wire, (int, float)):
         raise InvalidInput("wire", f"{wire!r} given; give a name, a rigidity EA in N, or a file.")
     return LinearElasticity(wire)
@@ -77,12 +75,12 @@ def as_wire(wire: Wire) -> Elasticity:
 def table_of(law: Elasticity) -> list[str]:
     """Return the lines of a TOML table of a law; InvalidInput if it was made from a function."""
     if law._kind not in _KINDS:
-        raise InvalidInput(
-            "elasticity", f"{law!r} was made from a function. Tabulate its strain to save it."
-        )
-    values = law._given if law._factor == 1.0 else law._given | {"factor": law._factor}
-    values = {"rigidity": law._constant} if law._kind == "linear" else values
-    lines = toml_lines(_Table(kind=law._kind, **values))  # type: ignore[arg-type]
+        problem = f"{law!r} was made from a function. Tabulate its strain to save it."
+        raise InvalidInput("elasticity", problem)
+    factor = {"factor": law._factor} if law._factor != 1.0 else {}
+    values = {"rigidity": law._constant} if law._kind == "linear" else law._given | factor
+    values = {"kind": law._kind, **values}
+    lines = [f"{key} = {toml_value(value)}" for key, value in values.items()]
     return [*lines, "slack_below = true"] if law._slack else lines
 
 
@@ -123,15 +121,11 @@ def label(law: Elasticity) -> str:
 
 def wires_text(cables: Sequence[Cable]) -> str:
     """Describe the wires of cables and their series springs; more than three kinds are counted."""
-    counts = Counter(
-        label(cable.elasticity)
-        + (
-            f" on a spring of {k / 1e3:.4g} N/mm"
-            if (k := cable.series_stiffness) < math.inf
-            else ""
-        )
-        for cable in cables
-    )
+    counts = Counter[str]()
+    for cable in cables:
+        k = cable.series_stiffness
+        spring = f" on a spring of {k / 1e3:.4g} N/mm" if k < math.inf else ""
+        counts[label(cable.elasticity) + spring] += 1
     if len(counts) > 3:
         return f"of {len(counts)} kinds"
     texts = [f"{name} ({count} of {len(cables)})" for name, count in counts.items()]

@@ -85,7 +85,7 @@ class Elasticity:
 
         text = read_text(path, any_encoding=True)  # to know a table of a testing machine
         if _MEASURED.search(text):
-            raise FileError(path, "looks like measured points, not a law. Fit it with `cdsm fit`.")
+            raise FileError(path, "looks like measured points. Fit it first: `cdsm fit`.")
         try:
             return from_table(read_toml(text))
         except (GeometryError, InvalidInput) as error:
@@ -206,12 +206,11 @@ class Elasticity:
         if F.size and not (F.min() >= self.low and F.max() <= self.high):
             outside = (self.low > F) | (self.high < F)
             below = "; slack_below() continues one to 0 N" if F.min() < self.low else ""
-            raise ElasticityRangeError(
+            problem = (
                 f"outside the domain {self._span} of the elasticity. Keep the tension inside it "
-                f"(minimum=, maximum=), or use an elasticity that covers it{below}.",
-                F[outside].tolist(),
-                np.flatnonzero(outside).tolist(),
+                f"(minimum=, maximum=), or use an elasticity that covers it{below}."
             )
+            raise ElasticityRangeError(problem, F[outside], np.flatnonzero(outside).tolist())
         return F
 
     def _evaluate(self, F: Array) -> tuple[Array, Array]:
@@ -236,11 +235,9 @@ class Elasticity:
         knots = np.append(0.0, self._table.knots) if self._slack else self._table.knots
         reached = length * self._evaluate(knots)[0] + series * (knots - self.rest)
         if (outside := (wanted < reached[0]) | (wanted > reached[-1] * (1.0 + 1e-15))).any():
-            raise ElasticityRangeError(
-                f"no tension of the domain {self._span} gives the {name} "
-                f"{wanted[outside][0]:.6g}; it reaches {reached[-1]:.6g}.",
-                indices=np.flatnonzero(outside).tolist(),
-            )
+            given = f"the {name} {wanted[outside][0]:.6g}; it reaches {reached[-1]:.6g}."
+            problem = f"no tension of the domain {self._span} gives {given}"
+            raise ElasticityRangeError(problem, indices=np.flatnonzero(outside).tolist())
         after = np.searchsorted(reached, wanted).clip(1, len(knots) - 1)
         low, high, F = knots[after - 1], knots[after], np.interp(wanted, reached, knots)
         for _ in range(50):  # Newton's method in a shrinking bracket
