@@ -210,7 +210,9 @@ class Elasticity:
                 f"outside the domain {self._span} of the elasticity. Keep the tension inside it "
                 f"(minimum=, maximum=), or use an elasticity that covers it{below}."
             )
-            raise ElasticityRangeError(problem, F[outside], np.flatnonzero(outside).tolist())
+            raise ElasticityRangeError(
+                problem, F[outside].tolist(), np.flatnonzero(outside).tolist()
+            )
         return F
 
     def _evaluate(self, F: Array) -> tuple[Array, Array]:
