@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.errors import CableError, CdsmError, InvalidInput, listed
 from cdsm.support.format import plural
 from cdsm.support.validation import (
-    instance,
     number_array,
     one_of,
     quantity,
@@ -25,7 +24,7 @@ from cdsm.support.validation import (
     vector,
 )
 from cdsm.support.values import Array
-from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.elasticity import Elasticity, checked_law
 
 Control = Literal["position", "force"]
 
@@ -103,7 +102,7 @@ class Cable:
     def __post_init__(self) -> None:
         try:
             text("name", self.name)
-            instance("elasticity", self.elasticity, Elasticity)
+            checked_law(self.elasticity)
             sites = sequence_of("sites", self.sites, Site)
             one_of("control", self.control, get_args(Control))
             lead = quantity("lead", self.lead, "length", zero=True)

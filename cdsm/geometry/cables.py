@@ -10,7 +10,7 @@ from cdsm.cable import Cable, Control, Site
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry import Geometry
 from cdsm.support.validation import instance
-from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.elasticity import Elasticity, checked_law
 
 
 def serpentine_cables(
@@ -41,7 +41,7 @@ def serpentine_cables(
     if isinstance(elasticity, (list, tuple)):
         elasticities = tuple(elasticity)
     else:
-        elasticities = (instance("elasticity", elasticity, Elasticity),) * count
+        elasticities = (checked_law(elasticity),) * count
     if len(elasticities) != count:
         raise InvalidInput(
             "elasticity",

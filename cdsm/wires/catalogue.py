@@ -87,13 +87,16 @@ def table_of(law: Elasticity) -> list[str]:
 def from_table(data: object) -> Elasticity:
     """Build a law from a parsed TOML table, or raise GeometryError or InvalidInput."""
     kind = data.get("kind") if isinstance(data, dict) else data
-    if not isinstance(kind, str) or kind not in _KINDS:
+    if not isinstance(data, dict) or kind not in [*_KINDS]:
         raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
-    given = {key: value for key, value in vars(parse(_Table, data)).items() if value is not None}
+    needed = [*inspect.signature(_KINDS[kind]).parameters]
+    faults = [f"{key}: is missing" for key in needed if key not in data]
+    try:
+        given = {key: each for key, each in vars(parse(_Table, data)).items() if each is not None}
+    except GeometryError as error:
+        raise GeometryError([*error.faults, *faults]) from None
     del given["kind"]
     factor, slack = given.pop("factor", 1.0), given.pop("slack_below", False)
-    needed = [*inspect.signature(_KINDS[kind]).parameters]
-    faults = [f"{key}: is missing" for key in needed if key not in given]
     faults += [f"{key}: is not a key of a {kind} law" for key in given if key not in needed]
     if faults:
         raise GeometryError(faults)

@@ -68,7 +68,7 @@ class Elasticity:
         if not low < high:
             raise InvalidInput("low", f"low < high needed, but are {low:g} and {high:g} N.")
         table = tabulate(rigidity, low, high, joins)
-        digest = hashlib.sha256(table.coefficients).hexdigest()[:16]
+        digest = hashlib.sha256(table.coefficients.tobytes()).hexdigest()[:16]
         given = {"low": low, "high": high, "digest": digest}
         return Elasticity(low, high, low, "", given, 1.0, table)
 
@@ -250,3 +250,15 @@ class Elasticity:
             if (abs(F - before) <= 1e-13 * np.maximum(F, 1.0)).all():
                 break
         return np.asarray(F)
+
+
+def checked_law(law: object) -> Elasticity:
+    """Return ``law``; raise InvalidInput if it is not an Elasticity."""
+    if isinstance(law, Elasticity):
+        return law
+    raise InvalidInput(
+        "elasticity",
+        f"{law!r} given; an Elasticity is needed: LinearElasticity(EA), a law of presets, or "
+        "Elasticity.from_rigidity(EA, low, high). The name of a wire is taken only in files, "
+        "and by wire= of Manipulator.read and read_cables.",
+    )

@@ -91,7 +91,9 @@ class StrandElasticity(Elasticity):
             below, above = polyval(join, before), polyval(join, after)
             if abs(above - below) > _MEET * abs(below):
                 problem = f"the ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} "
-                raise InvalidInput("coefficients", f"{problem}N above. Give more digits.")
+                raise InvalidInput(
+                    "coefficients", f"{problem}N above. Give more digits, or a TabulatedElasticity."
+                )
         given = {"coefficients": rows, "joins": joins, "low": low, "high": high}
         table = tabulate(lambda F: _piecewise(F, rows, joins), low, high, joins)
         super().__init__(low, high, low, "strand", given, 1.0, table)

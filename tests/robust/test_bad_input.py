@@ -106,12 +106,12 @@ CASES |= {
     "elasticity a number": (
         lambda: cdsm.Manipulator(GEOMETRY, 2e5),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("elasticity: 200000.0", "Elasticity is needed"),
+        ("elasticity: 200000.0", "an Elasticity is needed: LinearElasticity(EA)"),
     ),
     "elasticity a function": (
         lambda: cdsm.Manipulator(GEOMETRY, lambda F: 5e4),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("elasticity: <function", "an object of your own subclass"),
+        ("elasticity: <function", "Elasticity.from_rigidity(EA, low, high)"),
     ),
     "elasticity a name": (
         lambda: cdsm.Manipulator(GEOMETRY, "1x19-1.2mm"),  # type: ignore[arg-type]
@@ -293,7 +293,7 @@ CASES |= {
     "cables of no elasticity": (
         lambda: cdsm.serpentine_cables(GEOMETRY, None),  # type: ignore[arg-type]
         cdsm.InvalidInput,
-        ("elasticity: None", "Elasticity is needed"),
+        ("elasticity: None", "an Elasticity is needed"),
     ),
     "cables of too few elasticities": (
         lambda: cdsm.serpentine_cables(GEOMETRY, [STEEL] * (C - 1)),

@@ -120,7 +120,12 @@ def test_tension_outside_the_law_is_an_error_with_data(method: str) -> None:
         getattr(STRAND, method)([[50.0, 2.1], [900.0, 31.0]])
     assert caught.value.tension == (2.1, 900.0)
     assert caught.value.indices == (1, 2)
-    for part in ("2.1 N, 900 N", "[2.2 N, 810 N]", "minimum=", "slack_below() continues one to 0 N"):
+    for part in (
+        "2.1 N, 900 N",
+        "[2.2 N, 810 N]",
+        "minimum=",
+        "slack_below() continues one to 0 N",
+    ):
         assert part in str(caught.value)
     with pytest.raises(cdsm.ElasticityRangeError, match=r"\[0 N, inf N\)"):
         getattr(STEEL, method)(-1.0)
@@ -159,7 +164,7 @@ def test_laws_of_other_values_differ_and_cannot_be_changed() -> None:
     assert len({*LAWS.values(), cdsm.LinearElasticity(226_195)}) == len(LAWS)
     assert repr(cdsm.LinearElasticity(5.0)) == "LinearElasticity(rigidity=5.0)"
     with pytest.raises(AttributeError, match="high"):
-        STRAND.high = 900.0
+        STRAND.high = 900.0  # type: ignore[misc]
 
 
 # --- constructors ---------------------------------------------------------------------------
