@@ -73,6 +73,7 @@ def tabulate(
     before, after = np.maximum(F - 1e-5 * (F + 1.0), low), np.minimum(F + 1e-5 * (F + 1.0), high)
     slope = (_checked(rigidity, after) - _checked(rigidity, before)) / (after - before)
     EA, h = _checked(rigidity, F), np.diff(F)
+    slope[-1] += (slope[-1] - slope[-2]) / h[-1] * (high - before[-1]) / 2.0  # one-sided there
     # a quintic has the step of ε, and ε′ and ε″ at both ends
     a, b = 1.0 / EA, -slope / EA**2
     d = (steps - a[:-1] * h - b[:-1] * h**2 / 2.0) / h**3
