@@ -200,7 +200,7 @@ class Cable:
             InvalidInput: ``elongation`` is not numbers, or ``free_length`` is not positive.
             ElasticityRangeError: No tension in the domain gives one of the elongations.
         """
-        return self.elasticity._tension_at(
+        return self.elasticity._tension_of(
             number_array("elongation", elongation),
             "elongation",
             _length(free_length),

@@ -89,7 +89,7 @@ class CableLaws:
         rigidity = self.constant.copy()
         for law, held in self.nonlinear:
             try:
-                rigidity[held] = self._stretched(law, tension[held])
+                rigidity[held] = self._stretched(law, law._inside(tension[held]))
             except ElasticityRangeError as error:
                 raise self.naming(error, held) from None
         return rigidity
@@ -109,7 +109,7 @@ class CableLaws:
 
     def _stretched(self, law: Elasticity, tension: Array) -> Array:
         """Compute EA (1 + ε) [N] at F [N] of any shape; EA if the original length is stretched."""
-        strain, rigidity = law.strain_and_rigidity(tension)
+        strain, rigidity = law._evaluate(tension)
         return rigidity * (1.0 + strain) if self._unstrained else rigidity
 
     def original_lengths(self, lengths: Array, tension: Array) -> Array:
@@ -125,7 +125,7 @@ class CableLaws:
             wire[held] -= self.series[held] * (F - self.rest[held])
             if self._unstrained:
                 try:
-                    wire[held] /= 1.0 + law.strain(F)
+                    wire[held] /= 1.0 + law._evaluate(law._inside(F))[0]
                 except ElasticityRangeError as error:
                     raise self.naming(error, held) from None
         return frozen(wire)
@@ -150,7 +150,7 @@ class CableLaws:
             both = np.stack([F, beside])
             try:
                 slopes = law.rigidity_slope(both)
-                R = self._stretched(law, F)
+                R = self._stretched(law, F)  # inside: rigidity_slope has looked
                 if self._unstrained:  # (EA (1 + ε))′ = EA′ (1 + ε) + 1
                     slopes = slopes * (1.0 + law.strain(both)) + 1.0
             except ElasticityRangeError as error:

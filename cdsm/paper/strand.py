@@ -13,12 +13,17 @@ from numpy.typing import ArrayLike
 from cdsm import presets
 from cdsm.paper.claims import Claim, Figure
 from cdsm.support.values import Array, frozen
-from cdsm.wires.laws import EQ19_PRINTED
 
 GAUGE_LENGTH, JOIN = 0.5, 31.0  # [m], [N]
 
 LEVEL: Final = (400.0, 810.0)
 """Range of tension [N] over which the paper calls the rigidity near-constant (Section IV-C)."""
+
+EQ19_PRINTED: Final = (
+    (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -1e-4),
+    (-1924.5, 493.35, -2.26, 0.0054, -6.94e-6, 4.58e-9, -1.22e-12),
+)
+"""Printed coefficients of Eq. 19. Only the misprinted −1e-3 is corrected."""
 
 HALF_UNITS: Final = (
     frozen(np.array([5e-3, 5e-3, 5e-3, 5e-3, 5e-3, 5e-5, 5e-5])),

@@ -14,7 +14,7 @@ from cdsm.errors import ElasticityRangeError
 from cdsm.posture import Posture
 from cdsm.routing import Routing, Spans
 from cdsm.stiffness_matrix import Stiffness, assemble
-from cdsm.support.roots import rising_root
+from cdsm.support.validation import RANGES
 from cdsm.support.values import Array, frozen
 from cdsm.wires.elasticity import Elasticity
 
@@ -254,9 +254,18 @@ class _LockedLaw:
         """Compute F [N] and dF/dL [N/m] at ``lengths`` L [m]; the search starts at F = ``near``."""
         elongation = lengths - self._start
         inside = np.minimum(np.maximum(elongation, 0.0), self._span)
-        F, compliance = rising_root(
-            inside, near, self._low, self._high, self._elongation, self._compliance
-        )
+        low, high = self._low, np.minimum(self._high, RANGES["tension"].high)
+        F = np.clip(near, low, high)
+        for _ in range(200):  # Newton's method in a shrinking bracket
+            strain, EA = self.law._evaluate(F)
+            compliance = self._free_length / EA + self._series
+            wire = self._free_length * (strain - self._least_strain)
+            error = wire + (F - self.law.low) * self._series - inside
+            newton = F - error / compliance
+            if (abs(newton - F) <= 1e-13 * np.maximum(F, 1.0)).all():
+                break
+            low, high = np.where(error < 0.0, F, low), np.where(error > 0.0, F, high)
+            F = np.where((low <= newton) & (newton <= high), newton, (low + high) / 2.0)
         k = 1.0 / compliance
         excess = elongation - inside
         if np.count_nonzero(excess):

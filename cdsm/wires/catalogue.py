@@ -1,21 +1,19 @@
-"""Find the law of a wire by its name, its rigidity EA or its file; write laws as TOML."""
+"""Find the law of a wire by its name, its rigidity EA or its file; tables of laws in TOML."""
 
 from __future__ import annotations
 
 import inspect
 import math
 import os
-import re
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from pydantic import Field
 
-from cdsm.errors import FileError, GeometryError, InvalidInput, UnknownName, listed
-from cdsm.support.files import read_text, write_text
-from cdsm.support.records import Number, Rigidity, parse, read_toml, record, toml_lines
+from cdsm.errors import GeometryError, InvalidInput
+from cdsm.support.records import Number, Rigidity, parse, record, toml_value
+from cdsm.support.validation import one_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity, StrandElasticity, TabulatedElasticity
 
@@ -37,10 +35,6 @@ _KINDS: Final[dict[str, type[Elasticity]]] = {
     "tabulated": TabulatedElasticity,
 }
 _FILES = (".toml", ".csv", ".txt", ".tsv")  # a table of points is refused: it must be fitted first
-_NAMED = 3  # largest number of different wires that a text names
-
-_MEASURED = re.compile(r'^"?[-+]?\d[\d.,eE+-]*"?\s*[;,\t]\s*"?[-+]?\d', re.MULTILINE)
-"""Pattern of a line that begins with two numbers; such a file is a CSV, not a TOML."""
 
 Wire = Elasticity | str | float | os.PathLike[str]
 """Ways to give a wire: its law, a name of :data:`WIRES`, EA [N], or the path of a WIRE.toml."""
@@ -50,8 +44,6 @@ _Row = Annotated[tuple[Number, ...], Field(strict=False)]
 
 @record
 class _Table:
-    """The TOML of a law: its kind, the arguments of its class, and what was made of it."""
-
     kind: Literal["linear", "strand", "tabulated"]
     rigidity: Rigidity | None = None
     low: Number | None = None
@@ -71,12 +63,10 @@ def as_wire(wire: Wire) -> Elasticity:
     """
     if isinstance(wire, Elasticity):
         return wire
-    if isinstance(wire, str) and wire in WIRES:
-        return WIRES[wire]
     if isinstance(wire, os.PathLike) or (isinstance(wire, str) and wire.endswith(_FILES)):
         return Elasticity.read(wire)
     if isinstance(wire, str):
-        raise UnknownName("wire", wire, WIRES, "Or give a rigidity EA in N, or a file WIRE.toml.")
+        return WIRES[one_of("wire", wire, WIRES, "Or give EA in N, or a file WIRE.toml.")]
     if isinstance(wire, bool) or not isinstance(wire, (int, float)):
         raise InvalidInput("wire", f"{wire!r} given; give a name, a rigidity EA in N, or a file.")
     return LinearElasticity(wire)
@@ -85,57 +75,34 @@ def as_wire(wire: Wire) -> Elasticity:
 def table_of(law: Elasticity) -> list[str]:
     """Return the lines of a TOML table of a law; InvalidInput if it was made from a function."""
     if law._kind not in _KINDS:
-        raise InvalidInput(
-            "elasticity",
-            f"{law!r} was made from a function; files hold a LinearElasticity, StrandElasticity or "
-            "TabulatedElasticity. Tabulate its strain to save it.",
-        )
-    values = law._given if law._factor == 1.0 else law._given | {"factor": law._factor}
-    values = {"rigidity": law._constant} if law._kind == "linear" else values
-    lines = toml_lines(_Table(kind=law._kind, **values))  # type: ignore[arg-type]
+        problem = f"{law!r} was made from a function. Tabulate its strain to save it."
+        raise InvalidInput("elasticity", problem)
+    factor = {"factor": law._factor} if law._factor != 1.0 else {}
+    values = {"rigidity": law._constant} if law._kind == "linear" else law._given | factor
+    values = {"kind": law._kind, **values}
+    lines = [f"{key} = {toml_value(value)}" for key, value in values.items()]
     return [*lines, "slack_below = true"] if law._slack else lines
 
 
 def from_table(data: object) -> Elasticity:
     """Build a law from a parsed TOML table, or raise GeometryError or InvalidInput."""
     kind = data.get("kind") if isinstance(data, dict) else data
-    if not isinstance(kind, str) or kind not in _KINDS:
+    if not isinstance(data, dict) or kind not in [*_KINDS]:
         raise GeometryError([f"kind: must be one of {', '.join(_KINDS)}, but is {kind!r}"])
-    given = {key: value for key, value in vars(parse(_Table, data)).items() if value is not None}
+    needed = [*inspect.signature(_KINDS[kind]).parameters]
+    faults = [f"{key}: is missing" for key in needed if key not in data]
+    try:
+        given = {key: each for key, each in vars(parse(_Table, data)).items() if each is not None}
+    except GeometryError as error:
+        raise GeometryError([*error.faults, *faults]) from None
     del given["kind"]
     factor, slack = given.pop("factor", 1.0), given.pop("slack_below", False)
-    needed = [*inspect.signature(_KINDS[kind]).parameters]
-    faults = [f"{key}: is missing" for key in needed if key not in given]
     faults += [f"{key}: is not a key of a {kind} law" for key in given if key not in needed]
     if faults:
         raise GeometryError(faults)
     law = _KINDS[kind](**given)
     law = law if factor == 1.0 else law.scaled(factor)
     return law.slack_below() if slack else law
-
-
-def write_law(law: Elasticity, path: str | os.PathLike[str]) -> Path:
-    """Write a law to a TOML file; see :meth:`Elasticity.write`."""
-    units = "# Elasticity of a wire: tensions and rigidity in N, strains without unit\n"
-    return write_text(path, units + "\n".join(table_of(law)) + "\n")
-
-
-def read_law(path: str | os.PathLike[str]) -> Elasticity:
-    """Read a law from a TOML file; see :meth:`Elasticity.read`."""
-    text = read_text(path, any_encoding=True)  # to know a table of a testing machine
-    if _MEASURED.search(text):
-        raise FileError(
-            path,
-            "looks like a table of measured points, not like the law of a wire. Fit it first: "
-            "`cdsm fit`, or cdsm.read_tensile_csv and cdsm.fit_tensile_test.",
-        )
-    try:
-        return from_table(read_toml(text))
-    except GeometryError as error:
-        faults = error.faults
-    except InvalidInput as error:
-        faults = (str(error),)
-    raise FileError(path, f"is not an elasticity, {len(faults)} found:{listed(faults)}")
 
 
 def name_of(law: Elasticity) -> str | None:
@@ -145,31 +112,24 @@ def name_of(law: Elasticity) -> str | None:
 
 def label(law: Elasticity) -> str:
     """Return a short text for a law: the name of its wire, its EA, or its kind and tensions."""
-    if (known := name_of(law)) is not None:
-        return known
     if law._constant is not None:
-        return f"EA {law._constant:.6g} N"
-    kind = "table" if law._kind == "tabulated" else law._kind
+        return name_of(law) or f"EA {law._constant:.6g} N"
+    kind = {"tabulated": "table", "": "function"}.get(law._kind, law._kind)
     text = f"{kind}, {law.rest:.4g} to {law.high:.4g} N"
     text = "1x19-1.2mm" if law._given == STRAND._given else text
-    if law._factor != 1.0:
-        text += f", EA times {law._factor:.6g}"
-    if law._slack:
-        EA = float(law.rigidity(0.0))
-        text += f", with a slack branch of EA {EA:.4g} N below {law.rest:.4g} N"
-    return text
+    text += f", EA times {law._factor:.6g}" if law._factor != 1.0 else ""
+    branch = f", with a slack branch of EA {law.rigidity(law.low):.4g} N below {law.rest:.4g} N"
+    return text + branch if law._slack else text
 
 
 def wires_text(cables: Sequence[Cable]) -> str:
     """Describe the wires of cables and their series springs; more than three kinds are counted."""
-    springs = [
-        f" on a spring of {k / 1e3:.4g} N/mm" if k < math.inf else ""
-        for k in (cable.series_stiffness for cable in cables)
-    ]
-    pairs = zip(cables, springs, strict=True)
-    counts = Counter(label(cable.elasticity) + spring for cable, spring in pairs)
-    if len(counts) == 1:
-        return next(iter(counts))
-    if len(counts) > _NAMED:
+    counts = Counter[str]()
+    for cable in cables:
+        k = cable.series_stiffness
+        spring = f" on a spring of {k / 1e3:.4g} N/mm" if k < math.inf else ""
+        counts[label(cable.elasticity) + spring] += 1
+    if len(counts) > 3:
         return f"of {len(counts)} kinds"
-    return ", ".join(f"{name} ({count} of {counts.total()})" for name, count in counts.items())
+    texts = [f"{name} ({count} of {len(cables)})" for name, count in counts.items()]
+    return ", ".join(texts if len(counts) > 1 else counts)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
 from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
@@ -19,33 +18,22 @@ from cdsm.support.warning import warn
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.table import Table, tabulate
 
-EQ19_PRINTED: Final = (
-    (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -1e-4),
-    (-1924.5, 493.35, -2.26, 0.0054, -6.94e-6, 4.58e-9, -1.22e-12),
-)
-"""Printed coefficients of Eq. 19. Only the misprinted −1e-3 is corrected (see cdsm.paper)."""
-
 EQ19: Final = (
     (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -9.946263022943622e-05),
     (-1924.5, 493.34505, -2.26495, 5.38168e-3, -6.93505e-6, 4.58495e-9, -1.21505e-12),
 )
 """Coefficients of Eq. 19 with more digits, so that the branches meet; see eq19_repaired."""
-
 _USUAL: Final = 1e3, 1e9  # EA [N] of real wires
-
-_MEET = 1e-9
-"""Largest relative difference of two polynomials at their join. It allows for rounding."""
+_MEET: Final = 1e-9  # relative difference of two polynomials at their join that is rounding
+_LINE: Final = Table(np.array([0.0, RANGES["tension"].high]), np.array([[1.0], [0.0]]))
 
 
 @final
 class LinearElasticity(Elasticity):
     """Elasticity with constant EA: a solid wire, or a strand in its elastic stage.
 
-    Args:
-        rigidity: EA [N]. A CdsmWarning doubts it below 1 kN and above 1e9 N.
-
-    Raises:
-        InvalidInput: EA is not a number, or is outside its range.
+    ``rigidity`` is EA [N]. A CdsmWarning doubts it below 1 kN and above 1e9 N. Raises InvalidInput
+    if it is not a number, or outside its range.
     """
 
     def __init__(self, rigidity: float) -> None:
@@ -53,22 +41,15 @@ class LinearElasticity(Elasticity):
         if not _USUAL[0] <= EA <= _USUAL[1]:
             doubt = "kN" if _USUAL[0] > EA else "E instead of EA"
             warn(f"a wire with EA = {EA:g} N is unusual: {doubt}? EA is needed in N.")
-        super().__init__("linear", {}, 0.0, math.inf, EA)
+        super().__init__(0.0, math.inf, 0.0, "linear", {}, EA, _LINE)
 
     @classmethod
     def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
-        """Return the law EA = E π d²/4 of a solid wire, with E [Pa] and the diameter d [m].
-
-        Raises InvalidInput if one of them is not positive.
-        """
+        """Return EA = E π d²/4 of a solid wire, E [Pa] and d [m] positive, else InvalidInput."""
         for name, value in (("young_modulus", young_modulus), ("diameter", diameter)):
             if scalar(name, value) <= 0.0:
                 raise InvalidInput(name, f"{value:g} given; it must be positive.")
         return cls(young_modulus * math.pi * (diameter * diameter) / 4.0)
-
-    @cached_property
-    def _table(self) -> Table:
-        return Table(np.array([0.0, RANGES["tension"].high]), np.array([[1.0], [0.0]]))
 
 
 @final
@@ -76,24 +57,17 @@ class StrandElasticity(Elasticity):
     """Rigidity EA(F) as polynomials in the tension, one polynomial per range (form of Eq. 19).
 
     Neighbouring polynomials meet at their join, within 1e-9 of EA. A corner there is bridged
-    smoothly: within 1.2 N of 31 N, EA of Eq. 19 differs by up to 0.6 % from its polynomials;
-    elsewhere by 1e-11. The polynomials give the *tangent* rigidity: if they gave the secant S of
+    smoothly: within 1.4 N of 31 N, EA of Eq. 19 differs by up to 0.7 % from its polynomials;
+    elsewhere by 1e-8 at most. They give the *tangent* rigidity: if they gave the secant S of
     Eq. 18, the tangent S²/(S − F S') would be negative up to 31 N.
 
-    Args:
-        coefficients: One tuple per range, lowest power first [N, 1, 1/N, …].
-        joins: Tensions [N] at which one range ends and the next begins, one fewer than ranges.
-        low: Smallest tension [N].
-        high: Largest tension [N].
-
-    Raises:
-        InvalidInput: A number is invalid, the numbers of ranges and joins do not fit, ``low``,
-            ``joins`` and ``high`` do not rise from 0 or more, two ranges do not meet, or EA is not
-            positive.
+    ``coefficients`` are one tuple per range, lowest power first [N, 1, 1/N, …]; ``joins`` are the
+    tensions [N] at which one range ends and the next begins. Raises InvalidInput if a number is
+    invalid, 0 <= low < joins < high does not hold, two ranges do not meet, or EA is not positive.
     """
 
-    coefficients: tuple[tuple[float, ...], ...]
-    joins: tuple[float, ...]
+    coefficients = property(lambda law: law._given["coefficients"], doc="As given, in tuples.")
+    joins = property(lambda law: law._given["joins"], doc="As given [N], in a tuple.")
 
     def __init__(
         self,
@@ -102,67 +76,41 @@ class StrandElasticity(Elasticity):
         low: float,
         high: float,
     ) -> None:
-        if not all(isinstance(each, (list, tuple)) for each in (coefficients, joins)):
-            raise InvalidInput("coefficients", "give a tuple for each range, and a tuple of joins.")
+        if not isinstance(coefficients, (list, tuple)):
+            raise InvalidInput("coefficients", f"{coefficients!r} given; give a tuple per range.")
         rows, joins = tuple(_row("coefficients", row) for row in coefficients), _row("joins", joins)
         low, high = scalar("low", low), scalar("high", high)
         if not rows or not all(rows):
             raise InvalidInput("coefficients", "need at least one range with one coefficient.")
-        needed, edges = len(rows) - 1, (low, *joins, high)
-        if len(joins) != needed:
-            raise InvalidInput(
-                "joins", f"{len(joins)} given, {needed} needed: one fewer than ranges."
-            )
-        if low < 0.0 or any(a >= b for a, b in pairwise(edges)):
-            raise InvalidInput("joins", f"0 <= low < joins < high must rise, but are {edges} N.")
-        given = {"coefficients": rows, "joins": joins, "low": low, "high": high}
-        super().__init__("strand", given, low, high)
-        self.__dict__.update(coefficients=rows, joins=joins)
-        for join in joins:
-            below, above = self.polynomial([join, np.nextafter(join, np.inf)]).tolist()
+        if len(joins) != len(rows) - 1:
+            raise InvalidInput("joins", f"{len(joins)} given for {len(rows)} ranges; one fewer.")
+        if low < 0.0 or any(a >= b for a, b in pairwise((low, *joins, high))):
+            found = f"{low:g}, {joins}, {high:g} N"
+            raise InvalidInput("joins", f"0 <= low < joins < high must rise, but are {found}.")
+        for join, (before, after) in zip(joins, pairwise(rows), strict=True):
+            below, above = polyval(join, before), polyval(join, after)
             if abs(above - below) > _MEET * abs(below):
+                problem = f"the ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} "
                 raise InvalidInput(
-                    "coefficients",
-                    f"the ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} N "
-                    "above. Choose digits with which they meet, or use a TabulatedElasticity.",
+                    "coefficients", f"{problem}N above. Give more digits, or a TabulatedElasticity."
                 )
-        F = low + (high - low) * np.linspace(0.0, 1.0, 400) ** 4
-        if not (bad := F[self.polynomial(F) <= 0.0]).size == 0:
-            raise InvalidInput(
-                "coefficients",
-                f"the polynomials give {float(self.polynomial(bad[0])):.6g} N at {bad[0]:.4g} N, "
-                "and a rigidity must be positive. Narrow the domain, or correct the coefficients.",
-            )
+        given = {"coefficients": rows, "joins": joins, "low": low, "high": high}
+        table = tabulate(lambda F: _piecewise(F, rows, joins), low, high, joins)
+        super().__init__(low, high, low, "strand", given, 1.0, table)
 
     @classmethod
     def eq19_repaired(cls) -> StrandElasticity:
         """Return Eq. 19 of a 1×19 strand of 1.2 mm, with the digits missing in print filled in.
 
-        −1e-3 is read as −1e-4: with −1e-3 the branches give −787 884 N and 11 352 N at 31 N. The
-        digits leave EA(31 N) uncertain by 6 kN and EA(810 N) by 35 kN. Within them, the upper
-        polynomial is as flat as possible from 400 to 810 N, where the paper calls EA near-constant,
-        and the lower one is as near to the printed one as possible (linear programs in
-        ``tests/laws/test_errata.py``). None of these digits has one slope at 31 N (1022 and 368
-        here). The lower polynomial is negative below 2.11 N; the law covers 2.2 to 810 N.
+        −1e-3 is read as −1e-4. The digits leave EA(31 N) uncertain by 6 kN, EA(810 N) by 35 kN.
+        Within them, the upper polynomial is as flat as possible from 400 to 810 N, the lower one as
+        near to the printed one as possible (linear programs in ``tests/laws/test_errata.py``).
         """
         return cls(EQ19, joins=(31.0,), low=2.2, high=810.0)
 
     def polynomial(self, tension: ArrayLike) -> Array:
-        """Evaluate the polynomials EA(F) [N] at F of any shape, even beyond the law.
-
-        Raises InvalidInput if ``tension`` is not finite numbers.
-        """
-        return self._piecewise(number_array("tension", tension), 0)
-
-    @cached_property
-    def _table(self) -> Table:
-        return tabulate(
-            self.polynomial, self.low, self.high, self.joins, lambda F: self._piecewise(F, 1)
-        )
-
-    def _piecewise(self, F: Array, order: int) -> Array:
-        rows = [Polynomial(row).deriv(order)(F) for row in self.coefficients]
-        return np.choose(np.searchsorted(self.joins, F), rows)
+        """Evaluate the polynomials EA(F) [N] at F of any shape, even beyond the law."""
+        return _piecewise(number_array("tension", tension), self.coefficients, self.joins)
 
 
 @final
@@ -173,56 +121,48 @@ class TabulatedElasticity(Elasticity):
     of the chords over the middles of their strains, limited to ½ and 2½ times the chords beside.
     The error of EA is largest in the first steps from a soft low end: give more points there.
 
-    Args:
-        tensions: Tensions F of the points [N], ascending from 0 or more.
-        strains: Strains ε of the points [-], ascending. Only their differences matter.
-
-    Raises:
-        InvalidInput: There are fewer than two points, or they are not ascending.
+    ``tensions`` [N] and ``strains`` [-] of two or more points must rise, tensions from 0 or more,
+    or InvalidInput is raised. Only differences of strains matter.
     """
 
-    tensions: tuple[float, ...]
-    strains: tuple[float, ...]
+    tensions = property(lambda law: law._given["tensions"], doc="As given [N], in a tuple.")
+    strains = property(lambda law: law._given["strains"], doc="As given [-], in a tuple.")
 
     def __init__(self, tensions: Sequence[float], strains: Sequence[float]) -> None:
-        given = {"tensions": _row("tensions", tensions), "strains": _row("strains", strains)}
-        for name, row in given.items():
-            if len(row) < 2:
-                raise InvalidInput(name, f"{len(row)} given; two or more are needed.")
-            for i, (a, b) in enumerate(pairwise(row)):
-                if a >= b:
-                    raise InvalidInput(
-                        name, f"entry [{i + 1}] is {b:g} after {a:g}; they must rise."
-                    )
-        F, strain = given.values()
-        if len(F) != len(strain):
-            raise InvalidInput("strains", f"{len(strain)} given for {len(F)} tensions.")
-        if F[0] < 0.0:
-            raise InvalidInput("tensions", f"{F[0]:g} N is negative; cables only pull.")
-        if (steps := np.diff(F)).min() < SMALLEST:
-            raise InvalidInput("tensions", f"two points are only {steps.min():g} N apart.")
-        chords = np.diff(strain) / steps
-        if not 1.0 / LARGEST < chords.min() <= chords.max() < LARGEST:
-            raise InvalidInput("strains", "rise so steeply, or so little, that EA is no rigidity.")
-        super().__init__("tabulated", given, F[0], F[-1])
-        self.__dict__.update(given)
-
-    @cached_property
-    def _table(self) -> Table:
         from scipy.interpolate import CubicHermiteSpline, CubicSpline  # import slowly
 
-        F, strain = np.array(self.tensions), np.subtract(self.strains, self.strains[0])
-        chords = np.diff(strain) / np.diff(F)
+        given = {"tensions": _row("tensions", tensions), "strains": _row("strains", strains)}
+        F, strain = np.array(given["tensions"]), np.array(given["strains"])
+        if F.size != strain.size or F.size < 2:
+            raise InvalidInput("strains", f"{strain.size} given for {F.size} tensions; 2 or more.")
+        for name, row, least in (("tensions", F, SMALLEST), ("strains", strain, 0.0)):
+            if (steps := np.diff(row)).min() <= least:
+                at = int(steps.argmin()) + 1
+                rise = f"entry [{at}] is {row[at]:g} after {row[at - 1]:g}; they must rise."
+                raise InvalidInput(name, rise)
+        if F[0] < 0.0:
+            raise InvalidInput("tensions", f"{F[0]:g} N is negative; cables only pull.")
+        chords, strain = np.diff(strain) / np.diff(F), strain - strain[0]
+        if not 1.0 / LARGEST < chords.min() <= chords.max() < LARGEST:
+            raise InvalidInput("strains", "rise so steeply, or so little, that EA is no rigidity.")
         slopes = least = np.minimum(np.append(chords[0], chords), np.append(chords, chords[-1]))
-        if len(chords) > 1:
+        if chords.size > 1:
             middles = (strain[1:] + strain[:-1]) / 2.0
             ln = CubicSpline(middles, np.log(chords), bc_type="natural")(strain)
             slopes = np.exp(np.clip(ln, np.log(least / 2.0), np.log(2.5 * least)))
-        return Table(F, CubicHermiteSpline(F, strain, slopes).c)
+        low, high, table = (
+            float(F[0]),
+            float(F[-1]),
+            Table(F, CubicHermiteSpline(F, strain, slopes).c),
+        )
+        super().__init__(low, high, low, "tabulated", given, 1.0, table)
+
+
+def _piecewise(F: Array, rows: Sequence[Sequence[float]], joins: Sequence[float]) -> Array:
+    return np.choose(np.searchsorted(joins, F), [polyval(F, row) for row in rows])
 
 
 def _row(name: str, values: ArrayLike) -> tuple[float, ...]:
-    numbers = number_array(name, values)
-    if numbers.ndim != 1:
+    if (numbers := number_array(name, values)).ndim != 1:
         raise InvalidInput(name, f"{values!r} given; a sequence of numbers is needed.")
     return tuple(numbers.tolist())

@@ -10,9 +10,8 @@ from scipy.optimize import linprog
 
 import cdsm
 from cdsm.paper.section_v import CHECK, MEASURED, TABLE_II, TABLE_II_SWAPPED
-from cdsm.paper.strand import HALF_UNITS, JOIN, LEVEL, eq19_as_printed, left_open
+from cdsm.paper.strand import EQ19_PRINTED, HALF_UNITS, JOIN, LEVEL, eq19_as_printed, left_open
 from cdsm.support.values import Array
-from cdsm.wires.laws import EQ19_PRINTED
 from tests.core.test_urdf import eq1, eq2, eq3, table1
 from tests.support import digits
 from tests.support.arms import random_arm, random_posture, random_wrench

@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 
 from cdsm import presets
-from cdsm.paper.strand import HALF_UNITS, JOIN
+from cdsm.paper.strand import EQ19_PRINTED, HALF_UNITS, JOIN
 from cdsm.support.values import Array
-from cdsm.wires.laws import EQ19_PRINTED
 
 _SAMPLES: Final = 200  # number of tensions at which the lower branch is sampled
 _FORCE: Final = 1e4  # unit of rigidity [N] inside the linear programs, for the solver's tolerances

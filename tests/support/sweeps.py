@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm.support.values import Array
@@ -55,14 +54,14 @@ class Deadly(cdsm.Elasticity):
     least: float
 
     def __init__(self, folder: str, low: float = 0.0) -> None:
-        super().__init__("deadly", {"folder": folder}, 0.0, 1e6)
-        self.__dict__.update(folder=folder, least=low, _table=STEEL._table)
+        super().__init__(0.0, 1e6, 0.0, "", {"folder": folder}, 5e4, STEEL._table)
+        self.folder, self.least = folder, low
 
-    def strain_and_rigidity(self, tension: ArrayLike) -> tuple[Array, Array]:
-        if np.max(tension, initial=0.0) > self.least:
+    def _evaluate(self, F: Array) -> tuple[Array, Array]:
+        if np.max(F, initial=0.0) > self.least:
             for order in sorted(Path(self.folder).iterdir())[:1]:
                 with suppress(FileNotFoundError):  # another process was faster
                     order.unlink()
                     if order.name.startswith("die"):
                         os.kill(os.getpid(), signal.SIGKILL)
-        return STEEL.strain_and_rigidity(tension)
+        return STEEL._evaluate(F)

@@ -164,7 +164,7 @@ def test_laws_of_other_values_differ_and_cannot_be_changed() -> None:
     assert len({*LAWS.values(), cdsm.LinearElasticity(226_195)}) == len(LAWS)
     assert repr(cdsm.LinearElasticity(5.0)) == "LinearElasticity(rigidity=5.0)"
     with pytest.raises(AttributeError, match="high"):
-        STRAND.high = 900.0
+        STRAND.high = 900.0  # type: ignore[misc]
 
 
 # --- constructors ---------------------------------------------------------------------------
@@ -193,10 +193,10 @@ def test_rigidity_in_a_wrong_unit_is_doubted_once() -> None:
 
 @pytest.mark.parametrize("join", [31.0])
 def test_corner_of_eq19_is_bridged_and_nothing_else_changes(join: float) -> None:
-    away = np.concatenate([np.linspace(2.2, join - 1.2, 500), np.linspace(join + 1.2, 810.0, 500)])
-    np.testing.assert_allclose(STRAND.rigidity(away), STRAND.polynomial(away), rtol=1e-11)
-    near = np.linspace(join - 1.2, join + 1.2, 400)
-    np.testing.assert_allclose(STRAND.rigidity(near), STRAND.polynomial(near), rtol=6e-3)
+    away = np.concatenate([np.linspace(2.2, join - 1.4, 500), np.linspace(join + 1.4, 810.0, 500)])
+    np.testing.assert_allclose(STRAND.rigidity(away), STRAND.polynomial(away), rtol=1e-8)
+    near = np.linspace(join - 1.4, join + 1.4, 400)
+    np.testing.assert_allclose(STRAND.rigidity(near), STRAND.polynomial(near), rtol=7e-3)
     slope = STRAND.rigidity_slope(near)
     assert (slope > 0.0).all()
     assert abs(np.diff(slope)).max() < 12.0  # no jump; that of the polynomials is 654
@@ -249,7 +249,7 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "not positive": (
         lambda: cdsm.StrandElasticity(((10.0, -1.0), (-20.0, 1.0)), (15.0,), 2.2, 100.0),
-        "must be positive. Narrow",
+        "Narrow the domain",
     ),
     "empty domain": (lambda: cdsm.StrandElasticity(((1.0,),), (), 1.0, 1.0), "rise"),
     "negative low": (lambda: cdsm.StrandElasticity(((1.0,),), (), -1.0, 1.0), "0 <= low"),
@@ -290,9 +290,9 @@ def test_bad_constructor_input_names_the_argument(case: str) -> None:
 def test_scaled_law_is_as_many_times_as_rigid_and_stretches_as_many_times_less() -> None:
     for law in LAWS.values():
         stiffer = law.scaled(1.25)
-        np.testing.assert_allclose(stiffer.rigidity(F), 1.25 * law.rigidity(F), rtol=1e-15)
-        np.testing.assert_allclose(stiffer.strain(F), law.strain(F) / 1.25, rtol=1e-15)
-        np.testing.assert_allclose(stiffer.energy(F), law.energy(F) / 1.25, rtol=1e-15)
+        np.testing.assert_allclose(stiffer.rigidity(F), 1.25 * law.rigidity(F), rtol=1e-14)
+        np.testing.assert_allclose(stiffer.strain(F), law.strain(F) / 1.25, rtol=1e-14)
+        np.testing.assert_allclose(stiffer.energy(F), law.energy(F) / 1.25, rtol=1e-14)
         assert (stiffer.low, stiffer.high, stiffer.rest) == (law.low, law.high, law.rest)
 
 
