@@ -40,14 +40,14 @@ _TOUCHING = 5e-6  # part of a joint's range that is left out at both limits if d
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class KinematicSolution(Result):
-    """Joint angles; made by :func:`inverse_kinematics` and :func:`solve_joint_angles`.
+    """Joint angles, found by :func:`inverse_kinematics` or :func:`solve_joint_angles`.
 
     Attributes:
         posture: The arm at the angles that were found.
         of: What ``target`` is: ``"position"``, ``"pose"`` or ``"lengths"``.
         target: Wanted position (3,) [m] or pose (4, 4) of the tip, or cable lengths (C,) [m].
         guess: Joint angles that the solution should be near (nv,) [rad].
-        tolerance: Largest misfit at which the target counts as reached [-].
+        tolerance: Largest misfit of a reached target [-].
     """
 
     _headline = "misfit"
@@ -63,7 +63,7 @@ class KinematicSolution(Result):
         """Joint angles (nv,) [rad], within the limits; [m] for prismatic joints."""
         return self.posture.q
 
-    @quantity("1", "residual")
+    @quantity("1", "equation")
     def residual(self) -> Array:
         """Errors r [-] of the position (3,) or lengths (C,); for a pose, of rotation (3,) too."""
         return frozen(_residual(self.posture.arm, self.of, self.target, self.angles)[0])
@@ -98,9 +98,10 @@ class KinematicSolution(Result):
     @quantity("1", "limit")
     def at_limit(self) -> tuple[str, ...]:
         """Names of the joints at a limit."""
-        arm, margin = self.posture.arm, 2.0 * _TOUCHING
-        part = (self.angles - arm.lower) / (arm.upper - arm.lower)
-        return tuple(arm.joint_names[i] for i in np.flatnonzero(abs(part - 0.5) > 0.5 - margin))
+        arm, q = self.posture.arm, self.angles
+        room = np.minimum(q - arm.lower, arm.upper - q)
+        tight = np.flatnonzero(room <= 2.0 * _TOUCHING * (arm.upper - arm.lower))
+        return tuple(arm.joint_names[i] for i in tight)
 
     def __str__(self) -> str:
         arm = self.posture.arm
@@ -112,9 +113,9 @@ class KinematicSolution(Result):
             c = int(abs(self.length_error).argmax())
             said = f"{arm.cables[c].name} is off most, by {1e3 * self.length_error[c]:+.2g} mm"
         else:
-            said = f"the tip is {1e3 * self.position_error:.2g} mm"
-            said += f" and {math.degrees(self.orientation_error):.2g}°" if self.of == "pose" else ""
-            said += " from its target"
+            said = f"the tip is {1e3 * self.position_error:.2g} mm off its target"
+            turned = math.degrees(self.orientation_error)
+            said += f" and turned by {turned:.2g}°" if self.of == "pose" else ""
         verdict = "reachable" if self.reachable else "NOT REACHABLE"
         return "\n".join([*aligned([("joint", "angle", ""), *rows]), "", f"{verdict}: {said}"])
 
@@ -124,21 +125,18 @@ def inverse_kinematics(
 ) -> KinematicSolution:
     """Find joint angles for a tip target: min ½‖θ − guess‖² with tip(θ) = target (Eq. 7).
 
-    A redundant arm has many solutions; the one that is returned is nearest to the guess, at least
-    locally. If the arm cannot reach the target, ``reachable`` is false, and the angles have the
-    least misfit that searches from the guess and from a dozen other postures found.
+    Of many solutions, the one nearest to the guess is returned, at least locally. If there is none,
+    ``reachable`` is false, and the misfit is the least of searches from a dozen other postures too.
 
     Args:
         arm: The arm.
         target: Position (3,) [m] of ``tool0``, or pose (4, 4) like ``pose.tip`` [m], base axes.
-        guess: Joint angles that the solution should be near (nv,) [rad], within the limits; zeros
-            if not given.
-        tolerance: Largest misfit √(position error²/arm length² + orientation error²) [-] at which
-            the target counts as reached.
+        guess: Joint angles (nv,) [rad], within the limits, that the solution is near; default 0.
+        tolerance: Largest √(position error²/arm length² + orientation error²) of a reached target.
 
     Raises:
-        InvalidInput: ``target`` is not a position or a rigid transform, ``guess`` is not (nv,)
-            numbers or beyond the limits, or ``tolerance`` is not between 0 and 1.
+        InvalidInput: The target is no position or rigid transform, the guess is not (nv,) numbers
+            or beyond the limits, or the tolerance is not between 0 and 1.
     """
     wanted = frozen(number_array("target", target))
     if wanted.shape not in ((3,), (4, 4)):
@@ -148,12 +146,12 @@ def inverse_kinematics(
         R, last = wanted[:3, :3], wanted[3].tolist()
         off, determinant = float(abs(R.T @ R - np.eye(3)).max()), float(np.linalg.det(R))
         if off > 1e-9 or determinant < 0.0 or last != [0.0, 0.0, 0.0, 1.0]:
-            raise InvalidInput(
-                "target",
-                f"is no rigid transform: RᵀR is off the identity by {off:.2g}, det R = "
-                f"{determinant:.4g}, last row {last}. R must be a rotation, and the last row 0 0 0 "
-                "1; scipy.spatial.transform.Rotation.from_matrix(R) gives the nearest rotation.",
+            problem = (
+                f"is no rigid transform: RᵀR is off 1 by {off:.2g}, det R = {determinant:.4g}, the "
+                f"last row {last}. Give 0 0 0 1 below a rotation; scipy.spatial.transform.Rotation."
+                "from_matrix(R).as_matrix() is the nearest one to R."
             )
+            raise InvalidInput("target", problem)
     return _solve(arm, "pose" if wanted.ndim == 2 else "position", wanted, guess, tolerance)
 
 
@@ -170,19 +168,16 @@ def solve_joint_angles(
         arm: The arm.
         cable_lengths: L (C,) [m], lead included, in the order of ``arm.cables``.
         guess: As for :func:`inverse_kinematics`, with the same choice among many solutions.
-        tolerance: Largest misfit ‖L(θ) − L‖/arm length [-] at which the lengths count as reached.
-            For measured lengths give their error: no posture fits them exactly.
+        tolerance: Largest ‖L(θ) − L‖/arm length of reached lengths; for measured ones, their error.
 
     Raises:
-        InvalidInput: ``cable_lengths`` is not (C,) positive numbers, ``guess`` is not (nv,) numbers
-            or beyond the limits, or ``tolerance`` is not between 0 and 1.
+        InvalidInput: The lengths are not (C,) positive numbers; guess and tolerance as there.
         CableError: Two sites of a cable coincide at a posture of the search.
     """
     cables = instance("arm", arm, Manipulator).cables
     wanted = vector("cable_lengths", cable_lengths, len(cables), "one length [m] per cable")
-    if wanted.min() <= 0.0:
-        name, least = cables[int(wanted.argmin())].name, f"{wanted.min():g}"
-        problem = f"{least} m given for {name}; a length is positive, and includes the lead."
+    for c in np.flatnonzero(wanted <= 0.0).tolist():
+        problem = f"{wanted[c]:g} m given for {cables[c].name}; a length with its lead is positive."
         raise InvalidInput("cable_lengths", problem)
     return _solve(arm, "lengths", wanted, guess, tolerance)
 
@@ -197,15 +192,15 @@ def _solve(
             limits = arm.lower[i], arm.upper[i], arm.joint_units[i]
             problem = beyond(arm.joint_names[i], near[i], *limits)
             raise InvalidInput("guess", f"{problem}; guess angles within the joint limits.")
-    tolerance = scalar("tolerance", tolerance)
-    if not 0.0 < tolerance < 1.0:
+    if not 0.0 < (tolerance := scalar("tolerance", tolerance)) < 1.0:
         raise InvalidInput("tolerance", f"{tolerance:g} given; a number between 0 and 1 is needed.")
     search = partial(_nearest, partial(_residual, arm, of, target), near, tolerance)
+    lower, upper = arm.lower, np.maximum(arm.upper, arm.lower + 1e-12)  # a joint may be locked
     try:
-        pose = arm.at(search(arm.lower, arm.upper))
+        pose = arm.at(search(lower, upper))
     except CableError:  # disks touch at a limit, so a cable has no direction there
-        margin = _TOUCHING * (arm.upper - arm.lower)
-        pose = arm.at(search(arm.lower + margin, arm.upper - margin))
+        margin = _TOUCHING * (upper - lower)
+        pose = arm.at(search(lower + margin, upper - margin))
     return KinematicSolution(posture=pose, of=of, target=target, guess=near, tolerance=tolerance)
 
 
