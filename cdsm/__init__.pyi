@@ -73,10 +73,9 @@ from cdsm.identification import read_loops as read_loops
 from cdsm.interchange.caspr import read_caspr as read_caspr
 from cdsm.interchange.mjcf import to_mjcf as to_mjcf
 from cdsm.interchange.mjcf import write_mjcf as write_mjcf
-from cdsm.kinematics.maps import inverse_kinematics as inverse_kinematics
-from cdsm.kinematics.maps import solve_joint_angles as solve_joint_angles
-from cdsm.kinematics.solutions import JointSolution as JointSolution
-from cdsm.kinematics.solutions import KinematicSolution as KinematicSolution
+from cdsm.kinematics import KinematicSolution as KinematicSolution
+from cdsm.kinematics import inverse_kinematics as inverse_kinematics
+from cdsm.kinematics import solve_joint_angles as solve_joint_angles
 from cdsm.manipulator import Manipulator as Manipulator
 from cdsm.measures.clearance import Clearance as Clearance
 from cdsm.measures.clearance import clearance as clearance

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from cdsm import errors
 from cdsm.errors import CdsmError, InvalidInput
-from cdsm.kinematics.maps import inverse_kinematics
-from cdsm.kinematics.solutions import KinematicSolution
+from cdsm.kinematics import KinematicSolution, inverse_kinematics
 from cdsm.manipulator import Manipulator
 from cdsm.planning.follow import Follower, Sample
 from cdsm.planning.objectives import achieved, check_positive, checked_starts, target_constraints

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.errors import CdsmError
-from cdsm.kinematics.maps import inverse_kinematics
+from cdsm.kinematics import inverse_kinematics
 from cdsm.manipulator import Manipulator
 from cdsm.plots.style import MM
 from cdsm.support.values import Array

@@ -37,7 +37,7 @@ def rested(arm: cdsm.Manipulator, seed: int) -> tuple[bytes, ...]:
 
 def solved(arm: cdsm.Manipulator, seed: int) -> tuple[bytes, ...]:
     found = cdsm.solve_joint_angles(arm, random_posture(arm, seed, reach=0.3).cable_lengths)
-    return found.angles.tobytes(), found.lengths.tobytes()
+    return found.angles.tobytes(), found.posture.cable_lengths.tobytes()
 
 
 def one_by_one(arm: cdsm.Manipulator, work: Work, seeds: range) -> list[tuple[bytes, ...]]:

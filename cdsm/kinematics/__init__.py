@@ -1,1 +1,0 @@
-"""Inverse kinematics: joint angles from tip poses or from cable lengths."""
