@@ -6,7 +6,7 @@ import math
 import os
 import re
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -89,6 +89,10 @@ def read_tensile_csv(
     if decimal not in (None, ".", ","):
         raise InvalidInput("decimal", f"{decimal!r} given; it is '.' or ','.")
     table = read_table(path, ";\t,", any_encoding=True)
+
+    def refuse(problem: str) -> NoReturn:
+        raise FileError(path, problem)
+
     rows = [row for _, row in table.rows]
     values = [[_number(cell, table.delimiter, decimal) for cell in row] for row in rows]
     counts = [int(np.isfinite(row).sum()) for row in values]
@@ -96,82 +100,74 @@ def read_tensile_csv(
     for at, (line, row) in enumerate(table.rows):
         if line <= _HEADERS and not counts[at]:
             below = [cell.strip("[]() ") for cell in rows[at + 1]] if at + 1 < len(rows) else []
-            units_below = [] if _KNOWN.isdisjoint(below) else below
-            first = at + 1 + bool(units_below)
+            below = [] if _KNOWN.isdisjoint(below) else below  # the units
+            first = at + 1 + bool(below)
             points = next((k for k in range(first, len(rows)) if counts[k] < 2), len(rows)) - first
             fit = _fitting(row, columns)
-            heads.append((all(fit), points, -at, units_below, fit))
-    found, _, at, units_below, fit = max(heads, default=(False, 0, 0, [], ([], [])))
-    at = -at
-    names = rows[at] if rows else []
+            heads.append((all(fit), points, -at, first, below, fit))
+    found, _, at, first, below, fit = max(heads, default=(False, 0, 0, 0, [], ([], [])))
+    names = rows[-at] if rows else []
     if not found:
-        wanted = " and ".join(map(repr, columns or ("displacement", "force")))
-        raise FileError(
-            path,
-            f"has no header that names {wanted} in its first {_HEADERS} lines; there are "
-            f"{', '.join(names) or 'no names'}. Choose two by columns=.",
+        refuse(
+            f"has no header that names {' and '.join(columns or ('displacement', 'force'))} in "
+            f"its first {_HEADERS} lines; there are {', '.join(names) or 'no names'}. Choose two "
+            "by columns=."
         )
-    chosen = []
+    at, chosen = -at, []
     for kind, places, given in zip(_UNITS, fit, units or (None, None), strict=True):
         if len(places) > 1:
             several = " and ".join(names[k] for k in places)
-            raise FileError(path, f"{several} may both be the {kind}; choose by columns=.")
-        known = _UNITS[kind]
-        written = [_name_and_unit(names[places[0]])[1], *units_below[places[0] :][:1]]
+            refuse(f"{several} may both be the {kind}; choose by columns=.")
+        known, place = _UNITS[kind], places[0]
+        written = [_name_and_unit(names[place])[1], *below[place : place + 1]]
         unit = next((each for each in (*written, given) if each in known), None)
         if unit is None or given not in (None, unit):
-            raise FileError(
-                path,
-                f"has the {kind} {names[places[0]]!r} in {' '.join(written).strip() or 'no unit'}, "
-                f"and units= says {given or 'nothing'}; give one of {', '.join(known)}.",
+            refuse(
+                f"has the {kind} {names[place]!r} in {' '.join(written).strip() or 'no unit'}, and "
+                f"units= says {given or 'nothing'}; give one of {', '.join(known)}."
             )
-        chosen.append((places[0], unit, known[unit]))
+        chosen.append((place, unit, known[unit]))
     (x, x_unit, to_m), (y, _, to_N) = chosen
     ends = [k for k, row in enumerate(rows) if len(row) > max(x, y) and re.search(r"\d", row[y])]
-    kept = range(at + 1 + bool(units_below), (ends or [0])[-1] + 1)  # text below has no number
+    kept = range(first, max(ends, default=0) + 1)  # text below has no number
     for k in kept:
-        x_and_y = values[k][x : x + 1] + values[k][y : y + 1]
-        if len(x_and_y) < 2 or not np.isfinite(x_and_y).all() or any(rows[k][len(names) :]):
-            raise FileError(
-                path,
+        both = values[k][x : x + 1] + values[k][y : y + 1]
+        if len(both) < 2 or not np.isfinite(both).all() or any(rows[k][len(names) :]):
+            refuse(
                 f"line {table.rows[k][0]}: {table.delimiter.join(rows[k])!r} needs a number in "
-                "both columns and no more cells than the header; decimal= tells the decimal mark.",
+                "both columns and no more cells than the header; decimal= tells the decimal mark."
             )
-    text = " ".join(rows[k][place] for k in kept for place in (x, y))
-    if not decimal and table.delimiter != "," and {",", "."} <= set(text):
-        raise FileError(path, "has numbers with commas and with points; decimal= tells which.")
     if not kept:
-        raise FileError(path, f"has no rows of numbers below line {table.rows[at][0]}.")
+        refuse(f"has no rows of numbers below line {table.rows[at][0]}.")
+    text = "".join(rows[k][place] for k in kept for place in (x, y))
+    if not decimal and table.delimiter != "," and {",", "."} <= set(text):
+        refuse("has numbers with commas and with points; decimal= tells the decimal mark.")
     for said in _GAUGE.finditer("\n".join([*table.comments, *map(" ".join, rows[:at])])):
         if gauge_length is None and (unit := said[1] or said[3]):
             gauge_length = _number(said[2], ";", decimal) * _LENGTHS[unit.lower()]
     source = f"{names[x]!r} and {names[y]!r} of line {table.rows[at][0]}"
-    if gauge_length is None and x_unit not in _STRAINS:
-        raise FileError(
-            path, "has no gauge length; give gauge_length=, or a line # gauge_length = 500 mm."
-        )
     if gauge_length is None:
+        if x_unit not in _STRAINS:
+            refuse("has no gauge length; give gauge_length=, or a line # gauge_length = 500 mm.")
+        gauge_length = 1.0
         source += "; no gauge length: displacements are those of 1 m of wire"
-    length = 1.0 if gauge_length is None else gauge_length
-    to_m *= length if x_unit in _STRAINS else 1.0
+    to_m *= gauge_length if x_unit in _STRAINS else 1.0
     u, F = (np.array([values[k][place] for k in kept]) for place in (x, y))
-    return TensileTest(frozen(to_m * u), frozen(to_N * F), length, source)
+    return TensileTest(frozen(to_m * u), frozen(to_N * F), gauge_length, source)
 
 
 def _fitting(row: list[str], columns: Sequence[str] | None) -> tuple[list[int], list[int]]:
     """Return the columns of a header that may be the displacement, and those of the force."""
-    names = [_name_and_unit(cell)[0].lower() for cell in row]
+    cells = [(cell.lower(), _name_and_unit(cell)[0].lower()) for cell in row]
     if columns is not None:
-        cells, wanted = [cell.lower() for cell in row], [each.strip().lower() for each in columns]
-        a, b = ([k for k, c in enumerate(cells) if c == each] for each in wanted)
-        c, d = ([k for k, name in enumerate(names) if name == each] for each in wanted)
-        return a or c, b or d
-    moved, force = (
-        [k for k, name in enumerate(names) if words.search(name) and not _OTHER.search(name)]
-        for words in (_MOVED, _FORCE)
+        a, b = ([k for k, c in enumerate(cells) if each.strip().lower() in c] for each in columns)
+        return a, b
+    a, b = (
+        [k for k, (_, name) in enumerate(cells) if w.search(name) and not _OTHER.search(name)]
+        for w in (_MOVED, _FORCE)
     )
     # "strain (extension)" is no other gauge than the extension
-    return [k for k in moved if not _COMPUTED.search(row[k])] or moved, force
+    return [k for k in a if not _COMPUTED.search(row[k])] or a, b
 
 
 def _name_and_unit(cell: str) -> tuple[str, str]:

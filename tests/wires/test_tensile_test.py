@@ -19,7 +19,7 @@ from cdsm.cli import app
 DATA = Path(__file__).parents[1] / "data"
 INSTRON, ZWICK = DATA / "instron_strand.csv", DATA / "zwick_seil.csv"
 GERMAN = ("Standardweg", "Standardkraft")
-HALF = {"gauge_length": 0.5}
+HALF: dict[str, Any] = {"gauge_length": 0.5}
 
 
 def written(tmp_path: Path, text: str, encoding: str = "utf-8") -> Path:
@@ -75,7 +75,10 @@ def test_encodings(encoding: str, tmp_path: Path) -> None:
         ("Displacement (Strain 1)\tLoad\n(mm)\t(N)\n0\t0\n1.5\t100\n", HALF),
         ("Extension at Maximum Load [mm];Extension [mm];Load [N]\n9;0;0\n9;1.5;100\n", HALF),
         ("Load rate [N/s],Load [N],Extension [mm]\n9,0,0\n9,100,1.5\n", HALF),
-        ("made,by\n1,2\ns,F\n0,0\n1.5,0.1\n", {"columns": "sF", "units": ("mm", "kN"), **HALF}),
+        (
+            "made,by\n1,2\ns,F\n0,0\n1.5,0.1\n",
+            {"columns": ("s", "F"), "units": ("mm", "kN"), **HALF},
+        ),
         (
             "Extension [in];Extension [mm];Load [N]\n9;0;0\n9;1,5;100\n",
             {"columns": ("extension [mm]", "Load"), **HALF},
@@ -89,7 +92,6 @@ def test_encodings(encoding: str, tmp_path: Path) -> None:
     ],
 )
 def test_dialects(head: str, given: dict[str, Any], tmp_path: Path) -> None:
-    given = {k: list(v) if isinstance(v, str) and k == "columns" else v for k, v in given.items()}
     test = cdsm.read_tensile_csv(written(tmp_path, head), **given)
     np.testing.assert_allclose(test.displacement, [0.0, 1.5e-3], rtol=1e-9)
     np.testing.assert_allclose(test.force, [0.0, 100.0], rtol=1e-9)
@@ -130,10 +132,10 @@ def test_of_two_gauges_none_is_chosen_silently() -> None:
 @pytest.mark.parametrize(
     ("text", "given", "said"),
     [
-        ("", {}, "no header that names 'displacement' and 'force' in its first 50 lines"),
+        ("", {}, "no header that names displacement and force in its first 50 lines"),
         ("0,0\n1,2\n", {}, "no header"),
         ("weight [N],force [N]\n0,0\n", {}, "there are weight [N], force [N]. Choose two by"),
-        ("s,F\n0,0\n", {"columns": ("Weg", "F")}, "names 'Weg' and 'F'"),
+        ("s,F\n0,0\n", {"columns": ("Weg", "F")}, "names Weg and F"),
         ("force [N],load [N],stroke [mm]\n0,0,0\n", {}, "force [N] and load [N] may both"),
         ("displacement,force [N]\n0,0\n", {}, "the displacement 'displacement' in no unit"),
         ("displacement [mm],force\n0,0\n", {}, "give one of N, cN, mN, daN, kN, MN, lbf, kgf"),
@@ -143,7 +145,7 @@ def test_of_two_gauges_none_is_chosen_silently() -> None:
         ("displacement [mm],force [N]\n0,0\n1,\n2,2\n", {}, "line 3"),
         ("displacement [mm],force [N]\n0,1,0,2\n0,2,0,3\n", {}, "line 2"),
         ("stroke [mm];force [N]\n0;998\n1;1,002.32\n2;1100\n", {}, "line 3"),
-        ("stroke [mm];force [N]\n0,1;998\n1;1.004\n", {}, "commas and with points; decimal="),
+        ("stroke [mm];force [N]\n0,1;998\n1;1.004\n", {}, "commas and with points; decimal= tells"),
         ("displacement [mm],force [N]\n", HALF, "no rows of numbers below line 1"),
         ("displacement [mm],force [N]\n0,0\n1,2\n", {}, "gauge_length="),
         ("# gauge_length = 500\ndisplacement [mm],force [N]\n0,0\n", {}, "gauge_length ="),
