@@ -69,7 +69,9 @@ def loading(strain: Array, force: Array, between: tuple[float, float]) -> Loadin
     strain, force = strain[slack:], force[slack:]
     inside = (force >= between[0]) & (force <= between[1])
     strain, force = strain[inside], force[inside]
-    if len(force) < FEWEST or not _rises(strain, force):
+    in_order = force[np.argsort(strain, kind="stable")]
+    rising = isotonic_regression(in_order).x if len(force) else in_order
+    if len(force) < FEWEST or not np.std(in_order - rising) < 0.1 * np.ptp(rising):
         refuse(
             f"the force does not rise with the displacement in {len(force)} points of loading. "
             f"Give {FEWEST} or more in the order recorded; check that the columns belong together."
@@ -104,12 +106,6 @@ def _lone(values: Array) -> NDArray[np.bool_]:
     lone = np.asarray(abs(values - medfilt(values, 3)) > least)
     lone[[0, -1]] = False
     return lone
-
-
-def _rises(strain: Array, force: Array) -> bool:
-    in_order = force[np.argsort(strain, kind="stable")]
-    rising = isotonic_regression(in_order).x
-    return bool(np.std(in_order - rising) < 0.1 * np.ptp(rising))
 
 
 class Curve(NamedTuple):

@@ -104,7 +104,7 @@ def read_tensile_csv(
             first = at + 1 + bool(below)
             points = next((k for k in range(first, len(rows)) if counts[k] < 2), len(rows)) - first
             fit = _fitting(row, columns)
-            heads.append((all(fit), points, -at, first, below, fit))
+            heads.append((all(fit) and fit[0] != fit[1], points, -at, first, below, fit))
     found, _, at, first, below, fit = max(heads, default=(False, 0, 0, 0, [], ([], [])))
     names = rows[-at] if rows else []
     if not found:

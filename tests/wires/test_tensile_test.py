@@ -146,7 +146,7 @@ def test_of_two_gauges_none_is_chosen_silently() -> None:
         ("displacement [mm],force [N]\n0,1,0,2\n0,2,0,3\n", {}, "line 2"),
         ("stroke [mm];force [N]\n0;998\n1;1,002.32\n2;1100\n", {}, "line 3"),
         ("stroke [mm];force [N]\n0,1;998\n1;1.004\n", {}, "commas and with points; decimal= tells"),
-        ("displacement [mm],force [N]\n", HALF, "no rows of numbers below line 1"),
+        ("displacement [mm];force [N]\n", HALF, "no rows of numbers below line 1"),
         ("displacement [mm],force [N]\n0,0\n1,2\n", {}, "gauge_length="),
         ("# gauge_length = 500\ndisplacement [mm],force [N]\n0,0\n", {}, "gauge_length ="),
         ("displacement [mm],force [N]\n" + "1" * 200_000 + ",2\n", {}, "line 2"),
