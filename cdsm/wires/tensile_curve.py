@@ -10,12 +10,13 @@ from __future__ import annotations
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import isotonic_regression, least_squares, minimize_scalar
-from scipy.signal import find_peaks, medfilt
+from scipy.signal import find_peaks
 
 from cdsm.errors import InvalidInput
 from cdsm.support.values import Array
@@ -24,6 +25,7 @@ FEWEST: Final = 8  # points of a fit; fewer show no bend
 _FALL = 0.1  # a fall of the force by this share of its range ends a loading branch
 _REACHED = 0.95  # share of the largest force that the fitted branch reaches
 _SPLINES, _GRID, _MOST = 36, 600, 400  # splines, tensions of the grid, points (more are averaged)
+_JUMP = 10.0  # EA over the steepest measured chord; beyond it, the curve has overshot a jump
 _ROUGHER = 100.0  # smoothing of the fit over that of the curve for the band
 
 
@@ -103,9 +105,8 @@ def _lone(values: Array) -> NDArray[np.bool_]:
     """Return whether each value is alone and far from its neighbours."""
     noise, reach = _noise_and_reach(values)
     least = max(8.0 * noise, 5e-3 * reach, 2.0 * np.median(abs(np.diff(values))))
-    lone = np.asarray(abs(values - medfilt(values, 3)) > least)
-    lone[[0, -1]] = False
-    return lone
+    middle = np.median(sliding_window_view(np.pad(values, 1, mode="edge"), 3), axis=1)
+    return np.asarray(abs(values - middle) > least)
 
 
 class Curve(NamedTuple):
@@ -208,6 +209,13 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
     rough, _, covariance = solve(best - np.log10(_ROUGHER), x)
     variance = np.sum((splines @ covariance[:-1, :-1]) * splines, axis=1)
     (EA, grid), r = curve(x), error(x)
+    order, step = np.argsort(strain, kind="stable"), max(1, n // 50)
+    rise, along = (a[order[step:]] - a[order[:-step]] for a in (force, strain))
+    if EA.max() > _JUMP * np.max(rise / np.maximum(along, 1e-4 * span)):
+        refuse(
+            f"the force is discontinuous near {tension[EA.argmax()]:.4g} N, and no smooth curve "
+            "follows it. Look for a wire gripped anew, or units that change midway."
+        )
     correlation = float(r[1:] @ r[:-1] / (r @ r or 1.0))
     if np.std(r) < 1e-4 * reach:  # what is left is no noise
         correlation = 0.0

@@ -174,8 +174,8 @@ def fit_tensile_test(
 
     Raises:
         InvalidInput: An argument is not finite numbers, the arrays differ in length, the gauge
-            length is not positive, the wire is compressed, the force does not rise, the units are
-            impossible, or fewer than 8 points are left or lie below the yield.
+            length is not positive, the wire is compressed, the force does not rise or jumps, the
+            units are impossible, or fewer than 8 points are left or lie below the yield.
     """
     u, F = number_array("displacement", displacement), number_array("force", force)
     length = checked("gauge_length", gauge_length, "length")

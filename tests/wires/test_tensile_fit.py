@@ -283,6 +283,8 @@ NOISE = np.random.default_rng(0)
         (1e3 * RAMP, PULL, {}, "Check the units"),
         (RAMP, PULL / 1e6, {}, "Check the units"),
         (RAMP / 1e9, PULL, {}, "Check the units"),
+        (RAMP, PULL + 100.0 * (RAMP > 0.006), {}, "discontinuous near"),
+        (RAMP[::5], PULL[::5] + 1e3 * (RAMP[::5] > 0.006), {}, "discontinuous near"),
         (0.0 * RAMP, PULL, {}, "displacement and force change"),
         (RAMP, 500.0 * (RAMP / RAMP[-1]) ** 0.1, {}, "Sample more finely"),  # never elastic
     ],
