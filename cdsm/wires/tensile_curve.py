@@ -141,7 +141,8 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
     """
     groups = np.array_split(np.arange(len(force)), min(len(force), _MOST))
     strain, force = (np.array([a[group].mean() for group in groups]) for a in (strain, force))
-    weight = np.sqrt([len(group) * len(groups) / groups[-1][-1] for group in groups])
+    count = np.array([len(group) for group in groups])
+    weight = np.sqrt(count / count.mean())
     tension, splines = _grid(force, noise)
     (n, k), span, reach = (len(force), splines.shape[1]), np.ptp(strain), np.ptp(force)
     bends = np.hstack([np.diff(np.eye(k), 2, axis=0), np.zeros((k - 2, 1))])
@@ -199,12 +200,8 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
         x, score, _ = solve(power, x)
         scores[score] = power, x
     power, x = scores[min(scores)]
-    best = minimize_scalar(
-        lambda p: solve(p, x)[1],
-        bounds=(power - 2, power + 2),
-        method="bounded",
-        options={"xatol": 0.2},
-    ).x
+    around = {"bounds": (power - 2, power + 2), "method": "bounded", "options": {"xatol": 0.2}}
+    best = minimize_scalar(lambda p: solve(p, x)[1], **around).x
     x = solve(best, x)[0]
     rough, _, covariance = solve(best - np.log10(_ROUGHER), x)
     variance = np.sum((splines @ covariance[:-1, :-1]) * splines, axis=1)

@@ -12,6 +12,7 @@ import numpy as np
 
 from cdsm.errors import FileError, InvalidInput
 from cdsm.support.tables import read_table
+from cdsm.support.validation import sequence_of
 from cdsm.support.values import Array, frozen
 
 _LENGTHS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "in": 0.0254}
@@ -79,12 +80,12 @@ def read_tensile_csv(
             not depend on it: the result is then a test of 1 m of wire, and ``source`` says so.
 
     Raises:
-        InvalidInput: ``columns`` or ``units`` are not two entries; ``decimal`` is another mark.
+        InvalidInput: ``columns`` or ``units`` are not two texts; ``decimal`` is another mark.
         FileError: The file cannot be read; a column, a unit or the gauge length is missing, not
             known or not unique; or a cell is not a number (the line is named).
     """
     for name, pair in (("columns", columns), ("units", units)):
-        if pair is not None and (isinstance(pair, str) or len(pair) != 2):
+        if pair is not None and len(sequence_of(name, pair, str)) != 2:
             raise InvalidInput(name, f"{pair!r} given; give two, of displacement and force.")
     if decimal not in (None, ".", ","):
         raise InvalidInput("decimal", f"{decimal!r} given; it is '.' or ','.")
@@ -137,8 +138,6 @@ def read_tensile_csv(
                 f"line {table.rows[k][0]}: {table.delimiter.join(rows[k])!r} needs a number in "
                 "both columns and no more cells than the header; decimal= tells the decimal mark."
             )
-    if not kept:
-        refuse(f"has no rows of numbers below line {table.rows[at][0]}.")
     text = "".join(rows[k][place] for k in kept for place in (x, y))
     if not decimal and table.delimiter != "," and {",", "."} <= set(text):
         refuse("has numbers with commas and with points; decimal= tells the decimal mark.")
