@@ -48,7 +48,6 @@ from cdsm.errors import SingularMass as SingularMass
 from cdsm.errors import SingularStiffness as SingularStiffness
 from cdsm.errors import SolverError as SolverError
 from cdsm.errors import StoreError as StoreError
-from cdsm.errors import TensileTestError as TensileTestError
 from cdsm.errors import UnknownName as UnknownName
 from cdsm.errors import UnreachableStiffness as UnreachableStiffness
 from cdsm.errors import UrdfError as UrdfError
@@ -141,10 +140,9 @@ from cdsm.wires.elasticity import Elasticity as Elasticity
 from cdsm.wires.laws import LinearElasticity as LinearElasticity
 from cdsm.wires.laws import StrandElasticity as StrandElasticity
 from cdsm.wires.laws import TabulatedElasticity as TabulatedElasticity
-from cdsm.wires.tensile.fit import TensileFit as TensileFit
-from cdsm.wires.tensile.fit import fit_tensile_test as fit_tensile_test
-from cdsm.wires.tensile.record import TensileTest as TensileTest
-from cdsm.wires.tensile.record import read_tensile_csv as read_tensile_csv
+from cdsm.wires.tensile_fit import TensileFit as TensileFit
+from cdsm.wires.tensile_fit import fit_tensile_test as fit_tensile_test
+from cdsm.wires.tensile_test import read_tensile_csv as read_tensile_csv
 
 __version__: str
 __all__: list[str]

@@ -151,10 +151,6 @@ class CableError(CdsmError, ValueError):
         self.cable = cable
 
 
-class TensileTestError(CdsmError, ValueError):
-    """A tensile test from which no elasticity can be computed."""
-
-
 class JointLimitError(CdsmError, ValueError):
     """Joint angles beyond their limits.
 

@@ -7,10 +7,10 @@ from typing import Final
 
 # fmt: off
 _ALIKE: Final = (
-    "bins", "count", "damping", "damping_ratio", "diameter",
+    "between", "bins", "columns", "count", "damping", "damping_ratio", "decimal", "diameter",
     "direction", "force", "gauge_length", "gravity", "host", "largest_force",
-    "largest_tension", "port", "rate", "section", "seed", "skip", "solver", "steps", "target",
-    "wire", "wrench",
+    "largest_tension", "port", "rate", "section", "seed", "solver", "steps", "target",
+    "units", "wire", "wrench",
 )
 # fmt: on
 """Arguments of the library whose options have the same name."""

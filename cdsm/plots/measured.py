@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cdsm.identification.experiment_plan import ExperimentPlan
     from cdsm.identification.loop import WeightLoop
     from cdsm.identification.result import Identification
-    from cdsm.wires.tensile.fit import TensileFit
+    from cdsm.wires.tensile_fit import TensileFit
 
 _BROAD = 0.25  # stages wider than this fraction of the whole range have horizontal names
 _MOST_LABELS = 30  # above this number of measurements the axis shows numbers, not names
@@ -45,7 +45,7 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
     The second panel also shows the stages of the wire and the 95 % band of EA.
     """
     figure, ((left, right),) = panels(TWO_COLUMNS, 3.0, 2)
-    tension, band = fit.tensions, fit.band
+    tension, band = fit.tension, fit.band
     length = fit.test.gauge_length
     measured = 100.0 * fit.test.displacement / length
     fitted = 100.0 * (fit.start / length + fit.elasticity.strain(tension))
@@ -54,8 +54,8 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
     left.set(xlabel="strain [%]", ylabel="force [N]")
     ends = KN * band.low, KN * band.high
     right.fill_between(tension, *ends, color=BLUE, alpha=0.3, linewidth=0, label="95 % band")
-    right.plot(tension, KN * fit.elasticity.rigidity(tension), color=VERMILLION, label="EA")
-    shade_stages(right, [(stage.name, stage.low, stage.high) for stage in fit.stages])
+    right.plot(tension, KN * fit.rigidity, color=VERMILLION, label="EA")
+    shade_stages(right, fit.stages)
     right.set(xlabel="tension [N]", ylabel="tangent rigidity EA [kN]")
     right.set_ylim(0.0, 1.1 * right.get_ylim()[1])  # room for the names of the stages
     for axes in (left, right):

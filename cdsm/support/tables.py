@@ -8,7 +8,6 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
-from itertools import zip_longest
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
@@ -28,21 +27,6 @@ _NUMBERED = re.compile(r"[^\d]+(?=\d)")  # what is before the number of a name
 _TRIED = 500  # lines that tell the delimiter; titles are fewer
 
 
-def _numbers(decimal: str, thousands: str) -> tuple[re.Pattern[str], re.Pattern[str]]:
-    """Return two patterns of a number with the decimal mark ``decimal``.
-
-    Only the second allows marks ``thousands`` between groups of three digits.
-    """
-    whole = rf"(?:0|[1-9]\d{{0,2}}(?:{re.escape(thousands)}\d{{3}})*)"
-    point, power = re.escape(decimal), r"(?:[eE][-+]?\d+)?"
-    plain = rf"[-+]?(?:\d+(?:{point}\d*)?|{point}\d+){power}"
-    return re.compile(plain), re.compile(rf"[-+]?{whole}(?:{point}\d*)?{power}")
-
-
-_MARKS: Final = ",."  # of decimals; the other one separates thousands
-_NUMBERS: Final = {",": _numbers(",", "."), ".": _numbers(".", ",")}
-
-
 def csv_text(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
     """Write a header and rows as CSV."""
     out = io.StringIO()
@@ -56,7 +40,6 @@ class Table(NamedTuple):
     rows: list[tuple[int, list[str]]]  # line number and cells; the first row is the header
     comments: list[str]  # lines that begin with #
     delimiter: str  # between cells
-    marks: str = _MARKS  # those that may mark decimals, unless the delimiter is a comma
 
     @property
     def header(self) -> list[str]:
@@ -79,86 +62,26 @@ class Table(NamedTuple):
 
     def number(self, cell: str) -> float:
         """Return the number in a cell; NaN if the cell has no number."""
-        if self.delimiter != ",":
-            return next(iter(readings(cell, self.marks)), math.nan)
         try:
-            return float(cell)
+            return float(cell if self.delimiter == "," else cell.replace(",", "."))
         except ValueError:
             return math.nan
 
-    def with_decimal_mark(self, refuse: Callable[[str], NoReturn], first: int = 1) -> Table:
-        """Find the decimal mark, comma or point, and return this table with it.
-
-        The mark must fit all columns of numbers from row ``first`` on. If both marks occur, the
-        other one separates thousands. If only one occurs, it marks decimals. ``refuse`` is called,
-        which raises an error, if no mark fits, or if both fit and it is unclear which one is meant,
-        e.g. in a column of 998 and 1.004.
-        """
-        if self.delimiter == ",":
-            return self._replace(marks=".")
-        rows = self.rows[first:]
-        cells = zip_longest(*(cells for _, cells in rows), fillvalue="")
-        columns = [[cell for cell in column if cell] for column in cells]
-        columns = [column for column in columns if all(readings(each, _MARKS) for each in column)]
-        possible = [mark for mark in _MARKS if all(_is_read(each, mark) for each in columns)]
-        used = [mark for mark in _MARKS if any(mark in "".join(each) for each in columns)]
-        even = all(len({mark in cell for cell in each}) < 2 for each in columns for mark in used)
-        alone = len(possible) == 2 and len(used) < 2 and even
-        if not alone and len(possible) != 1:
-            shown = [
-                next(
-                    f"line {line}, column {at}: {cell!r}"
-                    for line, cells in rows
-                    for at, cell in enumerate(cells, 1)
-                    if mark in cell and readings(cell, _MARKS)
-                )
-                for mark in used
-            ]
-            refuse(
-                f"{' and '.join(shown)}: it is not clear whether a comma or a point marks "
-                "decimals; write all numbers with the same decimal mark and without separators of "
-                "thousands"
-            )
-        return self._replace(marks="".join(used if alone else possible) or _MARKS)
-
-
-def readings(cell: str, marks: str) -> list[float]:
-    """Return the value of a cell for each decimal mark of ``marks`` with which it is a number."""
-    return [
-        float(cell.replace(thousands, "").replace(mark, "."))
-        for mark, thousands in (",.", ".,")
-        if mark in marks and any(pattern.fullmatch(cell) for pattern in _NUMBERS[mark])
-    ]
-
-
-def _is_read(cells: list[str], mark: str) -> bool:
-    """Return whether all cells are numbers with the decimal mark ``mark``.
-
-    Either all must have separators of thousands, or none; 998 counts as both.
-    """
-    return any(all(map(pattern.fullmatch, cells)) for pattern in _NUMBERS[mark])
-
 
 def read_table(
-    path: str | os.PathLike[str],
-    delimiters: str = ",",
-    *,
-    skip: int = 0,
-    any_encoding: bool = False,
+    path: str | os.PathLike[str], delimiters: str = ",", *, any_encoding: bool = False
 ) -> Table:
-    """Read a table from a text file; the first ``skip`` lines are left out.
+    """Read a table from a text file.
 
-    The delimiter of the cells is the one of ``delimiters`` that splits most lines into two or more
-    numbers. Of several equal ones, the first that occurs in the header is taken. ``any_encoding``
-    is an argument of :func:`read_text`. FileError names a line that cannot be split into cells.
+    The delimiter of the cells is the first of ``delimiters`` that splits most lines into two or
+    more numbers. ``any_encoding`` is an argument of :func:`read_text`. FileError names a line that
+    cannot be split into cells.
     """
     text = read_text(path, any_encoding=any_encoding)
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and k > skip]
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip()]
     comments = [line for _, line in lines if line.lstrip().startswith("#")]
     lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
-    header = lines[0][1] if lines else ""
-    order = sorted(delimiters, key=lambda each: each not in header)
-    delimiter = max(order, key=lambda each: _rows_of_numbers(lines[:_TRIED], each))
+    delimiter = max(delimiters, key=lambda each: _rows_of_numbers(lines[:_TRIED], each))
     rows = [(k, _cells(path, k, line, delimiter)) for k, line in lines]
     return Table(rows, comments, delimiter)
 

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import cdsm
@@ -94,17 +93,3 @@ def test_stiffness_uses_the_table_of_the_arm(tmp_path: Path) -> None:
     given = call("stiffness", arm, "--angles", 5, "--tolerances", mine).stdout
     assert "of it rigidity" in given
     assert "of it hole radius" not in given
-
-
-def test_fit_writes_its_band(tmp_path: Path) -> None:
-    force = np.linspace(0.0, 200.0, 200)
-    noisy = force + np.random.default_rng(1).normal(0.0, 0.5, 200)
-    test, band = tmp_path / "test.csv", tmp_path / "band.toml"
-    rows = "\n".join(f"{1e3 * 0.5 * f / 48e3},{g}" for f, g in zip(force, noisy, strict=True))
-    test.write_text(f"displacement [mm],force [N]\n{rows}\n")
-    told = call("fit", test, "--gauge-length", 500, "--tolerances", band)
-    assert told.exit_code == 0, told.output
-    (tolerance,) = cdsm.Tolerances.read(band).given["rigidity"]
-    data = cdsm.read_tensile_csv(test, gauge_length=0.5)
-    fit = cdsm.fit_tensile_test(data.displacement, data.force, 0.5)
-    assert tolerance == fit.tolerance()

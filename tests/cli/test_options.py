@@ -22,7 +22,6 @@ _FILES = [
     ("sweep", "--out", ".csv"),
     ("map", "--out", ".png"),
     ("fit", "--out", ".toml"),
-    ("fit", "--tolerances", ".toml"),
     ("identify", "--figure", ".png"),
     ("export", "--out", ".xml"),
     ("export", "--cables-out", ".toml"),
@@ -73,11 +72,6 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(
             ("export", "a.toml", "--wire", "b.toml", "--cables-out", "b.toml"),
             "--cables-out",
             "--wire",
-        ),
-        (
-            ("fit", "t.csv", "--out", "new.toml", "--tolerances", "new.toml"),
-            "--out",
-            "--tolerances",
         ),
         (
             ("plan", "a.toml", "--path", "t.csv", "--direction", "z", "--out", "t.csv"),

@@ -27,7 +27,7 @@ def test_columns_are_numbers_whatever_separates_them(
 ) -> None:
     path = tmp_path / "table.csv"
     path.write_text("# a remark\n" + text, encoding="utf-8")
-    table = read_table(path, "\t;,")
+    table = read_table(path, ";\t,")
     assert table.delimiter == delimiter
     assert table.header == ["a", "b"]
     assert table.comments == ["# a remark"]

@@ -1,0 +1,220 @@
+"""Choose the loading branch of a tensile test, and fit a curve EA(F) to it.
+
+ln EA is a spline of the tension, on a scale that is half logarithmic and half linear; the strain is
+the integral of 1/EA. The penalty on the second differences of ln EA is the one of the largest
+restricted likelihood (REML; S. N. Wood, Generalized Additive Models, 2017, section 6.2).
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple, NoReturn
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import BSpline
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import isotonic_regression, least_squares, minimize_scalar
+from scipy.signal import find_peaks
+
+from cdsm.errors import InvalidInput
+from cdsm.support.values import Array
+
+FEWEST: Final = 8  # points of a fit; fewer show no bend
+_FALL = 0.1  # a fall of the force by this share of its range ends a loading branch
+_REACHED = 0.95  # share of the largest force that the fitted branch reaches
+_SPLINES, _GRID, _MOST = 36, 600, 400  # splines, tensions of the grid, points (more are averaged)
+_JUMP = 10.0  # EA over the steepest measured chord; beyond it, the curve has overshot a jump
+_ROUGHER = 100.0  # smoothing of the fit over that of the curve for the band
+
+
+def refuse(problem: str) -> NoReturn:
+    """Raise InvalidInput: the test cannot be fitted."""
+    raise InvalidInput("tensile test", problem)
+
+
+class Loading(NamedTuple):
+    """Points of the branch that is fitted, in the order recorded."""
+
+    strain: Array  # (n,) [-]
+    force: Array  # (n,) [N]
+    noise: float  # of a force, one σ [N]
+    notes: tuple[str, ...]  # what was left out
+
+
+def loading(strain: Array, force: Array, between: tuple[float, float]) -> Loading:
+    """Choose the last rise to the largest force; leave out slack, lone points and what follows.
+
+    Nothing is sorted or made to rise within it: noise of the displacement would then bias EA.
+    """
+    if len(force) < FEWEST or not np.ptp(strain) or not np.ptp(force):
+        refuse(
+            f"{len(force)} points given; at least {FEWEST} are needed, of which displacement and "
+            "force change."
+        )
+    noise, reach = _noise_and_reach(force)
+    lone = _lone(force) | _lone(strain)
+    strain, force = strain[~lone], force[~lone]
+    if (lowest := force.min()) < -max(6.0 * noise, 5e-3 * reach):
+        refuse(f"{lowest:.4g} N is compression. Tare the load cell, or change the sign.")
+    padded = np.pad(force, 1, constant_values=-np.inf)
+    peaks = find_peaks(padded, prominence=max(_FALL * reach, 8.0 * noise))[0] - 1
+    top = _REACHED * min(float(force.max()), between[1])
+    rise = int(np.flatnonzero(force[peaks] >= top)[-1])
+    first, last, after = 0, peaks[rise] + 1, len(force) - peaks[rise] - 1
+    if rise:
+        first = peaks[rise - 1] + int(force[peaks[rise - 1] : last].argmin())
+    strain, force = strain[first:last], force[first:last]
+    low = force <= force[: max(3, len(force) // 100)].min() + 4.0 * noise
+    slack = int(np.flatnonzero(low)[-1]) if force[0] <= 8.0 * noise and low.sum() > 2 else 0
+    strain, force = strain[slack:], force[slack:]
+    inside = (force >= between[0]) & (force <= between[1])
+    strain, force = strain[inside], force[inside]
+    in_order = force[np.argsort(strain, kind="stable")]
+    rising = isotonic_regression(in_order).x if len(force) else in_order
+    if len(force) < FEWEST or not np.std(in_order - rising) < 0.1 * np.ptp(rising):
+        refuse(
+            f"the force does not rise with the displacement in {len(force)} points of loading. "
+            f"Give {FEWEST} or more in the order recorded; check that the columns belong together."
+        )
+    chord = np.ptp(force) / np.ptp(strain)
+    if np.ptp(strain) > 1.0 or not 1.0 < chord < 1e9:
+        refuse(
+            f"strains to {np.ptp(strain):.3g} and a rigidity of about {chord:.3g} N. Check the "
+            "units of displacement, force and gauge length."
+        )
+    left_out = {
+        "points far from their neighbours left out": lone.sum(),
+        f"points before the last of {len(peaks)} loading branches left out": first,
+        "points after the largest force left out": after,
+        "points before the first load left out": slack,
+        f"points outside {between[0]:g} to {between[1]:g} N left out": (~inside).sum(),
+    }
+    notes = (f"{what}: {count}" for what, count in left_out.items() if count)
+    return Loading(strain, force, noise, tuple(notes))
+
+
+def _noise_and_reach(values: Array) -> tuple[float, float]:
+    """Return one σ of the noise of values in a row, and their range without extremes."""
+    noise = 1.4826 * np.median(abs(np.diff(values, 2))) / np.sqrt(6.0)
+    return float(noise), float(np.ptp(np.quantile(values, (0.02, 0.98))))
+
+
+def _lone(values: Array) -> NDArray[np.bool_]:
+    """Return whether each value is alone and far from its neighbours."""
+    noise, reach = _noise_and_reach(values)
+    least = max(8.0 * noise, 5e-3 * reach, 2.0 * np.median(abs(np.diff(values))))
+    middle = np.median(sliding_window_view(np.pad(values, 1, mode="edge"), 3), axis=1)
+    return np.asarray(abs(values - middle) > least)
+
+
+class Curve(NamedTuple):
+    """The fitted curve on a grid of g tensions."""
+
+    tension: Array  # (g,) [N]
+    strain: Array  # (g,) [-]
+    level: Array  # ln EA (g,)
+    rough: Array  # ln EA of a rougher curve, whose bias is far below its scatter (g,)
+    deviation: Array  # standard deviation of ``rough`` (g,)
+    correlation: float  # of neighbouring residuals
+
+
+def _grid(force: Array, noise: float) -> tuple[Array, Array]:
+    """Return a grid of tensions (g,) [N] from the first load on, and the splines there (g, k)."""
+    low, high = max(float(force.min()) - 3.0 * noise, 0.0), float(force.max())
+    corner = max(low, 8.0 * noise, 5e-3 * high)
+    top = np.log1p((high - low) / corner)
+    fine = low + corner * np.expm1(np.linspace(0.0, top, 8 * _GRID))
+    place = (np.log1p((fine - low) / corner) / top + (fine - low) / (high - low)) / 2.0
+    t, splines = np.linspace(0.0, 1.0, _GRID), min(_SPLINES, 4 + len(force) // 3)
+    knots = np.arange(-3, splines + 1) / (splines - 3)
+    rows = BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray()
+    return np.interp(t, place, fine), rows
+
+
+def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
+    """Fit a curve to points with ``noise`` [N] in their forces, and choose its smoothing.
+
+    The parameters x are the k coefficients of ln EA and the strain at the stiff end, over the range
+    of the strain.
+    """
+    groups = np.array_split(np.arange(len(force)), min(len(force), _MOST))
+    strain, force = (np.array([a[group].mean() for group in groups]) for a in (strain, force))
+    count = np.array([len(group) for group in groups])
+    weight = np.sqrt(count / count.mean())
+    tension, splines = _grid(force, noise)
+    (n, k), span, reach = (len(force), splines.shape[1]), np.ptp(strain), np.ptp(force)
+    bends = np.hstack([np.diff(np.eye(k), 2, axis=0), np.zeros((k - 2, 1))])
+    upper = np.argsort(strain)[n // 2 :]
+    chord = np.polyfit(strain[upper], force[upper], 1)[0]
+    start = np.log(max(chord, 1e-3 * reach / span))
+
+    def curve(x: Array) -> tuple[Array, Array]:
+        """Return EA (g,) and strain (g,); a step too far does no harm."""
+        EA = np.exp(np.clip(splines @ x[:-1], start - 16.0, start + 6.0))
+        total = cumulative_trapezoid(1.0 / EA, tension, initial=0.0)
+        return EA, x[-1] * span + total - total[-1]
+
+    def error(x: Array) -> Array:
+        """Return weighted errors (n,) [N]; the curve is straight beyond its ends."""
+        EA, grid = curve(x)
+        beyond = np.minimum(strain - grid[0], 0.0) * EA[0]
+        beyond += np.maximum(strain - grid[-1], 0.0) * EA[-1]
+        found = np.interp(strain, grid, tension) + beyond
+        return np.asarray(weight * np.clip(found - force, -1e9, 1e9))
+
+    def slope(x: Array) -> Array:
+        EA, grid = curve(x)
+        by = cumulative_trapezoid(splines / EA[:, None], tension, axis=0, initial=0.0)
+        rows = EA[:, None] * np.hstack([by - by[-1], np.full((len(EA), 1), -span)])
+        i = np.clip(np.searchsorted(grid, strain) - 1, 0, len(grid) - 2)
+        s = np.clip((strain - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)[:, None]
+        return np.asarray(weight[:, None] * ((1.0 - s) * rows[i] + s * rows[i + 1]))
+
+    def solve(power: float, x: Array) -> tuple[Array, float, Array]:
+        """Return parameters, −2 log likelihood and covariance for a smoothing of 10^power units."""
+        root = max(noise, 1e-4 * reach) * 10.0 ** (power / 2.0) * bends
+        x = least_squares(
+            lambda x: np.append(error(x), root @ x),
+            x,
+            lambda x: np.vstack([slope(x), root]),
+            method="lm",
+            max_nfev=80,
+            xtol=1e-6,
+            ftol=1e-6,
+        ).x
+        J, r = slope(x), error(x)
+        normal = J.T @ J + root.T @ root
+        scale = np.sqrt(np.diag(normal))  # strain and ln EA are orders apart
+        factor = cho_factor(normal / np.outer(scale, scale) + 1e-11 * np.eye(k + 1))
+        inverse = cho_solve(factor, np.eye(k + 1)) / np.outer(scale, scale)
+        left = r @ r + n * (1e-6 * reach) ** 2
+        score = (n - 3) * np.log(left + np.sum((root @ x) ** 2))
+        score += 2.0 * np.log(np.diag(factor[0]) * scale).sum() - (k - 2) * np.log(10.0) * power
+        variance = left / max(n - np.sum((J @ inverse) * J), 1.0)
+        return x, float(score), variance * inverse
+
+    x, scores = np.append(np.full(k, start), strain.max() / span), {}
+    for power in (6, 4, 2, 0, -2, -4):  # from a straight ln EA on: each start is near
+        x, score, _ = solve(power, x)
+        scores[score] = power, x
+    power, x = scores[min(scores)]
+    around = {"bounds": (power - 2, power + 2), "method": "bounded", "options": {"xatol": 0.2}}
+    best = minimize_scalar(lambda p: solve(p, x)[1], **around).x
+    x = solve(best, x)[0]
+    rough, _, covariance = solve(best - np.log10(_ROUGHER), x)
+    variance = np.sum((splines @ covariance[:-1, :-1]) * splines, axis=1)
+    (EA, grid), r = curve(x), error(x)
+    order, step = np.argsort(strain, kind="stable"), max(1, n // 50)
+    rise, along = (a[order[step:]] - a[order[:-step]] for a in (force, strain))
+    if EA.max() > _JUMP * np.max(rise / np.maximum(along, 1e-4 * span)):
+        refuse(
+            f"the force is discontinuous near {tension[EA.argmax()]:.4g} N, and no smooth curve "
+            "follows it. Look for a wire gripped anew, or units that change midway."
+        )
+    correlation = float(r[1:] @ r[:-1] / (r @ r or 1.0))
+    if np.std(r) < 1e-4 * reach:  # what is left is no noise
+        correlation = 0.0
+    level = splines @ rough[:-1]
+    return Curve(tension, grid, np.log(EA), level, np.sqrt(variance), correlation)
