@@ -49,7 +49,7 @@ def checked_parts(
     """Check the arguments of :class:`~cdsm.Manipulator`; ``urdf`` has been checked before."""
     one_of("original_length", original_length, get_args(OriginalLength))
     g = tuple(gravity_vector("gravity", gravity).tolist())
-    names = None if joint_names is None else tuple(joint_names)
+    names = None if joint_names is None else sequence_of("joint_names", joint_names, str)
     held = checked_cables(cables)
     return ArmParts(geometry, urdf, held, tip, g, original_length, names, tolerances)
 

@@ -389,19 +389,18 @@ class Manipulator(Printed):
             free = f"{plural(len(self.geometry.joints), 'joint')} ({free})"
         return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.6g} m long"
 
-    def _build(self, parts: ArmParts, robot: Manipulator | None = None) -> Self:
-        """Set all attributes; ``robot`` is an arm with the same rigid bodies, which are kept."""
-        self._body = body = (
-            RigidBody(parts.urdf, parts.tip, np.array(parts.gravity), parts.joint_names)
-            if robot is None
-            else robot._body
-        )
-        self._parts = parts._replace(joint_names=body.joint_names)
+    def _build(
+        self, parts: ArmParts, body: RigidBody | None = None, told: Sequence[str] = ()
+    ) -> Self:
+        """Set all attributes; the user has seen the doubts ``told`` of another arm."""
+        if body is None:
+            body = RigidBody(parts.urdf, parts.tip, np.array(parts.gravity), parts.joint_names)
+        self._body, self._parts = body, parts._replace(joint_names=body.joint_names)
         self._routing = Routing.of(body, parts.cables)
         self._laws = CableLaws(parts.cables, parts.original_length)
         self._doubts = doubts(parts, body)
         for doubt in self._doubts:
-            if robot is None or doubt not in robot._doubts:  # which the user has seen
+            if doubt not in told:
                 warn(f"{self.name}: {doubt}")
         return self
 
@@ -447,7 +446,8 @@ class Manipulator(Printed):
     def with_gravity(self, gravity: Direction) -> Self:
         """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis."""
         g = tuple(gravity_vector("gravity", gravity).tolist())
-        return type(self).__new__(type(self))._build(self._parts._replace(gravity=g))
+        parts = self._parts._replace(gravity=g)
+        return type(self).__new__(type(self))._build(parts, told=self._doubts)
 
     def _with_laws(self, laws: Sequence[Elasticity]) -> Self:
         """Return the same arm with other laws, one per cable; faster, since the rest is kept."""
@@ -461,4 +461,5 @@ class Manipulator(Printed):
 
     def _replace(self, **changes: Any) -> Self:
         """Return the same robot with other parts that do not concern its rigid bodies."""
-        return type(self).__new__(type(self))._build(self._parts._replace(**changes), self)
+        parts = self._parts._replace(**changes)
+        return type(self).__new__(type(self))._build(parts, self._body, self._doubts)

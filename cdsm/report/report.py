@@ -14,6 +14,7 @@ from cdsm.errors import CdsmError, SingularStiffness, listed
 from cdsm.report import checks
 from cdsm.report.checks import Comparison
 from cdsm.report.text import printed
+from cdsm.stiffness_matrix.prints import missing_leads
 from cdsm.support.format import plain
 from cdsm.support.result import Result, quantity, unit
 
@@ -76,7 +77,7 @@ class Report(Result):
         """Return the report and :meth:`Stiffness.to_dict` in SI for JSON, units in the keys."""
         said = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
         checked = {"comparisons": [asdict(each) for each in self.comparisons]}
-        return plain(said | checked) | super().to_dict() | self.stiffness.to_dict()
+        return self.stiffness.to_dict() | plain(said | checked) | super().to_dict()
 
     def to_html(self, about: str = "") -> str:
         """Return the report as a self-contained HTML page; ``about`` is text below the title."""
@@ -125,7 +126,7 @@ def _faults(report: Report) -> Iterator[str]:
 def _notes(report: Report) -> Iterator[str]:
     """Yield what a user of the stiffness should know; none of it means that it is wrong."""
     K, pose, arm = report.stiffness, report.stiffness.posture, report.stiffness.posture.arm
-    yield from pose.remarks
+    yield from (*pose.remarks, *missing_leads(K))
     if report.bound_violation is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"
         yield f"the tensions {came}, not distributed: they need not be the least."

@@ -403,6 +403,7 @@ def limit_memory() -> None:
 def main(where: str, largest: str, *names: str) -> None:
     """Read all attacks on some readers, and tell what became of each as a line of JSON."""
     warnings.simplefilter("error")
+    warnings.simplefilter("ignore", cdsm.CdsmWarning)
     path = Path(where)
     signal.signal(signal.SIGPROF, _too_long)
     limit_memory()

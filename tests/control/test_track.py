@@ -288,7 +288,7 @@ def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() 
     worst = {}
     for law in ("feedforward", "tension", "stiffness"):
         run = cdsm.track(plan, law, plant, sensors, payload=0.2, **BOUNDS)
-        worst[law] = abs(run.stiffness_error[::6]).max()
+        worst[law] = abs(run.stiffness_error[1:]).max()  # the first step does not know the wire
         assert run.outcome == "completed"
         assert (run.commanded_tension >= 10.0).all()
         assert (run.commanded_tension <= 250.0).all()

@@ -142,8 +142,9 @@ def test_a_file_that_may_not_be_read_is_named(folder: Path) -> None:
 # --- what could crash Pinocchio -------------------------------------------------------------
 
 _CRASH = """
-import sys, resource
+import sys, resource, warnings
 import cdsm
+warnings.simplefilter("ignore", cdsm.CdsmWarning)
 from tests.support.foreign import joint_element, link_element
 
 def chain(count, kind):

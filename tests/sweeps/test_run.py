@@ -367,7 +367,7 @@ def renamed(joint: str) -> cdsm.Manipulator:
         *((name, "is a name that the Dataset has already") for name in ("along", "tip_position")),
         *((name, "is a name that the Dataset has already") for name in ("status", "direction")),
         *((name, "is a name that the Dataset has already") for name in ("force", "axis")),
-        *((name, "is no name of a variable") for name in ("a/b", "a\\b", "(y)", ".y", "y\t")),
+        *((name, "is no name of a variable") for name in ("a/b", "a\\b", "(y)", ".y", "y ")),
     ],
 )
 def test_a_joint_whose_name_cannot_label_a_grid_is_refused(

@@ -101,8 +101,8 @@ def test_a_draw_without_errors_is_the_arm_itself(kind: str) -> None:
     drawn = DrawnArms(K, {"joint_angle": np.zeros((2, K.posture.arm.nv))}).evaluate()
     # EA + F or EA (1 + ε), rounded
     np.testing.assert_allclose(drawn.joint[1], K.joint, rtol=0.0, atol=1e-14 * abs(K.joint).max())
-    np.testing.assert_array_equal(drawn.length_jacobian[1], K.posture.length_jacobian)
-    np.testing.assert_array_equal(drawn.tip[1], K.posture.tip[:3, 3])
+    np.testing.assert_allclose(drawn.length_jacobian[1], K.posture.length_jacobian, atol=1e-15)
+    np.testing.assert_allclose(drawn.tip[1], K.posture.tip[:3, 3], rtol=1e-14, atol=1e-15)
     torque = K.posture.jacobian.T @ K.wrench - K.posture.gravity_torque
     np.testing.assert_allclose(drawn.torque[1], torque, rtol=1e-12, atol=1e-14)
 
