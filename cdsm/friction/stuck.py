@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.friction.sticking import Flags, tension_gradient
 from cdsm.posture import Posture, load_stiffness
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
-from cdsm.stiffness_matrix.sticking import Flags, tension_gradient
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
