@@ -94,8 +94,8 @@ class MissingWire(CdsmError, LookupError):
         self.path, self.cables = str(path), tuple(cables)
         whose = f"the cables {listed(self.cables)}" if self.cables else "its cables"
         super().__init__(
-            f"{path}: has no wire for {whose}. Give wire= (--wire on the command line), or write it "
-            'at the top of an ARM.toml: wire = "1x19-1.2mm", or wire = 48e3, a constant EA in N.'
+            f"{path}: has no wire for {whose}. Give wire= (--wire of a command), or write it at the "
+            'top of an ARM.toml: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
         )
 
 
@@ -257,9 +257,7 @@ class UnreachableStiffness(CdsmError):
             remedy = f", but the nearest found is {' and '.join(near)} N/mm. Raise starts=, ask for"
             remedy += " one of these, or change the bounds or the posture."
         else:
-            remedy = (
-                ". Ask for one within it, or change the bounds, the load, the posture or cables."
-            )
+            remedy = ". Ask for one within it, or change the bounds, load, posture or cables."
             if low <= 1e3 * target <= high:
                 remedy += " It looks as if the target is in N/mm: give it in N/m."
         along = f"({', '.join(f'{each:.4g}' for each in direction)})"
