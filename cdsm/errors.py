@@ -94,7 +94,7 @@ class MissingWire(CdsmError, LookupError):
         self.path, self.cables = str(path), tuple(cables)
         whose = f"the cables {listed(self.cables)}" if self.cables else "its cables"
         super().__init__(
-            f"{path}: has no wire for {whose}. Give wire= (--wire of a command), or write it at the "
+            f"{path}: has no wire for {whose}. Give wire= (--wire, of commands), or write at the "
             'top of an ARM.toml: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
         )
 
