@@ -78,8 +78,7 @@ class MissingExtra(CdsmError, ImportError):
     """A ``package`` that is not installed; ``extra`` of ``cdsm-stiffness`` installs it."""
 
     def __init__(self, package: str, extra: str) -> None:
-        run = f"run pip install -e '.[{extra}]' in the folder of cdsm, its clone."
-        super().__init__(f"{package} is not installed, which this needs; {run}")
+        super().__init__(f"{package} is missing; run pip install -e '.[{extra}]' in cdsm's clone.")
         self.package, self.extra = package, extra
 
 
@@ -206,8 +205,8 @@ class SolverError(CdsmError):
 class SingularStiffness(CdsmError, ArithmeticError):
     """A stiffness or compliance matrix that does not exist at this posture.
 
-    ``direction`` is a unit vector: the joint motion (nv,) with the least stiffness, or along which
-    the tip cannot move (3,), base axes.
+    ``direction`` is the joint motion (nv,) with the least stiffness, or the direction (3,) in base
+    axes in which the tip cannot move; of unit length.
     """
 
     def __init__(self, problem: str, direction: Array) -> None:
@@ -254,8 +253,7 @@ class UnreachableStiffness(CdsmError):
         values = (target, low, high, *self.nearest)
         wanted, least, most, *near = _distinct([value / 1e3 for value in values])
         if low <= target <= high:
-            remedy = f", but the nearest found is {' and '.join(near)} N/mm. Raise starts=, ask for"
-            remedy += " one of these, or change the bounds or the posture."
+            remedy = f", but only {' and '.join(near)} N/mm found. Raise starts=, ask for these."
         else:
             remedy = ". Ask for one within it, or change the bounds, load, posture or cables."
             if low <= 1e3 * target <= high:

@@ -65,10 +65,7 @@ class Stiffness(CartesianReadings):
 
     @property
     def free_lengths(self) -> Array:
-        """Original lengths l_0 (C,) [m] of the wires; see :class:`Cable`.
-
-        For a force-controlled cable it is L. Negative if the spring stretches by more than L.
-        """
+        """Original lengths l_0 (C,) [m] of the wires, see :class:`Cable`; L if force-controlled."""
         laws, L = self.posture.arm._laws, self.posture.cable_lengths
         l_0 = self.free_length
         return laws.original_lengths(L, self.tension) if l_0 is None else l_0
@@ -141,10 +138,7 @@ class Stiffness(CartesianReadings):
         return () if self.is_stable else (verdict(self), *map(str, self.remedies))
 
     def report(self) -> Report:
-        """Check this stiffness: is it right, balanced and stable, and how to read it.
-
-        The report lists all problems. InvalidInput if the stiffness is not frictionless.
-        """
+        """Check this frictionless stiffness: is it right, balanced, stable, and how to read it."""
         from cdsm.report import report_on  # the layer above
 
         return report_on(self.require_frictionless())
