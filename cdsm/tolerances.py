@@ -16,18 +16,9 @@ from cdsm.support.validation import one_of, scalar, sequence_of, text
 
 Distribution = Literal["normal", "uniform"]
 
-EVERY: Final = "*"
-"""Pattern of the names of all inputs."""
-
-COMMON: Final = ("rigidity", "friction")
-"""Sources whose inputs share one error by default: wires of one spool, holes of one material."""
-
-_LARGEST = {
-    **dict.fromkeys(("rigidity", "spring"), (0.5, "It is relative.")),
-    **dict.fromkeys(("joint_angle", "hole_angle"), (0.3, "It is in rad.")),
-    "friction": (0.5, "It is a coefficient."),
-}
-"""Largest allowed standard uncertainty of a source, and its unit in words."""
+EVERY: Final = "*"  # pattern of the names of all inputs
+_COMMON = ("rigidity", "friction")  # one error for all by default: one spool, one material
+_LARGEST = {"rigidity": 0.5, "spring": 0.5, "friction": 0.5, "joint_angle": 0.3, "hole_angle": 0.3}
 
 
 @final
@@ -38,14 +29,11 @@ class Tolerance:
     Attributes:
         standard: Standard uncertainty u (one sigma) of each input [rad], [m], [N], [kg] or [-].
         distribution: ``"normal"`` or ``"uniform"``. Only Monte Carlo needs it.
-        correlation: Correlation ρ of every two inputs, from 0 (independent errors) to 1 (one error
-            for all) [-].
+        correlation: Correlation ρ [-] of every two inputs, from 0 (independent errors) to 1 (one
+            error for all).
         of: Names of the inputs that have this tolerance, as a pattern: ``"cable1_*"``.
 
-    Raises:
-        InvalidInput: ``standard`` is negative or not a number, ``correlation`` is not between 0
-            and 1, or ``of`` is not a text.
-        UnknownName: ``distribution`` is unknown.
+    Raises InvalidInput, or UnknownName for an unknown ``distribution``.
     """
 
     standard: float
@@ -65,11 +53,7 @@ class Tolerance:
 
     @classmethod
     def within(cls, half_width: float, *, correlation: float = 0.0, of: str = EVERY) -> Self:
-        """Return the tolerance of inputs that are surely within ±a of their value; u = a/√3.
-
-        The distribution is uniform (JCGM 100, 4.3.7); a is ``half_width``, in the unit of the
-        inputs. The other arguments and all errors are those of :class:`Tolerance`.
-        """
+        """Return the tolerance of values surely within ±a: uniform, u = a/√3 (JCGM 100, 4.3.7)."""
         standard = scalar("half_width", half_width) / math.sqrt(3.0)
         return cls(standard, distribution="uniform", correlation=correlation, of=of)
 
@@ -83,16 +67,14 @@ OneOrMore = float | Tolerance | Sequence[Tolerance]
 class Tolerances:
     """Uncertainties of the dimensions of an arm and of the values measured on it.
 
-    A source of uncertainty is a standard uncertainty (one sigma) as a number, a
-    :class:`Tolerance`, or a list of tolerances, each for the inputs that its ``of`` names. It is
-    kept as a tuple of those that are not zero. A number for ``rigidity`` or ``friction`` has the
-    correlation 1: all cables are of one spool, all disks of one material. Other numbers have the
-    correlation 0.
+    A source is a standard uncertainty (one sigma) as a number, a :class:`Tolerance`, or a list of
+    tolerances, each for the inputs that its ``of`` names. It is kept as a tuple of those that are
+    not zero. A number for ``rigidity`` or ``friction`` has the correlation 1, since cables are of
+    one spool and disks of one material; other numbers have the correlation 0.
 
     Attributes:
         rigidity: EA of the law of each cable; relative [-].
-        spring: Stiffness k_series of the spring in series with each cable, such as its anchor or
-            its drive; relative [-].
+        spring: k_series in series with each cable, such as its anchor or drive; relative [-].
         joint_angle: Each joint angle [rad]; [m] for prismatic joints.
         tension: Each measured cable tension [N].
         lead: Straight length of each cable before the base disk [m].
@@ -102,11 +84,9 @@ class Tolerances:
         link_length: Length of each link [m].
         link_mass: Mass of each link [kg].
         friction: Coefficient μ of each hole with friction [-].
-        site: Each coordinate of each cable site [m], the only tolerance of holes if the arm is
-            from a URDF.
+        site: Each coordinate of each cable site [m]; for an arm from a URDF, instead of its holes.
 
-    Raises:
-        InvalidInput: A tolerance is negative, not a number, or larger than a plausible error.
+    Raises InvalidInput if one is negative, not a number, or larger than a plausible error.
     """
 
     rigidity: OneOrMore = 0.0
@@ -123,8 +103,7 @@ class Tolerances:
     site: OneOrMore = 0.0
 
     def __post_init__(self) -> None:
-        for name in SOURCES:
-            self.__dict__[name] = _checked(name, getattr(self, name))
+        self.__dict__.update({name: _checked(name, getattr(self, name)) for name in SOURCES})
 
     @property
     def given(self) -> Mapping[str, tuple[Tolerance, ...]]:
@@ -140,11 +119,7 @@ class Tolerances:
 
         Each key is a source. Its value is a standard uncertainty, or a table with ``standard`` or
         ``within`` (a half-width), ``distribution``, ``correlation`` and ``of``, or a list of such
-        tables.
-
-        Raises:
-            FileError: The file cannot be read, is not TOML, or has no tolerances. Every
-                fault is listed.
+        tables. FileError, with every fault, if there are none that can be read.
         """
         try:
             table = read_toml(read_text(path))
@@ -155,35 +130,27 @@ class Tolerances:
             raise FileError(path, f"does not hold tolerances:{faults}") from None
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write a TOML file from which :meth:`read` builds equal tolerances; return its path.
-
-        Raises:
-            FileError: The file cannot be written; an existing file stays unchanged.
-        """
+        """Write a TOML file from which :meth:`read` builds equal tolerances, or FileError."""
         head = "# Tolerances of an arm, one sigma: rad, m, N, kg; rigidity and spring relative.\n"
         return write_text(path, "\n".join([head, *tolerance_lines(self)]) + "\n")
 
 
 SOURCES: Final = tuple(field.name for field in fields(Tolerances))
-"""Names of all sources of uncertainty."""
 
 
-def _checked(source: str, value: object) -> tuple[Tolerance, ...]:
+def _checked(source: str, value: Any) -> tuple[Tolerance, ...]:
     """Return the tolerances of a source that are not zero; InvalidInput names the source."""
     try:
-        if isinstance(value, (list, tuple)):
-            given = sequence_of("tolerances", value, Tolerance)
-        elif isinstance(value, Tolerance):
-            given = (value,)
-        else:
-            given = (Tolerance(value, correlation=float(source in COMMON)),)  # type: ignore[arg-type]
+        if not isinstance(value, (list, tuple, Tolerance)):
+            value = Tolerance(value, correlation=float(source in _COMMON))
+        each = [value] if isinstance(value, Tolerance) else value
+        given = sequence_of("tolerances", each, Tolerance)
     except InvalidInput as error:
         raise InvalidInput(source, str(error).removeprefix("standard: ")) from None
-    largest, unit = _LARGEST.get(source, (math.inf, ""))
-    for u in (each.standard for each in given):
-        if u > largest:
-            said = f"a standard uncertainty of {u:g} given; up to {largest:g} is a tolerance."
-            raise InvalidInput(source, f"{said} {unit}")
+    u, largest = max([0.0, *(one.standard for one in given)]), _LARGEST.get(source, math.inf)
+    if u > largest:
+        said = f"a standard uncertainty of {u:g} given; up to {largest:g} is a tolerance"
+        raise InvalidInput(source, f"{said}. EA and springs are relative, angles in rad.")
     return tuple(each for each in given if each.standard)
 
 
@@ -198,15 +165,14 @@ class _Entry:
     of: str = EVERY
 
     def built(self, source: str) -> Tolerance:
-        rho = float(source in COMMON) if self.correlation is None else self.correlation
-        if (self.standard is None) == (self.within is None):
+        kind = self.distribution or ("normal" if self.within is None else "uniform")
+        u = self.standard if self.within is None else self.within / math.sqrt(3.0)
+        if u is None or None not in (self.standard, self.within):
             raise InvalidInput(source, "give one of standard and within.")
-        if self.standard is not None:
-            kind = self.distribution or "normal"
-            return Tolerance(self.standard, distribution=kind, correlation=rho, of=self.of)
-        if self.distribution == "normal" or self.within is None:
+        if self.within is not None and kind == "normal":
             raise InvalidInput(source, "within is uniform; give standard with normal.")
-        return Tolerance.within(self.within, correlation=rho, of=self.of)
+        rho = float(source in _COMMON) if self.correlation is None else self.correlation
+        return Tolerance(u, distribution=kind, correlation=rho, of=self.of)
 
 
 def from_table(table: Mapping[str, Any]) -> Tolerances:
@@ -216,7 +182,7 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
         try:
             one_of("source of uncertainty", name, SOURCES)
             if isinstance(value, (dict, list)):
-                tables = value if isinstance(value, list) else [value]
+                tables = [value] if isinstance(value, dict) else value
                 value = [parse(_Entry, each).built(name) for each in tables]
             found[name] = _checked(name, value)
         except GeometryError as error:
@@ -230,16 +196,10 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
 
 def tolerance_lines(tolerances: Tolerances) -> list[str]:
     """Return one TOML line for each source of ``tolerances`` that is not zero."""
-    tables = {name: [*map(_table, parts)] for name, parts in tolerances.given.items()}
-    return [
-        f"{name} = {one}" if not more else f"{name} = [{', '.join([one, *more])}]"
-        for name, (one, *more) in tables.items()
-    ]
+    tables = {name: ", ".join(map(_table, parts)) for name, parts in tolerances.given.items()}
+    return [f"{name} = [{entries}]" for name, entries in tables.items()]
 
 
 def _table(value: Tolerance) -> str:
-    """Return a tolerance as a TOML table."""
-    values: dict[str, object] = {"standard": value.standard, "correlation": value.correlation}
-    values |= {"distribution": value.distribution} if value.distribution != "normal" else {}
-    values |= {"of": value.of} if value.of != EVERY else {}
-    return f"{{{', '.join(f'{key} = {toml_value(x)}' for key, x in values.items())}}}"
+    shown = {name: x for name, x in vars(value).items() if x not in ("normal", EVERY)}
+    return f"{{{', '.join(f'{name} = {toml_value(x)}' for name, x in shown.items())}}}"

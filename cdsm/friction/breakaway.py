@@ -9,10 +9,10 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.friction.sticking import first_order_loads, holding
 from cdsm.friction.stuck import stuck_stiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.stiffness_matrix.sticking import first_order_loads, holding
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, unit

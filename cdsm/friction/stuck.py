@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.friction.sticking import Flags, tension_gradient
 from cdsm.posture import Posture, load_stiffness
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
-from cdsm.stiffness_matrix.sticking import Flags, tension_gradient
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
@@ -54,7 +54,6 @@ def assemble_segments(
     if friction == "stuck":
         passive = (passive + passive.T) / 2.0  # symmetric but for rounding
     load = load_stiffness(pose.jacobian, wrench, pose.arm._body.tip_joints)
-    terms = active, passive, pose.gravity_stiffness, load
     F = tension[segments.chains.start[:-1]]
     return Stiffness(
         posture=pose,
@@ -66,7 +65,6 @@ def assemble_segments(
         gravity=pose.gravity_stiffness,
         load=frozen(load),
         joint=frozen(active + passive + pose.gravity_stiffness + load),
-        _parts=frozen(np.sum(np.abs(terms), axis=0)),
         distribution=distribution,
         friction=friction,
         segment_tension=frozen(tension),

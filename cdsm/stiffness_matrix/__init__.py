@@ -1,11 +1,7 @@
 """Stiffness of an arm at a posture under given cable tensions.
 
-    K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ                          (Eq. 16)
-          active   passive       gravity   load
-
-``assembly`` computes K_θ, ``value`` is the result, ``cartesian`` the stiffness at its tip,
-``shares`` the contribution of each cable, ``instability`` what would make an unstable arm stable,
-``prints`` its text, and ``sticking`` the tensions of cables that stick in holes.
+K_θ = H_L·F + J_Lᵀ K_L J_L + ∂g/∂θ − ∂(J_Xᵀ W)/∂θ                          (Eq. 16)
+      active   passive       gravity   load
 """
 
 from cdsm.stiffness_matrix.assembly import assemble as assemble

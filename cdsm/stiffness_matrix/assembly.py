@@ -22,13 +22,12 @@ def stiffness(
     Args:
         pose: The posture.
         tension: The result of :func:`~cdsm.distribute_tension` at this posture, or your own
-            tensions (C,) [N], not negative, balanced or not; see :attr:`Stiffness.residual`.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; default zero. Only
-            for your own tensions, since a :class:`~cdsm.Tension` has its own.
+            tensions (C,) [N], balanced or not; see :attr:`Stiffness.residual`.
+        wrench: W (6,) at ``tool0`` in base axes, with your own tensions only: force [N], then
+            moment [N m]; default zero.
 
     Raises:
-        InvalidInput: A shape is wrong, a tension negative or of another posture or arm, or a wrench
-            is given with a ``Tension``.
+        InvalidInput: A shape is wrong, a tension negative, or of another posture or arm.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     F, W = checked_tension(pose, tension, wrench)
@@ -43,15 +42,13 @@ def checked_tension(
     arm = instance("pose", pose, Posture).arm
     if not isinstance(tension, Tension):
         F = vector("tension", tension, len(arm.cables), "one tension [N] per cable", "tension")
-        W = wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
         c = int(F.argmin())
         if F[c] < 0.0:
             said = f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
             raise InvalidInput("tension", said)
-        return F, W
+        return F, wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
     if not np.array_equal(tension.posture.q, pose.q):
-        said = "was distributed at another posture; distribute it at this one."
-        raise InvalidInput("tension", said)
+        raise InvalidInput("tension", "is of another posture; distribute it at this one.")
     if not tension.posture._equals(pose):
         raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
     if wrench is not None:
@@ -68,7 +65,7 @@ def assemble(
     free_length: Array | None = None,
 ) -> Stiffness:
     """Compute K_θ (Eq. 16) from checked, read-only arrays; :class:`Stiffness` explains them."""
-    active, passive, load, parts, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
+    active, passive, load, _, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
     return Stiffness(
         posture=pose,
         tension=tension,
@@ -79,7 +76,6 @@ def assemble(
         gravity=pose.gravity_stiffness,
         load=load,
         joint=joint,
-        _parts=parts,
         free_length=free_length,
         distribution=distribution,
     )

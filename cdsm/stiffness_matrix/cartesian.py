@@ -36,9 +36,9 @@ _SQUARE = unit("joint stiffness", "joint", "joint_column")
 class CartesianReadings(Result):
     """Stiffness and compliance at the tip; base class of :class:`~cdsm.Stiffness`.
 
-    The terms of K_θ may cancel. K_θ is therefore compared with P, the sum of their magnitudes, and
-    scaled by the diagonal D of P, which makes the test free of units. K_θ is singular if the
-    smallest singular value of D^-½ K_θ D^-½ is at most 1e-8 of the largest entry of D^-½ P D^-½.
+    K_θ is singular, and SingularStiffness raised, if the smallest singular value of D^-½ K_θ D^-½
+    is at most 1e-8 of the largest entry of D^-½ P D^-½. P is the sum of the magnitudes of the
+    terms, which may cancel; its diagonal D makes the test free of units.
     """
 
     posture: Posture
@@ -46,15 +46,14 @@ class CartesianReadings(Result):
     passive: Array = field(metadata=_SQUARE)
     gravity: Array = field(metadata=_SQUARE)
     load: Array = field(metadata=_SQUARE)
-    joint: Array = field(metadata=_SQUARE)
-    _parts: Array  # P (nv, nv)
+    # in exports, a variable must not have the name of a dimension
+    joint: Array = field(metadata={**_SQUARE, "name": "joint_stiffness"})
 
     @cached_property
     def compliance(self) -> Array:
         """Compliance C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench at the tip.
 
-        Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)]. SingularStiffness
-        if K_θ is singular: the arm is about to buckle.
+        Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
         """
         J = self.posture.jacobian
         return frozen(J @ self._inverse @ J.T)
@@ -65,7 +64,7 @@ class CartesianReadings(Result):
 
         A diagonal entry is the stiffness if the other two translations are *locked*. For a stable
         arm it is never less than :meth:`along` that axis, and often several times larger.
-        SingularStiffness if K_θ is singular, or the tip hardly moves in some direction.
+        SingularStiffness also if the tip hardly moves in some direction.
         """
         return self.cartesian_in(np.eye(3))
 
@@ -73,11 +72,8 @@ class CartesianReadings(Result):
         """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in some directions only.
 
         Use it for planar arms: their tip cannot leave a plane, so :attr:`cartesian` does not exist.
-        U are n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3).
-
-        Raises:
-            InvalidInput: The directions are not finite numbers, not orthogonal, or one is zero.
-            SingularStiffness: K_θ is singular, or the tip hardly moves in one of the directions.
+        U are n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3); InvalidInput
+        if they are not. SingularStiffness also if the tip hardly moves in one of the directions.
         """
         U = unit_directions("directions", directions).reshape(-1, 3)
         if abs(U @ U.T - np.eye(len(U))).max() > _ORTHOGONAL:
@@ -88,15 +84,10 @@ class CartesianReadings(Result):
     def along(self, direction: Direction) -> float:
         """Compute 1/(uᵀ C_vv u) [N/m], the tangent stiffness that a tip weight measures (Eq. 20).
 
-        A weight that is not small beside the tensions measures a secant: :func:`~cdsm.weight_test`.
-        It is inf if the tip cannot move along u, and may be negative if the arm is unstable.
-
-        Args:
-            direction: u: an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length.
-
-        Raises:
-            InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
-            SingularStiffness: K_θ is singular.
+        u is an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length, else
+        InvalidInput. A weight that is not small beside the tensions measures a secant:
+        :func:`~cdsm.weight_test`. The stiffness is inf if the tip cannot move along u, and may be
+        negative if the arm is unstable.
         """
         return self._along(unit_direction("direction", direction))[0]
 
@@ -114,19 +105,19 @@ class CartesianReadings(Result):
     @cached_property
     def _inverse(self) -> Array:
         """K_θ⁻¹ (nv, nv), or SingularStiffness with the joint motion."""
-        D = self._parts.diagonal()
+        P = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
+        D = P.diagonal()
         if not D.min() > 0.0:
             raise _singular("next to nothing holds the arm", np.eye(D.size)[D.argmin()])
         scale = 1.0 / np.sqrt(D)
         both = scale * scale[:, None]
-        scaled, least = self.joint * both, REGULAR * float((self._parts * both).max())
+        scaled, least = self.joint * both, REGULAR * float((P * both).max())
         try:
             inverse = np.linalg.inv(scaled)
-            # 1/|A⁻¹| is a lower bound of the smallest singular value of A
-            regular = least * math.sqrt(np.vdot(inverse, inverse)) < 1.0
         except np.linalg.LinAlgError:
-            regular = False
-        if not regular:
+            inverse = np.full_like(scaled, math.inf)
+        # 1/|A⁻¹| is a lower bound of the smallest singular value of A
+        if not least * math.sqrt(np.vdot(inverse, inverse)) < 1.0:
             _, values, rows = np.linalg.svd(scaled)
             if not values[-1] > least:
                 raise _singular("the arm is just about to buckle", rows[-1] * scale)
@@ -147,6 +138,15 @@ class CartesianReadings(Result):
             raise SingularStiffness(said, u)
         return B / S, V[: len(U)]
 
+    def _along(self, u: Array) -> tuple[float, Array]:
+        """Return stiffness along a unit vector u [N/m] and joint motion per force along u (nv,)."""
+        torque = u @ self.posture.jacobian[:3]
+        if not self._moves(torque):
+            return math.inf, np.zeros_like(torque)
+        motion = self._inverse @ torque
+        compliance = float(torque @ motion)
+        return 1.0 / compliance if compliance else math.inf, motion
+
     def _moves(self, torque: Array) -> bool:
         """Return whether a tip force with joint torques J_vᵀ u (nv,) moves any joint."""
         return bool(abs(torque).max() > UNMOVED * abs(self.posture.jacobian[:3]).max())
@@ -157,15 +157,6 @@ class CartesianReadings(Result):
             said = f"the tip cannot move along {coordinates(u)}: the stiffness there is infinite "
             said += "under any tension. Choose another direction, or bend the arm."
             raise SingularStiffness(said, u)
-
-    def _along(self, u: Array) -> tuple[float, Array]:
-        """Return stiffness along a unit vector u [N/m] and joint motion per force along u (nv,)."""
-        torque = u @ self.posture.jacobian[:3]
-        if not self._moves(torque):
-            return math.inf, np.zeros_like(torque)
-        motion = self._inverse @ torque
-        compliance = float(torque @ motion)
-        return 1.0 / compliance if compliance else math.inf, motion
 
 
 def axis_of(u: Array) -> str:

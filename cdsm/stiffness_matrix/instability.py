@@ -1,7 +1,6 @@
 """Remedies for an unstable arm: stiffer wires or springs, or other tensions.
 
-An arm is unstable if the smallest eigenvalue λ of the symmetric part of K_θ is not positive. Each
-remedy multiplies one quantity by a factor s and changes no other; λ(s) = 0 is solved by bracketing.
+Each multiplies one quantity by a factor s at which the smallest eigenvalue λ of K_θ is 0.
 """
 
 from __future__ import annotations
@@ -21,9 +20,9 @@ if TYPE_CHECKING:
     from cdsm.stiffness_matrix import Stiffness
 
 _QUANTITIES: Final = {"wire": "EA of wires", "spring": "k_series", "tension": "lower bounds"}
+# factors s that are tried, from 1 away, each row up to the first that makes the arm stable
 _STIFFER: Final = ((10.0, 100.0, 1000.0),)  # few, since λ rises with s
 _MORE_OR_LESS: Final = np.geomspace(1.0, 100.0, 21)[1:], np.geomspace(1.0, 1e-3, 31)[1:]
-"""Factors s that are tried, from 1 away, each row up to the first that makes the arm stable."""
 
 
 @final
@@ -31,21 +30,19 @@ _MORE_OR_LESS: Final = np.geomspace(1.0, 100.0, 21)[1:], np.geomspace(1.0, 1e-3,
 class Remedy:
     """Change of one quantity of an unstable arm; made by :attr:`Stiffness.remedies`.
 
-    Attributes:
-        change: ``"wire"``: EA of all wires; ``"spring"``: all k_series; ``"tension"``: the lower
-            bounds of the tensions.
-        factor: Factor [-] nearest to 1 at which the arm becomes stable; None if none was found.
+    ``change`` is ``"wire"``: EA of all wires; ``"spring"``: all k_series; ``"tension"``: the lower
+    bounds. ``factor`` [-] is the one nearest to 1 at which the arm becomes stable, None if none is.
     """
 
     change: Literal["wire", "spring", "tension"]
     factor: float | None
 
     def __str__(self) -> str:
-        if self.factor is None:
-            return f"no other {_QUANTITIES[self.change]} alone would hold it"
-        up = self.factor > 1.0
-        bound = f"{rounded(self.factor, up=up)} times as high, or {'more' if up else 'less'}"
-        return f"it would hold with {_QUANTITIES[self.change]} {bound}"
+        what, s = _QUANTITIES[self.change], self.factor
+        if s is None:
+            return f"no other {what} alone would hold it"
+        times = f"{rounded(s, up=s > 1.0)} times as high, or {'more' if s > 1.0 else 'less'}"
+        return f"it would hold with {what} {times}"
 
 
 def verdict(K: Stiffness) -> str:
@@ -56,10 +53,7 @@ def verdict(K: Stiffness) -> str:
 
 
 def find_remedies(K: Stiffness) -> Iterator[Remedy]:
-    """Yield the remedies of an unstable arm, one per quantity; see :attr:`Stiffness.remedies`.
-
-    None if only friction, or lengths l_0 of another posture, make the arm unstable.
-    """
+    """Yield the remedies of an unstable arm; none if friction or another l_0 makes it unstable."""
     from cdsm.stiffness_matrix.assembly import stiffness  # here, since it needs this module
 
     pose, cables, given = K.posture, K.posture.arm.cables, K.distribution

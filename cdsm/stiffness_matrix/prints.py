@@ -11,12 +11,15 @@ import numpy as np
 
 from cdsm.errors import SingularStiffness, listed
 from cdsm.stiffness_matrix.cartesian import axis_of
-from cdsm.support.format import MODEL
+from cdsm.support.format import MODEL, span
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix.value import Stiffness
 
-_PARTS = ("passive", "active", "gravity", "load")
+_ROWS = (
+    *("stiffness [N/mm]", "along", "  of it passive", "  of it active", "  of it gravity"),
+    *("  of it load", "cartesian, diagonal", "pseudoinverse, diagonal"),
+)
 
 
 def existing(read: Callable[[], object]) -> object:
@@ -32,31 +35,28 @@ def table(K: Stiffness) -> list[str]:
     for i, u in enumerate(axes):
         with suppress(SingularStiffness):
             rows[0, i] = K.along(u)
-            shares = K.shares(u)
-            rows[1:5, i] = [np.sum(getattr(shares, part)) for part in _PARTS]
+            of = K.shares(u)
+            rows[1:5, i] = of.passive.sum(), of.active.sum(), of.gravity, of.load
     mobile = np.isfinite(rows[0])
     with suppress(SingularStiffness):
         if mobile.any():
             rows[5, mobile] = K.cartesian_in(axes[mobile]).diagonal()
         rows[6] = K.pseudoinverse().diagonal()
-    names = ["along", *(f"  of it {part}" for part in _PARTS)]
-    names += ["cartesian, diagonal", "pseudoinverse, diagonal"]
     cells = [["-" if math.isnan(k) else f"{k:.4g}" for k in row] for row in rows / 1e3]
-    lines = zip(["stiffness [N/mm]", *names], [["x", "y", "z"], *cells], strict=True)
+    lines = zip(_ROWS, ["xyz", *cells], strict=True)
     return [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, row in lines]
 
 
 def notes(K: Stiffness) -> tuple[str, ...]:
     """Return the lines below the table: why entries are missing, and whether the arm is stable."""
     missing = []
-    if existing(lambda: K.compliance) is None:
+    try:
+        _ = K.cartesian
+    except SingularStiffness as error:
         missing = ["-: K_θ is singular, the arm is about to buckle"]
-    else:
-        try:
-            _ = K.cartesian
-        except SingularStiffness as error:
-            fixed = f"the tip cannot move along {axis_of(error.direction)}"
-            missing = [f"inf, -: {fixed}; cartesian: in the plane of other axes"]
+        if existing(lambda: K.compliance) is not None:
+            fixed = f"inf, -: the tip cannot move along {axis_of(error.direction)}"
+            missing = [f"{fixed}; cartesian: in the plane of other axes"]
     state, unit = "stable" if K.is_stable else "UNSTABLE", K.posture.arm.stiffness_unit()
     least = f"{state}, smallest joint stiffness {K.margin:.4g} {unit} ({model_of(K)})"
     return (*missing, *K.posture.remarks, *missing_leads(K), least)
@@ -64,8 +64,7 @@ def notes(K: Stiffness) -> tuple[str, ...]:
 
 def missing_leads(K: Stiffness) -> tuple[str, ...]:
     """Return a line that names the cables whose spring stretches by more than the whole cable."""
-    pairs = zip(K.posture.arm.cables, K.free_lengths, strict=True)
-    lost = [cable.name for cable, l_0 in pairs if l_0 <= 0.0]
+    lost = [K.posture.arm.cables[c].name for c in np.flatnonzero(K.free_lengths <= 0.0)]
     said = f"the series spring stretches by more than the whole cable is long: {listed(lost)}. "
     return (said + "Give a longer lead; without it K is off by up to F/EA.",) if lost else ()
 
@@ -74,7 +73,6 @@ def model_of(K: Stiffness) -> str:
     """Return the assumptions behind the stiffness ``K`` in words, such as locked motors."""
     if K.friction == "frictionless":
         return MODEL
-    values = K.posture.segments.chains.friction
-    low, high = values.min(initial=math.inf), values.max(initial=0.0)
-    mu = f"{low:g}" if low == high else f"{low:g} to {high:g}"
-    return MODEL.replace("frictionless", f"cables {K.friction}, μ = {mu}")
+    mu = K.posture.segments.chains.friction
+    said = span(mu, "{:g}".format) if mu.size else "0"
+    return MODEL.replace("frictionless", f"cables {K.friction}, μ = {said}")

@@ -28,12 +28,12 @@ class Shares(Result, Named):
     """Contributions to the stiffness in one direction; they add up to :attr:`total`.
 
     Attributes:
-        stiffness: The stiffness from which they are computed.
-        direction: The unit direction (3,), base axes.
-        passive: Contribution of each cable's elasticity, (C,) [N/m].
-        active: Contribution of each cable's tension, (C,) [N/m]; usually negative.
-        gravity: Contribution of the weight of the links [N/m].
-        load: Contribution of the wrench at the tip [N/m].
+        stiffness: The stiffness to which they contribute.
+        direction: Unit direction (3,), base axes.
+        passive: Of each cable's elasticity, (C,) [N/m].
+        active: Of each cable's tension, (C,) [N/m]; usually negative.
+        gravity: Of the weight of the links [N/m].
+        load: Of the wrench at the tip [N/m].
     """
 
     _headline, _rows = "total", "cable"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 
@@ -31,9 +30,7 @@ Friction = Literal["frictionless", "stuck", "sliding"]
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Stiffness(CartesianReadings):
-    """Joint and Cartesian stiffness with their posture, tensions and wrench.
-
-    Cartesian quantities are at ``tool0`` in base axes. All arrays are read-only.
+    """Joint stiffness and Cartesian stiffness (at ``tool0``, base axes) with all they depend on.
 
     Attributes:
         posture: The posture.
@@ -68,15 +65,10 @@ class Stiffness(CartesianReadings):
 
     @property
     def free_lengths(self) -> Array:
-        """Original lengths l_0 (C,) [m] of the wires, as used in :attr:`cable_stiffness`.
-
-        A locked motor keeps l_0 = (L − ΔF/k_series)/(1 + ε(F)), see :class:`Cable`. For a
-        force-controlled cable it is L. Negative if the spring stretches by more than the cable.
-        """
-        if self.free_length is not None:
-            return self.free_length
-        pose = self.posture
-        return pose.arm._laws.original_lengths(pose.cable_lengths, self.tension)
+        """Original lengths l_0 (C,) [m] of the wires, see :class:`Cable`; L if force-controlled."""
+        laws, L = self.posture.arm._laws, self.posture.cable_lengths
+        l_0 = self.free_length
+        return laws.original_lengths(L, self.tension) if l_0 is None else l_0
 
     @quantity("torque", "joint")
     def residual(self) -> Array:
@@ -97,8 +89,7 @@ class Stiffness(CartesianReadings):
     @cached_property
     def critical_direction(self) -> Array:
         """Unit eigenvector (nv,) of the smallest eigenvalue: the joint motion of buckling."""
-        vectors = np.linalg.eigh((self.joint + self.joint.T) / 2.0)[1]
-        return frozen(vectors[:, 0].copy())
+        return frozen(np.linalg.eigh((self.joint + self.joint.T) / 2.0)[1][:, 0].copy())
 
     @property
     def is_stable(self) -> bool:
@@ -109,8 +100,7 @@ class Stiffness(CartesianReadings):
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
         If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity and load, and so is along(u). ``direction`` and errors are those of
-        :meth:`along`; SingularStiffness also if the stiffness along u is infinite.
+        sum over cables, gravity and load, and so is along(u). SingularStiffness also if it is inf.
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)
@@ -137,8 +127,8 @@ class Stiffness(CartesianReadings):
     def remedies(self) -> tuple[Remedy, ...]:
         """Changes that would make an unstable arm stable, each alone; empty for a stable arm.
 
-        Stiffer wires, stiffer series springs and, if the tensions were distributed, other lower
-        bounds are tried at the same posture and wrench. This takes a few tenths of a second.
+        Stiffer wires, stiffer springs and, of distributed tensions, other lower bounds are tried at
+        the same posture and wrench. This takes a few tenths of a second.
         """
         return () if self.is_stable else tuple(find_remedies(self))
 
@@ -148,27 +138,21 @@ class Stiffness(CartesianReadings):
         return () if self.is_stable else (verdict(self), *map(str, self.remedies))
 
     def report(self) -> Report:
-        """Check this stiffness: is it right, balanced and stable, and how to read it.
-
-        Each term is compared with finite differences and with :func:`evaluate`. Problems are not
-        raised as errors; the report lists them. InvalidInput if the stiffness is not frictionless.
-        """
-        from cdsm.report import report_on  # here, since a stiffness does not need it
+        """Check this frictionless stiffness: is it right, balanced, stable, and how to read it."""
+        from cdsm.report import report_on  # the layer above
 
         return report_on(self.require_frictionless())
 
     def require_frictionless(self) -> Stiffness:
         """Return this stiffness; InvalidInput if its cables stick or slide."""
         if self.friction != "frictionless":
-            said = f"the cables are {self.friction}; give a frictionless K of stiffness."
-            raise InvalidInput("stiffness", said)
+            raise InvalidInput("stiffness", f"cables are {self.friction}; give a frictionless K.")
         return self
 
     def plot(self) -> Figure:
         """Plot the arm in mm and, if it is stable, the compliance at its tip as an ellipsoid.
 
-        Cables are coloured by tension if :attr:`distribution` is given. SingularStiffness if K_θ is
-        singular.
+        Cables are coloured by tension if :attr:`distribution` is given.
         """
         return self.posture.plot(self.distribution, self)
 
@@ -178,7 +162,7 @@ class Stiffness(CartesianReadings):
             "tip_position_m": self.posture.tip[:3, 3],
             "cable_length_m": self.posture.cable_lengths,
             "model": prints.model_of(self),
-            "along_N_per_m": [prints.existing(partial(self.along, u)) for u in np.eye(3)],
+            "along_N_per_m": [prints.existing(partial(self.along, u)) for u in "xyz"],
             "cartesian_N_per_m": prints.existing(lambda: self.cartesian),
             "pseudoinverse_N_per_m": prints.existing(self.pseudoinverse),
             "compliance": prints.existing(lambda: self.compliance),
@@ -186,11 +170,6 @@ class Stiffness(CartesianReadings):
             "remedies": {each.change: each.factor for each in self.remedies},
         }
         return super().to_dict() | plain(more)
-
-    def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
-        # a variable must not have the name of a dimension
-        for name, *rest in super()._quantities():
-            yield ("joint_stiffness" if name == "joint" else name, *rest)
 
     def __str__(self) -> str:
         return "\n".join([*self.warnings, *prints.table(self), *prints.notes(self)])

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.errors import CdsmError, EquilibriumError, InvalidInput
+from cdsm.friction.sticking import holding
 from cdsm.friction.stuck import stuck_stiffness
 from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
@@ -23,7 +24,6 @@ from cdsm.statics.load_history import LoadHistory
 from cdsm.statics.rest_search import equilibrium
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.instability import verdict
-from cdsm.stiffness_matrix.sticking import holding
 from cdsm.support.status import Status
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension

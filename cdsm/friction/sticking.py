@@ -10,12 +10,6 @@ No wire passes a hole in which the cable sticks. If the cable slides in a hole, 
 and after it belong to one block. No wire leaves a block, so Σ δa_j over its segments is zero.
 :func:`~cdsm.kernels.chain_problem.chain_tangent` computes the δT_j of a block. Without friction,
 each cable is one block: this gives the frictionless stiffness.
-
-A force of 1 N at the tip of a stuck arm moves the joints by θ̇ (nv,) [rad/N]. Hole i is between the
-segments j and j + 1, with the friction coefficient μ and the wrap angle φ_i. To first order, the
-cable begins to slide in this hole under the load
-
-    W_i = μ φ_i/(|x_i| − y_i),   x_i = (∂ln T_{j+1}/∂θ − ∂ln T_j/∂θ)·θ̇,   y_i = μ ∂φ_i/∂θ·θ̇.
 """
 
 from __future__ import annotations
@@ -30,11 +24,8 @@ from cdsm.posture import Posture
 from cdsm.segments import STRAIGHT
 from cdsm.support.values import Array, frozen
 
-ROUNDING = 1e-12
-"""A hole never slides if its |x_i| − y_i is below this fraction of the largest |x_i|."""
-
-SLACK = 1e-100
-"""Tension [N] that replaces zero, since the kernel takes logarithms."""
+_ROUNDING = 1e-12  # a hole never slides if its |x_i| − y_i is below this part of the largest |x_i|
+_SLACK = 1e-100  # tension [N] that replaces zero, since the kernel takes logarithms
 
 Flags = NDArray[np.bool_]
 
@@ -66,16 +57,16 @@ def tension_gradient(pose: Posture, tension: Array, sliding: Flags) -> Array:
     slides[chains.hole] = sliding | ~holding(pose)
     friction = np.zeros_like(segments.length_jacobian)
     friction[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian
-    T = np.where(tension > 0.0, tension, SLACK)
+    T = np.where(tension > 0.0, tension, _SLACK)
     gradient = segments.length_jacobian
     return frozen(chain_tangent(start, forced, stretch, compliance, T, slides, gradient, friction))
 
 
 def first_order_loads(pose: Posture, tension: Array, gradient: Array, motion: Array) -> Array:
-    """Compute the load W_i (P,) [N] at which the cable begins to slide in each hole; inf: never.
+    """Compute the load W_i (P,) [N] of :func:`~cdsm.breakaway` in each hole; inf: never.
 
-    All cables stick before. ``tension`` is T (S,) [N], ``gradient`` ∂T/∂θ (S, nv) [N/rad],
-    ``motion`` θ̇ (nv,) [rad/N]; the top of the module explains them.
+    ``tension`` is T (S,) [N], ``gradient`` ∂T/∂θ (S, nv) [N/rad] while all cables stick, ``motion``
+    dθ/dW (nv,) [rad/N].
     """
     segments = pose.segments
     chains, slack = segments.chains, tension == 0.0
@@ -84,6 +75,6 @@ def first_order_loads(pose: Posture, tension: Array, gradient: Array, motion: Ar
     rate = change - chains.friction * (segments.wrap_jacobian @ motion)
     # a slack cable holds nothing: any pull moves it
     grip = np.where(slack[chains.hole], 0.0, segments.grip)
-    least = ROUNDING * float(change.max(initial=0.0))
+    least = _ROUNDING * float(change.max(initial=0.0))
     loads = np.divide(grip, rate, out=np.full(rate.size, math.inf), where=rate > least)
     return np.where(holding(pose), loads, math.inf)
