@@ -85,9 +85,11 @@ def test_gradients_under_friction_and_tolerances(
         tolerances=tolerances,
     )
     coarse, fine = errors(task, AT, Measure(bound.of, bound.direction))
-    # central differences: the error falls with the square of the step
-    assert fine < 1e-6
-    assert fine < 0.02 * coarse
+    # central differences: the error falls with the square of the step, down to that of dEA/dF in
+    # the table of a strand
+    small = 1e-6 if law is LAW else 2e-5
+    assert fine < small
+    assert fine < max(0.02 * coarse, small)
 
 
 def test_a_deflection_under_a_load_with_a_moment_has_derivatives() -> None:

@@ -104,7 +104,7 @@ def test_differences_converge_to_the_slope_at_the_rate_they_must(lower: float) -
     value, slope = closed(lower)
     np.testing.assert_allclose(found.curve[0], [lower, value, slope], rtol=1e-11)
     assert_second_order(
-        along(pose), found.curve[0, 2:], np.array([lower]), step=0.5, size=value, tolerance=1e-8
+        along(pose), found.curve[0, 2:], np.array([lower]), step=0.5, size=value, tolerance=2e-7
     )
 
 
