@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput, UrdfError
-from cdsm.support.validation import one_of, sequence_of
+from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 
 
@@ -126,7 +126,7 @@ class RigidBody:
         return State(tip, J, torque, slope, twist, placement)
 
     def tip(self, q: Array) -> tuple[Array, Array]:
-        """Compute the pose (4, 4) of the tip and J_X (6, nv) at joint angles q (nv,)."""
+        """Compute only the pose (4, 4) of the tip and J_X (6, nv) of :meth:`state`."""
         model, data = self._model, self._data()
         pin.computeJointJacobians(model, data, self._permuted(q))
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
@@ -147,10 +147,7 @@ class RigidBody:
 
     def placement(self, q: Array, link: str) -> Array:
         """Compute the pose (4, 4) of one link's frame in base axes, or raise UnknownName."""
-        model, data, frame = self._model, self._data(), self._frame(link)
-        pin.forwardKinematics(model, data, self._permuted(q))
-        placement: Array = pin.updateFramePlacement(model, data, frame).homogeneous
-        return placement
+        return self.link_placements(q)[one_of("link", link, self._frames)]
 
     def potential_energy(self, q: Array) -> float:
         """Compute the gravitational energy V of all links [J] at joint angles (nv,) [rad]."""
@@ -240,11 +237,9 @@ class RigidBody:
         """Compute the unit twist of each joint in its own frame (nv+1, 6), linear part first."""
         model, data = self._model, self._data()
         pin.computeJointJacobians(model, data, pin.neutral(model))
-        local = [
-            pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, -1)[:, i - 1]
-            for i in self._rows[1:]
-        ]
-        return np.vstack([np.zeros(6), *local])
+        of = [pin.getJointJacobian(model, data, i, pin.LOCAL) for i in self._rows[1:]]
+        columns = zip(of, self._theirs, strict=True)
+        return np.vstack([np.zeros(6), *(J.reshape(6, -1)[:, i] for J, i in columns)])
 
     def _permuted(self, q: Array) -> Array:
         return q if self._sorted else q[self._ours]
@@ -266,7 +261,6 @@ class RigidBody:
 
 def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:
     """Return ``wanted``, the order of joints; InvalidInput unless it has each of ``names`` once."""
-    wanted = sequence_of("joint_names", wanted, str)
     if sorted(wanted) != sorted(names):
         missing = [name for name in names if name not in wanted]
         others = [name for name in wanted if name not in names or wanted.count(name) > 1]
