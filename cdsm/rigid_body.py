@@ -270,7 +270,7 @@ def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]
             if some
         )
         raise InvalidInput("joint_names", f"{faults}; name each joint that moves once.")
-    return wanted
+    return tuple(wanted)
 
 
 def pseudo_inertia(mass: float, centre: Array, inertia: Array) -> Array:
