@@ -195,14 +195,6 @@ class Posture(ReadOnlyState):
         """Compute the load term −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad] of K_θ for a wrench W (6,)."""
         return load_stiffness(self.jacobian, wrench, self.arm._body.tip_joints)
 
-    def _joint_stiffness(self, tension: Array, cable_stiffness: Array, wrench: Array) -> Array:
-        """Compute active, passive and load term, Σ|terms|, and K_θ (5, nv, nv) [N m/rad]."""
-        J = self.length_jacobian
-        active, load = self._active(tension), self._load(wrench)
-        passive, gravity = (J.T * cable_stiffness) @ J, self.gravity_stiffness
-        sizes = abs(active) + abs(passive) + abs(gravity) + abs(load)
-        return frozen(np.stack([active, passive, load, sizes, active + passive + gravity + load]))
-
 
 def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp]) -> Array:
     """Compute −∂(J_Xᵀ W)/∂θ (nv, nv) of a dead wrench W (6,) at the tip, from J_X (6, nv).

@@ -65,7 +65,9 @@ def assemble(
     free_length: Array | None = None,
 ) -> Stiffness:
     """Compute K_θ (Eq. 16) from checked, read-only arrays; :class:`Stiffness` explains them."""
-    active, passive, load, _, joint = pose._joint_stiffness(tension, cable_stiffness, wrench)
+    J, gravity = pose.length_jacobian, pose.gravity_stiffness
+    active, load = frozen(pose._active(tension)), frozen(pose._load(wrench))
+    passive = frozen((J.T * cable_stiffness) @ J)
     return Stiffness(
         posture=pose,
         tension=tension,
@@ -73,9 +75,9 @@ def assemble(
         cable_stiffness=cable_stiffness,
         active=active,
         passive=passive,
-        gravity=pose.gravity_stiffness,
+        gravity=gravity,
         load=load,
-        joint=joint,
+        joint=frozen(active + passive + gravity + load),
         free_length=free_length,
         distribution=distribution,
     )
