@@ -10,7 +10,7 @@ from cdsm.manipulator import ANOTHER_ARM
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.value import Stiffness
 from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
-from cdsm.support.values import Array
+from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
 
