@@ -72,8 +72,9 @@ def test_rows_are_single_postures(arm: cdsm.Manipulator) -> None:
         pose = arm.at(row)
         single = [cdsm.payload(pose, u, LOW, HIGH, W[n]).limits["tension"] for u in directions]
         assert force[n] == pytest.approx(single, rel=1e-9)
+        # Qhull merges facets that rounding sets apart
         assert margin[n] == pytest.approx(
-            cdsm.force_polytope(pose, LOW, HIGH, W[n]).margin(), rel=1e-8, abs=1e-9
+            cdsm.force_polytope(pose, LOW, HIGH, W[n]).margin(), rel=1e-7, abs=1e-9
         )
 
 
