@@ -97,6 +97,12 @@ class Manipulator(Printed):
         gravity: Direction = GRAVITY,
         original_length: OriginalLength = "unstrained",
     ) -> None:
+        if isinstance(geometry, str | os.PathLike):
+            raise InvalidInput(
+                "geometry",
+                f"{str(geometry)!r} given; a Geometry is needed. "
+                "Read the file of a robot with Manipulator.from_urdf().",
+            )
         described = instance("geometry", geometry, Geometry)
         if elasticity is not None and cables is None:
             cables = serpentine_cables(geometry, elasticity)
