@@ -152,7 +152,7 @@ def fitted_prototype(hybrid_stiffness: float | None = None) -> Manipulator:
     """Build :func:`experimental_prototype` with dimensions fitted to the numbers of Section V.
 
     The paper prints 20 numbers of its prototype, and no dimension. These dimensions, and the
-    conditions of the tests (:mod:`cdsm.paper.section_v`), are the least-squares fit to the 20
+    conditions of the tests (Section V), are the least-squares fit to the 20
     numbers within plausible bounds, with x and y exchanged in rows 2 to 4 of Table II. Hole radius
     and mass of a link ended at their largest allowed values, as did the tool and the stiffness of
     the drives; the links at their shortest. Table II is still missed by 21 %, 15 % and 33 % (root
