@@ -32,6 +32,8 @@ Indices = NDArray[np.intp]
 SHORTEST_SEGMENT = 1e-9
 """Distance of two neighbouring sites [m] below which they coincide."""
 
+_TINY = float(np.finfo(float).tiny)
+
 
 class Spans(NamedTuple):
     """Segments of all cables at a posture: lengths, directions and their motions."""
@@ -145,7 +147,7 @@ class Routing:
         b = site[:, self.second]
         w = b - site[:, self.first]
         length = np.sqrt(dot(w, w))
-        u = w / np.maximum(length, np.finfo(float).tiny)  # the caller refuses coincident sites
+        u = w / np.maximum(length, _TINY)  # the caller refuses coincident sites
         sign = self.sign.reshape(self.sign.shape + (1,) * (site.ndim - 2))
         along = twist[:, self.path] * sign
         d = along[:3] + cross(along[3:], b[:, :, None])

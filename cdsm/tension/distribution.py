@@ -59,12 +59,12 @@ def distribute_tension(
         SolverError: The solver's solution does not meet the optimality conditions.
     """
     instance("pose", pose, Posture)
-    names, fixed = pose.arm.cables.names, {} if fixed is None else fixed
+    cables, fixed = pose.arm.cables, {} if fixed is None else fixed
     low, high = bounds_at(pose, minimum, maximum, worst_friction)
     if not isinstance(fixed, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     for name, value in fixed.items():
-        c = names.index(one_of("cable", name, names))
+        c = cables.names.index(one_of("cable", name, cables.names))
         held = quantity(f"fixed[{name!r}]", value, "tension", zero=True)
         low, high = (frozen(np.r_[each[:c], held, each[c + 1 :]]) for each in (low, high))
     wrench = wrench_vector("wrench", wrench)
@@ -72,7 +72,8 @@ def distribute_tension(
     problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
     solution = solve(problem, solver)
     if isinstance(solution, str):
-        explain(pose, problem, solver, solution, np.array([name not in fixed for name in names]))
+        free = np.array([cable.name not in fixed for cable in cables])
+        explain(pose, problem, solver, solution, free)
     F = frozen(solution * problem.force)
     return Tension(posture=pose, values=F, wrench=wrench, minimum=low, maximum=high, solver=solver)
 
