@@ -142,7 +142,7 @@ class Segments(ReadOnlyState):
         np.subtract.at(gradient, (rows, routing.path[hole]), dot(p[:, :, None], back[:, hole]))
         turned = dot(q[:, :, None], spans.motion[:, hole + 1])
         np.subtract.at(gradient, (rows, routing.path[hole + 1]), turned)
-        return cls(
+        segments = cls(
             chains=chains,
             lengths=frozen(spans.length),
             length_jacobian=frozen(routing.jacobian(spans)),
@@ -152,6 +152,8 @@ class Segments(ReadOnlyState):
             _twist=frozen(twist),
             _sites=frozen(sites),
         )
+        segments.__dict__["_spans"] = spans  # a cached property
+        return segments
 
     @cached_property
     def _spans(self) -> Spans:
