@@ -165,14 +165,15 @@ class _Entry:
     of: str = EVERY
 
     def built(self, source: str) -> Tolerance:
-        kind = self.distribution or ("normal" if self.within is None else "uniform")
-        u = self.standard if self.within is None else self.within / math.sqrt(3.0)
-        if u is None or None not in (self.standard, self.within):
-            raise InvalidInput(source, "give one of standard and within.")
-        if self.within is not None and kind == "normal":
-            raise InvalidInput(source, "within is uniform; give standard with normal.")
         rho = float(source in _COMMON) if self.correlation is None else self.correlation
-        return Tolerance(u, distribution=kind, correlation=rho, of=self.of)
+        if self.standard is not None and self.within is None:
+            kind = self.distribution or "normal"
+            return Tolerance(self.standard, distribution=kind, correlation=rho, of=self.of)
+        if self.within is None or self.standard is not None:
+            raise InvalidInput(source, "give one of standard and within.")
+        if self.distribution == "normal":
+            raise InvalidInput(source, "within is uniform; give standard with normal.")
+        return Tolerance.within(self.within, correlation=rho, of=self.of)
 
 
 def from_table(table: Mapping[str, Any]) -> Tolerances:
