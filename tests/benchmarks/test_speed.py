@@ -89,7 +89,8 @@ def test_a_reading_costs_less_than_posture_and_stiffness(
         f"{name} on top of posture + stiffness, n = {joints}: cost over both alone",
         lambda: read(cdsm.stiffness(one.at(q), tension)),
         lambda: cdsm.stiffness(one.at(q), tension),
-        most=2.5,  # 1.1 to 2.1 on a busy Xeon
+        # 1.1 to 1.6 on a busy Xeon, but for one
+        most=2.5 if (name, joints) == ("cartesian", 5) else 1.65,
         slow_repeat=20,
         fast_repeat=20,
     )

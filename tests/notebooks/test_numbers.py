@@ -167,9 +167,10 @@ def weights_with_friction(nb: Shown) -> None:
     np.testing.assert_allclose([rough / small, tense / small], 2.0, rtol=0.01)
     assert 1.05 < nb.plateau.min() < nb.plateau.max() < 1.15
     tangents = np.array([tangent for _, tangent in nb.tangents.values()])
-    np.testing.assert_allclose(tangents[:, 5:], np.tile(tangents[1, 5:], (3, 1)), rtol=0.05)
+    np.testing.assert_allclose(tangents[0], tangents[1], rtol=0.05)
+    np.testing.assert_allclose(tangents[2, 5:], tangents[1, 5:], rtol=0.05)
     # the breakaway load is first order in the friction: at 0.2 a hole lets go a per cent later
-    np.testing.assert_allclose(tangents, np.tile(tangents[1], (3, 1)), rtol=0.2)
+    np.testing.assert_allclose(tangents[2], tangents[1], rtol=0.2)
 
 
 def is_it_true(nb: Shown) -> None:
