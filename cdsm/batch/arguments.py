@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from cdsm._former.bodies import Masses
+from cdsm._former.serpentine_guess import Blocks
+from cdsm._former.tree import Indices, Routing, Tree
 from cdsm.batch.layout import Flags
-from cdsm.kernels.bodies import Masses
-from cdsm.kernels.serpentine_guess import Blocks
-from cdsm.kernels.tree import Indices, Routing, Tree
 from cdsm.support.values import Array, frozen
 
 

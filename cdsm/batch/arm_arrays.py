@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cdsm.kernels.bodies import Masses
-from cdsm.kernels.serpentine_guess import find_blocks
-from cdsm.kernels.tree import Routing, Tree
+from cdsm._former.bodies import Masses
+from cdsm._former.serpentine_guess import find_blocks
+from cdsm._former.tree import Routing, Tree
 from cdsm.manipulator import LIMIT_SLACK, Manipulator
 from cdsm.routing import Routing as ArmRouting
 from cdsm.support.values import frozen

@@ -7,18 +7,18 @@ from itertools import pairwise
 
 import numpy as np
 
+from cdsm._former.compiling import FULL, WIDTH, is_new
+from cdsm._former.distribution import search_tensions
+from cdsm._former.read import read
+from cdsm._former.readings import IMMOBILE, READ, SINGULAR, UNREAD
+from cdsm._former.tension import Balance
+from cdsm._former.tree import Indices
 from cdsm.batch import layout
 from cdsm.batch.arguments import Asked, Kept, Rows
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.batch.inputs import checked_threads, kernel_arm, run_slices
 from cdsm.batch.layout import OK, POSTPONED, QUANTITIES, UNDECIDED, Codes
 from cdsm.errors import InfeasibleTension, SolverError
-from cdsm.kernels.compiling import FULL, WIDTH, is_new
-from cdsm.kernels.distribution import search_tensions
-from cdsm.kernels.read import read
-from cdsm.kernels.readings import IMMOBILE, READ, SINGULAR, UNREAD
-from cdsm.kernels.tension import Balance
-from cdsm.kernels.tree import Indices
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import Status
 from cdsm.support.values import Array, frozen

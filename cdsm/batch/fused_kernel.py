@@ -1,6 +1,6 @@
 """Fused kernel: one kernel that computes the quantities of many postures up to K_θ, in blocks.
 
-The physics is in :mod:`cdsm.kernels`, whose kernels this one calls. Memory is allocated once for
+The physics is in :mod:`cdsm._former`, whose kernels this one calls. Memory is allocated once for
 all blocks. Readings of K_θ, such as ``along``, are computed later from its results.
 """
 
@@ -8,6 +8,26 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdsm._former.bodies import gravity_torque, set_gravity_stiffness, tip_jacobian
+from cdsm._former.compiling import Index, Width, inlined, lanes, threaded, upwards
+from cdsm._former.distribution import distribute, keep_balance, set_arms, set_torque
+from cdsm._former.records import clear, copy, fetch, matrix, mirror, store, vector
+from cdsm._former.segments import (
+    SHORTEST_SEGMENT,
+    add_length_hessian,
+    segment_scratch,
+    set_lengths,
+)
+from cdsm._former.serpentine_guess import empty_guess
+from cdsm._former.serpentine_multipliers import set_proof
+from cdsm._former.stiffness import (
+    add_passive_stiffness,
+    set_cable_stiffness,
+    set_load_stiffness,
+    sum_terms,
+)
+from cdsm._former.tension import Balance, certificate, set_infeasible
+from cdsm._former.tree import Indices, empty_frames, forward_kinematics
 from cdsm.batch.arguments import Arm, Asked, Kept, Rows
 from cdsm.batch.layout import (
     ACTIVE,
@@ -32,26 +52,6 @@ from cdsm.batch.layout import (
     UNDECIDED,
     Codes,
 )
-from cdsm.kernels.bodies import gravity_torque, set_gravity_stiffness, tip_jacobian
-from cdsm.kernels.compiling import Index, Width, inlined, lanes, threaded, upwards
-from cdsm.kernels.distribution import distribute, keep_balance, set_arms, set_torque
-from cdsm.kernels.records import clear, copy, fetch, matrix, mirror, store, vector
-from cdsm.kernels.segments import (
-    SHORTEST_SEGMENT,
-    add_length_hessian,
-    segment_scratch,
-    set_lengths,
-)
-from cdsm.kernels.serpentine_guess import empty_guess
-from cdsm.kernels.serpentine_multipliers import set_proof
-from cdsm.kernels.stiffness import (
-    add_passive_stiffness,
-    set_cable_stiffness,
-    set_load_stiffness,
-    sum_terms,
-)
-from cdsm.kernels.tension import Balance, certificate, set_infeasible
-from cdsm.kernels.tree import Indices, empty_frames, forward_kinematics
 from cdsm.support.values import Array
 
 

@@ -9,10 +9,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm._former.tension import NO_ARM
 from cdsm.batch.arguments import Arm
 from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.errors import InvalidInput
-from cdsm.kernels.tension import NO_ARM
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import WRENCH, flag, number_array, whole_number
 from cdsm.support.values import Array, frozen

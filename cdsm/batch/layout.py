@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.kernels.tree import Indices
+from cdsm._former.tree import Indices
 from cdsm.support.status import Status
 
 Codes = NDArray[np.uint8]

@@ -13,7 +13,7 @@ def warm(as_json: AsJson = False) -> None:
     import numpy as np
 
     import cdsm
-    from cdsm.kernels.compiling import at_once
+    from cdsm._former.compiling import at_once
     from cdsm.support.progress import progress_bar
 
     start = time.perf_counter()

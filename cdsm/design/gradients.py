@@ -1,6 +1,6 @@
 """Derivatives of the quantities of a design with respect to its continuous variables.
 
-A kernel (:mod:`cdsm.kernels.sensitivity`) gives the derivatives of a stiffness with respect to
+A kernel (:mod:`cdsm._former.sensitivity`) gives the derivatives of a stiffness with respect to
 every hole, disk, link, lead and mass at constant tensions, and with respect to the tensions. The
 least tensions depend on the design, and so do their bounds, which friction narrows. The chain rule
 adds both effects. All these derivatives are exact.

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm._former.principal import principal_stiffness
 from cdsm.batch import Batch, evaluate
 from cdsm.design.goals import KINDS, Measure
 from cdsm.design.problem import DesignProblem
 from cdsm.errors import CdsmError, CdsmWarning, GeometryError
-from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS as CLEARANCES
 from cdsm.measures.rows import (

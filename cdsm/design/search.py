@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from cdsm._former.tree import Indices
 from cdsm.design.evaluation import Designs, gathered, violations, workers
 from cdsm.design.infeasible import explain
 from cdsm.design.problem import DesignProblem
 from cdsm.design.quantities import Found
 from cdsm.design.result import DesignProgress, DesignSearch
 from cdsm.design.variables import WHOLE
-from cdsm.kernels.tree import Indices
 from cdsm.support.extras import need
 from cdsm.support.progress import progress_bar
 from cdsm.support.validation import instance, whole_number

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm._former.chain_problem import chain_tangent, solve_chains
+from cdsm._former.tree import Indices
 from cdsm.cable import Cable
-from cdsm.kernels.chain_problem import chain_tangent, solve_chains
-from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 from cdsm.wires.elasticity import Elasticity
 
@@ -148,7 +148,7 @@ class ChainProblem:
 
         ``forced`` (C,) [N] is the tension of force-controlled motors, NaN for others. ``gradient``
         (S, nv) [m/rad] is ∂l/∂θ of the lengths, ``friction_gradient`` (S, nv) [1/rad] is μ ∂φ/∂θ of
-        the hole to the next segment. See :func:`~cdsm.kernels.chain_problem.chain_tangent`.
+        the hole to the next segment. See :func:`~cdsm._former.chain_problem.chain_tangent`.
         """
         return chain_tangent(
             self._start,
@@ -166,7 +166,7 @@ class ChainProblem:
 
         They approximately minimise Σ D_j(ln T_j) on the straight line from ln ``T`` to ln ``new``.
         The solution of the chain minimises the same convex sum, of which
-        :mod:`cdsm.kernels.chain_problem` defines the terms D_j. ``length`` and ``natural`` (S,) are
+        :mod:`cdsm._former.chain_problem` defines the terms D_j. ``length`` and ``natural`` (S,) are
         in [m].
         """
         T = np.maximum(T, _SLACK)

@@ -8,7 +8,7 @@ joint angles change by δθ, and the length δa_j of wire slides into the segmen
 
 No wire passes a hole in which the cable sticks. If the cable slides in a hole, the segments before
 and after it belong to one block. No wire leaves a block, so Σ δa_j over its segments is zero.
-:func:`~cdsm.kernels.chain_problem.chain_tangent` computes the δT_j of a block. Without friction,
+:func:`~cdsm._former.chain_problem.chain_tangent` computes the δT_j of a block. Without friction,
 each cable is one block: this gives the frictionless stiffness.
 """
 
@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.kernels.chain_problem import chain_tangent
+from cdsm._former.chain_problem import chain_tangent
 from cdsm.posture import Posture
 from cdsm.segments import STRAIGHT
 from cdsm.support.values import Array, frozen

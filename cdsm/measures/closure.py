@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdsm._former.principal import principal_stiffness
 from cdsm.errors import SolverError
-from cdsm.kernels.principal import principal_stiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.linear_program import OPTIMAL, least

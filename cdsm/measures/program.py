@@ -16,8 +16,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from cdsm._former import tension as tension_kernels
 from cdsm.errors import SolverError
-from cdsm.kernels import tension as tension_kernels
 from cdsm.measures.simplex import single_largest
 from cdsm.posture import Posture
 from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least

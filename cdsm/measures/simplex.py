@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 
-from cdsm.kernels.compiling import compiled, threaded
-from cdsm.kernels.tension import scaled_balance
-from cdsm.kernels.tree import Indices
+from cdsm._former.compiling import compiled, threaded
+from cdsm._former.tension import scaled_balance
+from cdsm._former.tree import Indices
 from cdsm.support.values import Array
 
 _ROUNDING = 1e-11  # reduced costs and pivots below this are rounding; coefficients are of order one

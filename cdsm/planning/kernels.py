@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.kernels.compiling import compiled
-from cdsm.kernels.linear_algebra import eliminate
+from cdsm._former.compiling import compiled
+from cdsm._former.linear_algebra import eliminate
 from cdsm.support.values import Array
 
 _CURVATURE = 1e-6  # curvatures below this part of the largest are raised to it

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
+from cdsm._former.tension import OPTIMALITY
 from cdsm.errors import InvalidInput
-from cdsm.kernels.tension import OPTIMALITY
 from cdsm.planning.gradient import stiffness_gradient
 from cdsm.planning.objectives import unstable
 from cdsm.planning.saturation_curve import End, Saturation

@@ -23,9 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm._former.tree import Indices
 from cdsm.errors import CdsmError
 from cdsm.friction.chain_problem import ChainProblem
-from cdsm.kernels.tree import Indices
 from cdsm.posture import Posture
 from cdsm.statics.frictional_arm import FrictionalArm, FrictionalState
 from cdsm.statics.locked_motors import require_domains

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm import batch
-from cdsm.kernels.principal import principal_stiffness
+from cdsm._former.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import (
     MEASURED,

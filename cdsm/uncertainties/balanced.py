@@ -12,7 +12,7 @@ where λ (nv,) solves B Bᵀ λ = τ − B_b F_b. With μ = (B Bᵀ)⁻¹ B y_f 
 
 Both terms are changes of a mechanical power at constant tensions and joint velocity: the power
 Σ r_c L̇_c at the velocity λ, and the power of the residual torque J_Lᵀ F − τ at the velocity −μ. So
-the kernel :mod:`cdsm.kernels.sensitivity`, which differentiates the stiffness, computes them too.
+the kernel :mod:`cdsm._former.sensitivity`, which differentiates the stiffness, computes them too.
 The formula holds while the same cables stay at their bounds.
 """
 
@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm._former.tension import OPTIMALITY
 from cdsm.errors import InvalidInput
-from cdsm.kernels.tension import OPTIMALITY
 from cdsm.support.values import Array
 from cdsm.tension import Tension
 from cdsm.uncertainties.inputs import Inputs

@@ -15,9 +15,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.sparse import csr_matrix, hstack
 
+from cdsm._former.sensitivity import single_gradient
 from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.errors import InvalidInput
-from cdsm.kernels.sensitivity import single_gradient
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.values import Array, frozen
@@ -159,7 +159,7 @@ class Inputs:
     ) -> tuple[dict[str, Array], Array, Array]:
         """Compute the derivatives of Ψ = zᵀ K_θ z + … with respect to all inputs.
 
-        :func:`~cdsm.kernels.sensitivity.single_gradient` defines Ψ; ``motion`` is z (nv,),
+        :func:`~cdsm._former.sensitivity.single_gradient` defines Ψ; ``motion`` is z (nv,),
         ``velocity`` is v (3,), and ``given`` are its arguments from ``tension`` on. The result has
         an array for each source of uncertainty (0 for inputs of wires), and the derivatives with
         respect to the tensions F (C,) and the cable stiffnesses k (C,).

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cdsm._former.tree import Indices
 from cdsm.errors import InvalidInput
-from cdsm.kernels.tree import Indices
 from cdsm.support.values import Array
 from cdsm.tolerances import EVERY, Tolerance, Tolerances
 

@@ -11,10 +11,10 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm._former.principal import principal_stiffness
 from cdsm.errors import CdsmError, EquilibriumError, InvalidInput
 from cdsm.friction.sticking import holding
 from cdsm.friction.stuck import stuck_stiffness
-from cdsm.kernels.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
@@ -164,7 +164,7 @@ class Shown(ReadOnlyState):
     def principal(self) -> dict[str, Array] | None:
         """Softest and stiffest direction, and the stiffness along each [N/m]; None if not stable.
 
-        The keys are those of :func:`~cdsm.kernels.principal.principal_stiffness`.
+        The keys are those of :func:`~cdsm._former.principal.principal_stiffness`.
         """
         return None if self.compliance is None else principal_stiffness(self.compliance)
 

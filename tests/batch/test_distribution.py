@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm._former import active_set, serpentine_guess, serpentine_multipliers, tension
+from cdsm._former.distribution import UNDECIDED, search_tensions
 from cdsm.batch import evaluator
 from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.batch.fused_kernel import evaluate_rows
-from cdsm.kernels import active_set, serpentine_guess, serpentine_multipliers, tension
-from cdsm.kernels.distribution import UNDECIDED, search_tensions
 from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm, one_hinge
 from tests.support.arms import STEEL, mixed_arm, random_arm

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm._former.compiling import at_once
 from cdsm.batch import evaluation, evaluator, fused_kernel
 from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.inputs import run_slices
 from cdsm.batch.layout import DIRECTIONAL, QUANTITIES
-from cdsm.kernels.compiling import at_once
 from cdsm.support.values import Array
 from tests.support.arms import STEEL, mixed_arm, random_arm, random_posture
 from tests.support.processes import uncompiled

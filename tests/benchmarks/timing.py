@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cdsm.kernels.compiling import at_once
+from cdsm._former.compiling import at_once
 
 
 def seconds(

@@ -14,9 +14,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import cdsm
+from cdsm._former.distribution import search_tensions
 from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.cli import app, options
-from cdsm.kernels.distribution import search_tensions
 from cdsm.tension import DEFAULT_SOLVER
 from tests.interchange.test_caspr import cable, folder, link
 from tests.support.patience import HANGS

@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_matrix
 
 import cdsm
+from cdsm._former.chain_problem import Wire, solve_chains
 from cdsm.friction.chain_problem import ChainProblem
-from cdsm.kernels.chain_problem import Wire, solve_chains
 from cdsm.support.values import Array
 
 ROUNDING = 8.0 * np.finfo(float).eps

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cdsm
-from cdsm.kernels.tension import OPTIMALITY
+from cdsm._former.tension import OPTIMALITY
 from cdsm.stiffness_matrix.cartesian import UNMOVED
 from cdsm.support.values import Array
 from tests.support import arms

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm.kernels.principal import principal_stiffness
+from cdsm._former.principal import principal_stiffness
 from cdsm.measures.payload import largest_force
 from cdsm.measures.program import Loads
 from cdsm.support.values import Array
