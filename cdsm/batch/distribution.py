@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 import cdsm
-from cdsm.batch.evaluator import Evaluator
-from cdsm.batch.inputs import given_wrench, postures
-from cdsm.batch.labels import to_dataset
-from cdsm.batch.layout import OK, Codes, Flags
+from cdsm.batch.inputs import checked_threads, given_wrench, postures
+from cdsm.batch.quantities import Codes, to_dataset
+from cdsm.batch.solution import Rows
 from cdsm.manipulator import Manipulator
-from cdsm.support.status import summary
+from cdsm.support.status import Status, summary
 from cdsm.support.tidy import tidy
-from cdsm.support.validation import instance
+from cdsm.support.validation import flag, instance
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
 
@@ -51,9 +50,9 @@ class Tensions(ReadOnlyState):
     status: Codes
 
     @property
-    def ok(self) -> Flags:
+    def ok(self) -> NDArray[np.bool_]:
         """Return for each posture whether tensions were found, (B,)."""
-        return frozen(self.status == OK)
+        return frozen(self.status == Status.OK)
 
     def plot(self) -> Figure:
         """Plot the median and the range of the tensions [N] of each cable over all postures.
@@ -90,9 +89,7 @@ def distribute_tensions(
     """Compute the least tensions that balance an arm at B postures: min ‖F‖² (Eqs. 13, 17).
 
     Tensions are accepted only if they meet the optimality conditions of
-    :func:`~cdsm.distribute_tension`. A posture gets the status ``INFEASIBLE`` only with a proof. If
-    the kernels find neither tensions nor a proof, :func:`~cdsm.distribute_tension` solves the
-    posture.
+    :func:`~cdsm.distribute_tension`. A posture gets the status ``INFEASIBLE`` only with a proof.
 
     Args:
         arm: The arm.
@@ -113,14 +110,19 @@ def distribute_tensions(
     low, high = checked_bounds(arm, minimum, maximum, len(angles))
     loads = given_wrench(wrench, len(angles))
     status = np.zeros(len(angles), dtype=np.uint8)
-    evaluator = Evaluator(
-        arm, angles, loads, ("tension",), bounds=(low, high), check_limits=check_limits
+    rows = Rows(
+        arm=arm,
+        q=angles,
+        wrench=np.atleast_2d(loads),
+        names=("tension",),
+        bounds=(np.atleast_2d(low), np.atleast_2d(high)),
+        check_limits=flag("check_limits", check_limits),
     )
-    evaluator.run(status, threads)
+    values = rows.solve(status, checked_threads(threads))["tension"]
     return Tensions(
         arm=arm,
         q=angles,
-        values=frozen(evaluator.values[0]),
+        values=frozen(values),
         wrench=loads,
         minimum=low,
         maximum=high,

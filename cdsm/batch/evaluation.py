@@ -9,20 +9,18 @@ from functools import cached_property
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from cdsm.batch import layout
 from cdsm.batch.distribution import Tensions
-from cdsm.batch.evaluator import Evaluator
-from cdsm.batch.inputs import given_tension, given_wrench, postures
-from cdsm.batch.labels import to_dataset
-from cdsm.batch.layout import DIRECTIONAL, QUANTITIES, Codes, Flags
+from cdsm.batch.inputs import checked_threads, given_tension, given_wrench, postures
+from cdsm.batch.quantities import DIMENSIONS, OF_POSTURE, Codes, to_dataset
+from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import ANOTHER_ARM, Manipulator
 from cdsm.support.directions import Direction, unit_directions
-from cdsm.support.status import summary
+from cdsm.support.status import Status, summary
 from cdsm.support.tidy import tidy
-from cdsm.support.validation import instance, one_of
+from cdsm.support.validation import flag, instance, one_of
 from cdsm.support.values import Array, Named, ReadOnlyState, frozen
 from cdsm.tension import checked_bounds
 
@@ -30,7 +28,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-OUTPUTS = (*(name for name in QUANTITIES if name != "tension"), "tension")
+OUTPUTS = (*(name for name in DIMENSIONS if name != "tension"), "tension")
 """Names of the quantities that :func:`evaluate` computes."""
 
 DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
@@ -89,9 +87,9 @@ class Batch(ReadOnlyState, Named):
         return self.outputs
 
     @cached_property
-    def ok(self) -> Flags:
+    def ok(self) -> NDArray[np.bool_]:
         """Return for each posture whether all requested quantities exist, (B,)."""
-        return frozen(self.status == layout.OK)
+        return frozen(self.status == Status.OK)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the quantities as a labelled Dataset in SI; needs xarray (MissingExtra)."""
@@ -165,7 +163,7 @@ def evaluate(
     names = _checked_outputs(outputs)
     angles = postures(arm, q)
     rows = len(angles)
-    if (direction is None) != set(DIRECTIONAL).isdisjoint(names):
+    if (direction is None) != ("along" not in names):
         raise InvalidInput("direction", "belongs to the output along: give both, or neither.")
     given, loads, status = _checked_load(arm, angles, tension, wrench)
     bounds = None
@@ -175,26 +173,29 @@ def evaluate(
         bounds = checked_bounds(arm, minimum, math.inf if maximum is None else maximum, rows)
     elif maximum is not None:
         raise InvalidInput("maximum", "belongs to minimum=: give that too.")
-    needy = [name for name in names if name not in QUANTITIES[: layout.TENSION]]
+    needy = [name for name in names if name not in OF_POSTURE]
     if needy and given is None and minimum is None:
         raise InvalidInput(
             "tension",
             f"{needy[0]!r} depends on it: give tension=, or minimum= to have it distributed.",
         )
     if not needy:
-        status[:] = layout.OK
+        status[:] = Status.OK
     u = None if direction is None else unit_directions("direction", direction)
-    evaluator = Evaluator(
-        arm,
-        angles,
-        loads,
-        names,
-        tension=given,
-        bounds=bounds if needy else None,
-        direction=u,
-        check_limits=check_limits,
-    )
-    evaluator.run(status, threads)
+    solved = Rows(
+        arm=arm,
+        q=angles,
+        wrench=np.atleast_2d(loads),
+        names=[name for name in names if given is None or name != "tension"],
+        tension=None if given is None else np.atleast_2d(given),
+        bounds=(np.atleast_2d(bounds[0]), np.atleast_2d(bounds[1])) if bounds and needy else None,
+        directions=np.zeros((0, 3)) if u is None else u.reshape(-1, 3),
+        check_limits=flag("check_limits", check_limits),
+    ).solve(status, checked_threads(threads))
+    if given is not None:
+        solved["tension"] = np.broadcast_to(given, (rows, len(arm.cables)))
+    if u is not None and u.ndim == 1:
+        solved["along"] = solved["along"][:, 0]
     return Batch(
         arm=arm,
         q=angles,
@@ -205,7 +206,7 @@ def evaluate(
         direction=u,
         status=frozen(status),
         outputs=names,
-        values=tuple(frozen(value) for value in evaluator.values),
+        values=tuple(frozen(solved[name]) for name in names),
     )
 
 

@@ -1,42 +1,16 @@
-"""Check the arguments of a batch, and divide it into ranges of rows (slices)."""
+"""Check the arguments of a batch."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm._former.tension import NO_ARM
-from cdsm.batch.arguments import Arm
-from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import WRENCH, flag, number_array, whole_number
+from cdsm.support.validation import WRENCH, number_array, whole_number
 from cdsm.support.values import Array, frozen
-
-_MOST = 4096
-"""Maximum number of postures in a slice; a slice allocates the kernel's scratch once."""
-
-
-def kernel_arm(arm: Manipulator, check_limits: bool) -> Arm:
-    """Return an arm as arrays for the kernel; its joint limits are infinite if not checked."""
-    model, endless = kernel_arrays(arm), np.full(arm.nv, np.inf)
-    checked = flag("check_limits", check_limits)
-    return Arm(
-        tree=model.tree,
-        routing=model.routing,
-        masses=model.masses,
-        lowest=model.lowest if checked else frozen(-endless),
-        highest=model.highest if checked else frozen(endless),
-        blocks=model.blocks,
-        smallest_arm=NO_ARM * arm.length,
-        linear=frozen(np.stack([arm._laws.constant, arm._laws.linear])),
-        series=arm._laws.series,
-        rest=arm._laws.rest,
-    )
 
 
 def postures(arm: Manipulator, q: ArrayLike) -> Array:
@@ -84,31 +58,6 @@ def given_tension(arm: Manipulator, value: ArrayLike, rows: int) -> Array:
 def given_wrench(value: ArrayLike | None, rows: int) -> Array:
     """Check a wrench (6,) or (rows, 6), zero if None; return it as a read-only array."""
     return per_row("wrench", np.zeros(6) if value is None else value, rows, 6, WRENCH, "wrench")
-
-
-def run_slices(work: Callable[[slice], None], rows: int, block: int, threads: int) -> None:
-    """Call ``work`` for slices that together cover all rows, in several threads.
-
-    These are Python threads; the kernels release the interpreter lock. Parallel loops of numba
-    take seconds longer to compile. On some machines two threads cannot enter such a loop at once;
-    on others a process that forks later cannot use one.
-
-    Args:
-        work: Computes the postures of its slice, and changes no others.
-        rows: Number of postures.
-        block: Number of postures that the kernel computes at a time.
-        threads: Maximum number of threads.
-    """
-    size = max(1, min(-(-rows // threads), _MOST))
-    size += -size % block
-    slices = [slice(first, min(first + size, rows)) for first in range(0, rows, size)]
-    if threads == 1 or len(slices) < 2:
-        for part in slices:
-            work(part)
-        return
-    with ThreadPoolExecutor(min(threads, len(slices))) as pool:
-        for _ in pool.map(work, slices):  # an error cancels the slices that have not begun
-            pass
 
 
 def checked_threads(threads: int | None) -> int:

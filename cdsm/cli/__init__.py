@@ -24,7 +24,6 @@ from cdsm.cli.paper import reproduce
 from cdsm.cli.plan import plan
 from cdsm.cli.sweep import map_sweep, sweep
 from cdsm.cli.view import view
-from cdsm.cli.warm import warm
 from cdsm.cli.wire import fit
 
 app = typer.Typer(
@@ -73,7 +72,7 @@ def main(
 
 _ALL = (
     *(new, urdf, stiffness, check, weigh, cycle, buckle, plan, sweep, map_sweep),
-    *(design, view, fit, identify, export, reproduce, warm),
+    *(design, view, fit, identify, export, reproduce),
 )
 for command in _ALL:
     name = "map" if command is map_sweep else command.__name__

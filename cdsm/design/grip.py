@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.batch.arm_arrays import kernel_arrays
+from cdsm._former.arm_arrays import kernel_arrays
 from cdsm.posture import Posture
 from cdsm.segments import STRAIGHT
 from cdsm.support.values import Array

@@ -9,10 +9,10 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm._former.arm_arrays import kernel_arrays, run_slices
 from cdsm._former.clearance import clearance_rows
 from cdsm._former.tree import Indices, Routing
-from cdsm.batch.arm_arrays import kernel_arrays
-from cdsm.batch.inputs import checked_threads, postures, run_slices
+from cdsm.batch.inputs import checked_threads, postures
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.format import plain

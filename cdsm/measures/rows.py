@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cdsm._former.arm_arrays import kernel_arrays, run_slices
 from cdsm._former.chains import grip_rows
 from cdsm._former.tree import Routing
 from cdsm.batch import evaluate
-from cdsm.batch.arm_arrays import kernel_arrays
-from cdsm.batch.inputs import checked_threads, run_slices
+from cdsm.batch.inputs import checked_threads
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS, clearances

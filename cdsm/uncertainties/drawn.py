@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cdsm._former.arm_arrays import kernel_arrays
 from cdsm._former.distribution import OPTIMAL, search_tensions
 from cdsm._former.draws import stiffness_of_draws
 from cdsm._former.tension import NO_ARM
-from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array, frozen

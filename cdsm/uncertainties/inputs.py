@@ -15,8 +15,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.sparse import csr_matrix, hstack
 
+from cdsm._former.arm_arrays import kernel_arrays
 from cdsm._former.sensitivity import single_gradient
-from cdsm.batch.arm_arrays import kernel_arrays
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture

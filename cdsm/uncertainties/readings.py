@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from cdsm.batch.arm_arrays import kernel_arrays
+from cdsm._former.arm_arrays import kernel_arrays
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import coordinates
 from cdsm.support.values import Array, ReadOnlyState

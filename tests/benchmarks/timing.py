@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from cdsm._former.compiling import at_once
+from cdsm.batch.choice import compiled
 
 
 def seconds(
@@ -52,6 +53,7 @@ class Clock:
         Raises:
             AssertionError: The ratio is below ``least`` or above ``most``.
         """
+        compiled()
         with at_once():  # warm up: compile, fill caches
             slow(), fast()
         best_slow = best_fast = math.inf

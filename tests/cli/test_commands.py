@@ -14,8 +14,6 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import cdsm
-from cdsm._former.distribution import search_tensions
-from cdsm.batch.fused_kernel import evaluate_rows
 from cdsm.cli import app, options
 from cdsm.tension import DEFAULT_SOLVER
 from tests.interchange.test_caspr import cable, folder, link
@@ -593,14 +591,6 @@ def test_options_that_this_kind_of_arm_does_not_heed_are_refused(
     assert result.exit_code == 2
     assert option in result.stderr
     assert said in " ".join(result.stderr.replace("│", " ").split())
-
-
-def test_warm_compiles_all_kernels_and_says_how_long_it_took() -> None:
-    result = call("warm")
-    assert result.exit_code == 0, result.output
-    assert "kernels are compiled" in result.output
-    kernels: tuple[Any, ...] = (evaluate_rows, search_tensions)
-    assert all(kernel.signatures for kernel in kernels)
 
 
 @pytest.mark.parametrize("command", ["stiffness", "check", "buckle"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +15,9 @@ from cdsm._former.tree import Routing, Tree
 from cdsm.manipulator import LIMIT_SLACK, Manipulator
 from cdsm.routing import Routing as ArmRouting
 from cdsm.support.values import frozen
+
+_MOST = 4096
+"""Maximum number of postures in a slice; a slice allocates the kernel's scratch once."""
 
 
 class KernelArrays:
@@ -86,3 +91,28 @@ def _table(routing: ArmRouting) -> Routing:
         joint=frozen(np.array(joints, dtype=np.intp)),
         fixed=frozen(fixed),
     )
+
+
+def run_slices(work: Callable[[slice], None], rows: int, block: int, threads: int) -> None:
+    """Call ``work`` for slices that together cover all rows, in several threads.
+
+    These are Python threads; the kernels release the interpreter lock. Parallel loops of numba
+    take seconds longer to compile. On some machines two threads cannot enter such a loop at once;
+    on others a process that forks later cannot use one.
+
+    Args:
+        work: Computes the postures of its slice, and changes no others.
+        rows: Number of postures.
+        block: Number of postures that the kernel computes at a time.
+        threads: Maximum number of threads.
+    """
+    size = max(1, min(-(-rows // threads), _MOST))
+    size += -size % block
+    slices = [slice(first, min(first + size, rows)) for first in range(0, rows, size)]
+    if threads == 1 or len(slices) < 2:
+        for part in slices:
+            work(part)
+        return
+    with ThreadPoolExecutor(min(threads, len(slices))) as pool:
+        for _ in pool.map(work, slices):  # an error cancels the slices that have not begun
+            pass

@@ -1,0 +1,293 @@
+"""The pipeline of a batch: pose → tensions → cable stiffness → K_θ → readings, in chunks of rows.
+
+The arguments are already checked. A row is a posture, possibly of a variant of the arm.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Collection
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from types import ModuleType
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.batch.choice import kernels_for
+from cdsm.batch.quantities import (
+    OF_POSTURE,
+    OF_TENSION,
+    READINGS,
+    TERMS,
+    Codes,
+    joint_axes,
+    shapes_of,
+)
+from cdsm.batch.readings import read
+from cdsm.batch.rows import Body, Pose, one_by_one, rows_of, side_by_side
+from cdsm.batch.search import explained, search
+from cdsm.manipulator import LIMIT_SLACK, Manipulator
+from cdsm.routing import SHORTEST_SEGMENT
+from cdsm.support.status import Status
+from cdsm.support.values import Array
+
+_Scalar = TypeVar("_Scalar", np.float64, np.bool_)
+Springs = Callable[[Array, Array, slice], Array]
+
+_CACHE, _WIDE = 2**18, 2**21  # numbers of the poses of a chunk, compiled and by numpy
+_LOST = (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES)
+_NO_TENSION = (*_LOST, Status.INFEASIBLE, Status.SOLVER_FAILED)
+_NO_STIFFNESS = (*_NO_TENSION, Status.OUTSIDE_ELASTICITY)
+_PIVOT = 1e-4  # smallest relative pivot with which K_θ is regular, and needs no exchange of rows
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Rows:
+    """Postures of an arm, loads, and what is given or asked of them.
+
+    An array of loads, tensions or bounds has one row for all, or one for each posture.
+
+    Attributes:
+        arm: The arm.
+        q: Joint angles (N, nv).
+        wrench: W (N, 6).
+        names: The quantities to compute.
+        tension: Given F (N, C) [N], or None.
+        bounds: Lower and upper bounds of F to distribute, (N, C) each [N], or None.
+        directions: Unit vectors (D, 3) of ``along``.
+        body: Dimensions of each row, rows first; those of the arm by default.
+        springs: Stiffness (n, C) of cables of lengths L (n, C) under F (n, C) in a slice of rows;
+            −1 outside a law; those of the arm by default.
+        check_limits: Whether rows beyond the joint limits are skipped.
+    """
+
+    arm: Manipulator
+    q: Array
+    wrench: Array
+    names: Collection[str]
+    tension: Array | None = None
+    bounds: tuple[Array, Array] | None = None
+    directions: Array = field(default_factory=partial(np.zeros, (0, 3)))
+    body: Body | None = None
+    springs: Springs | None = None
+    check_limits: bool = True
+
+    def solve(self, status: Codes, threads: int = 1) -> dict[str, Array]:
+        """Compute the quantities by name (N, …); set the ``status`` (N,) of rows that are OK."""
+        arm, table, count = self.arm, rows_of(self.arm), len(self.q)
+        kernels = kernels_for(table, count)
+        if self.check_limits:
+            beyond = (self.q < arm.lower - LIMIT_SLACK) | (self.q > arm.upper + LIMIT_SLACK)
+            status[beyond.any(axis=1)] = Status.BEYOND_LIMITS
+        # 64 postures side by side are fastest, or 32 of long arms; numpy takes a whole chunk
+        width = 32 if arm.nv >= 40 else 64
+        most = _CACHE // width * width if kernels.COMPILED else _WIDE
+        size = max(1, most // (table.size * (width if kernels.COMPILED else 1)))
+        size *= width if kernels.COMPILED else 1
+        parts = [slice(first, first + size) for first in range(0, count, size)]
+        shapes = shapes_of(arm.nv, len(arm.cables), len(self.directions))
+        values = {name: np.empty((count, *shapes[name])) for name in self.names}
+
+        scratch = threading.local()
+
+        def fill(part: slice) -> None:
+            memory = scratch.__dict__.setdefault("of", {})
+            with np.errstate(all="ignore"):
+                found = _Chunk(self, kernels, part, width, status[part], memory).quantities()
+            for name in self.names:
+                values[name][part] = found[name]
+
+        if threads == 1 or len(parts) < 2:
+            for part in parts:
+                fill(part)
+            return values
+        with ThreadPoolExecutor(min(threads, len(parts))) as pool:
+            for _ in pool.map(fill, parts):  # an error cancels the chunks that have not begun
+                pass
+        return values
+
+
+class _Chunk:
+    """Some of the rows, in blocks of postures side by side."""
+
+    def __init__(
+        self,
+        rows: Rows,
+        kernels: ModuleType,
+        part: slice,
+        width: int,
+        status: Codes,
+        memory: dict[str, Array],
+    ) -> None:
+        self._rows, self._kernels, self._part, self._status = rows, kernels, part, status
+        self._memory = memory
+        self._table, self._names = rows_of(rows.arm), set(rows.names)
+        self._q = rows.q[part]
+        self._width = width if kernels.COMPILED else len(self._q)
+
+    def quantities(self) -> dict[str, Array]:
+        """Compute the quantities (n, …); NaN where one does not exist, as the status says."""
+        table, rows, status = self._table, self._rows, self._status
+        W, q = self._lanes(rows.wrench), side_by_side(self._q[:, table.order], self._width)
+        at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
+        self._kernels.pose(table.arm, self._body(), q, W, at)
+        short = self._alone(at.shortest) < SHORTEST_SEGMENT
+        status[short & (status == Status.OK)] = Status.COINCIDENT_SITES
+        found = self._of_posture(at)
+        if not self._names <= found.keys():
+            F = self._tensions(at)
+            L, pull = self._alone(at.length), self._alone(F)
+            if self._names <= {*OF_POSTURE, *OF_TENSION}:
+                k = np.zeros_like(pull)
+            else:
+                k = (rows.springs or springs_of(rows.arm))(L, pull, self._part)
+            if k.min(initial=0.0) < 0.0:
+                outside = (k < 0.0).any(axis=1) & (status == Status.OK)
+                status[outside] = Status.OUTSIDE_ELASTICITY
+            found |= {"tension": pull, "cable_stiffness": k}
+            if "residual" in self._names:
+                balance = np.einsum("bcjw,bcw->bjw", at.jacobian, F)
+                found["residual"] = self._alone(balance - at.torque)
+            found |= self._of_stiffness(at, F, side_by_side(k, self._width), W)
+        return {name: self._finished(name, found[name]) for name in self._names}
+
+    def _of_posture(self, at: Pose) -> dict[str, Array]:
+        count = len(self._q)
+
+        def tip() -> Array:  # from the columns of the rotation, and the position
+            pose = np.zeros((count, 4, 4))
+            pose[:, :3], pose[:, 3, 3] = self._alone(at.tip).swapaxes(1, 2), 1.0
+            return pose
+
+        makers: dict[str, Callable[[], Array]] = {
+            "tip": tip,
+            "jacobian": lambda: _jacobian(at, np.arange(count)),
+            "cable_lengths": lambda: self._alone(at.length),
+            "length_jacobian": lambda: self._alone(at.jacobian),
+            "gravity_torque": lambda: self._alone(at.gravity),
+        }
+        return {name: make() for name, make in makers.items() if name in self._names}
+
+    def _tensions(self, at: Pose) -> Array:
+        """Return F (B, C, W): given, distributed, or 0 if nothing that is asked for depends on it.
+
+        Rows without tensions get some number, which is not used.
+        """
+        rows, status, shape = self._rows, self._status, at.length.shape
+        if rows.tension is not None:
+            return np.nan_to_num(self._lanes(rows.tension))
+        if rows.bounds is None:
+            return np.zeros(shape)
+        low, high = map(self._lanes, rows.bounds)
+        F, good = np.empty(shape), np.zeros((shape[0], shape[2]), dtype=np.bool_)
+        if len(self._table.arm.pairs):
+            self._kernels.guess(self._table.arm, at, low, high, F, good)
+        for n in np.flatnonzero(~self._alone(good) & (status == Status.OK)):
+            b, w = divmod(int(n), self._width)
+            at_row = at.jacobian[b, ..., w], at.torque[b, :, w], low[b, :, w], high[b, :, w]
+            F[b, :, w], status[n] = search(rows.arm, *at_row)
+            if status[n] == Status.SOLVER_FAILED and rows.body is None:
+                wrench = rows.wrench[(self._part.start + n) % len(rows.wrench)]
+                F[b, :, w], status[n] = explained(rows.arm, self._q[n], *at_row[2:], wrench)
+        return F
+
+    def _of_stiffness(self, at: Pose, F: Array, k: Array, W: Array) -> dict[str, Array]:
+        """Compute K_θ, its terms if they are needed, and what is read off it."""
+        names, status, u = self._names, self._status, self._rows.directions
+        wanted, fine = names & set(READINGS), np.flatnonzero(status == Status.OK)
+        fused = self._kernels.COMPILED and wanted <= {"along"} and names.isdisjoint(TERMS)
+        K, size = self._terms(at, F, k, W, apart=not fused)
+        found: dict[str, Array] = {}
+        if not fused or "joint" in names:
+            terms = self._alone(K)
+            found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
+            found["joint"] = terms.sum(axis=1)
+        if not wanted:
+            return found
+        if not fused:
+            read_off, status[fine] = read(wanted, terms[fine], _jacobian(at, fine), u)
+            for name, value in read_off.items():
+                found[name] = np.full((len(status), *value.shape[1:]), np.nan)
+                found[name][fine] = value
+            return found
+        shape = len(F), len(u), self._width
+        along, pivot, moment = np.empty(shape), np.empty(shape[::2]), bool(W[:, 3:].any())
+        self._kernels.along(K, size, at.tip_jacobian, u, moment, along, pivot)
+        found["along"] = self._alone(along)
+        doubtful = fine[~(self._alone(pivot)[fine] > _PIVOT)]
+        if doubtful.size:
+            *pose, F, k, W = (self._picked(x, doubtful) for x in (*at, F, k, W))
+            some = Pose(*pose)
+            terms = one_by_one(self._terms(some, F, k, W, apart=True)[0], doubtful.size)
+            of_tip = _jacobian(some, np.arange(doubtful.size))
+            read_off, status[doubtful] = read({"along"}, terms, of_tip, u)
+            found["along"][doubtful] = read_off["along"]
+        return found
+
+    def _terms(self, at: Pose, F: Array, k: Array, W: Array, *, apart: bool) -> tuple[Array, Array]:
+        B, nv, _ = at.gravity.shape
+        K = self._empty("K", B, 4 if apart else 1, nv, nv)
+        size = self._empty("size", B, nv)
+        self._kernels.stiffness(self._table.arm, at, F, k, W, K, size)
+        return K, size
+
+    def _finished(self, name: str, value: Array) -> Array:
+        """Put the joints in the order of q; NaN where the quantity does not exist."""
+        status, place = self._status, self._table.place
+        if not self._table.is_sorted:
+            for axis in range(value.ndim - joint_axes(name), value.ndim):
+                value = value.take(place, axis=axis)
+        if not status.any():
+            return value
+        kinds = (
+            _LOST if name in OF_POSTURE else _NO_TENSION if name in OF_TENSION else _NO_STIFFNESS
+        )
+        lost = np.isin(status, kinds)
+        return np.where(lost.reshape(-1, *[1] * (value.ndim - 1)), np.nan, value)
+
+    def _empty(self, name: str, blocks: int, *shape: int) -> Array:
+        """Return memory that the next chunk uses again: fresh pages cost as much as kernels."""
+        kept = self._memory.get(name)
+        if kept is None or len(kept) < blocks or kept.shape[1:] != (*shape, self._width):
+            kept = self._memory[name] = np.empty((blocks, *shape, self._width))
+        return kept[:blocks]
+
+    def _body(self) -> Body:
+        if self._rows.body is None:
+            return self._table.body(self._width if self._kernels.COMPILED else 1)
+        return Body(*(side_by_side(x[self._part], self._width) for x in self._rows.body))
+
+    def _lanes(self, x: Array) -> Array:
+        """Put the rows of an array side by side, or repeat its only row."""
+        shared = len(x) == 1 < len(self._rows.q)
+        some = np.broadcast_to(x, (len(self._q), *x.shape[1:])) if shared else x[self._part]
+        return side_by_side(some, self._width)
+
+    def _alone(self, x: NDArray[_Scalar]) -> NDArray[_Scalar]:
+        return one_by_one(x, len(self._q))
+
+    def _picked(self, x: Array, rows: NDArray[np.intp]) -> Array:
+        b, w = np.divmod(rows, self._width)
+        return side_by_side(x[b, ..., w], self._width)
+
+
+def springs_of(arm: Manipulator) -> Springs:
+    """Return the stiffness of the cables of an arm, by numpy for all of its laws."""
+    laws = arm._laws
+
+    def stiffness(L: Array, F: Array, _: slice) -> Array:
+        stretched = laws.rigidities(F)
+        wire = L - laws.series * (F - laws.rest)
+        return np.where(stretched > 0.0, 1.0 / (wire / stretched + laws.series), stretched)
+
+    return stiffness
+
+
+def _jacobian(at: Pose, rows: NDArray[np.intp]) -> Array:
+    """Return J_X (n, 6, nv) of some rows, in the kernels' order of joints."""
+    b, w = np.divmod(rows, at.shortest.shape[1])
+    both = np.ascontiguousarray(at.tip_jacobian[b, ..., w].swapaxes(2, 3))
+    return both.reshape(len(rows), 6, at.gravity.shape[1])

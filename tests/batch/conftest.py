@@ -1,0 +1,17 @@
+"""Batches with compiled kernels, and with the same source run by numpy."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import pytest
+
+from cdsm.batch import choice, solution
+
+
+@pytest.fixture(params=["compiled", "numpy"])
+def kernels(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Let all batches of a test use these kernels."""
+    chosen = choice.compiled() if request.param == "compiled" else choice.plain()
+    monkeypatch.setattr(solution, "kernels_for", lambda *_: chosen)
+    return chosen
