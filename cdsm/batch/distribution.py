@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm.batch.inputs import checked_threads, given_wrench, postures
-from cdsm.batch.quantities import Codes, to_dataset
+from cdsm.batch.quantities import Codes, OfPostures
 from cdsm.batch.solution import Rows
 from cdsm.manipulator import Manipulator
-from cdsm.support.status import Status, summary
-from cdsm.support.tidy import tidy
 from cdsm.support.validation import flag, instance
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
 if TYPE_CHECKING:
-    import pandas
-    import xarray
     from matplotlib.figure import Figure
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Tensions(ReadOnlyState):
+class Tensions(OfPostures):
     """Cable tensions that balance an arm at B postures, with loads, bounds and status.
 
     Attributes:
@@ -49,11 +46,6 @@ class Tensions(ReadOnlyState):
     maximum: Array
     status: Codes
 
-    @property
-    def ok(self) -> NDArray[np.bool_]:
-        """Return for each posture whether tensions were found, (B,)."""
-        return frozen(self.status == Status.OK)
-
     def plot(self) -> Figure:
         """Plot the median and the range of the tensions [N] of each cable over all postures.
 
@@ -61,19 +53,8 @@ class Tensions(ReadOnlyState):
         """
         return cdsm.plots.plot_tensions(self)
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Return tensions and status as a labelled Dataset in SI; needs xarray (MissingExtra)."""
-        return to_dataset(self.arm, self.q, self.status, {"tension": self.values})
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return :meth:`to_xarray` as a table, a row per posture; needs xarray (MissingExtra)."""
-        return tidy(self.to_xarray())
-
-    def __len__(self) -> int:
-        return len(self.q)
-
-    def __repr__(self) -> str:
-        return f"<Tensions of {self.arm.name}, {summary(self.status)}>"
+    def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
+        return self._of({"tension": self.values})
 
 
 def distribute_tensions(

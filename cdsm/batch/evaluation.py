@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cdsm.batch.distribution import Tensions
 from cdsm.batch.inputs import checked_threads, given_tension, given_wrench, postures
-from cdsm.batch.quantities import DIMENSIONS, OF_POSTURE, Codes, to_dataset
+from cdsm.batch.quantities import DIMENSIONS, OF_POSTURE, Codes, OfPostures
 from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput, UnknownName
 from cdsm.manipulator import ANOTHER_ARM, Manipulator
 from cdsm.support.directions import Direction, unit_directions
+from cdsm.support.format import coordinates
 from cdsm.support.status import Status, summary
-from cdsm.support.tidy import tidy
 from cdsm.support.validation import flag, instance, one_of
-from cdsm.support.values import Array, Named, ReadOnlyState, frozen
+from cdsm.support.values import Array, Named, frozen
 from cdsm.tension import checked_bounds
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
 
 OUTPUTS = (*(name for name in DIMENSIONS if name != "tension"), "tension")
 """Names of the quantities that :func:`evaluate` computes."""
@@ -37,7 +32,7 @@ DEFAULT_OUTPUTS = ("tip", "compliance", "margin")
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Batch(ReadOnlyState, Named):
+class Batch(OfPostures, Named):
     """Quantities at B postures: ``batch["joint"]`` is K_θ (B, nv, nv); ``len(batch)`` is B.
 
     The keys are the names in :attr:`outputs`; ``"joint" in batch``, ``list(batch)`` and
@@ -86,25 +81,12 @@ class Batch(ReadOnlyState, Named):
         """Return the names of the quantities, :attr:`outputs`."""
         return self.outputs
 
-    @cached_property
-    def ok(self) -> NDArray[np.bool_]:
-        """Return for each posture whether all requested quantities exist, (B,)."""
-        return frozen(self.status == Status.OK)
+    def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
+        return self._of(dict(zip(self.outputs, self.values, strict=True)))
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the quantities as a labelled Dataset in SI; needs xarray (MissingExtra)."""
-        values = dict(zip(self.outputs, self.values, strict=True))
-        return to_dataset(self.arm, self.q, self.status, values, self.direction)
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return :meth:`to_xarray` as a table, a row per posture; needs xarray (MissingExtra)."""
-        return tidy(self.to_xarray())
-
-    def __len__(self) -> int:
-        return len(self.q)
-
-    def __repr__(self) -> str:
-        return f"<Batch of {self.arm.name}, {summary(self.status)}>"
+    def _labels(self) -> dict[str, Sequence[object]]:
+        u = np.zeros((0, 3)) if self.direction is None else self.direction.reshape(-1, 3)
+        return {**super()._labels(), "direction": tuple(map(coordinates, u))}
 
     def __str__(self) -> str:
         lines = [summary(self.status)]

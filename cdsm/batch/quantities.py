@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.manipulator import Manipulator
-from cdsm.support.format import JointUnits, coordinates
-from cdsm.support.status import Status
-from cdsm.support.tidy import dataset
-from cdsm.support.values import Array
+from cdsm.support.format import JointUnits
+from cdsm.support.result import Result
+from cdsm.support.status import Status, summary
+from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
     import xarray
@@ -22,6 +24,7 @@ Codes = NDArray[np.uint8]
 _JOINTS: Final = ("joint", "joint_column")
 _MOTIONS: Final = ("motion", "motion_column")
 _AXES: Final = ("axis", "axis_column")
+_SIX: Final = ("x", "y", "z", "rx", "ry", "rz")
 
 DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     # these need the joint angles alone
@@ -30,17 +33,17 @@ DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     "cable_lengths": (("cable",), "m"),
     "length_jacobian": (("cable", "joint"), "lever"),
     "gravity_torque": (("joint",), "torque"),
-    "gravity": (_JOINTS, "stiffness"),
+    "gravity": (_JOINTS, "joint stiffness"),
     # these also need tensions
     "tension": (("cable",), "N"),
     "residual": (("joint",), "torque"),
-    "active": (_JOINTS, "stiffness"),
-    "load": (_JOINTS, "stiffness"),
+    "active": (_JOINTS, "joint stiffness"),
+    "load": (_JOINTS, "joint stiffness"),
     # these also need the stiffness of the cables
     "cable_stiffness": (("cable",), "N/m"),
-    "passive": (_JOINTS, "stiffness"),
-    "joint": (_JOINTS, "stiffness"),
-    "margin": ((), "stiffness"),
+    "passive": (_JOINTS, "joint stiffness"),
+    "joint": (_JOINTS, "joint stiffness"),
+    "margin": ((), "joint stiffness"),
     "pseudoinverse": (_AXES, "N/m"),
     # these also need a regular K_θ
     "along": (("direction",), "N/m"),
@@ -49,7 +52,7 @@ DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
 }
 """Dimensions and unit of each quantity.
 
-The unit is 1 for matrices whose entries have different SI units. Units of "torque", "stiffness" and
+The unit is 1 for matrices whose entries have different SI units. "torque", "joint stiffness" and
 "lever" depend on the joints of the arm: N m, N m/rad and m/rad, or N, N/m and 1 for prismatic ones.
 """
 
@@ -75,46 +78,64 @@ def joint_axes(name: str) -> int:
     return sum(each in _JOINTS for each in DIMENSIONS[name][0])
 
 
-def to_dataset(
-    arm: Manipulator,
-    q: Array,
-    status: Codes,
-    values: dict[str, Array],
-    directions: Array | None = None,
-) -> xarray.Dataset:
-    """Build a Dataset of the quantities ``values`` (B, …), joint angles (B, nv) and status (B,).
+class OfPostures(Result):
+    """Base class of results with a row for each of B postures.
 
-    ``directions`` (D, 3), or (3,) for one, label the values that depend on a direction. Raises
-    MissingExtra if xarray is not installed.
+    Attributes:
+        arm: The arm.
+        q: Joint angles (B, nv) [rad].
+        status: :class:`Status` of each posture (B,).
     """
-    units = {"torque": arm.torque_unit(), "stiffness": arm.stiffness_unit()}
-    units["lever"] = JointUnits(arm.slides).joined("m/rad", "1")
-    variables: dict[str, tuple[Sequence[str], Array, str]] = {
-        "q": (("pose", "joint"), q, " or ".join(sorted(set(arm.joint_units))[::-1]))
-    }
-    for name, value in values.items():
-        dims, unit = DIMENSIONS[name]
-        if name == "tip":
-            variables["tip_position"] = (("pose", "axis"), value[:, :3, 3], "m")
-            variables["tip_rotation"] = (("pose", *_AXES), value[:, :3, :3], "1")
-            continue
-        # one direction has no axis of its own; a variable must not have the name of a dimension
-        shown = value.reshape(len(q), -1) if name == "along" else value
-        label = "joint_stiffness" if name == "joint" else name
-        variables[label] = (("pose", *dims), shown, units.get(unit, unit))
-    motions = ("x", "y", "z", "rx", "ry", "rz")
-    labels = {
-        **dict.fromkeys(_JOINTS, arm.joint_names),
-        **dict.fromkeys(_MOTIONS, motions),
-        **dict.fromkeys(_AXES, motions[:3]),
-        "cable": arm.cables.names,
-    }
-    if directions is not None:
-        labels["direction"] = tuple(map(coordinates, directions.reshape(-1, 3)))
-    found = dataset(variables, labels, title=f"postures of {arm.name}")
-    flags = {
-        "flag_values": np.array([int(each) for each in Status], dtype=np.uint8),
-        "flag_meanings": " ".join(each.name.lower() for each in Status),
-    }
-    found["status"] = ("pose", status.copy(), flags)
-    return found
+
+    _rows = "pose"
+
+    arm: Manipulator
+    q: Array
+    status: Codes
+
+    @cached_property
+    def ok(self) -> NDArray[np.bool_]:
+        """Return for each posture whether all that was asked for exists, (B,)."""
+        return frozen(self.status == Status.OK)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return all quantities as a labelled Dataset in SI; needs xarray (MissingExtra)."""
+        found = super().to_xarray()
+        found["status"].attrs = {
+            "flag_values": np.array([int(each) for each in Status], dtype=np.uint8),
+            "flag_meanings": " ".join(each.name.lower() for each in Status),
+        }
+        return found
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.arm.name}, {summary(self.status)}>"
+
+    @property
+    def _posture(self) -> Any:
+        return SimpleNamespace(arm=self.arm, _coordinates={})
+
+    def _units(self) -> dict[str, str]:
+        return {**super()._units(), "lever": JointUnits(self.arm.slides).joined("m/rad", "1")}
+
+    def _labels(self) -> dict[str, Sequence[object]]:
+        labels = super()._labels()
+        return {**labels, **dict.fromkeys(_MOTIONS, _SIX), "axis_column": labels["axis"]}
+
+    def _of(self, values: Mapping[str, Array]) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
+        """Yield name, value, unit and dimensions of ``values`` (B, …)."""
+        units = self._units()
+        yield "q", self.q, units["joint"], ("pose", "joint")
+        for name, value in values.items():
+            dims, unit = DIMENSIONS[name]
+            if name == "tip":
+                yield "tip_position", value[:, :3, 3], "m", ("pose", "axis")
+                yield "tip_rotation", value[:, :3, :3], "1", ("pose", *_AXES)
+                continue
+            # one direction has no axis of its own; a variable must not have the name of a dimension
+            shown = value[:, None] if name == "along" and value.ndim == 1 else value
+            label = "joint_stiffness" if name == "joint" else name
+            yield label, shown, units.get(unit, unit), ("pose", *dims)
+        yield "status", self.status, "1", ("pose",)

@@ -37,7 +37,9 @@ from cdsm.support.values import Array
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
 Springs = Callable[[Array, Array, slice], Array]
 
-_CACHE, _WIDE = 2**18, 2**21  # numbers of the poses of a chunk, compiled and by numpy
+# numbers of the poses of a chunk, compiled and by numpy, where a chunk has one block; 64 postures
+# side by side are fastest, or 32 of long arms
+_CACHE, _WIDE = 2**18, 2**21
 _LOST = (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES)
 _NO_TENSION = (*_LOST, Status.INFEASIBLE, Status.SOLVER_FAILED)
 _NO_STIFFNESS = (*_NO_TENSION, Status.OUTSIDE_ELASTICITY)
@@ -82,11 +84,9 @@ class Rows:
         if self.check_limits:
             beyond = (self.q < arm.lower - LIMIT_SLACK) | (self.q > arm.upper + LIMIT_SLACK)
             status[beyond.any(axis=1)] = Status.BEYOND_LIMITS
-        # 64 postures side by side are fastest, or 32 of long arms; numpy takes a whole chunk
-        width = 32 if arm.nv >= 40 else 64
-        most = _CACHE // width * width if kernels.COMPILED else _WIDE
-        size = max(1, most // (table.size * (width if kernels.COMPILED else 1)))
-        size *= width if kernels.COMPILED else 1
+        width, size = 32 if arm.nv >= 80 else 64, min(max(1, _WIDE // table.size), 2048)
+        if kernels.COMPILED:
+            size = width * max(1, _CACHE // (table.size * width))
         parts = [slice(first, first + size) for first in range(0, count, size)]
         shapes = shapes_of(arm.nv, len(arm.cables), len(self.directions))
         values = {name: np.empty((count, *shapes[name])) for name in self.names}

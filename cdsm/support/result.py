@@ -93,7 +93,7 @@ class Result(ReadOnlyState):
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a unit in the name of each column; needs pandas (MissingExtra)."""
-        labels, index = self._labels(), np.arange(1)
+        labels, index = self._labels(), None
         columns: dict[str, Any] = {}
         for name, value, of, dims in self._quantities():
             suffix = "" if of == "1" else f" [{of}]"
@@ -109,6 +109,8 @@ class Result(ReadOnlyState):
                     columns[" ".join([name, *parts]) + suffix] = array[(slice(None), *place)]
         if self._rows in labels:
             index = np.asarray(labels[self._rows])
+        if index is None:  # rows without names
+            index = np.arange(len(next(iter(columns.values()), (None,))))
         return data_frame(columns, self._rows or "result", index)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
