@@ -132,20 +132,17 @@ class Manipulator(Printed):
         original_length: OriginalLength = "unstrained",
     ) -> None:
         if isinstance(geometry, str | os.PathLike):
-            raise InvalidInput(
-                "geometry",
-                f"{str(geometry)!r} given; a Geometry is needed. "
-                "Read the file of a robot with Manipulator.from_urdf().",
-            )
+            said = f"{str(geometry)!r} given; a Geometry is needed. "
+            said += "Read the file of a robot with Manipulator.from_urdf()."
+            raise InvalidInput("geometry", said)
         described = instance("geometry", geometry, Geometry)
-        if elasticity is not None and cables is None:
-            cables = serpentine_cables(geometry, elasticity)
-        elif elasticity is not None or cables is None:
-            raise InvalidInput(
-                "elasticity",
-                "give one of elasticity= (for the cables of the geometry) and cables=; "
-                + ("both were given." if cables is not None else "neither was."),
-            )
+        if (elasticity is None) == (cables is None):
+            said = "give one of elasticity= (for the cables of the geometry) and cables=; "
+            said += f"{'neither was' if cables is None else 'both were given'}."
+            raise InvalidInput("elasticity", said)
+        if elasticity is not None:
+            cables = serpentine_cables(described, elasticity)
+        assert cables is not None
         self._define(to_urdf(described), cables, TIP, gravity, original_length, None, described)
 
     @classmethod
@@ -173,8 +170,7 @@ class Manipulator(Printed):
             joint_names: The moving joints in the order of q. None: Pinocchio's order: branch by
                 branch, each from the base to its end, with the branches sorted by the names of
                 their joints.
-            gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s²
-                along it; (0, 0, 0) for none.
+            gravity: As for :class:`Manipulator`.
             check_inertia: Refuse moments of inertia that no rigid body can have. Stiffness does not
                 depend on them, but :func:`~cdsm.modes` do.
             original_length: As for :class:`Manipulator`.
@@ -302,11 +298,9 @@ class Manipulator(Printed):
         """Raise CableError if a segment, of the ``length`` (S,) [m], has no direction."""
         if length.min(initial=math.inf) < SHORTEST_SEGMENT:
             cable = self.cables[int(self._routing.cable[length.argmin()])]
-            raise CableError(
-                cable.name,
-                f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
-                "direction there. Move a site, or change the posture.",
-            )
+            said = f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
+            said += "direction there. Move a site, or change the posture."
+            raise CableError(cable.name, said)
 
     @property
     def geometry(self) -> Geometry:
@@ -466,16 +460,15 @@ def _doubts(arm: Manipulator) -> tuple[str, ...]:
     length = arm._body.length
     # without lengths between the joints, the frame of the robot may be as long as any arm
     most = max(_FARTHEST, 10.0 * length) if length > 0.0 else LONGEST
-    sizes = [(f"the lead of {each.name}", each.lead, most) for each in arm.cables]
+    sizes = []
     for each in arm.cables:
+        sizes.append((f"the lead of {each.name}", each.lead, most))
         far = max(math.hypot(*site.position) for site in each.sites)
         sizes.append((f"a site of {each.name}", far, most))
     largest = max(sizes, key=lambda size: size[1])
     # a geometry warns of its own length
     found = doubts_about_units(0.0 if arm.is_serpentine else length, [largest])
     if not arm._body.tip_joints.size:
-        found.append(
-            f"no joint moves its tip {arm.tip_link}, so its stiffness is infinite; give another "
-            "link as tip."
-        )
+        said = f"no joint moves its tip {arm.tip_link}, so its stiffness is infinite"
+        found.append(f"{said}; give another link as tip.")
     return tuple(found)

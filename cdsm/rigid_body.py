@@ -69,11 +69,6 @@ class RigidBody:
             raise UrdfError(f"Pinocchio does not accept the URDF: {error}") from None
         model.gravity.linear = np.array(gravity)
         names = tuple(model.names)[1:]
-        if model.nq != len(names) or model.nv != len(names):
-            raise UrdfError(
-                "the URDF has a joint with more than one coordinate; cdsm takes revolute and "
-                "prismatic ones."
-            )
         self.joint_names = names if joint_names is None else _reordered(names, joint_names)
         # index in Pinocchio's order of each of our coordinates, and the inverse permutation
         self._theirs = frozen(np.array([names.index(name) for name in self.joint_names]))
