@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import cdsm
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.contacts import overlapping
-from cdsm.routing import Spans
+from cdsm.routing import Spans, cross
 from cdsm.segments import Segments
 from cdsm.support.format import JointUnits, aligned, coordinates, plain
 from cdsm.support.result import Result, unit
@@ -190,18 +190,12 @@ def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp])
     """
     load = np.zeros((jacobian.shape[1],) * 2)
     if wrench.any():
-        J = jacobian[:, tip_joints]
+        v, z = np.split(jacobian[:, tip_joints], 2)
         later = np.tri(len(tip_joints), k=-1)
-        force = (1.0 - later) * (J[3:].T @ hat(wrench[:3]) @ J[:3])
-        moment = later * (J[3:].T @ hat(wrench[3:]) @ J[3:])
+        force = (1.0 - later) * (cross(z, wrench[:3, None]).T @ v)
+        moment = later * (cross(z, wrench[3:, None]).T @ z)
         load[np.ix_(tip_joints, tip_joints)] = force + force.T * later - moment
     return load
-
-
-def hat(a: Array) -> Array:
-    """Return the matrix of the cross product with a: its product with b is a × b."""
-    x, y, z = a.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 @final
