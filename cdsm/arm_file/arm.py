@@ -18,14 +18,13 @@ from cdsm.arm_file.cables import (
     setting_lines,
 )
 from cdsm.arm_file.wires import CableKeys, CableSettings, read_wires, wire_entries
-from cdsm.arm_parts import ArmParts
-from cdsm.cable import Cable, Cables
+from cdsm.cable import Cable
 from cdsm.cable_laws import OriginalLength
 from cdsm.errors import LINES, FileError, GeometryError, UnknownName, UrdfError, listed
 from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.geometry.toml import build, lines_of, split_geometry
-from cdsm.manipulator import GRAVITY
+from cdsm.manipulator import GRAVITY, Manipulator
 from cdsm.support.files import read_text
 from cdsm.support.records import CrossFaults, Number, parse, read_toml, record, toml_value
 from cdsm.support.validation import RANGES, one_of
@@ -73,8 +72,8 @@ class _Keys(CableKeys):
     tolerances: Any = Field(default_factory=dict)
 
 
-def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
-    """Read an ARM.toml. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
+def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> dict[str, Any]:
+    """Read what defines an arm. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
     text = read_text(path)
     forced = None if wire is None else as_wire(wire)
     if text.lstrip().startswith("<"):
@@ -111,19 +110,18 @@ def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
         cables = attempt(build_cables, routed, keys, wires, path)
     if faults or keys is None or cables is None or tolerances is None:
         raise FileError(path, f"cannot be read as an arm:{listed(faults, 20, LINES)}")
-    g, length = keys.gravity, keys.original_length
+    arm = {"cables": cables, "gravity": keys.gravity, "original_length": keys.original_length}
+    arm["tolerances"] = tolerances
     if robot is None:
         assert geometry is not None
-        return ArmParts(
-            geometry, to_urdf(geometry), Cables(cables), TIP, g, length, None, tolerances
-        )
+        return {**arm, "urdf": to_urdf(geometry), "tip_link": TIP, "geometry": geometry}
     source = robot.text if robot.file is None else Path(path).parent / robot.file
     assert source is not None
     try:
         urdf = read_urdf(source, check_inertia=robot.check_inertia)
     except FileError as error:
         raise FileError(path, f"urdf.file: {error}") from None
-    return ArmParts(None, urdf, Cables(cables), robot.tip, g, length, robot.joint_names, tolerances)
+    return {**arm, "urdf": urdf, "tip_link": robot.tip, "joint_names": robot.joint_names}
 
 
 def _tolerances(given: object) -> Tolerances:
@@ -165,23 +163,23 @@ def _routed(cables: object, geometry: Geometry | None) -> list[UnwiredCable]:
     ]
 
 
-def arm_text(parts: ArmParts) -> str:
+def arm_text(arm: Manipulator) -> str:
     """Return the text of an ARM.toml; InvalidInput if an elasticity cannot be written."""
-    geometry, cables = parts.geometry, parts.cables
+    geometry, cables = arm.geometry if arm.is_serpentine else None, arm.cables
     wires, tables = wire_entries(cables)
     settings = [setting_lines(cable) for cable in cables]
-    lines = [_HEAD, f"gravity = {toml_value(parts.gravity)}"]
-    lines.append(f"original_length = {toml_value(parts.original_length)}")
+    lines = [_HEAD, f"gravity = {toml_value(arm.gravity)}"]
+    lines.append(f"original_length = {toml_value(arm.original_length)}")
     if len(set(wires)) == 1:
         lines.append(f"wire = {wires[0]}")
         wires = [""] * len(cables)
     shared = [line for line in settings[0] if all(line in own for own in settings)]
     settings = [[line for line in own if line not in shared] for own in settings]
     lines += [*shared, "", *tables]
-    tolerances = tolerance_lines(parts.tolerances)
+    tolerances = tolerance_lines(arm.tolerances)
     lines += ["[tolerances]", *tolerances, ""] if tolerances else []
     if geometry is None:
-        lines += _urdf_lines(parts)
+        lines += _urdf_lines(arm)
     else:
         lines += ["[geometry]", *lines_of(geometry, "geometry."), ""]
     plain = () if geometry is None else serpentine_cables(geometry, LinearElasticity(1e5))
@@ -198,10 +196,10 @@ def _path(cable: Cable) -> tuple[object, ...]:
     return cable.name, cable.sites, cable.lead
 
 
-def _urdf_lines(parts: ArmParts) -> list[str]:
+def _urdf_lines(arm: Manipulator) -> list[str]:
     """Return the TOML lines of the table [urdf], with the URDF unescaped ('''…''') if possible."""
-    urdf, lines = parts.urdf, ["[urdf]", f"tip = {toml_value(parts.tip)}"]
-    lines.append(f"joint_names = {toml_value(parts.joint_names)}")
+    urdf, lines = arm.urdf, ["[urdf]", f"tip = {toml_value(arm.tip_link)}"]
+    lines.append(f"joint_names = {toml_value(arm.joint_names)}")
     try:
         read_urdf(urdf)
     except UrdfError:  # the arm was built without this check
