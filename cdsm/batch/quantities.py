@@ -17,6 +17,7 @@ from cdsm.support.status import Status, summary
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 Codes = NDArray[np.uint8]
@@ -106,6 +107,12 @@ class OfPostures(Result):
             "flag_meanings": " ".join(each.name.lower() for each in Status),
         }
         return found
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with a row for each posture; needs pandas (MissingExtra)."""
+        table = super().to_pandas()
+        table["status"] = [Status(each).name.lower() for each in self.status]
+        return table
 
     def __len__(self) -> int:
         return len(self.q)

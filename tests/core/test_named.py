@@ -245,11 +245,11 @@ def test_batch_has_one_row_for_each_posture_in_pandas_and_labels_in_xarray() -> 
     np.testing.assert_array_equal(
         found["length_jacobian"].sel(cable=NAMES[1], joint=joint), batch["length_jacobian"][:, 1, 2]
     )
-    np.testing.assert_array_equal(table[f"tension_{NAMES[2]} [N]"], batch["tension"][:, 2])
-    np.testing.assert_array_equal(table["along_(0, 0, 1) [N/m]"], batch["along"][:, 0])
+    np.testing.assert_array_equal(table[f"tension {NAMES[2]} [N]"], batch["tension"][:, 2])
+    np.testing.assert_array_equal(table["along (0, 0, 1) [N/m]"], batch["along"][:, 0])
     pulls = cdsm.distribute_tensions(POSE.arm, q, 10.0)
     np.testing.assert_array_equal(pulls.to_xarray()["tension"], pulls.values)
-    np.testing.assert_array_equal(pulls.to_pandas()[f"tension_{NAMES[0]} [N]"], pulls.values[:, 0])
+    np.testing.assert_array_equal(pulls.to_pandas()[f"tension {NAMES[0]} [N]"], pulls.values[:, 0])
 
 
 def test_sweeps_become_tidy_tables() -> None:
