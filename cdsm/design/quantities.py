@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm._former.principal import principal_stiffness
 from cdsm.batch import Batch, evaluate
 from cdsm.design.goals import KINDS, Measure
 from cdsm.design.problem import DesignProblem
@@ -24,6 +23,7 @@ from cdsm.measures.rows import (
     narrowed_bounds,
     payloads,
 )
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 from cdsm.tension import Tension, distribute_tension, grip

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm._former.principal import principal_stiffness
 from cdsm.errors import SolverError
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.linear_program import OPTIMAL, least
 from cdsm.support.validation import instance
 from cdsm.support.values import Array

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm import batch
-from cdsm._former.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import (
     MEASURED,
@@ -26,6 +25,7 @@ from cdsm.measures.rows import (
     payloads,
     require,
 )
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.arguments import Choice
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES

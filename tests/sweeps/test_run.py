@@ -11,9 +11,9 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm._former.principal import principal_stiffness
 from cdsm.measures.payload import largest_force
 from cdsm.measures.program import Loads
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
 from cdsm.sweeps.evaluation import _BATCH_NAMES
