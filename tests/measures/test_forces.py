@@ -50,7 +50,7 @@ def test_vertices_are_those_of_an_exhaustive_search(seed: int) -> None:
     assert gaps.max() < 1e-7 * size
     zero = -expected.equations[:, 3].max() if (expected.equations[:, 3] > 0).any() else None
     distance = (-expected.equations[:, 3]).min() if zero is None else zero
-    assert found.margin() == pytest.approx(distance, rel=1e-6)
+    assert found.radius == pytest.approx(distance, rel=1e-6)
 
 
 @pytest.mark.parametrize("arm", [mixed_arm(), cdsm.presets.virtual_prototype()])
@@ -119,7 +119,7 @@ def test_pycapacity_finds_the_same_polytope() -> None:
     # pycapacity 2.1.9, human.force_polytope(J_v, J_Lᵀ, 15, 800, 1e-9, −g)
     assert len(found.vertices) == 48
     assert found.volume == pytest.approx(VOLUME, rel=1e-9)
-    assert found.margin() == pytest.approx(MARGIN, rel=1e-9)
+    assert found.radius == pytest.approx(MARGIN, rel=1e-9)
     human = pytest.importorskip("pycapacity.human")
     theirs = human.force_polytope(
         pose.jacobian[:3],
@@ -144,7 +144,7 @@ def test_where_the_tip_cannot_move_the_links_hold_any_force() -> None:
     assert np.isinf(polytope.volume)
     assert cdsm.payload(pose, "x", 15.0, 800.0).limits["tension"] == np.inf
     side = cdsm.payload(pose, polytope.worst_direction, 15.0, 800.0)
-    assert side.force == pytest.approx(polytope.margin(), rel=1e-7)
+    assert side.force == pytest.approx(polytope.radius, rel=1e-7)
 
 
 def test_a_pair_holds_a_segment_of_forces() -> None:
@@ -156,7 +156,7 @@ def test_a_pair_holds_a_segment_of_forces() -> None:
     pose = cdsm.Manipulator(geometry, law, gravity=(0.0, 0.0, 0.0)).at([0.0])
     polytope = cdsm.force_polytope(pose, 10.0, 110.0)
     # one cable 110 N, the other 10 N, on 20 mm; the tip is 100 mm away
-    assert polytope.margin() == pytest.approx(100.0 * 0.02 / 0.1, rel=1e-9)
+    assert polytope.radius == pytest.approx(100.0 * 0.02 / 0.1, rel=1e-9)
     assert sorted(polytope.vertices[:, 2]) == pytest.approx([-20.0, 20.0])
     assert len(polytope.unbounded) == 2
 
@@ -170,4 +170,4 @@ def test_errors_name_what_is_missing() -> None:
     with pytest.raises(cdsm.InvalidInput, match="deflection"):
         cdsm.payload(pose, "z", 15.0, 100.0, deflection=-1.0)
     with pytest.raises(cdsm.InvalidInput, match="force"):
-        cdsm.force_polytope(pose, 15.0, 800.0).margin([1.0, 2.0])
+        cdsm.force_polytope(pose, 15.0, 800.0).radius_at([1.0, 2.0])
