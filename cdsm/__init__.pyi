@@ -15,7 +15,7 @@ from cdsm.cable import Cable as Cable
 from cdsm.cable import Cables as Cables
 from cdsm.cable import Site as Site
 from cdsm.control.mujoco_plant import MuJoCoPlant as MuJoCoPlant
-from cdsm.control.plant import SlowPlant as SlowPlant
+from cdsm.control.plants import QuasiStaticPlant as QuasiStaticPlant
 from cdsm.control.run import TrackingRun as TrackingRun
 from cdsm.control.sensors import Sensors as Sensors
 from cdsm.control.track import track as track
