@@ -25,6 +25,7 @@ _BACKBONE = 0.2
 _ON = 1e-9  # a site this near to a disk [m] is on the disk
 
 _PRECISE = 1e-9  # tolerance of coal's iterations [m]
+_MARGIN = 1e-6  # rounding of the distances of centres is smaller [m]
 
 
 class Named(NamedTuple):
@@ -39,8 +40,7 @@ class Named(NamedTuple):
 class Clearance(Result):
     """Smallest signed distances of the cables of an arm; made by :func:`clearance`.
 
-    A negative distance is the depth of an overlap: the smallest shift that ends it. A distance is
-    inf if the arm has no such pair.
+    A negative distance is the depth of an overlap. A distance is inf if the arm has no such pair.
 
     Attributes:
         posture: The posture.
@@ -80,7 +80,7 @@ def clearance(pose: Posture, diameter: float = 0.0, thickness: float = 0.0) -> C
     are bars from joint to joint, as the generated URDF draws them: their radius is a fifth of the
     hole radius. In an arm from your own URDF, links are lines, and there are no disks. Disks are
     cylinders. If a cable runs through a hole of a disk, its distance from this disk is the distance
-    between its surface and the outer rim.
+    between its surface and the outer rim. If it cuts through a disk, this way is negative.
 
     Args:
         pose: The posture.
@@ -131,75 +131,101 @@ def distances(
         poses = arm._body.link_placements(pose.q)
         place = np.array([poses[disk.link] for disk in disks]).reshape(-1, 4, 4)
         x, radius = (np.array([getattr(disk, of) for disk in disks]) for of in ("x", "radius"))
-        axis, thick = place[:, :3, 0], np.full(radius.size, thickness)
+        axis = place[:, :3, 0]
         centre = place[:, :3, 3] + x[:, None] * axis
-        numbered = [f"disk {number + 1}" for number in range(len(disks))]
-        plates = _Bodies(coal.Cylinder, numbered, centre, axis, thick, radius)
-        # where a segment ends in a hole of a disk, the rim counts
-        away = ends[:, :, None] - centre
-        height = (away * axis).sum(axis=3, keepdims=True)
-        rim = radius - np.linalg.norm(away - height * axis, axis=3)
-        rim = np.where((abs(height[..., 0]) < _ON) & (rim > 0.0), rim, np.inf).min(axis=1)
-        nearest = _nearest(wires, plates, np.isinf(rim))
+        across = np.sqrt(np.clip(1.0 - axis**2, 0.0, 1.0))
+        plates = _Bodies(
+            [f"disk {number + 1}" for number in range(len(disks))],
+            [coal.Cylinder(each, thickness) for each in radius.tolist()],
+            centre,
+            axis,
+            thickness / 2.0 * abs(axis) + radius[:, None] * across,
+        )
+        rim = _ways_to_the_rim(ends[:, :, None] - centre, axis, radius)
+        found["disk_clearance"] = _nearest(wires, plates, np.isinf(rim))
         if rim.size:
             i, j = divmod(int(rim.argmin()), len(disks))
-            nearest = min(nearest, Named(rim[i, j] - diameter / 2.0, (names[i], numbered[j])))
-        found["disk_clearance"] = nearest
+            way = Named(rim[i, j] - diameter / 2.0, (names[i], plates.names[j]))
+            found["disk_clearance"] = min(found["disk_clearance"], way)
     return found
 
 
-class _Bodies:
-    """Bodies round an axis, in base axes: n capsules or n cylinders of coal.
+def _ways_to_the_rim(away: Array, axis: Array, radius: Array) -> Array:
+    """Compute how far segments in a disk are from its rim (S, D) [m]; inf for those that are not.
 
-    Centres and axes are (n, 3); the lengths along the axes, without the round ends of a capsule,
-    and the radii are (n,) [m].
+    ``away`` (S, 2, D, 3) are the ends of the segments, seen from the centres of the disks. The way
+    is positive if the segment ends in a hole of the disk, and negative if it cuts through it.
+    """
+    height = (away * axis).sum(axis=3)
+    way = radius - np.linalg.norm(away - height[..., None] * axis, axis=3)
+    held = (abs(height) < _ON) & (way > 0.0)
+    own = np.where(held, way, np.inf).min(axis=1)
+    crosses = (height.prod(axis=1) < 0.0) & ~held.any(axis=1)
+    part = height[:, 0] / np.where(crosses, height[:, 0] - height[:, 1], 1.0)
+    cut = away[:, 0] + part[..., None] * (away[:, 1] - away[:, 0])
+    inside = radius - np.linalg.norm(cut, axis=2)
+    return np.asarray(np.where(crosses & (inside > 0.0), -inside, own))
+
+
+class _Bodies:
+    """Bodies in base axes: n shapes of coal with z along their axes, rounded by a radius.
+
+    Centres, axes and extents (halves of the boxes around the shapes) are (n, 3); lengths and
+    radii are (n,) [m].
     """
 
     def __init__(
-        self, kind: Any, names: list[str], centre: Array, axis: Array, length: Array, radius: Array
+        self, names: list[str], shapes: list[Any], centre: Array, axis: Array, extent: Array
     ) -> None:
-        self.names, self.centre, self.radius = names, centre, radius
-        rounded = kind is coal.Capsule
-        self.reach = length / 2.0 + radius if rounded else np.hypot(length / 2.0, radius)
+        self.names, self.centre, self.extent = names, centre, extent
+        self.radius, self._shapes = np.zeros(len(names)), shapes
         # a reflection that takes z to the axis, up to the sign, and one that turns the hand back
         v = axis + np.where(axis[:, 2:] > 0.0, 1.0, -1.0) * [0.0, 0.0, 1.0]
         mirror = np.eye(3) - 2.0 * v[:, :, None] * v[:, None] / (v**2).sum(axis=1)[:, None, None]
-        self._parts = kind, mirror * [1.0, -1.0, 1.0], radius.tolist(), length.tolist()
-        self._made: dict[int, tuple[Any, Any]] = {}
+        self._turn = mirror * [1.0, -1.0, 1.0]
+        self._poses: dict[int, Any] = {}
 
     @classmethod
     def bars(cls, names: list[str], ends: Array, radius: Array) -> Self:
-        """Return capsules around lines between points (n, 2, 3)."""
+        """Return round bars with round ends, along lines between points (n, 2, 3)."""
         along = ends[:, 1] - ends[:, 0]
         length = np.linalg.norm(along, axis=1)
-        axis = along / length[:, None]
-        return cls(coal.Capsule, names, ends.mean(axis=1), axis, length, radius)
+        shapes = [coal.Capsule(0.0, each) for each in length.tolist()]
+        made = cls(names, shapes, ends.mean(axis=1), along / length[:, None], abs(along) / 2.0)
+        made.radius = radius
+        return made
 
-    def __getitem__(self, number: int) -> tuple[Any, Any]:
-        if number not in self._made:
-            kind, turn, radius, length = self._parts
-            pose = coal.Transform3s(turn[number], self.centre[number])
-            self._made[number] = kind(radius[number], length[number]), pose
-        return self._made[number]
+    def __getitem__(self, i: int) -> tuple[Any, Any]:
+        if i not in self._poses:
+            self._poses[i] = coal.Transform3s(self._turn[i], self.centre[i])
+        return self._shapes[i], self._poses[i]
 
 
 def _nearest(one: _Bodies, other: _Bodies, pairs: NDArray[np.bool_]) -> Named:
-    """Return the smallest distance of the ``pairs`` (n, m), capsules with bodies.
+    """Return the smallest distance of the ``pairs`` (n, m) of bodies, the likeliest ones first.
 
-    A distance is at least that of the spheres around both bodies. It is at most that of the
-    centres, less the radius of the capsule.
+    The spheres and the boxes around two bodies bound their distance from below, the centres from
+    above.
     """
-    apart = np.linalg.norm(one.centre[:, None] - other.centre, axis=2)
-    least = np.where(pairs, apart - one.reach[:, None] - other.reach, np.inf)
-    most = np.where(pairs, apart - one.radius[:, None], np.inf).min(initial=math.inf)
+    best = Named(math.inf)
+    if not pairs.any():
+        return best
+    offset = one.centre.mean(axis=0)
+    a, b = one.centre - offset, other.centre - offset
+    square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * a @ b.T
+    apart = np.sqrt(np.maximum(square, 0.0)) - one.radius[:, None] - other.radius
+    reach = [np.linalg.norm(each.extent, axis=1) for each in (one, other)]
+    most = apart[pairs].min() + _MARGIN
+    i, j = np.nonzero(pairs & (apart - reach[0][:, None] - reach[1] < most))
+    gaps = np.maximum(abs(a[i] - b[j]) - one.extent[i] - other.extent[j], 0.0)
+    rounding = one.radius[i] + other.radius[j]
+    least = np.linalg.norm(gaps, axis=1) - rounding
     request, result = coal.DistanceRequest(False), coal.DistanceResult()
-    request.enable_signed_distance = True
-    request.gjk_tolerance = request.epa_tolerance = _PRECISE
-    best, near = Named(math.inf), np.argwhere(pairs & (least <= most))
-    for i, j in near[np.argsort(least[*near.T])].tolist():
-        if least[i, j] >= best.distance:
+    request.gjk_tolerance, request.enable_signed_distance = _PRECISE, False
+    for k in np.argsort(least).tolist():
+        if least[k] >= best.distance:
             break
         result.clear()
-        distance = coal.distance(*one[i], *other[j], request, result)
-        best = min(best, Named(distance, (one.names[i], other.names[j])))
+        distance = coal.distance(*one[int(i[k])], *other[int(j[k])], request, result) - rounding[k]
+        best = min(best, Named(float(distance), (one.names[i[k]], other.names[j[k]])))
     return best

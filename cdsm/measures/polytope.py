@@ -210,7 +210,8 @@ def _hull(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     none = np.zeros((0, 3), np.intp)
     if points.shape[1] == 1:
         return np.array([points.argmin(), points.argmax()]), none, np.array([[-1.0], [1.0]])
-    scaled = (points - points[0]) / (np.ptp(points, axis=0).max() or 1.0)
+    size = max(np.ptp(points, axis=0).max(), _OUTSIDE * abs(points).max()) or 1.0
+    scaled = (points - points[0]) / size
     try:
         hull, flat = ConvexHull(scaled), points.shape[1] < 3
     except QhullError:  # a flat polytope is made a little thick
@@ -240,11 +241,15 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
     A /= lever[:, None]
     b = (pose.jacobian.T @ wrench - pose.gravity_torque) / lever
     count, free = low.size, np.full(U.shape[1], math.inf)
+    # near the straight arm, forces along it are huge: each counts by what it does to the joints
+    scale = abs(A[:, count:]).max(axis=0)
+    scale[scale == 0.0] = 1.0
+    A[:, count:] /= scale
     force = float((high if np.isfinite(high).all() else np.append(low, abs(b))).max()) or 1.0
     bounds = np.append(low / force, -free), np.append(high / force, free)
 
     def farthest(along: Array) -> tuple[float, Array] | None:
-        found = solvers.largest(np.append(np.zeros(count), along), A, b / force, *bounds)
-        return found and (found[0] * force, found[1][count:] * force)
+        found = solvers.largest(np.append(np.zeros(count), along / scale), A, b / force, *bounds)
+        return found and (found[0] * force, found[1][count:] / scale * force)
 
     return farthest

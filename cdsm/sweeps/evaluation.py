@@ -179,9 +179,12 @@ def _bounds(
     if not task.worst_friction:
         low, high = (np.broadcast_to(x, shape) for x in (minima[:, None], task.maximum))
         return low, high, np.broadcast_to(True, len(q))
-    loss = np.ones(shape)
-    exist = batch.evaluate(task.arm, q, outputs=[], threads=threads).ok
-    loss[exist] = friction_losses(task.arm, q[exist])
+    cases = len(task.wrenches.values) * len(lows)
+    poses = q[::cases]
+    exist = batch.evaluate(task.arm, poses, outputs=[], threads=threads).ok
+    loss = np.ones((len(poses), shape[1]))
+    loss[exist] = friction_losses(task.arm, poses[exist])
+    loss = np.repeat(loss, cases, axis=0)
     return narrowed_bounds(task.arm, minima, task.maximum, loss)
 
 

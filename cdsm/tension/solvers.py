@@ -118,14 +118,17 @@ def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[f
     """Maximise cost · x subject to A x = b and low ≤ x ≤ high; return the maximum and x (n,).
 
     DAQP solves the quadratic program −cost · x + ½ε ‖x‖², which for ε = 1e-8 ends in the vertex of
-    the linear one; another ε moves it, or fails near straight postures. A, b and the finite bounds
-    must be of order one. Where DAQP finds nothing, or beyond 1e4, HiGHS decides. The result is None
-    if no x is feasible, and (inf, NaN) if cost · x is unbounded.
+    the linear one; another ε moves it, or fails near straight postures. A, b, the finite bounds and
+    x must be of order one. Where DAQP finds nothing, or beyond 1e4, HiGHS decides. The result is
+    None if no x is feasible, and (inf, NaN) if cost · x is unbounded.
     """
     import qpsolvers
 
     least, most = np.maximum(low, -_FARTHEST), np.minimum(high, _FARTHEST)
-    qp = qpsolvers.Problem(_CURVATURE * np.eye(cost.size), -cost, A=A, b=b, lb=least, ub=most)
+    unit = float(abs(cost).max()) or 1.0
+    qp = qpsolvers.Problem(
+        _CURVATURE * np.eye(cost.size), -cost / unit, A=A, b=b, lb=least, ub=most
+    )
     with suppress(qpsolvers.SolverError):
         found = qpsolvers.solve_problem(qp, DEFAULT_SOLVER, primal_tol=1e-11, dual_tol=1e-11)
         x = np.full_like(cost, np.nan) if found.x is None else np.asarray(found.x)

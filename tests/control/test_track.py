@@ -220,15 +220,6 @@ def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() 
     assert set(run.saturated_motors) <= set(plan.arm.cables.names)
 
 
-def test_a_step_that_was_not_planned_may_be_the_one_that_failed() -> None:
-    run = cdsm.track(small_path(), "feedforward", steps=2, **BOUNDS)
-    count = len(run.time)
-    cut = dataclasses.replace(run, replan_failed={count: "no tensions"})
-    assert cut.warnings == (
-        f"NOT PLANNED at 1 of {count} steps, from {count * run.period:.4g} s: no tensions",
-    )
-
-
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
