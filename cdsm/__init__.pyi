@@ -15,7 +15,7 @@ from cdsm.cable import Cable as Cable
 from cdsm.cable import Cables as Cables
 from cdsm.cable import Site as Site
 from cdsm.control.mujoco_plant import MuJoCoPlant as MuJoCoPlant
-from cdsm.control.plant import SlowPlant as SlowPlant
+from cdsm.control.plants import QuasiStaticPlant as QuasiStaticPlant
 from cdsm.control.run import TrackingRun as TrackingRun
 from cdsm.control.sensors import Sensors as Sensors
 from cdsm.control.track import track as track
@@ -78,13 +78,13 @@ from cdsm.kinematics import solve_joint_angles as solve_joint_angles
 from cdsm.manipulator import Manipulator as Manipulator
 from cdsm.measures.clearance import Clearance as Clearance
 from cdsm.measures.clearance import clearance as clearance
-from cdsm.measures.closure import has_wrench_closure as has_wrench_closure
-from cdsm.measures.closure import isotropy as isotropy
-from cdsm.measures.closure import tension_factor as tension_factor
-from cdsm.measures.forces import ForcePolytope as ForcePolytope
-from cdsm.measures.forces import force_polytope as force_polytope
+from cdsm.measures.indices import has_wrench_closure as has_wrench_closure
+from cdsm.measures.indices import isotropy as isotropy
+from cdsm.measures.indices import tension_factor as tension_factor
 from cdsm.measures.payload import Payload as Payload
 from cdsm.measures.payload import payload as payload
+from cdsm.measures.polytope import ForcePolytope as ForcePolytope
+from cdsm.measures.polytope import force_polytope as force_polytope
 from cdsm.planning.gradient import StiffnessGradient as StiffnessGradient
 from cdsm.planning.gradient import stiffness_gradient as stiffness_gradient
 from cdsm.planning.path import plan_path as plan_path

@@ -1,26 +1,16 @@
-"""Closed-loop control of position and stiffness: motor laws, sensors, plants, estimation."""
+"""Parts of a closed loop: motor laws, what they get and return, protocol of plants.
 
-from cdsm.control.laws import (
-    Command,
-    Law,
-    Moment,
-    Reading,
-    Reference,
-    feedforward,
-    limited,
-    mixed,
-    tension_control,
-)
-from cdsm.control.mujoco_plant import MuJoCoPlant
-from cdsm.control.plant import SlowPlant
-from cdsm.control.run import TrackingRun
-from cdsm.control.sensors import Sensors
-from cdsm.control.stiffness_loop import with_rigidity
-from cdsm.control.track import track
+:func:`cdsm.track` runs the loop, with :class:`cdsm.Sensors` and a plant.
+"""
 
-# fmt: off
-__all__ = [
-    "Command", "Law", "Moment", "MuJoCoPlant", "Reading", "Reference", "Sensors", "SlowPlant",
-    "TrackingRun", "feedforward", "limited", "mixed", "tension_control", "track", "with_rigidity",
-]
-# fmt: on
+from cdsm.control.laws import Command as Command
+from cdsm.control.laws import ControlInput as ControlInput
+from cdsm.control.laws import Law as Law
+from cdsm.control.laws import Reference as Reference
+from cdsm.control.laws import feedforward as feedforward
+from cdsm.control.laws import limited as limited
+from cdsm.control.laws import mixed as mixed
+from cdsm.control.laws import tension_control as tension_control
+from cdsm.control.observer import with_rigidity as with_rigidity
+from cdsm.control.plants import Plant as Plant
+from cdsm.control.sensors import Measurement as Measurement

@@ -4,7 +4,7 @@ Friction narrows the bounds of the tension of a cable by the factor exp(Σ μ φ
 
 A cable runs from a point a through a hole b to a point c. Its segments have the unit directions u
 and v and the lengths ℓ_u and ℓ_v. If the points move by da, db and dc, the wrap angle φ of the hole
-changes by the formula of :mod:`cdsm._former.chains`,
+changes by the formula of :class:`~cdsm.segments.Segments`,
 
     dφ = −(p·(db − da)/ℓ_u + q·(dc − db)/ℓ_v),
 

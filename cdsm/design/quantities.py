@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm._former.principal import principal_stiffness
 from cdsm.batch import Batch, evaluate
 from cdsm.design.goals import KINDS, Measure
 from cdsm.design.problem import DesignProblem
@@ -18,12 +17,13 @@ from cdsm.errors import CdsmError, CdsmWarning, GeometryError
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS as CLEARANCES
 from cdsm.measures.rows import (
-    capacity_margins,
+    force_radii,
     friction_losses,
     measured,
     narrowed_bounds,
     payloads,
 )
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 from cdsm.tension import Tension, distribute_tension, grip
@@ -89,7 +89,7 @@ class _Arm:
         self.loads = np.tile(problem.loads, (len(q), 1))
         loss = np.ones((len(q), len(arm.cables)))
         if problem.worst_friction:
-            loss = friction_losses(arm, q, 1)
+            loss = friction_losses(arm, q)
         self.loss = np.repeat(loss, len(problem.loads), axis=0)
         self.low, self.high, held = narrowed_bounds(
             arm, problem.minimum_of(row), problem.maximum, self.loss
@@ -100,7 +100,7 @@ class _Arm:
         wanted = {each.of for each in problem.measures} & {*CLEARANCES, "tension_factor"}
         if wanted:
             inside = self.held.reshape(len(q), -1).any(axis=1)
-            self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter, 1)
+            self.of_pose = measured(arm, q[inside], sorted(wanted), problem.diameter)
 
     def _evaluated(self, loads: Array) -> tuple[Batch, NDArray[np.bool_]]:
         """Compute tip, tensions, margin, compliance and lengths for R pairs of posture and load.
@@ -146,9 +146,9 @@ class _Arm:
             return principal_stiffness(C)["softest"]
         bounds = self.q[held], self.loads[held], self.low[held], self.high[held]
         if each.of == "payload":
-            return payloads(self.arm, *bounds, np.array(each.direction)[None], 1)[:, 0]
-        if each.of == "capacity_margin":
-            return capacity_margins(self.arm, *bounds)
+            return payloads(self.arm, *bounds, np.array(each.direction)[None])[:, 0]
+        if each.of == "force_radius":
+            return force_radii(self.arm, *bounds)
         assert each.of == "motor_force"
         along_cables = self.found["tension"][held] * self.loss[held]
         return np.asarray(along_cables.max(axis=1))

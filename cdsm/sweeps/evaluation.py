@@ -15,17 +15,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm import batch
-from cdsm._former.principal import principal_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import (
     MEASURED,
-    capacity_margins,
+    force_radii,
     friction_losses,
     measured,
     narrowed_bounds,
     payloads,
     require,
 )
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.sweeps.arguments import Choice
 from cdsm.sweeps.quantities import DIRECTIONAL, QUANTITIES
@@ -132,7 +132,7 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
     answer: BlockResult = {name: rows[name][::cases] for name in of_pose if name in rows}
     exist = exists("pose", status[::cases])
     wanted = [name for name in of_pose if name in MEASURED]
-    for name, values in measured(task.arm, q[exist], wanted, task.diameter, threads).items():
+    for name, values in measured(task.arm, q[exist], wanted, task.diameter).items():
         answer[name] = _spread(values, exist)
 
     held = exists("tension", status)
@@ -140,8 +140,8 @@ def evaluate(task: SweepTask, q: Array, threads: int | None = None) -> BlockResu
         F, bounds = rows["tension"][held], (task.arm, at[held], wrench[held], low[held], high[held])
         compute: dict[str, Callable[[], Array]] = {
             "tension": lambda: F,
-            "payload": lambda: payloads(*bounds, task.directions.values, threads),
-            "capacity_margin": lambda: capacity_margins(*bounds),
+            "payload": lambda: payloads(*bounds, task.directions.values),
+            "force_radius": lambda: force_radii(*bounds),
         }
         for name in of_tension:
             answer[name] = _spread(compute[name](), held)
@@ -179,9 +179,12 @@ def _bounds(
     if not task.worst_friction:
         low, high = (np.broadcast_to(x, shape) for x in (minima[:, None], task.maximum))
         return low, high, np.broadcast_to(True, len(q))
-    loss = np.ones(shape)
-    exist = batch.evaluate(task.arm, q, outputs=[], threads=threads).ok
-    loss[exist] = friction_losses(task.arm, q[exist], threads)
+    cases = len(task.wrenches.values) * len(lows)
+    poses = q[::cases]
+    exist = batch.evaluate(task.arm, poses, outputs=[], threads=threads).ok
+    loss = np.ones((len(poses), shape[1]))
+    loss[exist] = friction_losses(task.arm, poses[exist])
+    loss = np.repeat(loss, cases, axis=0)
     return narrowed_bounds(task.arm, minima, task.maximum, loss)
 
 

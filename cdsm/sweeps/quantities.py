@@ -54,7 +54,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
         "tension",
         ("direction",),
     ),
-    "capacity_margin": Quantity(
+    "force_radius": Quantity(
         "largest force in any direction within the limits of the tensions", "N", "tension"
     ),
     "cable_stiffness": Quantity("cable stiffness, diagonal of K_L", "N m-1", "joint", ("cable",)),

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from cdsm.batch.inputs import checked_threads
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
+from cdsm.measures.rows import SLOW
 from cdsm.support.directions import XYZ, Direction, unit_direction
 from cdsm.support.extras import need
 from cdsm.support.files import as_path
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger("cdsm")
 
+_SLOW_POSTURES = 500  # in a block whose measures take milliseconds, so that the bar moves
 _NUMBERS = 2**18  # default number of joint angles in a block: some tenths of a second of work
 
 
@@ -123,6 +125,8 @@ def sweep(
     )
     specification = Specification(task, poses)
     most = _NUMBERS // arm.nv if chunk is None else whole_number("chunk", chunk, 1)
+    if chunk is None and not SLOW.isdisjoint(task.outputs):
+        most = min(most, _SLOW_POSTURES * task.cases)
     extent = extents(poses.sizes, most // task.cases)
     if store is None:
         values = {name: specification.empty(name) for name in specification.variables}

@@ -11,7 +11,6 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm._former.principal import principal_stiffness
 from cdsm.errors import CdsmError, EquilibriumError, InvalidInput
 from cdsm.friction.sticking import holding
 from cdsm.friction.stuck import stuck_stiffness
@@ -24,6 +23,7 @@ from cdsm.statics.load_history import LoadHistory
 from cdsm.statics.rest_search import equilibrium
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.instability import verdict
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
@@ -164,7 +164,7 @@ class Shown(ReadOnlyState):
     def principal(self) -> dict[str, Array] | None:
         """Softest and stiffest direction, and the stiffness along each [N/m]; None if not stable.
 
-        The keys are those of :func:`~cdsm._former.principal.principal_stiffness`.
+        The keys are those of :func:`~cdsm.stiffness_matrix.principal.principal_stiffness`.
         """
         return None if self.compliance is None else principal_stiffness(self.compliance)
 

@@ -63,7 +63,7 @@ def test_quantities_are_those_of_single_postures(rough: bool) -> None:
     objectives = tuple(cdsm.Objective(name, "z") for name in names)  # type: ignore[arg-type]
     others = ("softest", "margin", "deflection", "motor_force", "tension_factor",
               "cable_clearance", "link_clearance", "disk_clearance", "workspace", "held", "mass",
-              "length", "wire_length", "capacity_margin")  # fmt: skip
+              "length", "wire_length", "force_radius")  # fmt: skip
     task = problem(
         objectives=(*objectives, *(cdsm.Objective(name) for name in others)),  # type: ignore[arg-type]
         diameter=1e-3,
@@ -91,7 +91,7 @@ def test_quantities_are_those_of_single_postures(rough: bool) -> None:
         "margin": min(K.margin for K in Ks),
         "deflection": max(np.linalg.norm(K.compliance[:3, :3] @ force) for K in unloaded),
         "motor_force": np.max(largest),
-        "capacity_margin": min(cdsm.force_polytope(p, *bounds, **worst).margin() for p in poses),
+        "force_radius": min(cdsm.force_polytope(p, *bounds, **worst).radius for p in poses),
         "tension_factor": min(cdsm.tension_factor(p) for p in poses),
         "cable_clearance": min(each.cables for each in clear),
         "link_clearance": min(each.links for each in clear),
@@ -286,7 +286,7 @@ def test_no_design_of_the_front_is_beaten() -> None:
     arm = found.arm(0)
     factors = [cdsm.tension_factor(arm.at(q)) for q in BENT]
     assert full["tension_factor"][0] == pytest.approx(min(factors), rel=1e-9)
-    assert full["capacity_margin"].min() > 0.0
+    assert full["force_radius"].min() > 0.0
     head, *rows = full.to_csv().splitlines()
     assert len(rows) == len(found.front)
     assert head.startswith("design,hole_radius [m],end of cable2_1,wire,motor_force [N],")
@@ -402,8 +402,8 @@ def test_problems_that_cannot_be_refined_say_why() -> None:
         ({"diameter": 1.2}, "diameter: 1.2 m given; 0, or 1e-06 to 0.5 m"),
         ({"coverage": -3.0}, "coverage: -3 given; give 0 or more"),
         (
-            {"objectives": (cdsm.Objective("capacity_margin"),), "maximum": np.inf},
-            "capacity_margin needs a finite one",
+            {"objectives": (cdsm.Objective("force_radius"),), "maximum": np.inf},
+            "force_radius needs a finite one",
         ),
         (
             {"objectives": (cdsm.Objective("deflection"),), "loads": np.zeros((1, 6))},

@@ -218,7 +218,7 @@ def design_of_an_arm(nb: Shown) -> None:
     assert nb.held.limit == "deflection"
     np.testing.assert_allclose(nb.held.force, 1.241, atol=2e-3)  # 500 g is 4.9 N
     np.testing.assert_allclose(nb.held.limits["tension"], 72.4, atol=0.1)
-    np.testing.assert_allclose(nb.polytope.margin(), 63.95, atol=0.01)
+    np.testing.assert_allclose(nb.polytope.radius, 63.95, atol=0.01)
     best = nb.found.values(0)
     np.testing.assert_allclose(best["motor_force"], 50.67, atol=0.5)
     assert best["deflection"] <= 1e-3

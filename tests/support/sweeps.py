@@ -12,7 +12,7 @@ import cdsm
 from cdsm.support.values import Array
 from cdsm.sweeps.quantities import QUANTITIES
 
-EVERYTHING = tuple(name for name in QUANTITIES if name != "capacity_margin")
+EVERYTHING = tuple(name for name in QUANTITIES if name != "force_radius")
 """All quantities that need no upper bound of the tensions and no size of the wire."""
 
 STEEL = cdsm.LinearElasticity(48e3)

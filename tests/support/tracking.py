@@ -6,9 +6,16 @@ import numpy as np
 
 import cdsm
 from cdsm import presets
+from cdsm.support.values import Array
 
 WANTED = 4000.0
 """Stiffness along z [N/m] of :func:`circle`."""
+
+
+def paid_out(plan: cdsm.PathPlan) -> Array:
+    """Wire that the motors pay out at each sample of a plan (P, C) [m]."""
+    pairs = zip(plan.cable_lengths, plan.tensions, strict=True)
+    return np.array([plan.arm._laws.original_lengths(L, F) for L, F in pairs])
 
 
 @cache

@@ -18,7 +18,7 @@ MAXIMUM = 150.0
 SHORT = cdsm.TabulatedElasticity((0.0, 60.0, 75.0), (0.0, 60.0 / 48e3, 75.0 / 48e3))
 LAWS = {"steel": STEEL, "short": SHORT}
 OUTPUTS = (
-    "tension", "payload", "capacity_margin", "margin", "along",
+    "tension", "payload", "force_radius", "margin", "along",
     "cable_clearance", "link_clearance", "disk_clearance",
 )  # fmt: skip
 
@@ -59,7 +59,7 @@ def single(
         return Status.INFEASIBLE, found
     found["tension"] = pull.values
     polytope = cdsm.force_polytope(pose, *bounds, worst_friction=worst)
-    found["capacity_margin"] = polytope.margin()
+    found["force_radius"] = polytope.radius
     ways = [polytope.normals @ u for u in np.eye(3)]
     found["payload"] = [(polytope.offsets[n > 1e-9] / n[n > 1e-9]).min() for n in ways]
     try:
@@ -89,7 +89,7 @@ def test_measures_of_a_sweep_are_those_of_the_posture(worst: bool) -> None:
                 assert np.isnan(entry[name].values).all(), name
                 continue
             # linear programs end at the same corner, facets of the hull near it
-            rtol = 1e-7 if name in ("payload", "capacity_margin") else 1e-12
+            rtol = 1e-7 if name in ("payload", "force_radius") else 1e-12
             np.testing.assert_allclose(entry[name], found[name], rtol=rtol, err_msg=name)
     assert seen >= {Status.OK, Status.INFEASIBLE, Status.OUTSIDE_ELASTICITY}
 
@@ -98,7 +98,7 @@ def test_worst_friction_takes_payload_and_costs_tension() -> None:
     free, rough = swept(False), swept(True)
     both = (free.status == Status.OK) & (rough.status == Status.OK)
     assert both.any()
-    for name in ("payload", "capacity_margin"):
+    for name in ("payload", "force_radius"):
         assert bool(((rough[name] < free[name]) | ~both).all()), name
     more = (rough.tension**2).sum("cable") > (free.tension**2).sum("cable")
     assert bool((more | ~both).all())

@@ -11,9 +11,9 @@ import pytest
 import xarray as xr
 
 import cdsm
-from cdsm._former.principal import principal_stiffness
 from cdsm.measures.payload import largest_force
-from cdsm.measures.program import Loads
+from cdsm.measures.polytope import balanced
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.values import Array
 from cdsm.sweeps.blocks import blocks, extents, postures
 from cdsm.sweeps.evaluation import _BATCH_NAMES
@@ -55,7 +55,7 @@ def single(
         return {Status.INFEASIBLE}, found
     found["tension"] = pull.values
     low, high = checked_bounds(arm, minimum, maximum)
-    ways = [Loads.of(pose, low, high, wrench, u[:, None]) for u in np.eye(3)]
+    ways = [balanced(pose, u[:, None], wrench, low, high) for u in np.eye(3)]
     found["payload"] = np.array([largest_force(each) for each in ways])
     try:
         K = cdsm.stiffness(pose, pull)

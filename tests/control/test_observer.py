@@ -5,42 +5,44 @@ import pytest
 
 import cdsm
 from cdsm.control import with_rigidity
-from cdsm.control.estimates import Estimate, Observer
-from cdsm.control.laws import Command, Reading
-from cdsm.control.plant import SlowState
-from tests.support.tracking import small_path
+from cdsm.control.laws import Command
+from cdsm.control.observer import Estimate, Observer
+from cdsm.control.plants import QuasiStaticState
+from cdsm.control.sensors import Measurement
+from tests.support.tracking import paid_out, small_path
 
-Pairs = list[tuple[SlowState, Estimate]]
+Pairs = list[tuple[QuasiStaticState, Estimate]]
 
 NONE = np.zeros(6)
 EXACT = cdsm.Sensors(encoder=0.0)
 FORCE = np.array([0.3, -0.5, -1.0, 0.0, 0.0, 0.0])
 
 
-def moved(friction: float, rigidity: float = 0.9) -> tuple[cdsm.PathPlan, list[SlowState]]:
+def moved(friction: float, rigidity: float = 0.9) -> tuple[cdsm.PathPlan, list[QuasiStaticState]]:
     """A plan, and states of an arm with another wire that is driven along it and then loaded."""
     plan = small_path(friction)
-    plant = cdsm.SlowPlant(with_rigidity(plan.arm, rigidity))
-    state = plant.begin(plan.angles[0], plan.tensions[0], NONE)
-    states, first = [state], state.true.wire
-    for wire in plan.unstrained_lengths:
-        to = first + wire - plan.unstrained_lengths[0]
-        command = Command(to, plan.tensions[0], np.zeros(len(to), dtype=np.bool_))
-        state = plant.move(state, command, NONE)
+    plant = cdsm.QuasiStaticPlant(with_rigidity(plan.arm, rigidity))
+    state = plant.initial(plan.angles[0], plan.tensions[0], NONE)
+    states, first = [state], state.true_values.paid_out
+    for wire in paid_out(plan):
+        command = Command(
+            first + wire - paid_out(plan)[0], plan.tensions[0], np.zeros(len(wire), dtype=np.bool_)
+        )
+        state = plant.step_to(state, command, NONE)
         states.append(state)
-    states.append(plant.move(state, command, FORCE))
+    states.append(plant.step_to(state, command, FORCE))
     return plan, states
 
 
 def observed(friction: float, sensors: cdsm.Sensors = EXACT, seed: int = 0) -> Pairs:
     plan, states = moved(friction)
     random = np.random.default_rng(seed)
-    truth: list[Reading] = [states[0].true]
+    true_values: list[Measurement] = [states[0].true_values]
     observer, pairs = Observer(plan.arm, sensors), []
-    estimate = observer.begin(plan.angles[0], sensors.read(truth, random))
+    estimate = observer.initial(plan.angles[0], sensors.measure(true_values, random))
     for state in states:
-        truth.append(state.true)
-        estimate = observer.update(estimate, sensors.read(truth, random))
+        true_values.append(state.true_values)
+        estimate = observer.update(estimate, sensors.measure(true_values, random))
         pairs.append((state, estimate))
     return pairs
 
@@ -57,7 +59,7 @@ def test_lengths_alone_are_wrong_where_tensions_count() -> None:
     """Without the stretch the lengths would be those of another posture."""
     state, _ = observed(0.0)[-1]
     alone = cdsm.solve_joint_angles(
-        state.pose.arm, state.true.wire, guess=state.pose.q, tolerance=0.5
+        state.pose.arm, state.true_values.paid_out, guess=state.pose.q, tolerance=0.5
     )
     assert abs(alone.angles - state.pose.q).max() > 1e-3
 
@@ -70,8 +72,8 @@ def test_model_of_the_wire_in_the_holes_finds_angles_and_force_under_friction() 
     state, estimate = pairs[-1]
     cable = state.pose.segments.chains.cable
     inner = state.state.settled.chain.tension
-    found = estimate.shares * state.true.tension[cable]
-    even = state.true.tension[cable]
+    found = estimate.shares * state.true_values.tension[cable]
+    even = state.true_values.tension[cable]
     # half of what friction changes is found, and more
     assert np.linalg.norm(found - inner) < 0.5 * np.linalg.norm(even - inner)
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm._former.principal import principal_stiffness
 from cdsm.errors import SolverError
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.linear_program import OPTIMAL, least
 from cdsm.support.validation import instance
-from cdsm.support.values import Array
 
 _CLOSED = 1e-9  # smaller ratios are rounding of the linear program
 
@@ -23,7 +22,22 @@ def tension_factor(pose: Posture) -> float:
     (2009), use the ratio of one solution, so their factor may be smaller. Raises SolverError if the
     linear program fails.
     """
-    return tension_factor_of(instance("pose", pose, Posture).length_jacobian)
+    J = instance("pose", pose, Posture).length_jacobian
+    count, nv = J.shape
+    if np.linalg.matrix_rank(J) < nv:
+        return 0.0
+    found = least(  # variables: F, then its least entry
+        np.append(np.zeros(count), -1.0),
+        A_eq=np.column_stack([J.T / abs(J).max(), np.zeros(nv)]),
+        b_eq=np.zeros(nv),
+        A_ub=np.column_stack([-np.eye(count), np.ones(count)]),
+        b_ub=np.zeros(count),
+        bounds=(0.0, 1.0),
+    )
+    if found.status != OPTIMAL:
+        raise SolverError("highs", f"finds no tension factor: {found.message}")
+    ratio = float(found.x[-1])
+    return ratio if ratio > _CLOSED else 0.0
 
 
 def has_wrench_closure(pose: Posture) -> bool:
@@ -34,32 +48,6 @@ def has_wrench_closure(pose: Posture) -> bool:
     linear program fails.
     """
     return tension_factor(pose) > 0.0
-
-
-def tension_factor_of(J: Array) -> float:
-    """Compute the tension factor [-] of J_L (C, nv)."""
-    return tension_ratio(J) if np.linalg.matrix_rank(J) == J.shape[1] else 0.0
-
-
-def tension_ratio(J: Array) -> float:
-    """Compute the largest min(F)/max(F) [-] of tensions F ≥ 0 with J_Lᵀ F = 0; 0 if none exist.
-
-    ``J`` is J_L (C, nv), of any rank. Raises SolverError if the linear program fails.
-    """
-    count, nv = J.shape
-    lever = abs(J).max()
-    found = least(  # variables: F, then the smallest entry of F
-        np.append(np.zeros(count), -1.0),
-        A_eq=np.column_stack([J.T / (lever or 1.0), np.zeros(nv)]),
-        b_eq=np.zeros(nv),
-        A_ub=np.column_stack([-np.eye(count), np.ones(count)]),
-        b_ub=np.zeros(count),
-        bounds=(0.0, 1.0),
-    )
-    if found.status != OPTIMAL:
-        raise SolverError("highs", f"finds no tension factor: {found.message}")
-    ratio = float(found.x[-1])
-    return ratio if ratio > _CLOSED else 0.0
 
 
 def isotropy(stiffness: Stiffness) -> float:
