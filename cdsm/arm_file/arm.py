@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from cdsm.arm_file.cables import routed, settings, wire_tables
-from cdsm.arm_file.model import read_model, wired
+from cdsm.arm_file.model import read_model
 from cdsm.arm_parts import ArmParts
 from cdsm.cable import Cable
 from cdsm.errors import FileError, UrdfError
@@ -20,7 +20,7 @@ from cdsm.support.toml import toml_text, verbatim
 from cdsm.tolerances import table_of as tolerance_table
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
-from cdsm.wires.catalogue import Wire, as_wire
+from cdsm.wires.catalogue import Wire
 
 _HEAD = (
     "# An arm of cdsm. Units: m, rad, kg, N, N/m, m/s2. Base axes: x along the straight arm.\n\n"
@@ -30,10 +30,8 @@ _ESCAPED = re.compile(r"'''|'$|[^\t\n -~\x80-\U0010ffff]")  # what a literal str
 
 def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> ArmParts:
     """Read an ARM.toml. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
-    forced = None if wire is None else as_wire(wire)
-    file = read_model(path, robot=True)
-    cables, geometry, robot = wired(file, forced, path), file.geometry, file.urdf
-    arm = file.gravity, file.original_length
+    file, cables = read_model(path, wire, robot=True)
+    geometry, robot, arm = file.geometry, file.urdf, (file.gravity, file.original_length)
     if robot is None:
         return ArmParts(geometry, to_urdf(geometry), cables, TIP, *arm, None, file.tolerances)
     source = robot.text if robot.file is None else Path(path).parent / robot.file

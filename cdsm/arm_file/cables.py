@@ -8,13 +8,13 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from cdsm.arm_file.model import SETTINGS, read_model, wired
+from cdsm.arm_file.model import SETTINGS, read_model
 from cdsm.cable import Cable, Site
 from cdsm.errors import InvalidInput
 from cdsm.support.files import write_text
 from cdsm.support.toml import one_line_each, toml_text
 from cdsm.support.validation import sequence_of
-from cdsm.wires.catalogue import Wire, as_wire, name_of, table_of
+from cdsm.wires.catalogue import Wire, name_of, table_of
 from cdsm.wires.elasticity import Elasticity
 
 _HEAD = """\
@@ -55,8 +55,7 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
         FileError: The file cannot be read or does not describe cables. Every fault is listed.
         MissingWire: The file names no wire for some cables, and ``wire`` is not given.
     """
-    forced = None if wire is None else as_wire(wire)
-    return tuple(wired(read_model(path, robot=False), forced, path))
+    return tuple(read_model(path, wire, robot=False)[1])
 
 
 def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Final, cast
 
@@ -16,15 +16,7 @@ from pydantic import ValidationInfo as Info
 
 from cdsm.cable import Cable, Cables, Control, Site
 from cdsm.cable_laws import OriginalLength
-from cdsm.errors import (
-    LINES,
-    CdsmError,
-    FileError,
-    GeometryError,
-    MissingWire,
-    UnknownName,
-    listed,
-)
+from cdsm.errors import LINES, CdsmError, FileError, GeometryError, MissingWire, listed
 from cdsm.geometry import Geometry, toml
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import GRAVITY
@@ -34,7 +26,7 @@ from cdsm.support.records import EACH, ONE, CrossFaults, record
 from cdsm.support.validation import RANGES, one_of
 from cdsm.tolerances import Tolerances
 from cdsm.tolerances import from_table as read_tolerances
-from cdsm.wires.catalogue import WIRES, as_wire, from_table
+from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
 
@@ -77,11 +69,16 @@ def _described(tables: dict[str, Any]) -> Geometry:
         ) from None
 
 
+def _one_of(kind: str, name: str, known: Iterable[str], remedy: str = "") -> str:
+    try:
+        return one_of(kind, name, known, remedy)
+    except CdsmError as error:  # it is no ValueError, as pydantic needs it
+        raise ValueError(str(error)) from None
+
+
 def _name_of_one(cable: str, info: Info) -> str:
     geometry = info.data.get("geometry")
-    if geometry and cable not in geometry.cable_names:
-        raise ValueError(str(UnknownName("cable", cable, geometry.cable_names)))
-    return cable
+    return _one_of("cable", cable, geometry.cable_names) if geometry else cable
 
 
 def _new_names(wires: dict[str, Elasticity]) -> dict[str, Elasticity]:
@@ -94,14 +91,11 @@ def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
     """Return the law of a key ``wire``; ``known`` has the valid keys before. Or a ValueError."""
     if isinstance(wire, dict):
         return from_table(wire)
-    try:
-        if not isinstance(wire, str):
-            return as_wire(wire)
-        # with faulty tables of wires, any name is right
-        laws: dict[str, Elasticity] = WIRES | known.get("wires", {wire: _NO_WIRE})
-        return laws[one_of("wire", wire, laws, "Or give EA in N, or a table [wires.NAME].")]
-    except CdsmError as error:
-        raise ValueError(re.sub("^(wire|rigidity): ", "", str(error))) from None
+    if not isinstance(wire, str):
+        return as_wire(wire)
+    # with faulty tables of wires, any name is right
+    laws: dict[str, Elasticity] = WIRES | known.get("wires", {wire: _NO_WIRE})
+    return laws[_one_of("wire", wire, laws, "Or give EA in N, or a table [wires.NAME].")]
 
 
 _G = Annotated[records.Number, Field(ge=-RANGES["gravity"].high, le=RANGES["gravity"].high)]
@@ -186,8 +180,7 @@ def _built(given: Any, check: Callable[[Any], Any], info: Info) -> Cables:
             place, cable = where, route.built() if own is route else route
             cables.append(replace(cable, elasticity=law or _NO_WIRE, **shared | _given(vars(own))))
         except ValueError as error:
-            several = getattr(error, "faults", ())
-            faults += [f"{place}.{each}" for each in several] or [f"{place}: {error}"]
+            faults += records.faults_at(place, error)
     if faults:
         raise CrossFaults(faults)
     return Cables(cables)
@@ -217,9 +210,14 @@ class ArmFile(_Settings, _Wires):
     cables: Annotated[_Tables, WrapValidator(_built), Field(validate_default=True)] = None  # type: ignore[assignment]
 
 
-def read_model(path: str | os.PathLike[str], *, robot: bool) -> ArmFile:
-    """Read a file of cables, or of an arm (``robot``); FileError lists every fault."""
-    text = read_text(path)
+def read_model(
+    path: str | os.PathLike[str], wire: Wire | None, *, robot: bool
+) -> tuple[ArmFile, Cables]:
+    """Read a file of cables, or of an arm (``robot``); all cables get the ``wire`` if it is given.
+
+    Raises FileError, which lists every fault, or MissingWire.
+    """
+    text, forced = read_text(path), None if wire is None else as_wire(wire)
     if robot and text.lstrip().startswith("<"):
         why = (
             "is XML, no ARM.toml. Give a URDF to Manipulator.from_urdf, with a tip and cables, or "
@@ -230,18 +228,15 @@ def read_model(path: str | os.PathLike[str], *, robot: bool) -> ArmFile:
         described, rest = toml.split_geometry(data)
         if robot and ("urdf" not in rest or any(key in described for key in _FORMS)):
             data = {_ROBOT: described, **rest}
-        return records.parse(ArmFile, data)
+        file, faults = records.parse(ArmFile, data), ""
     except GeometryError as error:
         faults = listed(error.faults, 20, LINES)
-    raise FileError(path, f"cannot be read as {'an arm' if robot else 'cables'}:{faults}")
-
-
-def wired(file: ArmFile, wire: Elasticity | None, path: str | os.PathLike[str]) -> Cables:
-    """Return the cables of a file, all of the law ``wire`` if it is given; or MissingWire."""
+    if faults:  # not inside except: its context could not be pickled
+        raise FileError(path, f"cannot be read as {'an arm' if robot else 'cables'}:{faults}")
     cables = cast(Cables, file.cables)  # see _built
-    if wire is not None:
-        return Cables(replace(cable, elasticity=wire) for cable in cables)
+    if forced is not None:
+        return file, Cables(replace(cable, elasticity=forced) for cable in cables)
     without = [cable.name for cable in cables if cable.elasticity is _NO_WIRE]
     if without:
         raise MissingWire(path, without if len(without) < len(cables) else ())
-    return cables
+    return file, cables

@@ -231,6 +231,14 @@ def misspelt(name: str, known: Iterable[str], least: float = 0.6) -> str:
     return "" if name in known else did_you_mean(name, as_long, least)
 
 
+def faults_at(where: str, error: ValueError) -> list[str]:
+    """Return the fault, or faults, of a value, each after the key ``where`` of the value."""
+    if several := getattr(error, "faults", ()):
+        return [f"{where}.{each}".lstrip(".").replace(".[", "[") for each in several]
+    own = f"{getattr(error, 'name', None)}: "  # the argument of an InvalidInput
+    return [f"{where}: {str(error).removeprefix(own)}"]
+
+
 def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
     known = _places(kind)
     listed: list[str] = []
@@ -244,10 +252,8 @@ def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
             if part not in (ONE, EACH, "[key]")  # of a table by names
         ).lstrip(".")
         cause = fault.get("ctx", {}).get("error")
-        if isinstance(cause, (CrossFaults, GeometryError)):
-            listed += [f"{where}.{each}".lstrip(".").replace(".[", "[") for each in cause.faults]
-        elif isinstance(cause, ValueError):
-            listed.append(f"{where}: {cause}")
+        if isinstance(cause, ValueError):
+            listed += faults_at(where, cause)
         elif fault["type"] == "too_short" and any(
             other["loc"][: len(fault["loc"])] == fault["loc"] and other is not fault
             for other in faults
