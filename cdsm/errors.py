@@ -92,10 +92,9 @@ class MissingWire(CdsmError, LookupError):
     def __init__(self, path: object, cables: Texts = ()) -> None:
         self.path, self.cables = str(path), tuple(cables)
         whose = f"the cables {listed(self.cables)}" if self.cables else "its cables"
-        super().__init__(
-            f"{path}: has no wire for {whose}. Give wire= (--wire, of commands), or write at the "
-            'top of an ARM.toml: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
-        )
+        said = f"{path}: has no wire for {whose}. Give wire= (--wire, of commands), or write at the"
+        remedy = 'top of an ARM.toml: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
+        super().__init__(f"{said} {remedy}")
 
 
 class GeometryError(CdsmError, ValueError):
@@ -130,10 +129,9 @@ class JointLimitError(CdsmError, ValueError):
     ) -> None:
         self.problem = listed(problems, 4, "; ")
         self.joints, self.angles, self.limits = tuple(joints), tuple(angles), tuple(limits)
-        super().__init__(
-            f"{self.problem}. Stay inside, or widen joint_limit in the geometry (limit of a joint, "
-            "or in a URDF), or, in Python, pass check_limits=False to compute beyond them."
-        )
+        stay = "Stay inside, or widen joint_limit in the geometry (limit of a joint, or in a URDF)"
+        beyond = "or, in Python, pass check_limits=False to compute beyond them."
+        super().__init__(f"{self.problem}. {stay}, {beyond}")
 
 
 class ElasticityRangeError(CdsmError, ValueError):
@@ -152,7 +150,7 @@ class ElasticityRangeError(CdsmError, ValueError):
         if self.tension:
             values = f"tension {listed([f'{text} N' for text in _distinct(self.tension)])}"
             where = f"{values} ({where})" if where else values
-        super().__init__(f"{where}: {problem}" if where else problem)
+        super().__init__(": ".join(filter(None, (where, problem))))
 
 
 class InfeasibleTension(CdsmError):
@@ -246,8 +244,7 @@ class UnreachableStiffness(CdsmError):
     ) -> None:
         self.direction, self.target, self.low, self.high = direction, target, low, high
         self.nearest = tuple(map(float, nearest))
-        values = (target, low, high, *self.nearest)
-        wanted, least, most, *near = _distinct([value / 1e3 for value in values])
+        wanted, least, most, *near = _distinct([x / 1e3 for x in (target, low, high, *nearest)])
         if low <= target <= high:
             remedy = f", but only {' and '.join(near)} N/mm found. Raise starts=, ask for these."
         else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -107,4 +107,6 @@ def with_rigidity(arm: Manipulator, factor: float) -> Manipulator:
     """Return the arm with ``factor`` times the rigidity of all its wires."""
     laws = {id(cable.elasticity): cable.elasticity for cable in arm.cables}
     scaled = {key: law.scaled(factor) for key, law in laws.items()}
-    return arm._with_laws([scaled[id(cable.elasticity)] for cable in arm.cables])
+    return arm.with_cables(
+        [replace(cable, elasticity=scaled[id(cable.elasticity)]) for cable in arm.cables]
+    )

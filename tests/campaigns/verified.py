@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm.stiffness_matrix.cartesian import REGULAR
+from cdsm.stiffness_matrix.value import REGULAR
 from cdsm.support.values import Array
 from tests.support.differences import EPSILON
 

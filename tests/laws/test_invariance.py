@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import cdsm
 from cdsm._former.tension import OPTIMALITY
-from cdsm.stiffness_matrix.cartesian import UNMOVED
+from cdsm.stiffness_matrix.value import UNMOVED
 from cdsm.support.values import Array
 from tests.support import arms
 
