@@ -7,10 +7,19 @@ import inspect
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields
 from functools import wraps
-from typing import Annotated, Any, TypeVar, cast, dataclass_transform, get_args, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    TypeVar,
+    cast,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 from pydantic import (
@@ -23,7 +32,7 @@ from pydantic import (
     TypeAdapter,
     ValidationError,
 )
-from pydantic.dataclasses import dataclass
+from pydantic.dataclasses import dataclass, is_pydantic_dataclass
 
 from cdsm.errors import GeometryError
 from cdsm.support.validation import LARGEST, RANGES, within
@@ -183,20 +192,23 @@ def toml_value(value: object) -> str:
     return repr(value)
 
 
-def _keys(kind: Callable[..., Any]) -> list[str]:
-    """Return the keywords of a function, or the fields of a record and of its nested records."""
+def _places(kind: Any, place: str = "at the top of the file") -> dict[str, str]:
+    """Return where each keyword of a function, or field of a record and its parts, belongs."""
     hints = get_type_hints(kind)
     hints.pop("return", None)
-    entries = [entry for hint in hints.values() for entry in get_args(hint)]
-    return [
-        *hints,
-        *(
-            key
-            for entry in entries
-            if isinstance(entry, type) and is_dataclass(entry)
-            for key in _keys(entry)
-        ),
-    ]
+    found: dict[str, str] = {}
+    for name, hint in hints.items():
+        for origin, part in _parts(hint):
+            found |= _places(part, f"in each of [[{name}]]" if origin is tuple else f"in [{name}]")
+    return found | dict.fromkeys(hints, place)
+
+
+def _parts(hint: Any, origin: Any = None) -> Iterator[tuple[Any, Any]]:
+    """Yield the records inside a type, each with the innermost type that holds it."""
+    if is_pydantic_dataclass(hint):
+        yield origin, hint
+    for part in get_args(hint):
+        yield from _parts(part, get_origin(hint))
 
 
 def did_you_mean(key: str, known: Iterable[str], least: float = 0.6) -> str:
@@ -219,8 +231,16 @@ def misspelt(name: str, known: Iterable[str], least: float = 0.6) -> str:
     return "" if name in known else did_you_mean(name, as_long, least)
 
 
+def faults_at(where: str, error: ValueError) -> list[str]:
+    """Return the fault, or faults, of a value, each after the key ``where`` of the value."""
+    if several := getattr(error, "faults", ()):
+        return [f"{where}.{each}".lstrip(".").replace(".[", "[") for each in several]
+    own = f"{getattr(error, 'name', None)}: "  # the argument of an InvalidInput
+    return [f"{where}: {str(error).removeprefix(own)}"]
+
+
 def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
-    known = _keys(kind)
+    known = _places(kind)
     listed: list[str] = []
     hinted = 0
     faults = error.errors()
@@ -229,13 +249,11 @@ def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
         where = "".join(
             f"[{part + 1}]" if isinstance(part, int) else f".{part}"
             for part in fault["loc"]
-            if part not in (ONE, EACH)
+            if part not in (ONE, EACH, "[key]")  # of a table by names
         ).lstrip(".")
         cause = fault.get("ctx", {}).get("error")
-        if isinstance(cause, CrossFaults):
-            listed += [f"{where}.{each}".lstrip(".") for each in cause.faults]
-        elif isinstance(cause, ValueError):
-            listed.append(f"{where}: {cause}")
+        if isinstance(cause, ValueError):
+            listed += faults_at(where, cause)
         elif fault["type"] == "too_short" and any(
             other["loc"][: len(fault["loc"])] == fault["loc"] and other is not fault
             for other in faults
@@ -247,6 +265,8 @@ def _faults(error: ValidationError, kind: Callable[..., Any]) -> list[str]:
             key = str(fault["loc"][-1])
             hinted += 1
             hint = did_you_mean(key, known) if hinted <= _HINTED else ""
+            if key in known and f"[{fault['loc'][0]}]" not in known[key]:
+                hint = f"; it belongs {known[key]}"
             listed.append(f"{where}: is not a key that is known here{hint}")
         else:
             value = repr(fault["input"])

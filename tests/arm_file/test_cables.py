@@ -70,14 +70,20 @@ def test_what_is_left_out_is_nothing(tmp_path: Path) -> None:
         (
             'name = "left"',
             'name = "left"\nminimum = 5.0\nmaximum = 2.0',
-            "cables[1].minimum: 5 N given, above",
+            "cables[1].maximum: 2 N given, below",
         ),
         ('name = "left"', 'name = "left"\nfriction = 2.5', "cables[1].friction: 2.5 given"),
         ("{link", "{friction = 0.1, link", "site 1 has friction or wrap"),
         ("{link", "{wrap = 20.0, link", "wrap: 20 rad given"),
         ("[[cables]]", "[[cable]]", "cable: is not a key that is known here; did you mean cables?"),
-        ("[[cables]]", "[cables]", "cables: "),
-        ("[wires.rope]", "wires = 3\n[wire]", "wires: is 3; give tables [wires.NAME]"),
+        ("[[cables]]", "[cables]", "cables: give tables [[cables]]"),
+        (
+            "[wires.rope]",
+            "lead = 0.1\n[wires.rope]",
+            "lead: is not a key that is known here; it be",
+        ),
+        ('name = "left"', 'name = "left"\nwires = 1', "it belongs at the top of the file"),
+        ("[wires.rope]", "wires = 3\n[wire]", "wires: input should be a table"),
         ("[[cables]]", "[[cables]", "is not TOML"),
     ],
 )

@@ -54,7 +54,8 @@ class Deadly(cdsm.Elasticity):
     least: float
 
     def __init__(self, folder: str, low: float = 0.0) -> None:
-        super().__init__(0.0, 1e6, 0.0, "", {"folder": folder}, 5e4, STEEL._table)
+        table = STEEL._knots, STEEL._coefficients
+        super().__init__(0.0, 1e6, 0.0, "", {"folder": folder}, 5e4, *table)
         self.folder, self.least = folder, low
 
     def _evaluate(self, F: Array) -> tuple[Array, Array]:
