@@ -18,10 +18,9 @@ import numpy as np
 
 from cdsm.control.plant import PlantState
 from cdsm.errors import CdsmError, SingularStiffness
-from cdsm.friction.band import half_width
-from cdsm.statics.locked_motors import LoadedArm, lengths_with
-from cdsm.statics.rest_search import no_rest
-from cdsm.statics.trust_region import find_rest
+from cdsm.friction.stick import half_width
+from cdsm.statics.equilibrium import locked_equilibrium
+from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.values import Array
 
@@ -71,11 +70,4 @@ def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
         ElasticityRangeError: A tension leaves the domain of its law.
     """
     pose, (wire, F) = state.pose, state.true
-    held = pose.arm.cables.position_controlled
-    loaded = LoadedArm(pose, F, wrench, lengths_with(wire[held], pose, F))
-    search = find_rest(loaded, loaded.at(pose, F))
-    K = search.state.K
-    if not search.converged:
-        raise no_rest(pose, search, 0.0)
-    loaded.require_domains(K.tension)
-    return K
+    return locked_equilibrium(LockedArm(pose, F, wrench, wire)).stiffness

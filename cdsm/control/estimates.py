@@ -28,7 +28,7 @@ from scipy.linalg import solve_triangular
 
 from cdsm.control.laws import Reading
 from cdsm.control.sensors import Sensors
-from cdsm.friction.chain_problem import ChainProblem
+from cdsm.friction.capstan import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.values import Array
@@ -76,7 +76,7 @@ class Observer:
         pose = self.arm.at(q)
         cable = pose.segments.chains.cable
         F = np.clip(reading.tension, *self._domains)
-        natural = self._problem.natural(pose.segments.lengths, F[cable])
+        natural = self._problem.rest_lengths(pose.segments.lengths, F[cable])
         one, shares = np.ones(F.size), np.ones(cable.size)
         force = self._tip_force(pose, F[cable])
         return Estimate(pose, F, one, force, 1.0, UNSURE**2, natural, shares)
@@ -124,7 +124,7 @@ class Observer:
         shares = np.divide(chain.tension, motor, out=np.ones_like(motor), where=motor > 0.0)
         means = np.add.reduceat(shares * segments.lengths, chains.start[:-1]) / pose.cable_lengths
         force = self._tip_force(pose, chain.tension)
-        natural = chain.natural
+        natural = chain.rest_length
         return Estimate(pose, means * F, means, force, softness, variance, natural, shares)
 
     def _tip_force(self, pose: Posture, tension: Array) -> Array:

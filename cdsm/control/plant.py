@@ -11,9 +11,8 @@ from cdsm.control.laws import Command, Reading
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.load_cycle import checked_accuracy, slow_loading
-from cdsm.statics.slow_loading import Load, SlowLoading, State
-from cdsm.support.validation import instance
+from cdsm.statics.quasi_static import Load, QuasiStaticArm, QuasiStaticState
+from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
 
 
@@ -55,20 +54,20 @@ class Plant(Protocol[AnyState]):
 class SlowState(NamedTuple):
     """State of a :class:`SlowPlant`; the wire in each segment depends on all earlier loads."""
 
-    loading: SlowLoading  # the arm
+    loading: QuasiStaticArm  # the arm
     reference_wire: Array  # l_0 (C,) [m] at the posture where the plant began
-    state: State  # posture, load and wire in each segment
+    state: QuasiStaticState  # posture, load and wire in each segment
 
     @property
     def pose(self) -> Posture:
         """The true posture."""
-        return self.state.pose
+        return self.state.arm_state.pose
 
     @property
     def true(self) -> Reading:
         """True length of the wire paid out [m] and tension [N] at each motor, both (C,)."""
         wire = self.reference_wire - np.where(self.loading.forced, 0.0, self.state.load.motors)
-        tension = self.state.settled.chain.tension[self.loading.start[:-1]]
+        tension = self.state.arm_state.tension[self.loading.start[:-1]]
         return Reading(frozen(wire), frozen(tension))
 
 
@@ -82,27 +81,26 @@ class SlowPlant:
 
     Attributes:
         arm: The true arm.
-        accuracy: Largest error of the energy balance of a step, relative to the work [-], as in
-            :func:`~cdsm.load_cycle`.
+        substeps: Number of equal sub-steps of a move, as in :func:`~cdsm.load_cycle`.
 
     Raises:
-        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``, or ``accuracy`` is not
-            from 1e-12 to 0.1.
+        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``, or ``substeps`` is not
+            a positive whole number.
     """
 
     arm: Manipulator
-    accuracy: float = 0.1
+    substeps: int = 1
 
     def __post_init__(self) -> None:
         require_unstrained("arm", self.arm)
-        checked_accuracy(self.accuracy)
+        whole_number("substeps", self.substeps, 1)
 
     def begin(self, q: Array, tension: Array, wrench: Array) -> SlowState:
         """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         pose = self.arm.at(q)
-        loading = slow_loading(pose, tension, wrench, self.accuracy)
+        loading = QuasiStaticArm(pose, tension)
         wire = self.arm._laws.original_lengths(pose.cable_lengths, tension)
-        return SlowState(loading, wire, loading.begin(tension, wrench))
+        return SlowState(loading, wire, loading.initial(wrench))
 
     def move(self, state: SlowState, command: Command, wrench: Array) -> SlowState:
         """Return the state after ``state``, as :meth:`Plant.move` describes.
@@ -113,7 +111,9 @@ class SlowPlant:
         taken_in = state.reference_wire - command.wire
         motors = np.where(loading.forced, command.tension, taken_in)
         load = Load(wrench, np.zeros(self.arm.nv), motors)
-        return state._replace(state=loading.carry(state.state, load, "the step")[0])
+        return state._replace(
+            state=loading.step_to(state.state, load, self.substeps, "the step")[0]
+        )
 
 
 def require_unstrained(name: str, arm: Manipulator) -> None:

@@ -33,7 +33,7 @@ def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
     pose = plan.arm.at(plan.angles[0])
     taken_in = plan.unstrained_lengths[0] - command.wire
     history = cdsm.load_cycle(
-        pose, plan.tensions[0], [wrench], motors=[taken_in], accuracy=plant.accuracy
+        pose, plan.tensions[0], [wrench], motors=[taken_in], substeps=plant.substeps
     )
     np.testing.assert_allclose(state.pose.q, history.angles[0], atol=1e-12)
     np.testing.assert_allclose(state.true.wire, command.wire, rtol=1e-14)
@@ -64,8 +64,8 @@ def test_stretched_lengths_are_refused() -> None:
 def test_plant_of_something_else_than_an_arm_is_refused() -> None:
     with pytest.raises(cdsm.InvalidInput, match="arm: None given; a Manipulator is needed"):
         cdsm.SlowPlant(None)  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="accuracy: 0 given"):
-        cdsm.SlowPlant(small_path().arm, accuracy=0.0)
+    with pytest.raises(cdsm.InvalidInput, match="substeps: 0 given"):
+        cdsm.SlowPlant(small_path().arm, substeps=0)
 
 
 def test_plant_with_other_cables_is_refused() -> None:
