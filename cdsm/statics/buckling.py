@@ -1,9 +1,8 @@
 """Buckling: tension or load makes K_θ of a fixed posture singular, under the least tensions.
 
 The elasticity of the cables stiffens an arm; their tension usually softens it (active part of
-Eq. 16). With stiff cables the elasticity outweighs the tension. With soft springs or long leads
-there is a critical tension: above it K_θ is not positive definite and the arm buckles.
-:func:`~cdsm.equilibrium` computes where an arm with locked motors moves then.
+Eq. 16). With soft springs or long leads there is a critical tension: above it K_θ is not positive
+definite and the arm buckles. :func:`~cdsm.equilibrium` computes where it moves then.
 """
 
 from __future__ import annotations
@@ -34,8 +33,7 @@ if TYPE_CHECKING:
 SAMPLES = 200  # bounds or load factors of a scan: a stable range narrower than a step is not seen
 _PRECISION = 1e-12  # relative precision of a critical bound or load factor
 _ABOVE = 1.0 + 1e-9  # just above the low end of a law: rounding may put a tension below its bound
-_LOWEST = 1e-3  # lowest bound of a scan from zero [N]
-_LARGEST = 1e6  # load factors are doubled up to this one
+_LOWEST, _LARGEST = 1e-3, 1e6  # lowest bound of a scan from zero [N]; end of doubled load factors
 _SHOWN = 10.0  # largest load factor of the curve if the critical one is infinite
 
 _BALANCED = ("none", "buckling")
@@ -76,9 +74,8 @@ class CriticalTension(_Critical):
     Attributes:
         posture: The fixed posture.
         wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
-        minimum: Lower bound of tension [N] at which the arm buckles as the bound rises: the end of
-            the first range in ``stable``. It is inf if that range reaches the end of ``examined``,
-            and the low end of ``examined`` if no range is stable.
+        minimum: Lower bound of tension [N] at which the arm buckles: the end of the first range in
+            ``stable``; inf if that is the end of ``examined``, its low end if no range is stable.
         stiffness: K_θ at ``minimum``; if the arm does not buckle, at the bound with the smallest of
             ``margins``. ``mode`` and ``tension`` belong to it.
         stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
@@ -110,8 +107,8 @@ class CriticalTension(_Critical):
         if math.isinf(self.minimum):
             verdict = f"does not buckle at any lower bound up to {self.examined[1]:.4g} N"
         spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
-        lines = [*(self.warnings or [verdict]), *([f"stable from {spans}"] if spans else [])]
-        return "\n".join([*lines, self._softest()])
+        stable = f"stable from {spans}\n" if spans else ""
+        return f"{(self.warnings or (verdict,))[0]}\n{stable}{self._softest()}"
 
 
 @final
@@ -124,13 +121,11 @@ class CriticalLoad(_Critical):
         wrench: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
         load: The wrench (6,) that is multiplied by the factor.
         factor: Largest factor [-] up to which the arm is balanced and stable; inf if it still is at
-            a factor of half a million.
+            half a million.
         limit: Reason of the failure: ``"buckling"``, ``"infeasible"`` (no tensions balance the
             load), ``"elasticity"`` (a tension leaves the domain of its law) or ``"none"``.
-        stiffness: K_θ at ``factor``, or at half a million if ``factor`` is inf. ``mode`` and
-            ``tension`` belong to it.
-        factors: Factors (n,) [-] under which the arm is stable, from zero to ``factor``; up to ten
-            if ``factor`` is inf.
+        stiffness: K_θ at ``factor``, or at half a million. ``mode`` and ``tension`` belong to it.
+        factors: Factors (n,) [-] under which the arm is stable, up to ``factor``, or to ten.
         margins: Smallest eigenvalue of K_θ at each of these factors (n,) [N m/rad].
     """
 
@@ -145,22 +140,21 @@ class CriticalLoad(_Critical):
     @property
     def warnings(self) -> tuple[str, ...]:
         """One sentence if the arm is UNSTABLE even without the load; otherwise empty."""
-        return () if self.factor else (f"UNSTABLE without the load: {self}".partition("\n")[0],)
+        return () if self.factor else (f"UNSTABLE without the load: {str(self).splitlines()[0]}",)
 
     def plot(self) -> Figure:
         """Plot the smallest eigenvalue of K_θ [N m/rad] against the factor of the load."""
         return cdsm.plots.plot_critical_load(self)
 
     def __str__(self) -> str:
+        none = self.factor == 0.0
         reason = {
-            "buckling": "there it buckles",
+            "buckling": "it buckles without the load already" if none else "there it buckles",
             "infeasible": "beyond, no tensions balance it",
             "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
             "none": "nothing happens that far",
         }[self.limit]
-        if self.factor == 0.0 and self.limit == "buckling":
-            reason = "it buckles without the load already"
-        part = f"the load up to a factor of {self.factor:.4g}" if self.factor else "no part of it"
+        part = "no part of it" if none else f"the load up to a factor of {self.factor:.4g}"
         return f"holds {part}; {reason}\n{self._softest()}"
 
 
@@ -169,9 +163,8 @@ def critical_tension(
 ) -> CriticalTension:
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
-    F_min is the lower bound of all cables. The symmetric part of K_θ under the least tensions is
-    examined at 200 bounds, even on a log scale, up to ``up_to``, or to where no tensions within the
-    domains of their laws and the maxima of the cables balance the arm.
+    The symmetric part of K_θ under the least tensions is examined at 200 bounds, even on a log
+    scale, up to ``up_to``, or to where no tensions within their laws and maxima balance the arm.
 
     Args:
         pose: The posture, which stays fixed.
@@ -200,7 +193,8 @@ def critical_tension(
     margins = _margins(pose, bounds[:, None], math.inf, W)
     n = int(np.append(np.isfinite(margins), False).argmin())  # bounds that balance the arm
     if n < bounds.size:
-        high = _bisect(lambda b: _failure(at, b) in _BALANCED, *bounds[n - 1 : n + 1])[0]
+        balances = ("none", "buckling")
+        high = _bisect(lambda b: _failure(at, b) in balances, *bounds[n - 1 : n + 1])[0]
         bounds, margins = np.append(bounds[:n], high), np.append(margins[:n], at(high).margin)
     changes = np.flatnonzero(np.diff(np.concatenate([[False], margins > 0.0, [False]])))
     edges = [
@@ -210,8 +204,7 @@ def critical_tension(
         for i in changes.tolist()
     ]
     ranges = tuple(zip(edges[::2], edges[1::2], strict=True))
-    buckles = [end for _, end in ranges if end < high]
-    minimum = buckles[0] if buckles else math.inf if ranges else low
+    minimum = next((end for _, end in ranges if end < high), math.inf if ranges else low)
     where = minimum if math.isfinite(minimum) else float(bounds[margins.argmin()])
     return CriticalTension(
         posture=pose,
@@ -234,8 +227,6 @@ def critical_load(
     wrench: ArrayLike = NO_WRENCH,
 ) -> CriticalLoad:
     """Compute the factor λ up to which an arm at a fixed posture is stable under λ load + wrench.
-
-    The factor is doubled until the arm fails, and the first failure is searched among 200 factors.
 
     Args:
         pose: The posture, which stays fixed. Tensions are distributed again for every load.
@@ -286,10 +277,7 @@ def critical_load(
 
 
 def _margins(pose: Posture, minimum: Array, maximum: ArrayLike, wrenches: Array) -> Array:
-    """Compute the smallest eigenvalue of K_θ (n,) [N m/rad] under the least tensions; or NaN.
-
-    The lower bounds [N] are (C,) or (n, 1), ``wrenches`` (6,) or (n, 6).
-    """
+    """Compute margins or NaN (n,) for lower bounds (C,) or (n, 1) and wrenches (6,) or (n, 6)."""
     q = np.tile(pose.q, (max(len(np.atleast_2d(each)) for each in (minimum, wrenches)), 1))
     bounds = np.broadcast_to(minimum, (len(q), len(pose.arm.cables))), maximum
     case: Any = {"minimum": bounds[0], "maximum": bounds[1], "check_limits": False}
@@ -297,7 +285,7 @@ def _margins(pose: Posture, minimum: Array, maximum: ArrayLike, wrenches: Array)
 
 
 def _failure(at: Callable[[float], Stiffness], place: float) -> Limit:
-    """Return why the arm fails at a lower bound [N], or a load factor."""
+    """Return why the arm fails at a lower bound [N] or load factor."""
     try:
         return "none" if at(float(place)).is_stable else "buckling"
     except (InfeasibleTension, SolverError, InvalidInput):  # on the very edge, or below 1e-9 N

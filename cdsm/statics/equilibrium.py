@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import cdsm
-from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.errors import SingularStiffness
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import FLAT, Balance, Point, equilibrium_error, settle
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.directions import Direction, unit_direction
-from cdsm.support.format import aligned, coordinates, place, without_rounding
+from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import wrench_vector
 from cdsm.support.values import Array, frozen
@@ -203,7 +203,8 @@ def equilibrium(
             of the ``Tension``, or zero.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.stiffness`, or the posture is beyond a joint limit.
+        InvalidInput: As for :func:`~cdsm.stiffness`.
+        JointLimitError: The posture is beyond a joint limit.
         ElasticityRangeError: A tension at the reference or at the equilibrium is outside the domain
             of its law. A law does not say how a cable becomes slack or yields.
         EquilibriumError: No equilibrium was found. If two sites of a cable meet (disks overlap),
@@ -211,7 +212,7 @@ def equilibrium(
     """
     K = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = K.wrench if wrench is None else wrench_vector("wrench", wrench)
-    require_between_stops(pose)
+    pose.arm._angles(pose.q, True)  # within the joint limits
     return locked_equilibrium(LockedArm(pose, K.tension, W))
 
 
@@ -235,18 +236,3 @@ def as_equilibrium(arm: LockedArm, found: Point) -> Equilibrium:
         stiffness=arm.stiffness(found.state.pose),
         stop_torque=found.stop_torque,
     )
-
-
-def require_between_stops(pose: Posture) -> None:
-    """Raise InvalidInput if a joint is beyond its stop."""
-    arm, q = pose.arm, pose.q
-    beyond = arm._beyond_limits(q)
-    if np.count_nonzero(beyond):
-        i = int(beyond.argmax())
-        of = arm.joint_units[i]
-        stop = arm.lower[i] if q[i] < arm.lower[i] else arm.upper[i]
-        raise InvalidInput(
-            "pose",
-            f"{arm.joint_names[i]} = {place(q[i], of)} is beyond its stop at {place(stop, of)}, "
-            "where no motor can be locked; start within the joint limits, or widen joint_limit.",
-        )

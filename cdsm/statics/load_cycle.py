@@ -26,12 +26,7 @@ from cdsm.tension import Tension
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_LOADS = 100_000
-"""Largest number of loads of a history."""
-
-MOST_SUBSTEPS = 1000
-"""Largest number of sub-steps between two loads."""
-
+_MOST_LOADS = 100_000  # of a history
 _SHOWN = 24  # largest number of loads that are printed; of more, the first and the last ones
 
 
@@ -212,13 +207,13 @@ def load_cycle(
     F, W = checked_tension(pose, tension, None)
     pose.arm._laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
     loads = number_array("wrenches", wrenches, "wrench")
-    if loads.ndim != 2 or loads.shape[1] != 6 or not 0 < len(loads) <= MOST_LOADS:
+    if loads.ndim != 2 or loads.shape[1] != 6 or not 0 < len(loads) <= _MOST_LOADS:
         raise InvalidInput(
             "wrenches",
-            f"shape {loads.shape} given, (n, 6) with n from 1 to {MOST_LOADS} needed: one wrench "
+            f"shape {loads.shape} given, (n, 6) with n from 1 to {_MOST_LOADS} needed: one wrench "
             f"per load ({WRENCH}).",
         )
-    substeps = whole_number("substeps", substeps, 1, MOST_SUBSTEPS)
+    substeps = whole_number("substeps", substeps, 1, 1000)
     arm = QuasiStaticArm(pose, F)
     state, none = arm.initial(W), np.zeros(pose.q.size)
     commands = np.tile(state.load.motors, (len(loads), 1))

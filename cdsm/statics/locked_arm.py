@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError
+from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.solve import ArmState
 from cdsm.stiffness_matrix import Stiffness, assemble
@@ -17,7 +16,7 @@ from cdsm.support.validation import RANGES
 from cdsm.support.values import Array, frozen
 from cdsm.wires.elasticity import Elasticity
 
-_BEYOND = 1e-9  # a tension outside the domain of a law by at most this part is rounding
+_ROUNDING = 1e-9  # a tension outside the domain of a law by at most this part is rounding
 
 Indices = slice | NDArray[np.intp]
 
@@ -27,7 +26,7 @@ class LockedArm:
 
     They are locked at ``reference``, or hold the wires of ``rest_length`` (C,) [m], of an arm with
     ``original_length="unstrained"``. Tensions may leave the domains of their laws: outside, a cable
-    has the stiffness of the nearest end of the domain, or is slack. :func:`require_domains` refuses
+    has the stiffness of the nearest end of the domain, or is slack. :func:`require_domain` refuses
     a result outside. Raises ElasticityRangeError if a law gives no strain at F, or if a series
     spring is longer than its whole cable.
     """
@@ -65,8 +64,8 @@ class LockedArm:
     def stiffness(self, pose: Posture) -> Stiffness:
         """Return K_θ at a posture; ElasticityRangeError if a tension is outside its law."""
         F, k = self._tensions(pose)
-        groups = [(law, of) for law, of, _ in self._laws]
-        require_domains(self.reference.arm.cables, groups, F)
+        for law, of, _ in self._laws:
+            require_domain(pose.arm, law, of, F[of])
         return assemble(pose, frozen(F), self.wrench, frozen(k), free_length=self.rest_length)
 
     def _tensions(self, pose: Posture) -> tuple[Array, Array]:
@@ -137,26 +136,17 @@ class _LockedLaw:
         return F, k
 
 
-def require_domains(
-    cables: Sequence[Cable],
-    groups: Iterable[tuple[Elasticity, Indices]],
-    tension: Array,
-    where: str = "at the equilibrium",
+def require_domain(
+    arm: Manipulator, law: Elasticity, of: Indices, tension: Array, where: str = ""
 ) -> None:
-    """Raise ElasticityRangeError if tensions (C,) [N] are outside the domains of their laws.
+    """Raise ElasticityRangeError if the tensions F [N] of the cables ``of`` are outside their law.
 
-    ``groups`` are pairs: a law, and the indices of its cables. ``where`` begins the error message.
+    ``where`` begins the error message.
     """
-    for law, of in groups:
-        F = tension[of]
-        outside = (law.low * (1.0 - _BEYOND) > F) | (law.high * (1.0 + _BEYOND) < F)
-        if np.count_nonzero(outside):
-            below = ", or continue it below by its slack_below()" * bool((law.low > F).any())
-            at = np.arange(tension.size)[of][outside].tolist()
-            problem = (
-                f"{where}; the elasticity is defined on {law._span}, and says neither how a cable "
-                "goes slack below it nor how it yields above. Change the tensions or the load, or "
-                f"use an elasticity that covers them{below}."
-            )
-            names = [cables[c].name for c in at]
-            raise ElasticityRangeError(problem, F[outside].tolist(), at, names)
+    inside = np.clip(tension, law.low, law.high)
+    near = abs(tension - inside) <= _ROUNDING * tension
+    try:
+        law._inside(np.where(near, inside, tension))
+    except ElasticityRangeError as error:
+        said = ElasticityRangeError(f"{where}{error.problem}", error.tension, error.indices)
+        raise arm._laws.naming(said, of) from None

@@ -20,7 +20,7 @@ from cdsm.support.format import aligned
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import instance
 from cdsm.support.values import Array, frozen
-from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
+from cdsm.urdf import CROSS_INERTIA
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,9 +105,17 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     arm = instance("pose", pose, Posture).arm
     if not instance("stiffness", stiffness, Stiffness).posture._equals(pose):
         raise InvalidInput("stiffness", "belongs to another posture or arm; compute it for this.")
-    if arm.is_serpentine:
-        _require_mass(pose)
     M = arm._body.mass_matrix(pose.q)
+    if arm.is_serpentine:
+        least = int(M.diagonal().argmin())  # crosses and massless links have placeholders
+        crossed = any(len(joint.axes) == 2 for joint in arm.geometry.joints)
+        light = crossed and M[least, least] < _LIGHT * CROSS_INERTIA
+        if light or arm.geometry.links[-1].mass == 0.0:
+            raise SingularMass(
+                f"{arm.joint_names[least]} moves links of no mass, or of hardly any: its frequency "
+                "would be that of placeholders. Give the links their link_mass.",
+                frozen(np.eye(arm.nv)[least]),
+            )
     squares, shapes = vibrations(stiffness, M)
     shapes *= np.sign(shapes[abs(shapes).argmax(axis=0), np.arange(arm.nv)])
     vibrates = squares > 0.0
@@ -142,21 +150,3 @@ def vibrations(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
         said += "Give the links a mass and moments of inertia."
         raise SingularMass(said, frozen(motion)) from None
     return squares, scale[:, None] * shapes
-
-
-def _require_mass(pose: Posture) -> None:
-    """Raise SingularMass if a joint moves hardly more than the placeholders of its URDF."""
-    mass = inertia = 0.0
-    geometry, last = pose.arm.geometry, pose.arm.nv
-    for joint, link in zip(reversed(geometry.joints), reversed(geometry.links), strict=True):
-        last -= len(joint.axes)
-        mass += link.mass
-        inertia += link.mass * (geometry.hole_radius**2 / 4.0 + link.length**2 / 3.0)
-        light = mass < _LIGHT * CROSS_MASS or inertia < _LIGHT * CROSS_INERTIA
-        if mass == 0.0 or (light and len(joint.axes) == 2):
-            raise SingularMass(
-                f"{pose.arm.joint_names[last]} moves links of no mass, or of hardly any "
-                f"({mass:g} kg): its frequency would be that of placeholders. Give the links "
-                "their link_mass.",
-                frozen(np.eye(pose.arm.nv)[last]),
-            )

@@ -16,8 +16,7 @@ import numpy as np
 
 from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import require_between_stops
-from cdsm.statics.locked_arm import LockedArm, require_domains
+from cdsm.statics.locked_arm import LockedArm, require_domain
 from cdsm.statics.solve import ArmState, Balance, Point, continued, equilibrium_error, settle
 from cdsm.support.values import Array, frozen
 
@@ -64,14 +63,14 @@ class Step(NamedTuple):
 class QuasiStaticArm:
     """Arm with friction whose motors are locked at ``reference``, with tensions F (C,) [N].
 
-    Raises InvalidInput if the posture is beyond a joint limit, and ElasticityRangeError if a series
-    spring leaves no wire.
+    Raises JointLimitError if the posture is beyond a joint limit, and ElasticityRangeError if a
+    series spring leaves no wire.
     """
 
     def __init__(self, reference: Posture, tension: Array) -> None:
-        require_between_stops(reference)
-        LockedArm(reference, tension, np.zeros(6))  # refuses a spring that leaves no wire
         arm = reference.arm
+        arm._angles(reference.q, True)  # within the joint limits
+        LockedArm(reference, tension, np.zeros(6))  # refuses a spring that leaves no wire
         self.reference, self._tension = reference, tension
         self.start = reference.segments.chains.start
         self.forced = ~arm.cables.position_controlled
@@ -154,12 +153,9 @@ class QuasiStaticArm:
 
     def _require_domains(self, tension: Array, what: str) -> None:
         cables = self.reference.arm.cables
-        # a motor that holds the tension of a cable without friction needs no law
-        groups = [
-            (law, np.array([c for c in of if not self.forced[c] or any(cables[c].friction)]))
-            for law, of in self._problem.laws
-        ]
-        known = [(law, of) for law, of in groups if of.size]
-        for extreme in (np.minimum, np.maximum):
-            F = extreme.reduceat(tension, self.start[:-1])
-            require_domains(cables, known, F, f"after {what}")
+        for law, of in self._problem.laws:
+            # a motor that holds the tension of a cable without friction needs no law
+            known = np.array([c for c in of if not self.forced[c] or any(cables[c].friction)], int)
+            for extreme in (np.minimum, np.maximum):
+                F = extreme.reduceat(tension, self.start[:-1])[known]
+                require_domain(self.reference.arm, law, known, F, f"after {what}, ")

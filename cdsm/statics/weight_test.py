@@ -29,11 +29,9 @@ if TYPE_CHECKING:
 
 SLIDING = 1.25  # an arm slides if its tangent is at most so many times the frictionless one
 
-_MOST_STEPS = 1000  # a curve with more points is not smoother, but takes long
 _MEASURED = 1e-12  # least displacement, over the arm's length, with about three correct digits
 _DISPLACED = 1e-9  # least displacement, over the arm's length, above the rounding of equilibrium
-_FINEST = 2.0**-12  # relative precision of a buckling load
-_SLIGHT = 1e-9  # below this part of the load the precision is absolute: this part times _FINEST
+_FINEST = 2.0**-12  # relative precision of a buckling load; absolute below 1e-9 of the load
 
 
 @final
@@ -253,7 +251,7 @@ def weight_test(
     force = vector("force", force, 3, "a force in base axes [N]", "force")
     if not force.any():
         raise InvalidInput("force", "is zero; nothing moves, and there is nothing to measure.")
-    steps = whole_number("steps", steps, 1, _MOST_STEPS)
+    steps = whole_number("steps", steps, 1, 1000)
     unloaded = equilibrium(pose, tension, wrench)
     states, added, W = [unloaded], np.append(force, np.zeros(3)), unloaded.wrench
     for step in range(steps):
@@ -292,14 +290,11 @@ def _follow(
         found = continued(f, (q / f.unit - before.stop_torque * f.unit / f.k,), q)
         if found is not None and stable_between(arm.at, q, found.state.pose.q):
             before, reached, step = as_equilibrium(arm, found), part, 2.0 * step
-        elif step > _FINEST * max(reached, _SLIGHT):
+        elif step > _FINEST * max(reached, 1e-9):
             step /= 2.0
         else:
-            joint = int(abs(before.stiffness.critical_direction).argmax())
-            name = before.pose.arm.joint_names[joint]
-            problem = (
-                f"the arm buckles at {100.0 * reached:.4g} % of the load, under "
-                f"{reached * float(np.linalg.norm(added)):.4g} N: {name} buckles"
-            )
-            raise EquilibriumError(problem, before.residual, reached, name)
+            worst = int(abs(before.stiffness.critical_direction).argmax())
+            joint, load = before.pose.arm.joint_names[worst], reached * np.linalg.norm(added)
+            problem = f"the arm buckles at {100.0 * reached:.4g} % of the load, under {load:.4g} N"
+            raise EquilibriumError(f"{problem}: {joint} buckles", before.residual, reached, joint)
     return before
