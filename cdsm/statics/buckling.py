@@ -120,10 +120,8 @@ class CriticalLoad(_Critical):
         posture: The fixed posture.
         wrench: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
         load: The wrench (6,) that is multiplied by the factor.
-        factor: Largest factor [-] up to which the arm is balanced and stable; inf if it still is at
-            half a million.
-        limit: Reason of the failure: ``"buckling"``, ``"infeasible"`` (no tensions balance the
-            load), ``"elasticity"`` (a tension leaves the domain of its law) or ``"none"``.
+        factor: Largest factor [-] up to which the arm is balanced and stable; inf: half a million.
+        limit: What ends it: ``"buckling"``, ``"infeasible"``, ``"elasticity"`` or ``"none"``.
         stiffness: K_θ at ``factor``, or at half a million. ``mode`` and ``tension`` belong to it.
         factors: Factors (n,) [-] under which the arm is stable, up to ``factor``, or to ten.
         margins: Smallest eigenvalue of K_θ at each of these factors (n,) [N m/rad].

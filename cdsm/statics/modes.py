@@ -138,12 +138,11 @@ def vibrations(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
     from scipy.linalg import eigh  # slow to import
 
     # scaled by joint: the mass of the last link may be rounding beside that of the arm
-    with np.errstate(divide="ignore"):
-        scale = 1.0 / np.sqrt(M.diagonal())
+    scale = 1.0 / np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
     K, scaled = (matrix * scale * scale[:, None] for matrix in (stiffness.joint, M))
     try:
         squares, shapes = eigh((K + K.T) / 2.0, scaled)
-    except (np.linalg.LinAlgError, ValueError):  # M is not positive definite
+    except np.linalg.LinAlgError:  # M is not positive definite
         motion = np.linalg.eigh(M)[1][:, 0]
         joint = stiffness.posture.arm.joint_names[int(abs(motion).argmax())]
         said = f"a motion of {joint} moves no link of any mass. "

@@ -139,10 +139,10 @@ def continued(f: Balance, guesses: Iterable[Array], before: Array) -> Point | No
     for search in (_descend, _hybrid):
         for x in guesses:
             try:
-                here, found = search(f, f(x), 0.0)
+                here, found = search(f, f(x), 0.0, before / f.unit)
             except (CdsmError, np.linalg.LinAlgError, ValueError):
                 continue
-            if found and (abs(here.state.pose.q - before) / f.unit).max() <= FAR:
+            if found:
                 return here
     return None
 
@@ -160,14 +160,18 @@ def stable_between(at: Callable[[Array], ArmState], before: Array, after: Array)
     return True
 
 
-def _descend(f: Balance, here: Point, shift: float) -> tuple[Point, bool]:
+def _descend(
+    f: Balance, here: Point, shift: float, home: Array | None = None
+) -> tuple[Point, bool]:
     """Newton's method on K + ``shift``, which is raised to be positive definite.
 
     A step counts if the work ∫f·dx along it is negative. It ends at a stable equilibrium, not at a
-    saddle, unless the stops bar both ways down.
+    saddle, unless the stops bar both ways down; and if a joint is more than 0.1 rad from ``home``.
     """
     kicks, identity = 0, np.eye(here.x.size)
     for _ in range(_STEPS):
+        if home is not None and abs(f.inside(here.x) - home).max() > FAR:
+            break
         lowest, mode = _softest(f, here)
         saddle = here.off <= BALANCED
         if saddle and (lowest >= 0.0 or kicks == 2):
@@ -180,7 +184,7 @@ def _descend(f: Balance, here: Point, shift: float) -> tuple[Point, bool]:
             step = f.limited(here.x, -np.asarray(np.linalg.lstsq(K, here.value, rcond=None)[0]))
             kicks *= bool(abs(step).max() < _KICK)
         there, gain = f.attempt(here.x + step), float(here.value @ step)
-        if there and (saddle or 0.0 > 1e-3 * gain > (here.value + there.value) @ step):
+        if there and (saddle or 0.0 > 0.5 * gain > (here.value + there.value) @ step):
             here, shift = there, shift / 4.0
         else:
             shift = 4.0 * max(shift, -lowest, 1e-4 * f.k)
@@ -233,13 +237,13 @@ def _flow(f: Balance, x: Array) -> Array:
         return x
 
 
-def _hybrid(f: Balance, here: Point, shift: float) -> tuple[Point, bool]:
+def _hybrid(f: Balance, here: Point, shift: float, home: Array) -> tuple[Point, bool]:
     """Hybrid method of scipy, which stops at a step length, not at a residual."""
     from scipy.optimize import root  # slow to import, and rarely needed
 
     options = {"xtol": 1e-11, "factor": 0.1}
     found = root(lambda x: f(x)[2:4], here.x, jac=True, method="hybr", options=options)
-    return _descend(f, f(found.x), shift)
+    return _descend(f, f(found.x), shift, home)
 
 
 def equilibrium_error(
