@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.values import Array
-from tests.support.arms import mixed_arm, random_arm, random_posture
+from tests.support.arms import mixed_arm, random_posture
 
 SPRING, RADIUS, OFFSET, LENGTH = 1890.0, 0.02, 0.01, 0.1
 
@@ -165,16 +164,6 @@ def test_margin_changes_its_sign_there_and_nowhere_below(pose: cdsm.Posture) -> 
         assert margin(pose, low + part * (found.minimum - low)) > 0.0
 
 
-def test_mode_is_the_null_vector_of_the_joint_stiffness() -> None:
-    pose = soft_arms()[1]
-    found = cdsm.critical_tension(pose)
-    K = cdsm.stiffness(pose, found.tension).joint
-    symmetric: Array = (K + K.T) / 2.0
-    assert abs(symmetric @ found.mode).max() < 1e-9 * np.linalg.norm(K, 2)
-    assert np.linalg.norm(found.mode) == pytest.approx(1.0, rel=1e-12)
-    assert found.mode[abs(found.mode).argmax()] > 0.0
-
-
 def test_stiff_strand_does_not_buckle_within_its_domain() -> None:
     found = cdsm.critical_tension(cdsm.presets.virtual_prototype().at(np.full(10, 0.17)))
     assert math.isinf(found.minimum)
@@ -267,12 +256,3 @@ def test_one_cable_holds_a_weight_on_one_side_only(up: float) -> None:
         # its tension is what statics say, so the bound can rise no further than that
         weight = 9.81 * LENGTH / 2.0 / RADIUS
         assert found.examined[1] == pytest.approx(weight, rel=1e-6)
-
-
-def test_what_the_cables_may_carry_ends_what_is_examined() -> None:
-    geometry = random_arm(3, 2).geometry
-    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e5))
-    bounded = [replace(cable, maximum=80.0 + c) for c, cable in enumerate(cables)]
-    arm = cdsm.Manipulator(geometry, cables=bounded, gravity=(0.0, 0.0, 0.0))
-    found = cdsm.critical_tension(arm.at(np.zeros(arm.nv)))
-    assert found.examined[1] == pytest.approx(80.0, rel=1e-9)

@@ -223,15 +223,6 @@ def test_tangent_is_the_derivative_of_the_history(load: float) -> None:
     assert history.stiffness(1).along("z") == pytest.approx(numerical, rel=1e-5)
 
 
-def test_holes_that_hold_give_the_stuck_stiffness() -> None:
-    pose, pull = prototype(0.2)
-    history = cdsm.load_cycle(pose, pull, along_z(1e-3))
-    assert not history.sliding.any()
-    stuck = cdsm.stuck_stiffness(pose, pull).along("z")
-    assert 1e-3 / history.displacement[0, 2] == pytest.approx(stuck, rel=1e-5)
-    assert history.stiffness(0).along("z") == pytest.approx(stuck, rel=1e-5)
-
-
 # --- numbers of an independent computation ----------------------------------------------------
 
 PLANAR = {  # μ: secant to −6 N [N/mm], left over at 0 N [mm], loss per cycle of ±6 N [mJ]
