@@ -119,8 +119,8 @@ class ChainProblem:
         base, softness = self._strain(tension)
         energy = self._softness * tension**2 / 2.0
         for law, of in self._curved:
-            T, (inside, rigidity) = tension[of], _within(law, tension[of])
-            energy[of] = law.energy(inside) + (T**2 - inside**2) / (2.0 * rigidity)
+            T, inside = tension[of], np.clip(tension[of], law.low, law.high)
+            energy[of] = law.energy(inside) + softness[of] * (T**2 - inside**2) / 2.0
         return np.asarray(tension * (base + softness * tension) - energy)
 
     def _shortened(self, T: Array, new: Array, length: Array, rest_length: Array) -> Array:
@@ -141,16 +141,11 @@ class ChainProblem:
             return self._base, self._softness
         base, softness = self._base.copy(), self._softness.copy()
         for law, of in self._curved:
-            inside, rigidity = _within(law, tension[of])
+            inside = np.clip(tension[of], law.low, law.high)
+            strain, rigidity = law._evaluate(inside)
             softness[of] = 1.0 / rigidity
-            base[of] += law.strain(inside) - inside / rigidity
+            base[of] += strain - inside / rigidity
         return base, softness
-
-
-def _within(law: Elasticity, tension: Array) -> tuple[Array, Array]:
-    """Return ``tension`` clipped to the domain of ``law``, and the rigidities EA there [N]."""
-    inside = np.clip(tension, law.low, law.high)
-    return inside, law.rigidity(inside)
 
 
 def chain_tangent(
