@@ -107,7 +107,7 @@ def unfinished(problem: LeastSquares, point: Array, jacobian: Array) -> list[str
     step = np.zeros_like(point)
     step[~fixed] = np.linalg.lstsq(jacobian[:, ~fixed], -r, rcond=RANK_TOLERANCE)[0]
     fall = float(np.sum((jacobian @ step) ** 2))
-    if fall < (_LEFT if problem.followed else NEGLIGIBLE):
+    if fall < (_LEFT if problem.rough else NEGLIGIBLE):
         return []
     # look nearby for the end of the model: the search may have stopped there
     size = 1e-3 / max(1e-3, float(abs(step).max()))

@@ -21,7 +21,7 @@ from cdsm.support.progress import progress_allowed, track
 from cdsm.support.validation import number_array, scalar, whole_number
 from cdsm.support.values import Array, frozen
 
-_STEP = 1e-5  # relative change of a parameter for its central difference
+_STEP = 1e-4  # relative change of a parameter for its central difference
 _MOST = 5000  # largest number of candidates and of tests
 
 
@@ -234,8 +234,7 @@ def _rows(
     columns = []
     for name, value in values.items():
         near, far = (
-            model.residuals_beside(values, values | {name: value * (1.0 + s * _STEP)})
-            for s in (1.0, -1.0)
+            model.residuals(values | {name: value * (1.0 + s * _STEP)}) for s in (1.0, -1.0)
         )
         columns.append((near - far) / (2.0 * _STEP))
     return np.column_stack(columns)

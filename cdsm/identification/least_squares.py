@@ -23,7 +23,7 @@ from cdsm.support.values import Array
 _DECADES = 100.0
 """Least ratio of positive bounds with which the logarithm of a parameter is searched instead."""
 
-_ONE_SIDED, _CENTRAL = 1e-7, 1e-5
+_ONE_SIDED, _CENTRAL, _ROUGH = 1e-7, 1e-5, 1e-4
 """Steps of the finite differences in the unit cube. They balance rounding and truncation."""
 
 Method = Literal["trf", "dogbox"]
@@ -94,9 +94,8 @@ class LeastSquares:
             :class:`NoModelError`.
         count: Number n of residuals.
         bounds: (low, high) of each parameter.
-        beside: Function (here, moved) that returns r (n,) at the parameters ``moved``, to first
-            order in their distance from the parameters ``here``. Finite differences use it, since
-            it is faster than ``residuals_of``. None: they use ``residuals_of``.
+        rough: Whether the residuals are less exact and have kinks, as those of loops: finite
+            differences then take larger steps.
     """
 
     def __init__(
@@ -104,18 +103,13 @@ class LeastSquares:
         residuals_of: Callable[[dict[str, float]], Array],
         count: int,
         bounds: Mapping[str, tuple[float, float]],
-        beside: Callable[[dict[str, float], dict[str, float]], Array] | None = None,
+        rough: bool = False,
     ) -> None:
         self.names = tuple(bounds)
         self.box = Box(np.array(list(bounds.values()), dtype=np.float64))
         self.count = count
-        self._residuals_of, self._beside = residuals_of, beside
+        self._residuals_of, self.rough = residuals_of, rough
         self._cached = lru_cache(maxsize=_CACHED)(self._evaluate)
-
-    @property
-    def followed(self) -> bool:
-        """Whether finite differences use the function ``beside``, which is exact to first order."""
-        return self._beside is not None
 
     def parameters(self, point: Array) -> dict[str, float]:
         """Compute the parameters by name at a ``point`` (P,) of the unit cube."""
@@ -160,7 +154,10 @@ class LeastSquares:
         return np.column_stack([self._column(point, i, central) for i in chosen])
 
     def _column(self, point: Array, i: int, central: bool) -> Array:
-        here, step = self.residuals(point), _CENTRAL if central else _ONE_SIDED
+        here, step = (
+            self.residuals(point),
+            _ROUGH if self.rough else _CENTRAL if central else _ONE_SIDED,
+        )
 
         def at(k: int) -> Array | None:
             """Compute the residuals (n,) k steps away; None beyond a bound, or without a model."""
@@ -168,11 +165,6 @@ class LeastSquares:
             moved[i] += k * step
             if not 0.0 <= moved[i] <= 1.0:
                 return None
-            if self._beside is not None:
-                try:
-                    return self._beside(self.parameters(point), self.parameters(moved))
-                except NoModelError:
-                    return None
             return self.residuals(moved) if self.failure(moved) is None else None
 
         for side in (1, -1):

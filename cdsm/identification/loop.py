@@ -10,7 +10,8 @@ import numpy as np
 from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import Measurement, checked_conditions
 from cdsm.manipulator import Manipulator
-from cdsm.statics.loading_path import LoadingPath
+from cdsm.posture import Posture
+from cdsm.statics.load_cycle import load_cycle
 from cdsm.support.directions import Axis, unit_direction
 from cdsm.support.validation import SMALLEST, instance, number_array, scalar, whole_number
 from cdsm.support.values import Array
@@ -124,11 +125,19 @@ class WeightLoop:
             tension = distribute_tension(pose, self.minimum, wrench=wrench).values
         else:
             tension = np.array(self.tension)
-        tips = LoadingPath.of(pose, tension, wrench, self.applied).tips
-        read = (tips - pose.tip[:3, 3]) @ self._unit
+        read = tips(pose, tension, wrench, self.applied) @ self._unit
         if random is not None:
             read += self.displacement_std * random.normal(size=read.size)
         return replace(self, displacements=tuple(read.tolist()))
+
+
+def tips(pose: Posture, tension: Array, wrench: Array, forces: Array) -> Array:
+    """Compute how far ``forces`` (n, 3) [N], one after the other, move the tip (n, 3) [m].
+
+    ``pose``, ``tension`` (C,) [N] and ``wrench`` (6,) are those before the first force.
+    """
+    path = wrench + np.pad(forces, ((1, 0), (0, 3)))
+    return load_cycle(pose, tension, path, substeps=2).displacement[1:]
 
 
 def measured(measurement: Measurement | WeightLoop) -> Array:

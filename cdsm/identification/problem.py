@@ -6,30 +6,25 @@ The differences from the measurements are the residuals that :func:`identify` mi
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
-from cdsm.identification.least_squares import LeastSquares, NoModelError, no_model
-from cdsm.identification.loop import WeightLoop, measured, offset
+from cdsm.identification.least_squares import LeastSquares, no_model
+from cdsm.identification.loop import WeightLoop, measured, offset, tips
 from cdsm.identification.measurement import Measurement, label
 from cdsm.manipulator import Manipulator
-from cdsm.statics.following import follow
-from cdsm.statics.loading_path import LoadingPath, same_segments
-from cdsm.statics.rest_search import equilibrium
-from cdsm.statics.weight_test import WeightTest, weight_test
+from cdsm.statics.weight_test import weight_test
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.directions import unit_direction
 from cdsm.support.validation import SMALLEST
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array
 from cdsm.tension import Tension, distribute_tension
 
 Parameters = dict[str, float]
-
-_STORED = 8  # sets of parameters whose paths are stored
 
 
 class UserFaultError(Exception):
@@ -48,8 +43,6 @@ class Model:
     # function that gives the tensions, or None
     tension_of: Callable[..., Tension | ArrayLike] | None
     measurements: tuple[Measurement | WeightLoop, ...]
-    _last_rest: dict[Measurement, Array] = field(default_factory=dict)
-    _paths: dict[tuple[float, ...], list[LoadingPath | None]] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -65,40 +58,21 @@ class Model:
         """Compute all residuals (n,) for these ``parameters``, in standard deviations."""
         return self.weigh(self.predict(parameters)[1])
 
-    def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
-        """Compute the residuals (n,) for parameters ``moved`` near ``here``, to first order.
-
-        Equilibria of the loops are searched for only at the parameters ``here``; those for
-        ``moved`` are linearised about them. This is ten times as fast as :meth:`residuals`.
-        """
-        return self.weigh(self.predict(moved, here)[1])
-
-    def predict(
-        self, parameters: Parameters, near: Parameters | None = None
-    ) -> tuple[Manipulator, list[Array]]:
+    def predict(self, parameters: Parameters) -> tuple[Manipulator, list[Array]]:
         """Build the arm of ``parameters``; predict each stiffness (1,) [N/m] or loop (m,) [m].
 
         The predictions of a loop are displacements of the tip from its position without the forces.
-        If ``near`` is given, they are linearised about the equilibria at the parameters ``near``;
-        otherwise they are exact.
         """
         arm = self.arm(parameters)
-        paths = self._paths_at(near) if near else self._paths_at(parameters, arm)
         predicted = []
-        for i, (each, path) in enumerate(zip(self.measurements, paths, strict=True)):
+        for i, each in enumerate(self.measurements):
             with no_model(f"measurement {label(i, each)}: "):
                 if isinstance(each, Measurement):
                     predicted.append(np.array([self._along(arm, each, parameters)]))
-                    continue
-                assert path is not None
-                tips, pose = path.tips, path.loading.reference
-                if near:
+                else:
                     K = self._stiffness(arm, each, parameters)
-                    pose = K.posture
-                    if not same_segments(pose, path.start.pose):
-                        raise NoModelError("the cables have other segments than beside there.")
-                    tips = path.beside(pose, K.tension, K.wrench)
-                predicted.append(((tips - pose.tip[:3, 3]) @ each.axes.T).ravel())
+                    moved = tips(K.posture, K.tension, K.wrench, each.applied)
+                    predicted.append((moved @ each.axes.T).ravel())
         return arm, predicted
 
     def weigh(self, predicted: list[Array]) -> Array:
@@ -130,34 +104,6 @@ class Model:
         if not isinstance(arm, Manipulator):
             raise InvalidInput("model_of", f"returns {arm!r}; a Manipulator is needed.")
         return arm
-
-    def _paths_at(
-        self, parameters: Parameters, arm: Manipulator | None = None
-    ) -> list[LoadingPath | None]:
-        """Return the equilibria of each loop for ``parameters``; None for a measured stiffness.
-
-        The equilibria for the last 8 sets of parameters are stored. ``arm`` is the arm of
-        ``parameters``, if it is already built.
-        """
-        key = tuple(parameters.values())
-        if key not in self._paths:
-            arm = arm or self.arm(parameters)
-            near = next(reversed(self._paths.values()), [None] * len(self.measurements))
-            found = [self._path(i, arm, parameters, path) for i, path in enumerate(near)]
-            while len(self._paths) >= _STORED:
-                del self._paths[next(iter(self._paths))]
-            self._paths[key] = found
-        return self._paths[key]
-
-    def _path(
-        self, i: int, arm: Manipulator, parameters: Parameters, near: LoadingPath | None
-    ) -> LoadingPath | None:
-        loop = self.measurements[i]
-        if not isinstance(loop, WeightLoop):
-            return None
-        with no_model(f"measurement {label(i, loop)}: "):
-            K = self._stiffness(arm, loop, parameters)
-            return LoadingPath.of(K.posture, K.tension, K.wrench, loop.applied, near=near)
 
     def _stiffness(
         self, arm: Manipulator, measurement: Measurement | WeightLoop, parameters: Parameters
@@ -195,25 +141,13 @@ class Model:
         return value
 
     def _secant(self, measurement: Measurement, K: Stiffness) -> float:
-        # start at the equilibrium of the last parameters: a tenth of the time of weight_test
-        pose, last = K.posture, self._last_rest.get(measurement)
         force = measurement.force * unit_direction("direction", measurement.direction)
-        test = None
-        if last is not None:
-            without = equilibrium(pose, K.tension, K.wrench)
-            loaded = follow(without, frozen(K.wrench + np.append(force, np.zeros(3))), last)
-            if loaded is not None:
-                test = WeightTest(force=force, without=without, loaded=(loaded,))
-        if test is None:
-            test = weight_test(pose, K.tension, force, wrench=K.wrench)
-        self._last_rest[measurement] = test.loaded[-1].pose.q
-        return test.stiffness
+        return weight_test(K.posture, K.tension, force, wrench=K.wrench).stiffness
 
 
 def problem_of(model: Model, bounds: Mapping[str, tuple[float, float]]) -> LeastSquares:
     """Return the least-squares problem of ``model`` within ``bounds`` (low, high) by name."""
-    beside = model.residuals_beside if model.loops else None
-    return LeastSquares(model.residuals, model.count, bounds, beside)
+    return LeastSquares(model.residuals, model.count, bounds, rough=bool(model.loops))
 
 
 def _call_model(

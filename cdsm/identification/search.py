@@ -220,7 +220,7 @@ def _checked_start(problem: LeastSquares, start: Mapping[str, float]) -> Array:
 
 def _optimum(problem: LeastSquares, start: Array) -> Array:
     """Search from ``start`` (P,) for the minimum of χ², in the unit cube."""
-    coarse, fine = (_OF_LOOPS, _OF_LOOPS) if problem.followed else (_COARSE, _FINE)
+    coarse, fine = (_OF_LOOPS, _OF_LOOPS) if problem.rough else (_COARSE, _FINE)
     first = problem.search(start, method="trf", tolerances=coarse, most=_EVALUATIONS)
     finer = problem.search(first, method="dogbox", tolerances=fine, most=_EVALUATIONS, central=True)
     best = min(finer, first, key=problem.cost)

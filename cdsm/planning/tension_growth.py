@@ -13,11 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from cdsm._former.tension import OPTIMALITY
 from cdsm.errors import InvalidInput
-from cdsm.planning.gradient import stiffness_gradient
-from cdsm.planning.objectives import unstable
-from cdsm.planning.saturation_curve import End, Saturation
-from cdsm.posture import Posture
-from cdsm.statics.bound_scan import (
+from cdsm.planning.bound_scan import (
     StiffnessAt,
     failure_at,
     log_samples,
@@ -26,6 +22,10 @@ from cdsm.statics.bound_scan import (
     stable_ranges,
     tension_domain,
 )
+from cdsm.planning.gradient import stiffness_gradient
+from cdsm.planning.objectives import unstable
+from cdsm.planning.saturation_curve import End, Saturation
+from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.validation import NO_WRENCH, bound, instance, scalar

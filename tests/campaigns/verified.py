@@ -453,9 +453,10 @@ def at_rest(pull: cdsm.Tension, wrench: Array) -> None:
     torque = rest.tension @ pose.length_jacobian + pose.gravity_torque - wrench @ pose.jacobian
     scale = abs(rest.tension @ abs(pose.length_jacobian)).max() + abs(pose.gravity_torque).max()
     scale += abs(wrench @ pose.jacobian).max() + rounded(rest.stiffness)
-    np.testing.assert_allclose(torque - rest.reaction, rest.residual, rtol=0.0, atol=1e-11 * scale)
-    assert (rest.reaction[pose.q <= arm.lower] >= -1e-9 * scale).all()
-    assert (rest.reaction[pose.q >= arm.upper] <= 1e-9 * scale).all()
+    left = torque - rest.stop_torque
+    np.testing.assert_allclose(left, rest.residual, rtol=0.0, atol=1e-11 * scale)
+    assert (rest.stop_torque[pose.q <= arm.lower] >= -1e-9 * scale).all()
+    assert (rest.stop_torque[pose.q >= arm.upper] <= 1e-9 * scale).all()
 
 
 def weighed(pull: cdsm.Tension, K: cdsm.Stiffness) -> None:

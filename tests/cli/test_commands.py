@@ -150,7 +150,7 @@ def test_weigh_json_holds_the_numbers_of_the_api(geometry: Path, tmp_path: Path)
     pose = arm.at(np.full(6, np.deg2rad(8.0)))
     pull = cdsm.distribute_tension(pose, 30.0)
     test = cdsm.weight_test(pose, pull, [0.0, 0.0, -3.0], steps=3)
-    np.testing.assert_array_equal(told["tip_displacements_m"], test.displacements)
+    np.testing.assert_array_equal(told["displacements_m"], test.displacements)
     np.testing.assert_array_equal(told["tensions_N"], test.tensions)
     assert told["stiffness_N_per_m"] == test.stiffness
     assert png.read_bytes().startswith(b"\x89PNG")

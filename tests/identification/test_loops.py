@@ -81,9 +81,8 @@ def test_loops_of_a_load_cycle_give_the_arm_that_made_them() -> None:
     for loop in PLANNED:
         pose = hinge().at(loop.angles)
         wrenches = np.c_[loop.applied, np.zeros((len(FORCES), 3))]
-        tip = cdsm.load_cycle(
-            pose, cdsm.distribute_tension(pose, 200.0), wrenches, accuracy=1e-5
-        ).tip
+        pull = cdsm.distribute_tension(pose, 200.0)
+        tip = cdsm.load_cycle(pose, pull, wrenches, substeps=64).tip
         read = tuple(map(tuple, (tip + np.array([0.3, -2.0, 5.0])).tolist()))
         loops.append(replace(loop, displacements=read))
     found = identify(hinge, loops, FREE, start={"friction": 0.2, "rigidity": 6e4})
