@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array, frozen
+from cdsm.tension.solvers import NO_ARM
 
 Indices = NDArray[np.intp]
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
@@ -34,6 +35,7 @@ class Arm(NamedTuple):
     tip: int  # frame of the tip
     tip_rotation: Array  # (3, 3)
     gravity: Array  # (3,) [m/s²]
+    least: float  # moment arms below this are rounding [m]
     axes: NDArray[np.intp]  # joints of the K blocks of the kernel guess, from base to tip (nv,)
     axis_ends: NDArray[np.intp]  # where each block begins in axes, and the last ends (K+1,)
     cables: NDArray[np.intp]  # cables of the blocks (C,)
@@ -117,6 +119,7 @@ class ArmRows:
             tip=int(frame[tree.tip]),
             tip_rotation=frozen(tree.tip_rotation),
             gravity=frozen(np.array(arm.gravity)),
+            least=NO_ARM * arm.length,
             **_blocks(pulls),
         )
         self.dimensions = Body(
