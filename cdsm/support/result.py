@@ -84,7 +84,7 @@ class Result(ReadOnlyState):
         """Return all numbers as a labelled Dataset in SI; needs xarray (MissingExtra)."""
         variables, words = {}, {}
         for name, value, of, dims in self._quantities():
-            array = np.asarray(value)
+            array = _array(value)
             if array.dtype.kind in "USO":
                 words[name] = str(value)
             else:
@@ -103,7 +103,7 @@ class Result(ReadOnlyState):
             elif dims == (self._rows,) and name == self._rows:
                 index = np.asarray(value)
             elif dims[:1] == (self._rows,):
-                array = np.asarray(value)
+                array = _array(value)
                 for place in np.ndindex(array.shape[1:]):
                     parts = [str(labels[d][i]) for d, i in zip(dims[1:], place, strict=True)]
                     columns[" ".join([name, *parts]) + suffix] = array[(slice(None), *place)]
@@ -162,6 +162,11 @@ class Result(ReadOnlyState):
             labels |= {"joint": arm.joint_names, "joint_column": arm.joint_names}
             labels["cable"] = arm.cables.names
         return labels
+
+
+def _array(value: Any) -> Any:
+    """Return a value as an array; of a mapping, its values."""
+    return np.asarray([*value.values()] if isinstance(value, Mapping) else value)
 
 
 def _by_name(value: Any, dims: Sequence[str], labels: Mapping[str, Sequence[object]]) -> Any:

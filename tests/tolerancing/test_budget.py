@@ -11,8 +11,7 @@ import pytest
 
 import cdsm
 from cdsm.tolerances import SOURCES, Distribution
-from cdsm.uncertainties.inputs import inputs_of
-from cdsm.uncertainties.parts import draw, parts_of
+from cdsm.tolerancing.inputs import inputs_of
 from tests.support import arms
 from tests.support.arms import readme_geometry
 
@@ -67,9 +66,10 @@ def test_correlation_decides_between_root_and_sum() -> None:
     g = cdsm.uncertainty(
         pose, tension, cdsm.Tolerances(rigidity=0.05), direction=[0, 1, 0]
     ).sensitivities["rigidity"]
+    # differences with steps of u/10 leave the square of 0.5 % of a common error
     assert u(0.0) == pytest.approx(0.05 * np.linalg.norm(g), rel=1e-14)
-    assert u(1.0) == pytest.approx(0.05 * abs(g.sum()), rel=1e-14)
-    assert u(0.5) == pytest.approx(math.hypot(u(0.0), u(1.0)) / math.sqrt(2.0), rel=1e-14)
+    assert u(1.0) == pytest.approx(0.05 * abs(g.sum()), rel=1e-5)
+    assert u(0.5) == pytest.approx(math.hypot(u(0.0), u(1.0)) / math.sqrt(2.0), rel=1e-5)
     # a stiffness without gravity and active part is proportional to EA: 5 % of it, but for them
     assert u(1.0) / cdsm.stiffness(pose, tension).along([0, 1, 0]) == pytest.approx(0.05, rel=0.02)
 
@@ -129,15 +129,9 @@ def _two_least() -> dict[str, Any]:
 
 def _at_a_bound() -> dict[str, Any]:
     """A cable at its bound stays there to first order, but leaves it in some arms."""
-    pose, _ = posture()
-    tension = cdsm.distribute_tension(pose, 50.0)
-    at_bound = [c for c, F in enumerate(tension.values) if F == 50.0]
-    return {
-        "pose": pose,
-        "tension": tension,
-        "of": "tension",
-        "cable": pose.arm.cables[at_bound[0]].name,
-    }
+    pose, tension = posture()
+    assert tension["cable3_1"] == 50.0
+    return {"pose": pose, "tension": tension, "of": "tension", "cable": "cable3_1"}
 
 
 def _wild_angles() -> dict[str, Any]:
@@ -153,7 +147,7 @@ def test_first_order_says_where_it_does_not_hold(case: Callable[[], dict[str, An
     budget = cdsm.uncertainty(**given)
     assert not budget.is_linear
     assert "use Monte Carlo" in str(budget)
-    assert budget.to_dict()["linear"] is False
+    assert budget.to_dict()["is_linear"] is False
 
 
 def test_the_interval_covers_the_truth() -> None:
@@ -172,8 +166,8 @@ def test_more_draws_begin_with_the_same_draws() -> None:
     np.testing.assert_array_equal(whole.values[:1500], part.values)
     data = whole.to_xarray()
     assert data.sizes["draw"] == 2500
-    assert data["along"].attrs["units"] == "N/m"
-    assert data["hole_radius_error"].std() == pytest.approx(1e-4, rel=0.02)
+    assert data["values"].attrs["units"] == "N/m"
+    assert whole.errors["hole_radius"].std() == pytest.approx(1e-4, rel=0.02)
 
 
 def test_samples_are_what_tools_for_sensitivity_analysis_take() -> None:
@@ -181,38 +175,38 @@ def test_samples_are_what_tools_for_sensitivity_analysis_take() -> None:
     pose, tension = posture()
     tolerances = cdsm.Tolerances(rigidity=0.05, joint_angle=math.radians(0.5), tension=2.0)
     run = cdsm.monte_carlo(pose, tension, tolerances, direction="x", draws=20_000, progress=False)
-    data = run.to_xarray()
-    problem: dict[str, Any] = {"names": [], "bounds": [], "dists": []}
-    columns = []
-    for source, (tolerance,) in tolerances.given.items():
-        for name in data[f"{source}_input"].values:
-            column = data[f"{source}_error"].sel({f"{source}_input": name}).values
-            problem["names"].append(f"{source} {name}")
-            problem["bounds"].append([0.0, tolerance.standard])
-            problem["dists"].append("norm")
-            columns.append(column)
-    X, Y = np.array(columns).T, data["along"].values
-    assert X.shape == (20_000, len(problem["names"])) == (20_000, 12 + 8 + 12)
+    labels, errors = run.budget.measurand.inputs.labels, run.errors
+    names = [f"{source} {name}" for source in errors for name in labels[source]]
+    X, Y = np.hstack([*errors.values()]), run.values
+    assert X.shape == (20_000, len(names)) == (20_000, 12 + 8 + 12)
     # of a function near linear, the first-order Sobol index is the squared correlation
     first = np.corrcoef(X, Y, rowvar=False)[-1, :-1] ** 2
     budget = run.budget
     for name in ("joint1_1", "joint2_1"):
-        at = problem["names"].index(f"joint_angle {name}")
+        at = names.index(f"joint_angle {name}")
         g = budget.sensitivities["joint_angle"][pose.arm.joint_names.index(name)]
         share = (g * math.radians(0.5) / budget.standard_uncertainty) ** 2
         assert first[at] == pytest.approx(share, abs=0.03)
 
 
-def test_distributions_keep_their_standard_uncertainty() -> None:
-    rng = np.random.default_rng(1)
-    for distribution in get_args(Distribution):
-        for correlation in (0.0, 0.6, 1.0):
-            tolerance = cdsm.Tolerance(2.0, distribution=distribution, correlation=correlation)
-            parts = parts_of(cdsm.Tolerances(lead=tolerance), {"lead": ("a", "b")})
-            drawn = draw(parts["lead"], rng, 100_000, 2)
-            np.testing.assert_allclose(drawn.std(axis=0), 2.0, rtol=0.01)
-            found = np.mean(drawn[:, 0] * drawn[:, 1]) / 4.0
-            assert found == pytest.approx(correlation, abs=0.02)
+@pytest.mark.parametrize("source", ["lead", "rigidity"])
+@pytest.mark.parametrize("correlation", [0.0, 0.6, 1.0])
+@pytest.mark.parametrize("distribution", get_args(Distribution))
+def test_distributions_keep_their_standard_uncertainty(
+    distribution: Distribution, correlation: float, source: str
+) -> None:
+    """Factors of rigidities are lognormal: always positive, of the same mean and deviation."""
+    u = 0.4 if source == "rigidity" else 2e-3
+    tolerance = cdsm.Tolerance(u, distribution=distribution, correlation=correlation)
+    inputs = inputs_of(readme_arm())
+    groups = inputs.groups(cdsm.Tolerances(**{source: tolerance}))
+    drawn = inputs.draw(groups, np.random.default_rng(1), 100_000)[source][:, :2]
+    np.testing.assert_allclose(drawn.mean(axis=0), 0.0, atol=0.01 * u)
+    np.testing.assert_allclose(drawn.std(axis=0), u, rtol=0.015)
+    found = (drawn[:, 0] * drawn[:, 1]).mean() / u**2
+    assert found == pytest.approx(correlation, abs=0.03)
+    if distribution == "normal" and source == "rigidity":
+        assert drawn.min() > -1.0
     assert cdsm.Tolerance.within(0.3).standard == pytest.approx(0.3 / math.sqrt(3.0))
 
 
@@ -228,16 +222,16 @@ def test_two_spools_and_disks_drilled_together() -> None:
     budget = cdsm.uncertainty(pose, tension, tolerances, direction="y")
     g = budget.sensitivities["rigidity"]
     expected = math.hypot(0.05 * g[:6].sum(), 0.02 * g[6:].sum())
-    assert budget.contributions["rigidity"] == pytest.approx(expected, rel=1e-14)
+    assert budget.contributions["rigidity"] == pytest.approx(expected, rel=1e-5)
     labels = inputs_of(pose.arm).labels["hole_radius"]
     on_link = ["on link1" in label for label in labels]
     assert sum(on_link) == 12 + 9
     common = abs(budget.sensitivities["hole_radius"][on_link].sum())
-    assert budget.contributions["hole_radius"] == pytest.approx(1e-4 * common, rel=1e-14)
+    assert budget.contributions["hole_radius"] == pytest.approx(1e-4 * common, rel=1e-5)
     assert "2 to 5 %" in str(budget)
     run = cdsm.monte_carlo(pose, tension, tolerances, direction="y", draws=20_000, progress=False)
     assert run.standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.03)
-    errors = run.to_xarray()["rigidity_error"].values
+    errors = run.errors["rigidity"]
     assert np.ptp(errors[:, :6], axis=1).max() == np.ptp(errors[:, 6:], axis=1).max() == 0.0
     assert abs(np.corrcoef(errors[:, 0], errors[:, 6])[0, 1]) < 0.03
 
