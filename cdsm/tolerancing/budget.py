@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING, Final, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,9 +31,7 @@ from cdsm.tolerancing.measurand import Measurand, MeasurandName, measurand_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LINEAR: Final = 0.05
-"""Largest ``nonlinearity`` with which first-order propagation is taken as sufficient."""
-
+_LINEAR = 0.05  # largest nonlinearity with which first order is taken as sufficient
 _DRAWN = 100  # random arms that show how far from linear a measurand is
 _STEP = 0.1  # of differences, in standard uncertainties
 _ROWS = 1000  # arms in one batch, which bounds its memory
@@ -76,11 +74,8 @@ class Uncertainty(Result):
 
     @quantity("1")
     def is_linear(self) -> bool:
-        """Whether first order is sufficient: nonlinearity at most 5 %, and no arm failed.
-
-        If not, see :func:`~cdsm.monte_carlo`.
-        """
-        return self.nonlinearity <= LINEAR and not self.failed
+        """Whether first order is sufficient: nonlinearity at most 5 %, and no arm failed."""
+        return self.nonlinearity <= _LINEAR and not self.failed
 
     @property
     def relative(self) -> float:
@@ -118,8 +113,9 @@ class Uncertainty(Result):
         The contribution of an input x to the uncertainty of the value f is |∂f/∂x| u(x), in SI.
         """
         found = []
-        for source, g in self.sensitivities.items():
-            parts, names = abs(g) * self._standards(source), self.measurand.inputs.labels[source]
+        for source, inputs, tolerance in self.measurand.inputs.groups(self.tolerances):
+            parts = abs(self.sensitivities[source][inputs]) * tolerance.standard
+            names = [self.measurand.inputs.labels[source][i] for i in inputs]
             found += [(source, *pair) for pair in zip(names, parts.tolist(), strict=True)]
         return tuple(sorted(found, key=lambda part: -part[2])[:count])
 
@@ -137,11 +133,12 @@ class Uncertainty(Result):
             f"{'source':<14}{'tolerance':>16}{f'contribution [{unit}]':>24}{'of variance':>14}",
         ]
         for source, u in self.contributions.items():
-            if u:
-                share = 100.0 * (u / self.standard_uncertainty) ** 2
-                scale, of_inputs = _UNITS.get(source, (1e-3, " mm"))
-                tolerance = span(self._standards(source) / scale, "{:.3g}".format) + of_inputs
-                lines.append(f"{source:<14}{tolerance:>16}{u / size:>24.3g}{share:>12.3g} %")
+            scale, of_inputs = _UNITS.get(source, (1e-3, " mm"))
+            given = np.array([each.standard for each in self.tolerances.given[source]])
+            tolerance = span(given / scale, "{:.3g}".format) + of_inputs
+            share = 100.0 * (u / (self.standard_uncertainty or 1.0)) ** 2
+            line = f"{source:<14}{tolerance:>16}{u / size:>24.3g}{share:>12.3g} %"
+            lines += [line] if u else []
         if without := [source for source, u in self.contributions.items() if not u]:
             lines.append(f"without influence on it: {', '.join(without)}")
         return "\n".join([*lines, *self._nonlinear])
@@ -170,14 +167,6 @@ class Uncertainty(Result):
             why = f"it does not exist for {self.failed} of {_DRAWN} random arms"
         said = f"first order is not enough here: {why}; use Monte Carlo (cdsm.monte_carlo)"
         return () if self.is_linear else (said,)
-
-    def _standards(self, source: str) -> Array:
-        """Return the standard uncertainties (n,) of the n inputs of a source, in SI."""
-        found = np.zeros(len(self.measurand.inputs.labels[source]))
-        for of, inputs, tolerance in self.measurand.inputs.groups(self.tolerances):
-            if of == source:
-                found[inputs] = tolerance.standard
-        return found
 
     def _units(self) -> dict[str, str]:
         return {"measurand": self.measurand.si_unit}

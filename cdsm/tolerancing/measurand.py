@@ -75,7 +75,7 @@ class Measurand(ReadOnlyState):
         """Return the value of the arm without errors (1,), or of each cable (C,), in SI."""
         K, u = self.stiffness, self.direction
         if self.of == "tension":
-            return K.tension[self.cable :][: 1 if self.cable is not None else None]
+            return K.tension if self.cable is None else K.tension[[self.cable]]
         if u is None:
             return np.array([K.margin])
         return np.array([K.along(u) if self.of == "along" else u @ K.posture.tip[:3, 3]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,9 +29,7 @@ from cdsm.tolerancing.measurand import MeasurandName, measurand_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-AGREES: Final = 0.1
-"""Two 95 % intervals agree if their limits differ by at most this part of the uncertainty."""
-
+_AGREES = 0.1  # largest difference of the ends of intervals that agree, in uncertainties
 _BLOCK = 1000  # number of draws in a block; each block has its own random numbers
 
 
@@ -96,7 +94,7 @@ class MonteCarlo(Result):
         JCGM 101, clause 8, compares them too; here they may differ by 10 % of the uncertainty.
         """
         both = zip(self.interval(), self.budget.interval(), strict=True)
-        return all(abs(a - b) <= AGREES * self.standard_uncertainty for a, b in both)
+        return all(abs(a - b) <= _AGREES * self.standard_uncertainty for a, b in both)
 
     def plot(self) -> Figure:
         """Plot the histogram of the values and the normal distribution of :attr:`budget`."""
