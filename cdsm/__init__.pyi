@@ -129,10 +129,10 @@ from cdsm.tension import Tension as Tension
 from cdsm.tension import distribute_tension as distribute_tension
 from cdsm.tolerances import Tolerance as Tolerance
 from cdsm.tolerances import Tolerances as Tolerances
-from cdsm.uncertainties.budget import Uncertainty as Uncertainty
-from cdsm.uncertainties.budget import uncertainty as uncertainty
-from cdsm.uncertainties.monte_carlo import MonteCarlo as MonteCarlo
-from cdsm.uncertainties.monte_carlo import monte_carlo as monte_carlo
+from cdsm.tolerancing.budget import Uncertainty as Uncertainty
+from cdsm.tolerancing.budget import uncertainty as uncertainty
+from cdsm.tolerancing.monte_carlo import MonteCarlo as MonteCarlo
+from cdsm.tolerancing.monte_carlo import monte_carlo as monte_carlo
 from cdsm.urdf import to_urdf as to_urdf
 from cdsm.urdf import write_urdf as write_urdf
 from cdsm.wires.elasticity import Elasticity as Elasticity

@@ -4,9 +4,9 @@ The cables that end at a joint turn this joint and the joints before it, but non
 J_Lᵀ is block triangular; a block is the axes of one joint (at most two) and the cables that end
 there. From the last joint to the first, one cable per axis gets a tension above its lower bound, to
 balance the joint. From the first joint to the last, the multipliers follow from these cables: see
-:mod:`cdsm._former.serpentine_multipliers`. Usually this guess is the optimum: with three cables for
+the optimality conditions. Usually this guess is the optimum: with three cables for
 each universal joint, in all of 9000 random postures up to half the joint limits, and in three of
-four postures up to nine tenths. A guess takes 0.3 µs, a search by :mod:`cdsm._former.active_set`
+four postures up to nine tenths. A guess takes 0.3 µs, a search by an active-set method
 about 4 µs.
 """
 

@@ -32,6 +32,14 @@ def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
+    """Return ``value ± uncertainty`` [SI] as text in a unit of this ``size``: two digits of it."""
+    u, places = uncertainty / size, 4
+    if 0.0 < u < math.inf:
+        places = min(max(1 - math.floor(math.log10(u)), 0), 12)
+    return f"{value / size:.{places}f} ± {u:.{places}f}"
+
+
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return the rows as aligned lines: the first column to the left, the others to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -90,7 +90,7 @@ class Result(ReadOnlyState):
         """Return all numbers as a labelled Dataset in SI; needs xarray (MissingExtra)."""
         variables, words = {}, {}
         for name, value, of, dims in self._quantities():
-            array = np.asarray(value)
+            array = _array(value)
             if array.dtype.kind in "USO":
                 words[name] = str(value)
             else:
@@ -109,7 +109,7 @@ class Result(ReadOnlyState):
             elif dims == (self._rows,) and name == self._rows:
                 index = np.asarray(value)
             elif dims[:1] == (self._rows,):
-                array = np.asarray(value)
+                array = _array(value)
                 for place in np.ndindex(array.shape[1:]):
                     parts = [
                         str(labels[d][i] if d in labels else i + 1)
@@ -175,6 +175,11 @@ class Result(ReadOnlyState):
             labels |= {"joint": joints, "joint_column": joints, "cable": cables.names}
             labels["held_cable"] = [each.name for each in cables if each.control == "position"]
         return labels
+
+
+def _array(value: Any) -> Any:
+    """Return a value as an array; of a mapping, its values."""
+    return np.asarray([*value.values()] if isinstance(value, Mapping) else value)
 
 
 def _by_name(value: Any, dims: Sequence[str], labels: Mapping[str, Sequence[object]]) -> Any:

@@ -193,6 +193,14 @@ def scalar(name: str, value: object) -> float:
     return float(array)
 
 
+def fraction(name: str, value: object) -> float:
+    """Return a number between 0 and 1, the ends excluded; raise InvalidInput for any other."""
+    number = scalar(name, value)
+    if not 0.0 < number < 1.0:
+        raise InvalidInput(name, f"{number:g} given; a number between 0 and 1 is needed.")
+    return number
+
+
 def flag(name: str, value: object) -> bool:
     """Return the value if it is True or False, else raise :class:`InvalidInput`."""
     if not isinstance(value, (bool, np.bool_)):

@@ -5,12 +5,10 @@ import pytest
 from numpy.typing import ArrayLike
 
 from cdsm._former import linear_algebra
-from cdsm._former.singular_values import singular_values
 from cdsm.support.values import Array
 from tests.support.kernels import block, from_python
 
 _smallest_eigenvalue = from_python(linear_algebra.smallest_eigenvalue)
-_singular_values = from_python(singular_values)
 _eliminate = from_python(linear_algebra.eliminate)
 
 
@@ -81,24 +79,6 @@ def test_smallest_eigenvalue_of_nearly_diagonal_matrices(exponent: int) -> None:
         A = (A + A.T) / 2.0
         (found,) = smallest_eigenvalues(A[None])
         assert abs(found - np.linalg.eigvalsh(A)[0]) <= 2e-14 * np.linalg.norm(A, 2)
-
-
-def test_singular_values_of_three_rows() -> None:
-    rng = np.random.default_rng(4)
-    scales = np.array([(1.0, 1.0, 1.0), (1.0, 1e-3, 1e-7), (1e6, 0.0, 1.0)])
-    for n in (1, 2, 3, 10, 31):
-        # three matrices as a block: each needs its own number of rotations
-        A = rng.normal(size=(3, 3, 3)) * scales[:, None] @ rng.normal(size=(3, 3, n))
-        right, left, values = block(A), np.empty((3, 3, 3)), np.empty((3, 3))
-        _singular_values(right, left, values, np.empty((5, 3)), 3)
-        for w in range(3):
-            U, S, V = left[..., w], values[:, w], right[..., w]
-            expected = np.linalg.svd(A[w], compute_uv=False)
-            size = expected.max()
-            found = np.sort(S)[::-1][: expected.size]
-            np.testing.assert_allclose(found, expected, atol=1e-14 * size)
-            np.testing.assert_allclose(U @ (S[:, None] * V), A[w], rtol=0.0, atol=1e-14 * size)
-            np.testing.assert_allclose(U.T @ U, np.eye(3), rtol=0.0, atol=1e-14)
 
 
 def test_elimination_solves_and_tells_of_singular_matrices() -> None:

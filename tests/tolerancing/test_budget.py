@@ -11,8 +11,7 @@ import pytest
 
 import cdsm
 from cdsm.tolerances import SOURCES, Distribution
-from cdsm.uncertainties.inputs import inputs_of
-from cdsm.uncertainties.parts import draw, parts_of
+from cdsm.tolerancing.inputs import inputs_of
 from tests.support import arms
 from tests.support.arms import readme_geometry
 
@@ -67,9 +66,10 @@ def test_correlation_decides_between_root_and_sum() -> None:
     g = cdsm.uncertainty(
         pose, tension, cdsm.Tolerances(rigidity=0.05), direction=[0, 1, 0]
     ).sensitivities["rigidity"]
+    # differences with steps of u/10 leave the square of 0.5 % of a common error
     assert u(0.0) == pytest.approx(0.05 * np.linalg.norm(g), rel=1e-14)
-    assert u(1.0) == pytest.approx(0.05 * abs(g.sum()), rel=1e-14)
-    assert u(0.5) == pytest.approx(math.hypot(u(0.0), u(1.0)) / math.sqrt(2.0), rel=1e-14)
+    assert u(1.0) == pytest.approx(0.05 * abs(g.sum()), rel=1e-5)
+    assert u(0.5) == pytest.approx(math.hypot(u(0.0), u(1.0)) / math.sqrt(2.0), rel=1e-5)
     # a stiffness without gravity and active part is proportional to EA: 5 % of it, but for them
     assert u(1.0) / cdsm.stiffness(pose, tension).along([0, 1, 0]) == pytest.approx(0.05, rel=0.02)
 
@@ -129,15 +129,9 @@ def _two_least() -> dict[str, Any]:
 
 def _at_a_bound() -> dict[str, Any]:
     """A cable at its bound stays there to first order, but leaves it in some arms."""
-    pose, _ = posture()
-    tension = cdsm.distribute_tension(pose, 50.0)
-    at_bound = [c for c, F in enumerate(tension.values) if F == 50.0]
-    return {
-        "pose": pose,
-        "tension": tension,
-        "of": "tension",
-        "cable": pose.arm.cables[at_bound[0]].name,
-    }
+    pose, tension = posture()
+    assert tension["cable3_1"] == 50.0
+    return {"pose": pose, "tension": tension, "of": "tension", "cable": "cable3_1"}
 
 
 def _wild_angles() -> dict[str, Any]:
@@ -153,15 +147,7 @@ def test_first_order_says_where_it_does_not_hold(case: Callable[[], dict[str, An
     budget = cdsm.uncertainty(**given)
     assert not budget.is_linear
     assert "use Monte Carlo" in str(budget)
-    assert budget.to_dict()["linear"] is False
-
-
-def test_the_interval_covers_the_truth() -> None:
-    """Of 10⁴ arms within the tolerances, 95 ± 1 % lie in the interval of the arm as described."""
-    pose, tension = posture()
-    run = cdsm.monte_carlo(pose, tension, WORKSHOP, direction=[0, 0, 1], draws=10_000, seed=3)
-    low, high = run.budget.interval(0.95)
-    assert np.mean((run.values >= low) & (run.values <= high)) == pytest.approx(0.95, abs=0.01)
+    assert budget.to_dict()["is_linear"] is False
 
 
 def test_more_draws_begin_with_the_same_draws() -> None:
@@ -172,47 +158,82 @@ def test_more_draws_begin_with_the_same_draws() -> None:
     np.testing.assert_array_equal(whole.values[:1500], part.values)
     data = whole.to_xarray()
     assert data.sizes["draw"] == 2500
-    assert data["along"].attrs["units"] == "N/m"
-    assert data["hole_radius_error"].std() == pytest.approx(1e-4, rel=0.02)
+    assert data["values"].attrs["units"] == "N/m"
+    assert whole.errors["hole_radius"].std() == pytest.approx(1e-4, rel=0.02)
 
 
-def test_samples_are_what_tools_for_sensitivity_analysis_take() -> None:
-    """SALib takes names, a matrix of inputs and the values; shares of variance come out of them."""
-    pose, tension = posture()
-    tolerances = cdsm.Tolerances(rigidity=0.05, joint_angle=math.radians(0.5), tension=2.0)
-    run = cdsm.monte_carlo(pose, tension, tolerances, direction="x", draws=20_000, progress=False)
-    data = run.to_xarray()
-    problem: dict[str, Any] = {"names": [], "bounds": [], "dists": []}
-    columns = []
-    for source, (tolerance,) in tolerances.given.items():
-        for name in data[f"{source}_input"].values:
-            column = data[f"{source}_error"].sel({f"{source}_input": name}).values
-            problem["names"].append(f"{source} {name}")
-            problem["bounds"].append([0.0, tolerance.standard])
-            problem["dists"].append("norm")
-            columns.append(column)
-    X, Y = np.array(columns).T, data["along"].values
-    assert X.shape == (20_000, len(problem["names"])) == (20_000, 12 + 8 + 12)
-    # of a function near linear, the first-order Sobol index is the squared correlation
-    first = np.corrcoef(X, Y, rowvar=False)[-1, :-1] ** 2
-    budget = run.budget
-    for name in ("joint1_1", "joint2_1"):
-        at = problem["names"].index(f"joint_angle {name}")
-        g = budget.sensitivities["joint_angle"][pose.arm.joint_names.index(name)]
-        share = (g * math.radians(0.5) / budget.standard_uncertainty) ** 2
-        assert first[at] == pytest.approx(share, abs=0.03)
+def test_a_sum_of_four_rectangular_errors_is_that_of_jcgm_101() -> None:
+    """JCGM 101, 9.2.3: four of unit variance have u = 2 and a 95 % interval of ± 3.88."""
+    u = 1e-4
+    tolerances = cdsm.Tolerances(link_length=cdsm.Tolerance.within(u * math.sqrt(3.0)))
+    question: dict[str, Any] = {"of": "tip", "direction": "x", "tolerances": tolerances}
+    pose = readme_arm().at(np.zeros(8))
+    run = cdsm.monte_carlo(pose, np.full(12, 50.0), **question, draws=200_000, progress=False)
+    assert run.budget.standard_uncertainty == pytest.approx(2.0 * u, rel=1e-9)
+    assert run.budget.nonlinearity < 1e-9
+    assert run.standard_uncertainty == pytest.approx(2.0 * u, rel=0.005)
+    low, high = run.interval()
+    assert (high - low) / (2.0 * u) == pytest.approx(3.88, abs=0.02)
 
 
-def test_distributions_keep_their_standard_uncertainty() -> None:
-    rng = np.random.default_rng(1)
-    for distribution in get_args(Distribution):
-        for correlation in (0.0, 0.6, 1.0):
-            tolerance = cdsm.Tolerance(2.0, distribution=distribution, correlation=correlation)
-            parts = parts_of(cdsm.Tolerances(lead=tolerance), {"lead": ("a", "b")})
-            drawn = draw(parts["lead"], rng, 100_000, 2)
-            np.testing.assert_allclose(drawn.std(axis=0), 2.0, rtol=0.01)
-            found = np.mean(drawn[:, 0] * drawn[:, 1]) / 4.0
-            assert found == pytest.approx(correlation, abs=0.02)
+def test_draws_without_a_stiffness_are_left_out_and_counted() -> None:
+    """The strand begins at 2.2 N: of tensions of 4 ± 1 N, 3.6 % are below it."""
+    arm = cdsm.Manipulator(readme_geometry(), cdsm.presets.STRAND_1X19)
+    pose, own = arm.at(np.full(8, 0.1)), cdsm.Tolerances(tension=cdsm.Tolerance(1.0, correlation=1))
+    asked: dict[str, Any] = {"direction": "z", "draws": 20_000, "progress": False}
+    run = cdsm.monte_carlo(pose, np.full(12, 4.0), own, **asked)
+    assert run.failed / 20_000 == pytest.approx(0.0359, abs=0.005)
+    assert run.values.size + run.failed == run.status.size == 20_000
+    assert run.errors["tension"].min() >= -1.8
+    assert np.isfinite(run.values).all()
+    assert f"{run.failed} more draws, left out: OUTSIDE_ELASTICITY" in str(run)
+    assert not run.budget.is_linear
+    assert f"does not exist for {run.budget.failed} of 100 random arms" in str(run.budget)
+    with pytest.raises(cdsm.InvalidInput, match=r"of 20000 draws; most others are OUTSIDE_ELAST"):
+        cdsm.monte_carlo(pose, np.full(12, 2.2), own, **(asked | {"seed": 4}))
+
+
+def test_at_the_end_of_a_law_a_difference_is_one_sided() -> None:
+    arm = cdsm.Manipulator(readme_geometry(), cdsm.presets.STRAND_1X19)
+    pose, least = arm.at(np.full(8, 0.1)), cdsm.Tolerances(tension=1e-5)
+    end, inside = (cdsm.uncertainty(pose, [F] * 12, least, direction="z") for F in (2.2, 2.20001))
+    assert end.standard_uncertainty == pytest.approx(inside.standard_uncertainty, rel=1e-3)
+
+
+def test_the_tensions_of_an_arm_on_paper_follow_its_dimensions() -> None:
+    """A strand under other tensions is another spring: EA(F) rises with the least tensions."""
+    arm = cdsm.Manipulator(readme_geometry(), cdsm.presets.STRAND_1X19)
+    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
+    tension = cdsm.distribute_tension(pose, 50.0)
+    heavier = cdsm.Tolerances(link_mass=cdsm.Tolerance(0.03, correlation=1.0), tension=2.0)
+    measured, again = (
+        cdsm.uncertainty(pose, tension, heavier, direction="z", redistribute=redistribute)
+        for redistribute in (False, True)
+    )
+    assert measured.value == again.value
+    assert again.contributions["tension"] == 0.0
+    assert "without influence on it: tension" in str(again)
+    assert again.contributions["link_mass"] > 1.3 * measured.contributions["link_mass"]
+
+
+@pytest.mark.parametrize("source", ["lead", "rigidity"])
+@pytest.mark.parametrize("correlation", [0.0, 0.6, 1.0])
+@pytest.mark.parametrize("distribution", get_args(Distribution))
+def test_distributions_keep_their_standard_uncertainty(
+    distribution: Distribution, correlation: float, source: str
+) -> None:
+    """Factors of rigidities are lognormal: always positive, of the same mean and deviation."""
+    u = 0.4 if source == "rigidity" else 2e-3
+    tolerance = cdsm.Tolerance(u, distribution=distribution, correlation=correlation)
+    inputs = inputs_of(readme_arm())
+    groups = inputs.groups(cdsm.Tolerances(**{source: tolerance}))
+    drawn = inputs.draw(groups, np.random.default_rng(1), 100_000)[source][:, :2]
+    np.testing.assert_allclose(drawn.mean(axis=0), 0.0, atol=0.01 * u)
+    np.testing.assert_allclose(drawn.std(axis=0), u, rtol=0.015)
+    found = (drawn[:, 0] * drawn[:, 1]).mean() / u**2
+    assert found == pytest.approx(correlation, abs=0.03)
+    if distribution == "normal" and source == "rigidity":
+        assert drawn.min() > -1.0
     assert cdsm.Tolerance.within(0.3).standard == pytest.approx(0.3 / math.sqrt(3.0))
 
 
@@ -225,45 +246,16 @@ def test_two_spools_and_disks_drilled_together() -> None:
     ]
     drilled = cdsm.Tolerance(1e-4, correlation=1.0, of="* on link1, *")
     tolerances = cdsm.Tolerances(rigidity=spools, hole_radius=drilled)
-    budget = cdsm.uncertainty(pose, tension, tolerances, direction="y")
-    g = budget.sensitivities["rigidity"]
+    run = cdsm.monte_carlo(pose, tension, tolerances, direction="y", draws=20_000, progress=False)
+    budget, g = run.budget, run.budget.sensitivities["rigidity"]
     expected = math.hypot(0.05 * g[:6].sum(), 0.02 * g[6:].sum())
-    assert budget.contributions["rigidity"] == pytest.approx(expected, rel=1e-14)
-    labels = inputs_of(pose.arm).labels["hole_radius"]
-    on_link = ["on link1" in label for label in labels]
+    assert budget.contributions["rigidity"] == pytest.approx(expected, rel=1e-5)
+    on_link = ["on link1" in name for name in inputs_of(pose.arm).labels["hole_radius"]]
     assert sum(on_link) == 12 + 9
     common = abs(budget.sensitivities["hole_radius"][on_link].sum())
-    assert budget.contributions["hole_radius"] == pytest.approx(1e-4 * common, rel=1e-14)
+    assert budget.contributions["hole_radius"] == pytest.approx(1e-4 * common, rel=1e-5)
     assert "2 to 5 %" in str(budget)
-    run = cdsm.monte_carlo(pose, tension, tolerances, direction="y", draws=20_000, progress=False)
     assert run.standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.03)
-    errors = run.to_xarray()["rigidity_error"].values
-    assert np.ptp(errors[:, :6], axis=1).max() == np.ptp(errors[:, 6:], axis=1).max() == 0.0
-    assert abs(np.corrcoef(errors[:, 0], errors[:, 6])[0, 1]) < 0.03
-
-
-def test_the_band_of_a_fit_is_the_tolerance_of_its_cables() -> None:
-    """All cables share one error."""
-    rng = np.random.default_rng(4)
-    force = np.linspace(0.0, 200.0, 300)
-    fit = cdsm.fit_tensile_test(
-        cdsm.LinearElasticity(48e3).strain(force) * 0.5, force + rng.normal(0.0, 0.5, 300), 0.5
-    )
-    arm = readme_arm()
-    arm = arm.with_cables(
-        [replace(cable, elasticity=fit.elasticity) for cable in arm.cables]
-    ).with_tolerances(
-        cdsm.Tolerances(
-            rigidity=cdsm.Tolerance(fit.relative_uncertainty(50.0, 120.0), correlation=1.0)
-        )
-    )
-    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
-    tension = cdsm.distribute_tension(pose, minimum=50.0)
-    budget = cdsm.uncertainty(pose, tension, direction="y")
-    standard = fit.relative_uncertainty(50.0, 120.0)
-    g = budget.sensitivities["rigidity"]
-    assert budget.standard_uncertainty == pytest.approx(abs(g.sum()) * standard, rel=1e-2)
-    assert 0.0005 < budget.relative < 0.05
 
 
 def test_the_tolerances_of_an_arm_are_those_of_its_budgets() -> None:
@@ -289,23 +281,6 @@ def test_friction_does_not_enter_the_frictionless_stiffness() -> None:
         cdsm.uncertainty(pose, tension, tolerances, direction="z")
 
 
-def test_springs_in_series_share_the_compliance_with_the_wire() -> None:
-    pose, tension = posture()
-    with pytest.raises(cdsm.InvalidInput, match="spring: arm has no springs in series; see ser"):
-        cdsm.uncertainty(pose, tension, cdsm.Tolerances(spring=0.1), direction="z")
-    wires = [replace(cable, series_stiffness=1e5) for cable in pose.arm.cables]
-    K = cdsm.stiffness(pose.arm.with_cables(wires).at(pose.q), tension.values)
-    common = cdsm.Tolerance(0.1, correlation=1.0)
-    budget = cdsm.uncertainty(
-        K.posture, K.tension, cdsm.Tolerances(rigidity=0.1, spring=common), direction="z"
-    )
-    # k = 1/(l_0/EA + 1/k_series): each has its share of 1/k; active part and gravity are left
-    shares = K.cable_stiffness.mean() / 1e5, 1.0 - K.cable_stiffness.mean() / 1e5
-    for source, share in zip(("spring", "rigidity"), shares, strict=True):
-        u = budget.contributions[source] / budget.value
-        assert u == pytest.approx(0.1 * share, rel=0.1)
-
-
 def test_tolerances_show_their_sources_in_help_and_completion() -> None:
     assert tuple(inspect.signature(cdsm.Tolerances).parameters) == SOURCES
 
@@ -326,6 +301,10 @@ def test_bad_input_is_named() -> None:
         cdsm.uncertainty(pose, tension, WORKSHOP, of="margin", direction=[0, 0, 1])
     with pytest.raises(cdsm.UnknownName, match="cable"):
         cdsm.uncertainty(pose, tension, WORKSHOP, of="tension", cable="cable9")
+    with pytest.raises(cdsm.InvalidInput, match="spring: arm has no springs in series; see ser"):
+        cdsm.uncertainty(pose, tension, cdsm.Tolerances(spring=0.1), direction="z")
+    with pytest.raises(cdsm.InvalidInput, match="tension: is distributed again: give a least"):
+        cdsm.uncertainty(pose, tension.values, WORKSHOP, direction="z", redistribute=True)
     straight = pose.arm.at(np.zeros(8))
     with pytest.raises(cdsm.SingularStiffness, match="infinite"):
         cdsm.uncertainty(straight, np.full(12, 50.0), WORKSHOP, direction=[1, 0, 0])
