@@ -103,15 +103,12 @@ class Uncertainty(Result):
         """
         from scipy.special import ndtri
 
-        half = float(ndtri(0.5 + fraction("probability", probability) / 2.0))
-        half *= self.standard_uncertainty
-        return self.value - half, self.value + half
+        k = float(ndtri(0.5 + fraction("probability", probability) / 2.0))
+        low, high = (self.value + s * k * self.standard_uncertainty for s in (-1.0, 1.0))
+        return low, high
 
     def largest_inputs(self, count: int = 5) -> tuple[tuple[str, str, float], ...]:
-        """Return the ``count`` inputs that contribute most: source, name and contribution.
-
-        The contribution of an input x to the uncertainty of the value f is |∂f/∂x| u(x), in SI.
-        """
+        """Return the ``count`` inputs x that contribute most: source, name, |∂f/∂x| u(x) in SI."""
         found = []
         for source, inputs, tolerance in self.measurand.inputs.groups(self.tolerances):
             parts = abs(self.sensitivities[source][inputs]) * tolerance.standard
@@ -161,10 +158,10 @@ class Uncertainty(Result):
     @property
     def _nonlinear(self) -> tuple[str, ...]:
         far = 100.0 * self.nonlinearity
-        why = f"up to {far:.2g} % larger or smaller" if far < 100.0 else "several times as large"
-        why = f"the uncertainty may be {why}"
-        if self.failed:
-            why = f"it does not exist for {self.failed} of {_DRAWN} random arms"
+        why = f"it does not exist for {self.failed} of {_DRAWN} random arms"
+        if not self.failed:
+            part = f"up to {far:.2g} % larger or smaller"
+            why = f"the uncertainty may be {part if far < 100.0 else 'several times as large'}"
         said = f"first order is not enough here: {why}; use Monte Carlo (cdsm.monte_carlo)"
         return () if self.is_linear else (said,)
 
@@ -202,8 +199,7 @@ def uncertainty(
     Args:
         pose: The posture.
         tension: A :class:`~cdsm.Tension`, or your own tensions (C,) [N].
-        tolerances: Tolerances of the arm, the angles and the tensions; None: those of the arm, as
-            in the table ``[tolerances]`` of its file.
+        tolerances: Tolerances of the arm, the angles and the tensions; None: those of the arm.
         direction: u in base axes, for ``"along"`` and ``"tip"`` only.
         of: ``"along"``: the stiffness along u [N/m], without friction. ``"margin"``: the
             smallest eigenvalue of K_θ [N m/rad]. ``"tip"``: the tip's coordinate along u [m].
@@ -214,9 +210,8 @@ def uncertainty(
             :class:`~cdsm.Tension`, and its tolerance has no influence.
 
     Raises:
-        InvalidInput: An argument has the wrong type or shape; ``direction`` or ``cable`` is missing
-            or not wanted; the arm does not have one of the sources; or the measurand does not exist
-            for small errors of an input.
+        InvalidInput: An argument has the wrong type or shape, is missing or not wanted; the arm has
+            none of a source; or the measurand does not exist for small errors of an input.
         UnknownName: ``of`` or ``cable`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The measurand does not exist.
@@ -257,10 +252,9 @@ def budget_of(measurand: Measurand, tolerances: Tolerances | None) -> Uncertaint
 def propagate(
     measurand: Measurand, groups: Sequence[Group], drawn: Errors
 ) -> tuple[dict[str, Array], Array, Codes]:
-    """Compute the variance (k,) by each source, and what is not linear in D ``drawn`` arms.
+    """Compute the variance (k,) by each source, and what is not linear (D, k) in D drawn arms.
 
-    The latter is the difference (D, k) of the measurand and its linear approximation, with the
-    status (D,) of these arms.
+    The latter is the measurand less its linear approximation; the status (D,) of the arms follows.
     """
     alone = [group.split() for group in groups]
     slopes, values, status = _differences(measurand, list(chain(*alone)), drawn)
