@@ -24,7 +24,6 @@ def warm(as_json: AsJson = False) -> None:
         K = cdsm.stiffness(pose, tension)
         str(K)
         up = (0.0, 0.0, 1.0)
-        cdsm.plan_stiffness(pose, up, 1.01 * K.along(up), minimum=40.0)
         readings = ("margin", "along", "compliance", "cartesian", "pseudoinverse")
         rough = cdsm.presets.virtual_prototype(friction=0.1).at(pose.q)
         q, F = pose.q[None], tension.values

@@ -39,7 +39,7 @@ class Schedule(NamedTuple):
             return np.asarray(values[before] + part * (values[after] - values[before]))
 
         wire = plan.cable_lengths.copy()
-        wire[:, plan.arm.cables.position_controlled] = plan.unstrained_lengths
+        wire[:, plan.arm.cables.position_controlled] = plan.rest_lengths
         k = np.array([K.cable_stiffness for K in plan.stiffness])
         angles = along(plan.angles)
         parts = angles, along(plan.tensions), along(wire), along(k)

@@ -11,10 +11,8 @@ from cdsm.control.estimates import Estimate
 from cdsm.control.laws import Reference
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.planning.follow import least_change
-from cdsm.planning.objectives import target_constraints
-from cdsm.planning.range import MARGIN
-from cdsm.planning.stiffness_model import StiffnessModel
+from cdsm.planning.goal import Goal
+from cdsm.planning.tension_space import TensionSpace
 from cdsm.support.values import Array
 
 _SOFTER = 5e-3  # change of the estimated softness 1/s from which the arm is built again with it
@@ -65,17 +63,18 @@ class StiffnessLoop:
             arm = self._with_softness(estimate.softness)
             bounds = self.minimum * estimate.ratio, self.maximum * estimate.ratio
             wrench = np.append(estimate.force, np.zeros(3))
-            model = StiffnessModel(arm.at(estimate.pose.q), *bounds, wrench, MARGIN)
-            constraints = target_constraints(model, self.directions, target)
-            within = np.clip(before, *bounds)  # as the motors hold them
-            found = least_change(model, constraints, within, self.rate)
+            pose = arm.at(estimate.pose.q)
+            space = TensionSpace(pose, self.directions, *bounds, wrench)
+            goal, held = Goal(space, target.reshape(-1)), np.clip(before, *bounds)
+            near = space.within(held, self.rate)
+            found = goal.search(held, near, held)
+            if found is None:
+                found = goal.nearest(held, near)
+                short = found is not None and goal.search(found) is None
             if found is None:
                 refused = "no tensions within the rate balance the arm and hold it"
             else:
-                mean, met = found
-                if not met:
-                    found = least_change(model, constraints, mean, np.full_like(mean, np.inf))
-                    short = found is None or not found[1]
+                mean = found
         except CdsmError as error:
             refused = str(error)
         lengths = arm.cable_lengths(wanted.angles)

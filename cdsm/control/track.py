@@ -19,7 +19,7 @@ from cdsm.control.schedule import tension_controlled as choose_cables
 from cdsm.control.sensors import Sensors
 from cdsm.control.stiffness_loop import StiffnessLoop
 from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, listed
-from cdsm.planning.path import checked_rate
+from cdsm.planning.path import checked_change
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support import progress
 from cdsm.support.validation import flag, instance, one_of, quantity, scalar, whole_number
@@ -107,7 +107,7 @@ def track(
     wrenches = schedule.wrenches.copy()
     wrenches[from_step:, :3] += quantity("payload", payload, "mass", zero=True) * arm.gravity
     period = quantity("period", period, "time")
-    limit, outer = checked_rate(arm, rate), None
+    limit, outer = checked_change("rate", arm, rate), None
     if flag("replan", name == "stiffness" if replan is None else replan):
         outer = StiffnessLoop(arm, schedule.directions, low, high, limit)
     forced = choose_cables(plan, tension_controlled)

@@ -30,8 +30,10 @@ def unit(unit: str, *dims: str, name: str = "") -> Mapping[str, Any]:
 
     ``unit`` is an SI unit, "1" for a plain number, or "torque", "joint stiffness" or "joint" for a
     unit that depends on whether joints turn or slide. ``dims`` name the axes of an array: "joint",
-    "cable", "axis", "component", or any other; a field that is called like its own and only
-    dimension is the coordinate of this dimension. ``name`` replaces the field's in the export.
+    "cable", "held_cable" (position-controlled), "axis", "component", or any other; a field that is
+    called like its own and only dimension is the coordinate of this dimension. The dimension
+    "direction" is left out of a value for one direction. ``name`` replaces the field's in the
+    export.
     """
     return {"unit": unit, "dims": dims, "name": name}
 
@@ -58,7 +60,7 @@ class Result(ReadOnlyState):
 
     Fields and properties without metadata are not exported. Subclasses write ``__str__`` and
     ``plot`` by hand, nothing else. ``_posture`` is the posture whose joint coordinates come first
-    in the JSON; its arm names joints and cables.
+    in the JSON; its arm, or the attribute ``arm``, names joints and cables.
     """
 
     _headline: ClassVar[str] = ""
@@ -70,6 +72,10 @@ class Result(ReadOnlyState):
     @property
     def _posture(self) -> Any:
         return getattr(self, "posture", None)
+
+    @property
+    def _arm(self) -> Any:
+        return self._posture.arm if self._posture else getattr(self, "arm", None)
 
     def to_dict(self) -> dict[str, object]:
         """Return all numbers in SI for JSON, with the unit in the keys; inf and NaN are None."""
@@ -105,7 +111,10 @@ class Result(ReadOnlyState):
             elif dims[:1] == (self._rows,):
                 array = np.asarray(value)
                 for place in np.ndindex(array.shape[1:]):
-                    parts = [str(labels[d][i]) for d, i in zip(dims[1:], place, strict=True)]
+                    parts = [
+                        str(labels[d][i] if d in labels else i + 1)
+                        for d, i in zip(dims[1:], place, strict=True)
+                    ]
                     columns[" ".join([name, *parts]) + suffix] = array[(slice(None), *place)]
         if self._rows in labels:
             index = np.asarray(labels[self._rows])
@@ -140,14 +149,16 @@ class Result(ReadOnlyState):
         units = self._units()
         for name, metadata in told.items():
             of = metadata["unit"]
-            value = getattr(self, name)
-            yield metadata["name"] or name, value, units.get(of, of), metadata["dims"]
+            value, dims = getattr(self, name), metadata["dims"]
+            if "direction" in dims and np.ndim(value) < len(dims):
+                dims = tuple(dim for dim in dims if dim != "direction")
+            yield metadata["name"] or name, value, units.get(of, of), dims
 
     def _units(self) -> dict[str, str]:
         """Return the units that depend on the joints of the arm."""
-        if not self._posture:
+        if not self._arm:
             return {}
-        units = JointUnits(self._posture.arm.slides)
+        units = JointUnits(self._arm.slides)
         return {
             "joint": units.joined("rad", "m"),
             "torque": units.torque(),
@@ -157,10 +168,10 @@ class Result(ReadOnlyState):
     def _labels(self) -> dict[str, Sequence[object]]:
         """Return the names along each dimension that has names."""
         labels: dict[str, Sequence[object]] = {"axis": AXES, "component": COMPONENTS}
-        if self._posture:
-            arm = self._posture.arm
-            labels |= {"joint": arm.joint_names, "joint_column": arm.joint_names}
-            labels["cable"] = arm.cables.names
+        if self._arm:
+            joints, cables = self._arm.joint_names, self._arm.cables
+            labels |= {"joint": joints, "joint_column": joints, "cable": cables.names}
+            labels["held_cable"] = [each.name for each in cables if each.control == "position"]
         return labels
 
 
@@ -168,5 +179,5 @@ def _by_name(value: Any, dims: Sequence[str], labels: Mapping[str, Sequence[obje
     """Return an array as nested dictionaries by the labels of its dimensions."""
     if not dims:
         return value
-    pairs = zip(labels[dims[0]], value, strict=True)
+    pairs = zip(labels[dims[0]], np.asarray(value), strict=True)
     return {label: _by_name(each, dims[1:], labels) for label, each in pairs}

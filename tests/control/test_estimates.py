@@ -23,8 +23,8 @@ def moved(friction: float, rigidity: float = 0.9) -> tuple[cdsm.PathPlan, list[S
     plant = cdsm.SlowPlant(with_rigidity(plan.arm, rigidity))
     state = plant.begin(plan.angles[0], plan.tensions[0], NONE)
     states, first = [state], state.true.wire
-    for wire in plan.unstrained_lengths:
-        to = first + wire - plan.unstrained_lengths[0]
+    for wire in plan.rest_lengths:
+        to = first + wire - plan.rest_lengths[0]
         command = Command(to, plan.tensions[0], np.zeros(len(to), dtype=np.bool_))
         state = plant.move(state, command, NONE)
         states.append(state)

@@ -19,7 +19,7 @@ PAYLOAD = np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
 def test_both_plants_rest_at_the_same_place() -> None:
     """Far from where the model was linearised, and under a load: within a thousandth."""
     plan = small_path()
-    wire = plan.unstrained_lengths[-1] + 2e-5 * np.arange(6)
+    wire = plan.rest_lengths[-1] + 2e-5 * np.arange(6)
     command = Command(wire, plan.tensions[-1], np.zeros(6, dtype=np.bool_))
     slow, fast = cdsm.SlowPlant(plan.arm), cdsm.MuJoCoPlant(plan.arm, damping_ratio=0.7)
     begin = plan.angles[0], plan.tensions[0], np.zeros(6)
@@ -78,7 +78,7 @@ def test_a_slack_branch_pulls_below_the_range_of_its_law() -> None:
 def test_a_law_that_begins_above_0_n_ends_where_its_cable_would_be_slack() -> None:
     """The strand is defined from 2.2 N; a wire longer than its cable has no tension there."""
     plan = small_path()
-    plant, wire = cdsm.MuJoCoPlant(plan.arm), plan.unstrained_lengths[0].copy()
+    plant, wire = cdsm.MuJoCoPlant(plan.arm), plan.rest_lengths[0].copy()
     wire[1] = plan.arm.cable_lengths(plan.angles[0])[1] + 1e-3
     state = plant.begin(plan.angles[0], plan.tensions[0], np.zeros(6))
     command = Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))

@@ -11,14 +11,14 @@ NONE = np.zeros(6)
 
 
 def paid_out(plan: cdsm.PathPlan, by: float) -> Command:
-    wire = plan.unstrained_lengths[0] + by * np.arange(6)
+    wire = plan.rest_lengths[0] + by * np.arange(6)
     return Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
 
 
 def test_plant_begins_with_the_wire_that_a_plan_pays_out() -> None:
     plan = small_path()
     state = cdsm.SlowPlant(plan.arm).begin(plan.angles[0], plan.tensions[0], NONE)
-    np.testing.assert_allclose(state.true.wire, plan.unstrained_lengths[0], rtol=1e-14)
+    np.testing.assert_allclose(state.true.wire, plan.rest_lengths[0], rtol=1e-14)
     np.testing.assert_allclose(state.true.tension, plan.tensions[0], rtol=1e-14)
     np.testing.assert_array_equal(state.pose.q, plan.angles[0])
 
@@ -31,7 +31,7 @@ def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
     command = paid_out(plan, 1e-5)
     state = plant.move(before, command, wrench)
     pose = plan.arm.at(plan.angles[0])
-    taken_in = plan.unstrained_lengths[0] - command.wire
+    taken_in = plan.rest_lengths[0] - command.wire
     history = cdsm.load_cycle(
         pose, plan.tensions[0], [wrench], motors=[taken_in], accuracy=plant.accuracy
     )
@@ -46,7 +46,7 @@ def test_paying_wire_out_slackens_its_cable() -> None:
     plan = small_path()
     plant = cdsm.SlowPlant(plan.arm)
     state = plant.begin(plan.angles[0], plan.tensions[0], NONE)
-    wire = plan.unstrained_lengths[0].copy()
+    wire = plan.rest_lengths[0].copy()
     wire[2] += 1e-4
     command = Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
     assert plant.move(state, command, NONE).true.tension[2] < plan.tensions[0, 2] - 1.0
