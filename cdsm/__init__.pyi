@@ -94,8 +94,8 @@ from cdsm.planning.plan import StiffnessPlan as StiffnessPlan
 from cdsm.planning.plan import plan_stiffness as plan_stiffness
 from cdsm.planning.range import StiffnessRange as StiffnessRange
 from cdsm.planning.range import stiffness_range as stiffness_range
-from cdsm.planning.saturation_curve import Saturation as Saturation
-from cdsm.planning.tension_growth import saturation as saturation
+from cdsm.planning.saturation import Saturation as Saturation
+from cdsm.planning.saturation import saturation as saturation
 from cdsm.posture import MomentArms as MomentArms
 from cdsm.posture import Posture as Posture
 from cdsm.report import Report as Report

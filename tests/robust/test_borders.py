@@ -130,14 +130,8 @@ FLAGS: dict[str, Callable[[Any], object]] = {
     "check_inertia": lambda flag: cdsm.Manipulator.from_urdf(
         ARM.urdf, ARM.cables, tip="tool0", check_inertia=flag
     ),
-    "progress of plan_path": lambda flag: cdsm.plan_path(
-        ARM, UP, K.along(UP), 10.0, 100.0, angles=Q, progress=flag
-    ),
-    "progress of plan_stiffness": lambda flag: cdsm.plan_stiffness(
-        POSE, UP, K.along(UP), 10.0, 100.0, progress=flag
-    ),
-    "progress of stiffness_range": lambda flag: cdsm.stiffness_range(
-        POSE, UP, 10.0, 100.0, starts=2, progress=flag
+    "at_least of plan_stiffness": lambda flag: cdsm.plan_stiffness(
+        POSE, UP, K.along(UP), 10.0, 100.0, at_least=flag
     ),
     "progress of sweep": lambda flag: cdsm.sweep(ARM, Q, minimum=10.0, progress=flag),
 }
@@ -160,16 +154,8 @@ def test_flags_of_numpy_are_flags(what: str) -> None:
 
 COUNTS: dict[str, tuple[Callable[[Any], object], str]] = {
     "steps": (lambda n: cdsm.weight_test(POSE, PULL, (0.0, 0.0, -1.0), steps=n), "1 to 1000"),
-    "starts": (
-        lambda n: cdsm.plan_stiffness(POSE, UP, K.along(UP), 10.0, 100.0, starts=n),
-        "1 to 1000",
-    ),
     "starts of a range": (
         lambda n: cdsm.stiffness_range(POSE, UP, 10.0, 100.0, starts=n),
-        "1 to 1000",
-    ),
-    "starts of a path": (
-        lambda n: cdsm.plan_path(ARM, UP, K.along(UP), 10.0, 100.0, angles=Q, starts=n),
         "1 to 1000",
     ),
     "count": (lambda n: cdsm.RandomPoses(n), f"1 to {2**30}"),
@@ -188,23 +174,11 @@ def test_a_count_is_bounded(what: str, given: object) -> None:
         call(given)
 
 
-@pytest.mark.parametrize("margin", [1e-200, 1e-10, 0.0, -1.0, 1.0])
-def test_a_margin_below_rounding_is_none(margin: float) -> None:
-    """At 1e-14 the range went down to stiffnesses below zero, which it calls stable."""
-    for call in (
-        lambda: cdsm.plan_stiffness(POSE, UP, K.along(UP), 10.0, 100.0, margin=margin),
-        lambda: cdsm.stiffness_range(POSE, UP, 10.0, 100.0, margin=margin),
-        lambda: cdsm.plan_path(ARM, UP, K.along(UP), 10.0, 100.0, angles=Q, margin=margin),
-    ):
-        with pytest.raises(cdsm.InvalidInput, match=r"margin: .* 1e-09 <= margin < 1"):
-            call()
-
-
 @pytest.mark.parametrize("rigidity", [600.0, 2000.0, 8000.0])
-def test_at_the_least_margin_a_range_ends_at_a_stable_arm(rigidity: float) -> None:
+def test_a_range_ends_at_a_stable_arm(rigidity: float) -> None:
     arm = cdsm.Manipulator(ARM.geometry, cdsm.LinearElasticity(rigidity), gravity=ARM.gravity)
     pose = arm.at(POSE.q)
-    found = cdsm.stiffness_range(pose, UP, 1.0, 4000.0, margin=1e-9)
+    found = cdsm.stiffness_range(pose, UP, 1.0, 4000.0)
     softest = cdsm.stiffness(pose, found.low_tension)
     assert found.low > 0.0
     assert softest.is_stable
@@ -233,7 +207,8 @@ def test_targets_at_the_ends_of_what_is_taken_have_an_answer(target: float) -> N
         warnings.simplefilter("error")
         with pytest.raises(cdsm.UnreachableStiffness):
             cdsm.plan_stiffness(POSE, UP, target, 10.0, 100.0)
-        assert not cdsm.plan_stiffness(POSE, (UP,), (target,), 10.0, 100.0).reached
+        both = ((1.0, 0.0, 0.0), UP)
+        assert not cdsm.plan_stiffness(POSE, both, (target, target), 10.0, 100.0).reached
 
 
 # --- tables ---------------------------------------------------------------------------------
