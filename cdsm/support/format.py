@@ -51,13 +51,15 @@ def without_rounding(values: Array) -> Array:
 
 
 def plain(numbers: Mapping[str, Any]) -> dict[str, object]:
-    """Prepare values for JSON: arrays and tuples become lists, infinite numbers and NaN None."""
+    """Prepare values for JSON: arrays become lists, results dictionaries, inf and NaN None."""
     return {name: _plain(each) for name, each in numbers.items()}
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return plain(value)
+    if hasattr(value, "to_dict"):
+        return _plain(value.to_dict())
     if isinstance(value, (np.ndarray, np.generic)):
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
