@@ -1,9 +1,8 @@
 """Recompute Figs. 3, 4, 6, 7 and 8 of the paper: stiffness over Young's modulus or tension.
 
-Every number is computed in three ways: K_R with the pseudo-inverse and EA/L, L the stretched
-length, as in the paper; the same with EA/l_0, l_0 the original length; and, with EA/l_0, the
-stiffness ``along`` an axis that a small weight at the tip measures. Where the paper is silent,
-:mod:`cdsm.presets` and this module assume values; each :class:`Claim` says so.
+Every number is computed in three ways: K_R by the pseudo-inverse and EA/L, L the stretched length,
+as in the paper; the same by EA/l_0, l_0 the original length; by EA/l_0, the stiffness ``along`` an
+axis that a small weight measures. Each :class:`Claim` says what is assumed.
 """
 
 from __future__ import annotations
@@ -44,8 +43,7 @@ FIGURE_8_POSTURES: Final = {
 LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
 """Examined leads [m]. With a lead of 0.33 m or more the arm buckles below 800 N."""
 
-_FROM_FIG_6: Final = "prototype searched for Fig. 6"
-_POINTS: Final = 25
+_FROM_FIG_6, _POINTS = "prototype searched for Fig. 6", 25
 Part = Literal["active", "passive"]
 _STIFFNESS: Final = unit("N/m", "case", "axis")
 _CHANGE: Final = unit("percent", "lead", "reading", "axis")
@@ -104,11 +102,10 @@ class StiffnessFigure(Figure):
 class LeadFigure(Figure):
     """Change of stiffness if the lower bound of tension rises from 100 N to 800 N, for each lead.
 
-    The lead is the straight cable between its actuator and the base disk. Changes (N, 2, 3) are
-    those of K_R (row 0) and of the stiffness that a small weight measures (row 1), in x, y and z.
+    Changes (N, 2, 3) are those of K_R and of what a small weight measures, in x, y and z.
 
     Attributes:
-        leads: Leads of all cables (N,) [m].
+        leads: Straight cable between its actuator and the base disk, for all cables (N,) [m].
         stretched: Changes (N, 2, 3) [%] with the stretched length, l_0 = L, as in the paper.
         original: Changes (N, 2, 3) [%] with the original length l_0.
     """
@@ -158,19 +155,16 @@ def _claim(
     measure: Callable[[Array, Array], Array],
     assumption: str,
     searched: str = _FROM_FIG_6,
-    **options: Any,
+    at_most: bool = False,
 ) -> Claim:
     """Return the numbers that ``measure`` takes from a stiffness and its part (N, 3) [N/m]."""
     paper, original = pair
-    return Claim(
-        *said,
+    numbers = (
         floats(measure(paper.pseudoinverse, paper.pseudoinverse_part)),
         floats(measure(original.pseudoinverse, original.pseudoinverse_part)),
         floats(measure(original.along, original.along_part)),
-        assumption=assumption,
-        searched=searched,
-        **options,
     )
+    return Claim(*said, *numbers, assumption=assumption, searched=searched, at_most=at_most)
 
 
 def _figure(
@@ -188,12 +182,12 @@ def figure_3() -> StiffnessFigure:
     laws = [LinearElasticity.of_wire(modulus, presets.STRAND_DIAMETER) for modulus in moduli]
     labels = {F: f"lower bound {F:g} N" for F in (50.0, 800.0)}
     pairs = [_curves(labels[F], laws, [F], part="passive", swept=moduli) for F in labels]
-
     wire = "solid wire of 1.2 mm, lower bound"
-    proportional = "stiffness at 320 GPa over stiffness at 160 GPa (proportional: 2)"
-    twice = "Fig. 3", proportional, "-", (2.0, 2.0, 2.0)
+    ratio = "stiffness at 320 GPa over stiffness at 160 GPa (proportional: 2)", "-", (2.0, 2.0, 2.0)
     gap = "Fig. 3", "largest difference of passive and total stiffness", "%", (1.5,)
-    claims = [_claim(twice, pairs[0], lambda total, _: total[-1] / total[0], f"{wire} 50 N")]
+    claims = [
+        _claim(("Fig. 3", *ratio), pairs[0], lambda total, _: total[-1] / total[0], f"{wire} 50 N")
+    ]
     for pair, F in zip(pairs, labels, strict=True):
         claims.append(_claim(gap, pair, _largest_gap, f"{wire} {F:g} N", at_most=True))
     title = "Fig. 3: stiffness over Young's modulus, cable tension constant"
@@ -206,26 +200,23 @@ def figure_4() -> StiffnessFigure:
     strand = "EA = 48 kN (the strand in its elastic stage)", [presets.ELASTIC_STAGE]
     wire = "EA = 226 kN (solid wire, the stated 200 GPa)", [presets.STEEL_WIRE_200GPA]
     said = "Fig. 4", "change of stiffness with tension", "%", (-1.46, -1.04, -1.43)
-    pairs, claims = [], []
-    for case, searched in ((strand, "EA, range of tension"), (wire, "range of tension")):
-        pairs.append(_curves(*case, minima))
-        assumed = f"{case[0]}, lower bound 100 to 800 N"
-        claims.append(_claim(said, pairs[-1], _percent, assumed, f"{searched}; {_FROM_FIG_6}"))
-    return _figure(
-        "Fig. 4: stiffness over cable tension, cable elasticity constant", pairs, *claims
-    )
+    pairs, claims = [_curves(*case, minima) for case in (strand, wire)], []
+    for pair, searched in zip(pairs, ("EA, range of tension", "range of tension"), strict=True):
+        assumed = f"{pair[0].label}, lower bound 100 to 800 N"
+        claims.append(_claim(said, pair, _percent, assumed, f"{searched}; {_FROM_FIG_6}"))
+    title = "Fig. 4: stiffness over cable tension, cable elasticity constant"
+    return _figure(title, pairs, *claims)
 
 
 def figure_lead() -> LeadFigure:
     """Compute, for each lead of the cables, the change of stiffness in Fig. 4.
 
-    With EA constant, tension softens the arm by the active stiffness, and stiffens it since the
-    original length of a locked wire is shorter than the cable: EA/l_0 = (EA + F)/L. Only the second
-    effect depends on the lead. The paper takes l_0 = L and has only the first.
+    With EA constant, tension softens the arm by the active stiffness, and stiffens it since locked
+    wires are shorter than the cable: EA/l_0 = (EA + F)/L. Only this depends on the lead. The paper
+    takes l_0 = L and leaves it out.
     """
-    pairs = [
-        _curves("", [presets.ELASTIC_STAGE], [100.0, 800.0], lead=lead) for lead in LEADS.tolist()
-    ]
+    law, ends = [presets.ELASTIC_STAGE], [100.0, 800.0]
+    pairs = [_curves("", law, ends, lead=lead) for lead in LEADS.tolist()]
     stretched, original = (
         _rows((_percent(curve.pseudoinverse), _percent(curve.along)) for curve in curves)
         for curves in zip(*pairs, strict=True)
@@ -235,14 +226,9 @@ def figure_lead() -> LeadFigure:
         roots = (CubicSpline(LEADS, column).roots(extrapolate=False) for column in changes.T)
         return floats(1e3 * found.min() if found.size else 0.0 for found in roots)
 
-    claim = Claim(
-        *("Fig. 4, lead", "lead from which stiffness falls with tension", "mm", None),
-        computed=first_falls(stretched[:, 0]),
-        original=first_falls(original[:, 0]),
-        along=first_falls(original[:, 1]),
-        assumption="as Fig. 4, EA = 48 kN",
-        searched=_FROM_FIG_6,
-    )
+    said = "Fig. 4, lead", "lead from which stiffness falls with tension", "mm", None
+    falls = first_falls(stretched[:, 0]), first_falls(original[:, 0]), first_falls(original[:, 1])
+    claim = Claim(*said, *falls, assumption="as Fig. 4, EA = 48 kN", searched=_FROM_FIG_6)
     title = "Change of stiffness, 100 N to 800 N, over the lead of the cables, EA = 48 kN"
     given = {"leads": LEADS, "stretched": stretched, "original": original}
     return LeadFigure(name="lead", title=title, claims=(claim,), **given)
@@ -286,8 +272,8 @@ def figure_8() -> StiffnessFigure:
         end = _curves(label, law, [LEVEL[0], highest], q)
         assumed = f"{label}; Eq. 19 repaired, lower bound 5 to {highest:.0f} N"
         claims.append(_claim(rise, pairs[-1], _increment, assumed))
-        assumed = f"{label}; Eq. 19 most level within its digits, "
-        assumed += f"lower bound {LEVEL[0]:g} to {highest:.0f} N"
+        assumed = f"{label}; Eq. 19 most level within its digits, lower bound "
+        assumed += f"{LEVEL[0]:g} to {highest:.0f} N"
         claims.append(_claim(fall, end, _percent, assumed))
     title = "Fig. 8: stiffness over the whole range of tension, Eq. 19, three postures"
     return _figure(title, pairs, *claims)
@@ -296,12 +282,10 @@ def figure_8() -> StiffnessFigure:
 def _highest_minimum(q: Array) -> float:
     """Find the lower bound [N] of all tensions at which the largest reaches :data:`STRAND_END`."""
     pose = presets.virtual_prototype().at(q)
-
-    def excess(minimum: float) -> float:
-        return float(distribute_tension(pose, minimum).values.max()) - STRAND_END
-
-    bound: float = brentq(excess, 5.0, STRAND_END, xtol=1e-6)
-    return bound - 1e-3  # safely inside the domain of the law
+    bound = brentq(
+        lambda F: distribute_tension(pose, F).values.max() - STRAND_END, 5.0, STRAND_END, xtol=1e-6
+    )
+    return float(bound) - 1e-3  # safely inside the domain of the law
 
 
 def _largest_gap(total: Array, part: Array) -> Array:
