@@ -61,7 +61,6 @@ from cdsm.geometry import Geometry as Geometry
 from cdsm.geometry import Joint as Joint
 from cdsm.geometry import Link as Link
 from cdsm.geometry.cables import serpentine_cables as serpentine_cables
-from cdsm.identification import ArmParameters as ArmParameters
 from cdsm.identification import ExperimentPlan as ExperimentPlan
 from cdsm.identification import Identification as Identification
 from cdsm.identification import Measurement as Measurement
@@ -85,6 +84,7 @@ from cdsm.measures.payload import Payload as Payload
 from cdsm.measures.payload import payload as payload
 from cdsm.measures.polytope import ForcePolytope as ForcePolytope
 from cdsm.measures.polytope import force_polytope as force_polytope
+from cdsm.parameters import ArmParameters as ArmParameters
 from cdsm.planning.gradient import StiffnessGradient as StiffnessGradient
 from cdsm.planning.gradient import stiffness_gradient as stiffness_gradient
 from cdsm.planning.path import plan_path as plan_path
