@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,11 +56,13 @@ def gravity_vector(name: str, value: Direction) -> Array:
 
 def unit_directions(name: str, value: Direction | Iterable[Direction]) -> Array:
     """Return the read-only unit vector (3,) of one direction, or (n, 3) of n directions."""
-    rows = [*value] if isinstance(value, (list, tuple)) else value
-    if not isinstance(rows, list) or not any(isinstance(each, str) for each in rows):
-        if isinstance(rows, str) or number_array(name, rows).ndim < 2:  # type: ignore[arg-type]
-            return unit_direction(name, rows)  # type: ignore[arg-type]
-        rows = [*np.asarray(rows)]
-    if not rows:
-        raise InvalidInput(name, "is empty; give one direction (3,), or several (n, 3).")
+    rows: Any = value
+    if isinstance(rows, str):
+        return unit_direction(name, rows)
+    if not (isinstance(rows, (list, tuple)) and any(isinstance(each, str) for each in rows)):
+        rows = number_array(name, rows)
+        if rows.ndim < 2:
+            return unit_direction(name, rows)
+        if rows.ndim > 2 or rows.shape[1] != 3 or not len(rows):
+            raise InvalidInput(name, f"shape {rows.shape} given, (3,) or (n, 3) needed.")
     return frozen(np.array([unit_direction(f"{name}[{i}]", each) for i, each in enumerate(rows)]))

@@ -587,7 +587,6 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
     ),
     "q infinite": (lambda: cdsm.evaluate(ARM, changed(Q, 2, 0, math.inf), F), ("[2, 0] is inf",)),
     "q ragged": (lambda: cdsm.evaluate(ARM, [[0.0], [0.0, 1.0]], F), ("q: is not an array",)),
-    "q masked": (lambda: cdsm.evaluate(ARM, np.ma.masked_array(Q, Q > 0), F), ("q: is a masked",)),
     "q complex": (lambda: cdsm.evaluate(ARM, Q + 0j, F), ("q: holds complex128",)),
     "q None": (lambda: cdsm.evaluate(ARM, ANY, F), ("q: holds object entries, such as None;",)),
     "tension short": (
