@@ -13,7 +13,6 @@ from cdsm.cli.files import Picture
 from cdsm.cli.options import ArmOptions, AsJson
 from cdsm.cli.output import answer, write_picture
 from cdsm.cli.values import misuse
-from cdsm.support.format import aligned, plain
 
 if TYPE_CHECKING:
     from cdsm.parameters import ArmParameters
@@ -67,6 +66,7 @@ def identify(
     """
     from cdsm.identification.experiment_plan import plan_tests
     from cdsm.parameters import ArmParameters
+    from cdsm.support.format import aligned, plain
 
     described = arm.read()
     ranges = _ranges(free)

@@ -91,7 +91,7 @@ class Result(ReadOnlyState):
         variables, words = {}, {}
         for name, value, of, dims in self._quantities():
             array = _array(value)
-            if array.dtype.kind in "USO":
+            if array.dtype.kind in "USO" or array.ndim != len(dims):
                 words[name] = str(value)
             else:
                 variables[name] = (dims, array, of)
