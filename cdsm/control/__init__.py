@@ -14,7 +14,7 @@ from cdsm.control.laws import (
     tension_control,
 )
 from cdsm.control.observer import with_rigidity
-from cdsm.control.plants import Plant
+from cdsm.control.plants import Plant as Plant
 from cdsm.control.sensors import Measurement
 
 __all__ = [
@@ -22,7 +22,6 @@ __all__ = [
     "ControlInput",
     "Law",
     "Measurement",
-    "Plant",
     "Reference",
     "feedforward",
     "limited",
