@@ -132,9 +132,10 @@ class PathPlan(Result):
         """Return a table with a row and the status of each sample; needs pandas (MissingExtra)."""
         failed = {each.index: each for each in self.infeasible}
         table = super().to_pandas().reindex(range(len(self.target))).rename_axis("sample")
-        table.insert(
-            0, "status", [failed[i].status if i in failed else "planned" for i in table.index]
-        )
+        # joints have their own names, as in the files that are read as a path
+        table = table.rename(columns=lambda column: column.removeprefix("angles "))
+        status = [failed[i].status if i in failed else "planned" for i in table.index]
+        table.insert(0, "status", status)
         for k, column in enumerate(np.reshape(self.target, (len(table), -1)).T):
             table[f"target {k + 1} [N/m]" if self.target.ndim > 1 else "target [N/m]"] = column
         return table.assign(reason=[failed[i].reason if i in failed else "" for i in table.index])

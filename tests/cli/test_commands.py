@@ -554,7 +554,7 @@ def test_path_along_a_slide_of_which_nothing_can_be_planned(
     assert result.exit_code == 3, result.output
     assert "0 of 2 samples planned" in result.stdout
     head = out.read_text(encoding="utf-8")
-    assert head.startswith("sample,status,angles way [m],tensions left [N]")
+    assert head.startswith("sample,status,way [m],tensions left [N]")
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

@@ -252,7 +252,7 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
     names = [cable.name for cable in arm.cables]
     held = [name for name in names if name != "cable2_1"]
     columns = {
-        "angles": (arm.joint_names, "rad", plan.angles),
+        "": (arm.joint_names, "rad", plan.angles),
         "tensions": (names, "N", plan.tensions),
         "cable_lengths": (names, "m", plan.cable_lengths),
         "rest_lengths": (held, "m", plan.rest_lengths),
@@ -260,7 +260,7 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
     }
     for k, row in enumerate((rows[0], rows[2])):
         for kind, (each, unit, values) in columns.items():
-            told = [float(row[f"{kind} {name} [{unit}]"]) for name in each]
+            told = [float(row[f"{kind} {name} [{unit}]".strip()]) for name in each]
             np.testing.assert_array_equal(told, values[k])
         assert float(row["achieved [N/m]"]) == plan.achieved[k]
     assert [float(row["target [N/m]"]) for row in rows] == targets
