@@ -15,10 +15,8 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
     """The small arm and its path as files."""
     plan = small_path()
     path = plan.write(tmp_path / "path.csv")
-    rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
-    angles = [i for i, name in enumerate(rows[0]) if name.startswith("angles ")]
-    text = "\n".join(",".join(row[i] for i in angles) for row in rows).replace("angles ", "")
-    path.write_text(text, encoding="utf-8")
+    columns = [line.split(",")[2 : 2 + plan.arm.nv] for line in path.read_text().splitlines()]
+    path.write_text("\n".join(map(",".join, columns)), encoding="utf-8")
     return plan.arm.write(tmp_path / "arm.toml"), path
 
 
