@@ -69,9 +69,19 @@ class CableLaws:
         if self.nonlinear and stretched.min() < 0.0:
             for law, of in self.nonlinear:
                 self._evaluate(law, of, tension[of])
-        wire = lengths - self.series * (tension - self.rest)
+        return frozen(self.stiffness_of(lengths, tension, stretched))
+
+    def stiffness_of(
+        self, lengths: Array, tension: Array, stretched: Array, series: Array | None = None
+    ) -> Array:
+        """Compute the same (…, C) from EA (1 + ε) (…, C), as :meth:`rigidities` gives it.
+
+        −1 stays where a tension is outside its law. ``series`` replaces the arm's own 1/k_series.
+        """
+        series = self.series if series is None else series
+        wire = lengths - series * (tension - self.rest)
         with np.errstate(divide="ignore"):
-            return frozen(np.where(stretched > 0.0, 1.0 / (wire / stretched + self.series), 0.0))
+            return np.where(stretched > 0.0, 1.0 / (wire / stretched + series), stretched)
 
     def rigidities(self, tension: Array) -> Array:
         """Compute EA (1 + ε) (…, C) [N] at F (…, C): 0: force-controlled; −1: outside, or NaN."""

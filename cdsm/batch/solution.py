@@ -32,7 +32,7 @@ from cdsm.batch.search import explained, search
 from cdsm.manipulator import LIMIT_SLACK, Manipulator
 from cdsm.routing import SHORTEST_SEGMENT
 from cdsm.support.status import Status
-from cdsm.support.values import Array
+from cdsm.support.values import Array, frozen
 
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
 Springs = Callable[[Array, Array, slice], Array]
@@ -140,10 +140,13 @@ class _Chunk:
         if not self._names <= found.keys():
             F = self._tensions(at)
             L, pull = self._alone(at.length), self._alone(F)
+            laws = rows.arm._laws
             if self._names <= {*OF_POSTURE, *OF_TENSION}:
                 k = np.zeros_like(pull)
+            elif rows.springs is not None:
+                k = rows.springs(L, pull, self._part)
             else:
-                k = (rows.springs or springs_of(rows.arm))(L, pull, self._part)
+                k = laws.stiffness_of(L, pull, laws.rigidities(pull))
             if k.min(initial=0.0) < 0.0:
                 outside = (k < 0.0).any(axis=1) & (status == Status.OK)
                 status[outside] = Status.OUTSIDE_ELASTICITY
@@ -215,7 +218,8 @@ class _Chunk:
             return found
         shape = len(F), len(u), self._width
         along, pivot, moment = np.empty(shape), np.empty(shape[::2]), bool(W[:, 3:].any())
-        self._kernels.along(K, size, at.tip_jacobian, u, moment, along, pivot)
+        # a copy is writable, whatever u is: the kernel compiles once
+        self._kernels.along(K, size, at.tip_jacobian, u.copy(), moment, along, pivot)
         found["along"] = self._alone(along)
         doubtful = fine[~(self._alone(pivot)[fine] > _PIVOT)]
         if doubtful.size:
@@ -258,7 +262,8 @@ class _Chunk:
     def _body(self) -> Body:
         if self._rows.body is None:
             return self._table.body(self._width if self._kernels.COMPILED else 1)
-        return Body(*(side_by_side(x[self._part], self._width) for x in self._rows.body))
+        rows = (side_by_side(x[self._part], self._width) for x in self._rows.body)
+        return Body(*map(frozen, rows))  # as those of the arm: kernels compile once
 
     def _lanes(self, x: Array) -> Array:
         """Put the rows of an array side by side, or repeat its only row."""
@@ -272,18 +277,6 @@ class _Chunk:
     def _picked(self, x: Array, rows: NDArray[np.intp]) -> Array:
         b, w = np.divmod(rows, self._width)
         return side_by_side(x[b, ..., w], self._width)
-
-
-def springs_of(arm: Manipulator) -> Springs:
-    """Return the stiffness of the cables of an arm, by numpy for all of its laws."""
-    laws = arm._laws
-
-    def stiffness(L: Array, F: Array, _: slice) -> Array:
-        stretched = laws.rigidities(F)
-        wire = L - laws.series * (F - laws.rest)
-        return np.where(stretched > 0.0, 1.0 / (wire / stretched + laws.series), stretched)
-
-    return stiffness
 
 
 def _jacobian(at: Pose, rows: NDArray[np.intp]) -> Array:

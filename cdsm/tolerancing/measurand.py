@@ -123,8 +123,7 @@ class Measurand(ReadOnlyState):
         for law, of in laws.held:
             EA[:, of] = law.rigidity(np.clip(F[:, of], law.low, law.high))
         stretched = stretched + np.where(stretched > 0.0, change * EA, 0.0)
-        wire = L - series * (F - laws.rest)
-        return np.where(stretched > 0.0, 1.0 / (wire / stretched + series), stretched)
+        return laws.stiffness_of(L, F, stretched, series)
 
 
 def measurand_of(
