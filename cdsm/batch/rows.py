@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from itertools import combinations
 from typing import NamedTuple, TypeVar
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,14 +157,10 @@ class ArmRows:
         return sum(math.prod(shape) for shape in self.shapes.values())
 
 
-_made: WeakKeyDictionary[Manipulator, ArmRows] = WeakKeyDictionary()
-
-
+@lru_cache(maxsize=16)
 def rows_of(arm: Manipulator) -> ArmRows:
     """Return the arrays of an arm, which are made once."""
-    if arm not in _made:
-        _made[arm] = ArmRows(arm)
-    return _made[arm]
+    return ArmRows(arm)
 
 
 def side_by_side(values: Array, width: int) -> Array:

@@ -36,7 +36,6 @@ _ABOVE = 1.0 + 1e-9  # just above the low end of a law: rounding may put a tensi
 _LOWEST, _LARGEST = 1e-3, 1e6  # lowest bound of a scan from zero [N]; end of doubled load factors
 _SHOWN = 10.0  # largest load factor of the curve if the critical one is infinite
 
-_BALANCED = ("none", "buckling")
 
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,14 +155,10 @@ class Inputs:
         return errors
 
 
-_found: WeakKeyDictionary[Manipulator, Inputs] = WeakKeyDictionary()
-
-
+@lru_cache(maxsize=16)
 def inputs_of(arm: Manipulator) -> Inputs:
     """Return the inputs of an arm, which are found once."""
-    if arm not in _found:
-        _found[arm] = Inputs(arm)
-    return _found[arm]
+    return Inputs(arm)
 
 
 _NO_HOLES = (

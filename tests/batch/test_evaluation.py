@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import evaluation, solution
+from cdsm.batch import choice, evaluation, solution
 from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.quantities import OF_POSTURE
 from cdsm.presets import STRAND_1X19
@@ -309,6 +309,21 @@ def test_foreign_memory_layouts_give_the_same() -> None:
             np.testing.assert_array_equal(value, expected, err_msg=name)
         pulled = cdsm.distribute_tensions(arm, change(q), change(0.1 * tension), wrench=wrench)
         assert pulled.ok.all(), name
+
+
+def test_each_kernel_is_compiled_for_one_signature(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise it is compiled again at work, for seconds, though it was compiled ahead."""
+    kernels: Any = choice.compiled()
+    monkeypatch.setattr(solution, "kernels_for", lambda *_: kernels)
+    arm = random_arm(1, 3)
+    q, tension, wrench = problem(arm, 70)
+    for u in ("z", DIRECTIONS):
+        cdsm.evaluate(arm, q, tension, wrench, ("along",), direction=u)
+        cdsm.evaluate(arm, q, outputs=OUTPUTS, direction=u, minimum=5.0)
+    pull = cdsm.distribute_tension(arm.at(q[0]), 5.0)
+    cdsm.uncertainty(pull.posture, pull, cdsm.Tolerances(hole_radius=1e-4), direction="z")
+    for kernel in (kernels.pose, kernels.guess, kernels.stiffness, kernels.along):
+        assert len(kernel.signatures) == 1, kernel
 
 
 @pytest.mark.usefixtures("kernels")
