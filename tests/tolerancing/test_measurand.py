@@ -31,15 +31,8 @@ ERRORS = {
 
 def posture(**errors: float) -> cdsm.Posture:
     """Return the posture of an arm that is built with errors of all inputs of each source."""
-    sizes = {
-        "link_length": 0.06,
-        "disk_offset": 0.012,
-        "hole_radius": 0.025,
-        "link_mass": 0.12,
-        "lead": 0.3,
-    }
-    given: dict[str, Any] = {name: size + errors.get(name, 0.0) for name, size in sizes.items()}
-    geometry = cdsm.Geometry.universal(joints=3, cables_per_joint=3, base_length=0.03, **given)
+    sizes = {name: size + errors.get(name, 0.0) for name, size in arms.README_SIZES.items()}
+    geometry = arms.readme_geometry(joints=3, **sizes)
     law = cdsm.LinearElasticity(3e4 * (1.0 + errors.get("rigidity", 0.0)))
     series = 2e5 * (1.0 + errors.get("spring", 0.0))
     cables = cdsm.serpentine_cables(geometry, law, series_stiffness=series)
