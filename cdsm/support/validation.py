@@ -84,10 +84,10 @@ def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
     """
     array = _native(name, value)
     unit, _, largest = ("", 0.0, LARGEST) if kind is None else RANGES[kind]
-    usable = abs(array) <= largest
-    if not usable.all():
+    if not (array.min(initial=0.0) >= -largest and array.max(initial=0.0) <= largest):
+        unusable = ~(abs(array) <= largest)
         allowed = f"finite numbers up to {f'{largest:g} {unit}'.rstrip()} are allowed"
-        raise InvalidInput(name, f"{_first_of(array, ~usable)}; {allowed}.")
+        raise InvalidInput(name, f"{_first_of(array, unusable)}; {allowed}.")
     return array
 
 
