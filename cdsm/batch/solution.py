@@ -89,6 +89,7 @@ class Rows:
         shapes = shapes_of(arm.nv, len(arm.cables), len(self.directions))
         values = {name: np.empty((count, *shapes[name])) for name in self.names}
 
+        # to pass on the interpreter's lock at each small call would take longer than the call
         scratch, turn = threading.local(), threading.Lock()
 
         def fill(part: slice) -> None:
@@ -258,10 +259,7 @@ class _Chunk:
         return np.where(lost.reshape(-1, *[1] * (value.ndim - 1)), np.nan, value)
 
     def _aside(self, function: Callable[..., _Result], *arguments: object) -> _Result:
-        """Compute while another thread has its turn at the small calls in between.
-
-        Threads that pass on the interpreter's lock at each of these wait longer than they run.
-        """
+        """Compute while another thread has its turn at the small calls of numpy in between."""
         self._turn.release()
         try:
             return function(*arguments)
