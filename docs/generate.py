@@ -41,6 +41,7 @@ CHAPTERS = {
     "planning": "Planning",
     "uncertainties": "Uncertainty",
     "identification": "Identification",
+    "parameters": "Identification",
     "interchange": "Other programs",
     "control": "Control",
     "design": "Design",
