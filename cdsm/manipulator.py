@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +27,7 @@ from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
+from cdsm.springs import Spring, Springs, springs_of
 from cdsm.support.directions import Direction, gravity_vector
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
@@ -89,6 +90,8 @@ class Manipulator(Printed):
         gravity: Gravity in base axes (3,) [m/s²].
         original_length: Length of a wire that is l_0 in EA/l_0, as given.
         tolerances: Uncertainties of dimensions and measured values; zero if none were given.
+        springs: Springs at the joints: ``springs.stiffness`` k (nv,) [N m/rad] and
+            ``springs.angle`` q_0 (nv,) [rad], at which they have no torque.
         nv: Number of degrees of freedom.
         joint_names: Names of the joints, in the order of every (nv,) array.
         slides: Whether each joint is prismatic (nv,); its coordinate is then a length [m].
@@ -111,6 +114,7 @@ class Manipulator(Printed):
     gravity: Array
     original_length: OriginalLength
     tolerances: Tolerances
+    springs: Springs
     nv: int
     joint_names: tuple[str, ...]
     slides: NDArray[np.bool_]
@@ -156,6 +160,7 @@ class Manipulator(Printed):
         gravity: Direction = GRAVITY,
         check_inertia: bool = True,
         original_length: OriginalLength = "unstrained",
+        springs: Mapping[str, Spring] | None = None,
     ) -> Manipulator:
         """Build an arm from a URDF and cables: a tree of revolute, prismatic and fixed joints.
 
@@ -174,6 +179,7 @@ class Manipulator(Printed):
             check_inertia: Refuse moments of inertia that no rigid body can have. Stiffness does not
                 depend on them, but :func:`~cdsm.modes` do.
             original_length: As for :class:`Manipulator`.
+            springs: As for :meth:`with_springs`; a URDF has no element for them.
 
         Raises:
             FileError: The file of the URDF or of the cables cannot be read.
@@ -185,7 +191,8 @@ class Manipulator(Printed):
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
-        return cls.__new__(cls)._define(text, cables, tip, gravity, original_length, joint_names)
+        made = cls.__new__(cls)._define(text, cables, tip, gravity, original_length, joint_names)
+        return made if springs is None else made.with_springs(springs)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], wire: Wire | None = None) -> Manipulator:
@@ -328,6 +335,11 @@ class Manipulator(Printed):
         return max(self._body.length, reach)
 
     @cached_property
+    def has_springs(self) -> bool:
+        """Whether a spring turns any joint."""
+        return bool(self.springs.stiffness.any())
+
+    @cached_property
     def has_friction(self) -> bool:
         """Whether any cable has friction in a hole. Results that neglect this friction say so."""
         return any(any(cable.friction) for cable in self.cables)
@@ -364,10 +376,12 @@ class Manipulator(Printed):
         joint_names: Sequence[str] | None = None,
         geometry: Geometry | None = None,
         tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
+        springs: Mapping[str, Spring] | None = None,
         like: Manipulator | None = None,
     ) -> Self:
         """Check what defines an arm, and set all attributes; ``urdf`` has been checked before.
 
+        Without ``springs``, they are those of the geometry.
         ``like`` is an arm of the same robot, whose doubts the user has seen.
         """
         one_of("original_length", original_length, get_args(OriginalLength))
@@ -380,6 +394,8 @@ class Manipulator(Printed):
         self.__dict__.update(urdf=urdf, cables=cables, tip_link=tip_link, gravity=gravity)
         self.__dict__.update(original_length=original_length, tolerances=tolerances)
         self.__dict__.update({name: getattr(body, name) for name in _OF_BODY})
+        given = geometry.springs if geometry and springs is None else springs or {}
+        self.__dict__.update(springs=springs_of(given, self.joint_names))
         self.__dict__.update(_geometry=geometry, _body=body, _routing=Routing.of(body, cables))
         self.__dict__.update(_laws=CableLaws(cables, original_length), _doubts=_doubts(self))
         for doubt in self._doubts:
@@ -391,6 +407,8 @@ class Manipulator(Printed):
         """Return what defines the arm: two arms are equal if these values are equal."""
         names = ("urdf", "cables", "tip_link", "original_length", "joint_names", "tolerances")
         state = {name: getattr(self, name) for name in names}
+        rows = zip(self.joint_names, *(each.tolist() for each in self.springs), strict=True)
+        state["springs"] = {name: (k, angle) for name, k, angle in rows if k or angle}
         return state | {"geometry": self._geometry, "gravity": tuple(self.gravity.tolist())}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -418,6 +436,19 @@ class Manipulator(Printed):
     def with_tolerances(self, tolerances: Tolerances) -> Manipulator:
         """Return the same arm with other :class:`Tolerances`; InvalidInput for another type."""
         return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
+
+    def with_springs(self, springs: Mapping[str, Spring]) -> Manipulator:
+        """Return the same arm with these springs at its joints, and no others.
+
+        Args:
+            springs: By the name of the joint: stiffness k [N m/rad], or [N/m] if it is prismatic;
+                or (k, q_0) with the angle [rad] or way [m] without torque, which is 0 otherwise.
+
+        Raises:
+            InvalidInput: A stiffness is negative, or no number.
+            UnknownName: There is no such joint.
+        """
+        return self._replace(springs=springs)
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
         """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis."""

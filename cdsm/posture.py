@@ -59,6 +59,21 @@ class Posture(ReadOnlyState):
     _sites: Array
     _spans: Spans
 
+    @property
+    def spring_torque(self) -> Array:
+        """Torque k (q − q_0) (nv,) [N m] of the joint springs, as a derivative of their energy."""
+        return frozen(self.arm.springs.torque(self.q))
+
+    @property
+    def _own_torque(self) -> Array:
+        """Derivative of the energy of weight and springs (nv,)."""
+        return self.gravity_torque + self.spring_torque
+
+    @property
+    def _own_stiffness(self) -> Array:
+        """Second derivative of the energy of weight and springs (nv, nv)."""
+        return self.gravity_stiffness + np.diag(self.arm.springs.stiffness)
+
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
 

@@ -125,7 +125,7 @@ def evaluate(
             :func:`distribute_tensions`, which contains it.
         outputs: Names of the quantities to store. Of a posture: ``"tip"``, ``"jacobian"``,
             ``"cable_lengths"``, ``"length_jacobian"``, ``"gravity_torque"``. Of a stiffness:
-            ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"joint"``,
+            ``"active"``, ``"passive"``, ``"gravity"``, ``"load"``, ``"springs"``, ``"joint"``,
             ``"cable_stiffness"``, ``"residual"``, ``"margin"``, ``"compliance"``, ``"cartesian"``,
             ``"along"``, ``"pseudoinverse"``. The tensions: ``"tension"``.
         direction: u of ``"along"``: an axis such as ``"z"``, or (3,), any length. For several

@@ -34,6 +34,7 @@ DIMENSIONS: Final[dict[str, tuple[tuple[str, ...], str]]] = {
     "length_jacobian": (("cable", "joint"), "lever"),
     "gravity_torque": (("joint",), "torque"),
     "gravity": (_JOINTS, "joint stiffness"),
+    "springs": (_JOINTS, "joint stiffness"),
     # these also need tensions
     "tension": (("cable",), "N"),
     "residual": (("joint",), "torque"),
@@ -60,7 +61,7 @@ _NAMES: Final = tuple(DIMENSIONS)
 OF_POSTURE: Final = _NAMES[: _NAMES.index("tension")]
 OF_TENSION: Final = _NAMES[_NAMES.index("tension") : _NAMES.index("cable_stiffness")]
 READINGS: Final = _NAMES[_NAMES.index("margin") :]
-TERMS: Final = ("active", "passive", "gravity", "load")
+TERMS: Final = ("active", "passive", "gravity", "load", "springs")
 
 
 def shapes_of(nv: int, cables: int, directions: int) -> dict[str, tuple[int, ...]]:

@@ -25,7 +25,7 @@ def read(
 
     Args:
         names: Any of ``margin``, ``along``, ``compliance``, ``cartesian``, ``pseudoinverse``.
-        terms: The terms of K_θ (N, 4, nv, nv).
+        terms: The terms of K_θ (N, 5, nv, nv).
         jacobian: J_X (N, 6, nv).
         directions: Unit vectors u (D, 3) of ``along``.
     """

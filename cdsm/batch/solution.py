@@ -138,6 +138,9 @@ class _Chunk:
         W, q = self._lanes(rows.wrench), side_by_side(self._q[:, table.order], self._width)
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
         self._aside(self._kernels.pose, table.arm, self._body(), q, W, at)
+        if rows.arm.has_springs:
+            k, free = (each[table.order, None] for each in rows.arm.springs)
+            at.torque[...] -= k * (q - free)
         short = self._alone(at.shortest) < SHORTEST_SEGMENT
         status[short & (status == Status.OK)] = Status.COINCIDENT_SITES
         found = self._of_posture(at)
@@ -209,7 +212,7 @@ class _Chunk:
         K, size = self._terms(at, F, k, W, apart=not fused)
         found: dict[str, Array] = {}
         if not fused or "joint" in names:
-            terms = self._alone(K)
+            terms = self._with_springs(self._alone(K))
             found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
             found["joint"] = terms.sum(axis=1)
         if not wanted:
@@ -232,6 +235,7 @@ class _Chunk:
             *pose, F, k, W = (self._picked(x, doubtful) for x in (*at, F, k, W))
             some = Pose(*pose)
             terms = one_by_one(self._terms(some, F, k, W, apart=True)[0], doubtful.size)
+            terms = self._with_springs(terms)
             of_tip = _jacobian(some, np.arange(doubtful.size))
             read_off, status[doubtful] = read({"along"}, terms, of_tip, u)
             found["along"][doubtful] = read_off["along"]
@@ -242,7 +246,20 @@ class _Chunk:
         K = self._empty("K", B, 4 if apart else 1, nv, nv)
         size = self._empty("size", B, nv)
         self._aside(self._kernels.stiffness, self._table.arm, at, F, k, W, K, size)
+        if self._rows.arm.has_springs and not apart:
+            K[:, 0, range(nv), range(nv)] += self._springs[:, None]
+            size += self._springs[:, None]
         return K, size
+
+    @property
+    def _springs(self) -> Array:
+        """Stiffness of the joint springs (nv,) in the kernels' order."""
+        return self._rows.arm.springs.stiffness[self._table.order]
+
+    def _with_springs(self, terms: Array) -> Array:
+        """Add the springs to the other terms (n, 4, nv, nv) of K_θ."""
+        springs = np.broadcast_to(np.diag(self._springs), (len(terms), 1, *terms.shape[2:]))
+        return np.concatenate([terms, springs], axis=1)
 
     def _finished(self, name: str, value: Array) -> Array:
         """Put the joints in the order of q; NaN where the quantity does not exist."""

@@ -130,7 +130,7 @@ class Observer:
         F = tension[segments.chains.start[:-1]]
         spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), grip(pose) * F)
         weights = np.linalg.pinv(pose.length_jacobian.T * spread)
-        torque = tension @ segments.length_jacobian + pose.gravity_torque
+        torque = tension @ segments.length_jacobian + pose._own_torque
         found = np.linalg.lstsq(weights @ pose.jacobian[:3].T, weights @ torque, rcond=None)
         return np.asarray(found[0])
 

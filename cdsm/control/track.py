@@ -237,7 +237,7 @@ def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
     parts = plan.angles, plan.tensions, plan.target, loads
     for q, F, target, W in zip(*map(along, parts), strict=True):
         pose = arm.at(q)
-        missing = pose.jacobian.T @ W - pose.gravity_torque - F @ pose.length_jacobian
+        missing = pose.jacobian.T @ W - pose._own_torque - F @ pose.length_jacobian
         F = np.clip(F + np.linalg.lstsq(pose.length_jacobian.T, missing)[0], *domains)
         reference = reference_at(arm, q, F)
         late = 2 * len(wanted) >= len(at) - 1

@@ -288,7 +288,9 @@ def assemble_segments(
         frictionless,
         active=active,
         passive=frozen(passive),
-        joint=frozen(active + passive + frictionless.gravity + frictionless.load),
+        joint=frozen(
+            active + passive + frictionless.gravity + frictionless.load + frictionless.springs
+        ),
         friction=friction,
         segment_tension=frozen(tension),
         tension_gradient=frozen(gradient),

@@ -232,6 +232,21 @@ class Geometry(Printed):
         number = defaultdict[int, Iterator[int]](lambda: count(1))
         return tuple(f"cable{c.joint}_{next(number[c.joint])}" for c in self.cables)
 
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Name of each axis in a URDF: ``joint{k}_1``, ``joint{k}_2``; of a hinge ``joint{k}``."""
+        return tuple(
+            f"joint{k}_{i}" if len(joint.axes) == 2 else f"joint{k}"
+            for k, joint in enumerate(self.joints, start=1)
+            for i in range(1, len(joint.axes) + 1)
+        )
+
+    @property
+    def springs(self) -> dict[str, tuple[float, float]]:
+        """Stiffness [N m/rad] and angle without torque [rad] of each spring, by joint name."""
+        each = [(joint.stiffness, joint.rest_angle) for joint in self.joints for _ in joint.axes]
+        return {name: own for name, own in zip(self.joint_names, each, strict=True) if own[0]}
+
     def to_toml(self) -> str:
         """Return the TOML text from which :meth:`read` builds an equal geometry."""
         lines = [

@@ -28,6 +28,8 @@ class Joint:
             ``hole_radius`` of the :class:`Geometry`.
         disk_radius: Outer radius of the two disks [m]; None: 1.1 times the distance of the farthest
             hole from the axis.
+        stiffness: k of a spring about each axis [N m/rad]; 0: none.
+        rest_angle: Angle about each axis at which the spring has no torque [rad].
     """
 
     axes: Annotated[tuple[records.Direction, ...], Field(strict=False, min_length=1, max_length=2)]
@@ -35,6 +37,8 @@ class Joint:
     limit: Limit | None = None
     hole_radius: records.Length | None = None
     disk_radius: records.Length | None = None
+    stiffness: records.JointSpring = 0.0
+    rest_angle: records.Number = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -32,6 +32,9 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
     return geometry, {key: value for key, value in data.items() if key in others}
 
 
+_NONE = "friction = 0.0", "stiffness = 0.0", "rest_angle = 0.0"  # not written
+
+
 @record
 class _Sections:
     sections: Annotated[tuple[dict[str, Any], ...], Field(strict=False, min_length=1)]
@@ -71,5 +74,5 @@ def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
     for key in ("joints", "links", "cables"):
         for part in getattr(geometry, key):
             rows = toml_lines(part)
-            lines += ["", f"[[{prefix}{key}]]", *(row for row in rows if row != "friction = 0.0")]
+            lines += ["", f"[[{prefix}{key}]]", *(row for row in rows if row not in _NONE)]
     return lines

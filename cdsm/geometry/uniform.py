@@ -33,7 +33,7 @@ _HoleAngles = Annotated[
 ]
 _OF_JOINTS = (
     *("disk_offset", "hole_radius", "disk_radius", "joint_limit", "link_length", "link_mass"),
-    *("lead", "friction", "cable_radius", "phase"),
+    *("lead", "friction", "cable_radius", "phase", "joint_stiffness", "rest_angle"),
 )
 
 
@@ -61,6 +61,8 @@ class Universal:
         cable_radius: As ``radius`` of :class:`CableRoute`, for the cables of each joint [m].
         hole_angles: φ of the cables of a joint [rad]: one list for all joints, or one for each.
         phase: Added to φ of the cables of each joint [rad].
+        joint_stiffness: Stiffness of a spring about each axis of every joint [N m/rad]; 0: none.
+        rest_angle: Angle about each axis at which its spring has no torque [rad].
         spread: Angle [rad] between the holes of g cables whose angles φ are equal: the hole of
             cable i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: not turned.
         name: Name of the robot.
@@ -80,6 +82,8 @@ class Universal:
     cable_radius: PerJoint[records.Length] | None = None
     hole_angles: _HoleAngles | None = None
     phase: PerJoint[records.Number] = 0.0
+    joint_stiffness: PerJoint[records.JointSpring] = 0.0
+    rest_angle: PerJoint[records.Number] = 0.0
     spread: Turn = 0.0
     name: records.Name = "arm"
 
@@ -130,9 +134,12 @@ def fields_of(sizes: Universal) -> dict[str, Any]:
     each = [value if isinstance(value, Sequence) else [value] * n for value in values]
     joints, links, cables, common = [], [], [], each[1][0]
     rows = zip(axes, angles, *each, strict=True)
-    for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase in rows:
+    for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase, k, rest in rows:
         R = None if common == R else R
-        joints += [Joint(axes=axis, disk_offset=h, limit=top, hole_radius=R, disk_radius=r)]
+        spring = {"stiffness": k, "rest_angle": rest}
+        joints += [
+            Joint(axes=axis, disk_offset=h, limit=top, hole_radius=R, disk_radius=r, **spring)
+        ]
         links += [Link(length=length, mass=mass)]
         kept = {"joint": len(joints), "lead": lead, "friction": mu, "radius": ring}
         cables += [CableRoute(angle=phi + phase, **kept) for phi in phis]

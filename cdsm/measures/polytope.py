@@ -239,7 +239,7 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
     lever = abs(A).max(axis=1)
     lever[lever == 0.0] = 1.0
     A /= lever[:, None]
-    b = (pose.jacobian.T @ wrench - pose.gravity_torque) / lever
+    b = (pose.jacobian.T @ wrench - pose._own_torque) / lever
     count, free = low.size, np.full(U.shape[1], math.inf)
     # near the straight arm, forces along it are huge: each counts by what it does to the joints
     scale = abs(A[:, count:]).max(axis=0)

@@ -83,10 +83,12 @@ class TensionSpace:
         K, J = stiffness(pose, self.least), pose.length_jacobian
         for u in self.directions:
             K._require_mobile(u)
-        parts = sum(abs(each.diagonal()) for each in (K.active, K.passive, K.gravity, K.load))
+        parts = sum(
+            abs(each.diagonal()) for each in (K.active, K.passive, K.gravity, K.load, K.springs)
+        )
         self.floor = MARGIN * max(K.margin, _REGULAR * float(np.min(parts)), SMALLEST)
-        self._constant = K.gravity + K.load
-        torque = pose.jacobian.T @ self.least.wrench - pose.gravity_torque
+        self._constant = K.gravity + K.load + K.springs
+        torque = pose.jacobian.T @ self.least.wrench - pose._own_torque
         self._balance = nondimensional(J, torque, low, high, pose.arm.length)
         _, sizes, basis = np.linalg.svd(J.T)
         rank = int((sizes > _FLAT * sizes.max(initial=0.0)).sum())

@@ -40,22 +40,23 @@ _MOST_NAMES = 72  # largest number of names below an axis; of more, every second
 
 
 def plot_shares(shares: Shares) -> Figure:
-    """Plot the contribution of each cable, of gravity and of the load to a stiffness as bars.
+    """Plot the contribution of each cable, of gravity, load and springs to a stiffness as bars.
 
     Raises InvalidInput if ``shares`` is not a result of :meth:`cdsm.Stiffness.shares`.
     """
     expect("shares", shares, "Shares")
     arm = shares.stiffness.posture.arm
-    names = [*arm.cables.names, "gravity", "load"]
+    names = [*arm.cables.names, *shares.others]
     figure, ((axes,),) = panels(_width(names), 2.8, 1)
-    passive = N_PER_MM * np.append(shares.passive, [0.0, 0.0])
-    active = N_PER_MM * np.append(shares.active, [0.0, 0.0])
-    others = N_PER_MM * np.array([0.0] * len(shares.cables) + [shares.gravity, shares.load])
+    rest = np.array([*shares.others.values()])
+    passive = N_PER_MM * np.append(shares.passive, 0.0 * rest)
+    active = N_PER_MM * np.append(shares.active, 0.0 * rest)
+    others = N_PER_MM * np.append(0.0 * shares.cables, rest)
     # bars of one sign stand on each other, so that none hides another
     for values, below, color, label in (
         (passive, 0.0 * passive, BLUE, "passive: elasticity"),
         (active, np.where(active * passive > 0.0, passive, 0.0), ORANGE, "active: tension"),
-        (others, 0.0 * others, GREEN, "gravity, load"),
+        (others, 0.0 * others, GREEN, ", ".join(shares.others)),
     ):
         axes.bar(names, values, bottom=below, color=color, label=label)
     axes.axhline(0.0, color="0.2", linewidth=0.8)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Verdict = Literal["agrees", "DIFFERS", "not possible"]
 
-TERMS = ("active", "passive", "gravity", "load", "joint")
+TERMS = ("active", "passive", "gravity", "load", "springs", "joint")
 TORQUES = ("cable torque", "gravity torque", "load torque")
 
 TOLERANCE = 1e-6
@@ -95,7 +95,7 @@ def compared(K: Stiffness) -> tuple[Comparison, ...]:
     edge = listed([each for c in moved for each in _edges(K, c)], 3)
 
     def derived(places: Array) -> Array:
-        """Compute three potentials and four torques (3 + 4 nv, …) at ``places`` (nv, …)."""
+        """Compute three potentials and five torques (3 + 5 nv, …) at ``places`` (nv, …)."""
         poses = [arm.at(pose.q + x * unit, check_limits=False) for x in places.reshape(nv, -1).T]
         longer = np.array([each.cable_lengths for each in poses]) - pose.cable_lengths
         F, stored = np.tile(K.tension, (len(poses), 1)), K.tension * longer
@@ -109,15 +109,17 @@ def compared(K: Stiffness) -> tuple[Comparison, ...]:
             work = W[:3] @ (there.tip[:3, 3] - pose.tip[:3, 3]) + W[3:] @ turn
             weight = arm._body.potential_energy(there.q)
             J, g, J_X = there.length_jacobian, there.gravity_torque, there.jacobian
-            torques = np.array([K.tension @ J, (tension - K.tension) @ J, g, -W @ J_X]) * unit
-            rows.append(np.concatenate([[energy.sum(), weight, -work], torques.ravel()]))
+            torques = [K.tension @ J, (tension - K.tension) @ J, g, -W @ J_X, there.spring_torque]
+            rows.append(
+                np.concatenate([[energy.sum(), weight, -work], (np.array(torques) * unit).ravel()])
+            )
         return np.asarray(np.array(rows).T / scale[:, None]).reshape(-1, *places.shape[1:])
 
     torques = np.array([K.tension @ pose.length_jacobian, pose.gravity_torque, -W @ pose.jacobian])
     terms = np.array([getattr(K, name) for name in TERMS]) * unit[:, None] * unit
     sizes, largest = _torque_sizes(K), abs(terms).max(axis=(1, 2))
-    sizes, largest = sizes + _SMALL * sizes.sum(), largest + _SMALL * largest[4]
-    scale = np.concatenate([sizes, np.repeat(largest[:4], nv)])
+    sizes, largest = sizes + _SMALL * sizes.sum(), largest + _SMALL * largest[-1]
+    scale = np.concatenate([sizes, np.repeat(largest[:-1], nv)])
     scale[scale == 0.0] = 1.0
     tolerances, failure = {"atol": TOLERANCE / 10.0, "rtol": 0.0}, ""
     options = {"initial_step": _step(K, moved), "order": 4, "maxiter": 6}
@@ -126,13 +128,13 @@ def compared(K: Stiffness) -> tuple[Comparison, ...]:
         both = np.array([found.df, found.error]) * scale[:, None]
     except CdsmError as error:  # outside a law, or two sites meet
         both, failure = np.zeros((2, scale.size, nv)), str(error)
-    matrices = both[:, 3:].reshape(2, 4, nv, nv)
+    matrices = both[:, 3:].reshape(2, 5, nv, nv)
     matrices = np.concatenate([matrices, matrices.sum(axis=1, keepdims=True)], axis=1)
     why = [failure or (edge if name in ("passive", "joint") else "") for name in TERMS]
     return (
         *map(_compare, TERMS, terms, *matrices, TOLERANCE * largest, why),
         *map(_compare, TORQUES, torques * unit, *both[:, :3], TOLERANCE * sizes, [failure] * 3),
-        _compare("batch", terms, _batch(K) * unit[:, None] * unit, 0.0, _SAME * largest[4], ""),
+        _compare("batch", terms, _batch(K) * unit[:, None] * unit, 0.0, _SAME * largest[-1], ""),
     )
 
 
@@ -149,7 +151,7 @@ def _compare(
 
 
 def _batch(K: Stiffness) -> Array:
-    """Compute the terms of K and K_θ (5, nv, nv) by :func:`cdsm.evaluate`."""
+    """Compute the terms of K and K_θ (6, nv, nv) by :func:`cdsm.evaluate`."""
     arm, slack = K.posture.arm, (K.tension == 0.0) & (K.cable_stiffness == 0.0)
     if slack.any():  # in an equilibrium, slack cables give nothing
         pairs = zip(arm.cables, slack, strict=True)

@@ -56,8 +56,8 @@ class LockedArm:
     def at_pose(self, pose: Posture) -> ArmState:
         """Compute the state at a posture."""
         F, k = self._tensions(pose)
-        J, W, g = pose.length_jacobian, self.wrench, pose.gravity_torque
-        K = pose._active(F) + (J.T * k) @ J + pose.gravity_stiffness + pose._load(W)
+        J, W, g = pose.length_jacobian, self.wrench, pose._own_torque
+        K = pose._active(F) + (J.T * k) @ J + pose._own_stiffness + pose._load(W)
         scale = F @ abs(J) + abs(g) + abs(W) @ abs(pose.jacobian)
         return ArmState(pose, F, F @ J + g - W @ pose.jacobian, K, scale)
 

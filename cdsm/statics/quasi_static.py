@@ -136,14 +136,14 @@ class QuasiStaticArm:
 
     def _state(self, pose: Posture, rest_length: Array, load: Load, near: Array) -> ChainArmState:
         """Compute the state at a posture; the search for tensions starts at ``near`` (S,) [N]."""
-        segments, W, g = pose.segments, load.wrench, pose.gravity_torque
+        segments, W, g = pose.segments, load.wrench, pose._own_torque
         chains, J = segments.chains, segments.length_jacobian
         forced = np.where(self.forced, load.motors, np.nan)
         chain = self._problem.settle(segments.lengths, rest_length, segments.ratio, forced, near)
         turning, T = np.zeros_like(J), chain.tension
         turning[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian
         slope = chain_tangent(self.start, self.forced, chain, J, turning)
-        K = segments.active(T) + J.T @ slope + pose.gravity_stiffness + pose._load(W)
+        K = segments.active(T) + J.T @ slope + pose._own_stiffness + pose._load(W)
         scale = T @ abs(J) + abs(g) + abs(W) @ abs(pose.jacobian)
         return ChainArmState(pose, T, T @ J + g - W @ pose.jacobian, K, scale, chain, slope)
 

@@ -17,7 +17,7 @@ from cdsm.tension import Tension
 def stiffness(
     pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
 ) -> Stiffness:
-    """Compute the joint stiffness with its four terms (Eq. 16), and the Cartesian stiffness.
+    """Compute the joint stiffness with its terms (Eq. 16), and the Cartesian stiffness.
 
     Args:
         pose: The posture.
@@ -68,6 +68,7 @@ def assemble(
     J, gravity = pose.length_jacobian, pose.gravity_stiffness
     active, load = frozen(pose._active(tension)), frozen(pose._load(wrench))
     passive = frozen((J.T * cable_stiffness) @ J)
+    springs = frozen(np.diag(pose.arm.springs.stiffness))
     return Stiffness(
         posture=pose,
         tension=tension,
@@ -77,7 +78,8 @@ def assemble(
         passive=passive,
         gravity=gravity,
         load=load,
-        joint=frozen(active + passive + gravity + load),
+        springs=springs,
+        joint=frozen(active + passive + gravity + load + springs),
         free_length=free_length,
         distribution=distribution,
     )

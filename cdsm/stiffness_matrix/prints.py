@@ -16,10 +16,7 @@ from cdsm.support.values import Array
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix.value import Stiffness
 
-_ROWS = (
-    *("stiffness [N/mm]", "along", "  of it passive", "  of it active", "  of it gravity"),
-    *("  of it load", "cartesian, diagonal", "pseudoinverse, diagonal"),
-)
+_PARTS = ("passive", "active", "gravity", "load", "springs")
 
 
 def existing(read: Callable[[], object]) -> object:
@@ -31,19 +28,22 @@ def existing(read: Callable[[], object]) -> object:
 
 def table(K: Stiffness) -> list[str]:
     """Return the lines of the printed table: readings [N/mm] along x, y and z."""
-    axes, rows = np.eye(3), np.full((7, 3), math.nan)
+    axes, parts = np.eye(3), _PARTS if K.posture.arm.has_springs else _PARTS[:-1]
+    rows = np.full((3 + len(parts), 3), math.nan)
     for i, u in enumerate(axes):
         with suppress(SingularStiffness):
             rows[0, i] = K.along(u)
             of = K.shares(u)
-            rows[1:5, i] = of.passive.sum(), of.active.sum(), of.gravity, of.load
+            rows[1:-2, i] = [np.sum(getattr(of, part)) for part in parts]
     mobile = np.isfinite(rows[0])
     with suppress(SingularStiffness):
         if mobile.any():
-            rows[5, mobile] = K.cartesian_in(axes[mobile]).diagonal()
-        rows[6] = K.pseudoinverse().diagonal()
+            rows[-2, mobile] = K.cartesian_in(axes[mobile]).diagonal()
+        rows[-1] = K.pseudoinverse().diagonal()
     cells = [["-" if math.isnan(k) else f"{k:.4g}" for k in row] for row in rows / 1e3]
-    lines = zip(_ROWS, ["xyz", *cells], strict=True)
+    names = ["along", *(f"  of it {part}" for part in parts), "cartesian, diagonal"]
+    names = ["stiffness [N/mm]", *names, "pseudoinverse, diagonal"]
+    lines = zip(names, ["xyz", *cells], strict=True)
     return [f"{name:<24}{''.join(f'{cell:>12}' for cell in row)}" for name, row in lines]
 
 

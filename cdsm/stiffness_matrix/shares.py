@@ -1,4 +1,4 @@
-"""Contributions of cables, gravity and load to the stiffness of an arm in one direction."""
+"""Contributions of cables, gravity, load and springs to the stiffness in one direction."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ class Shares(Result, Named):
         active: Of each cable's tension, (C,) [N/m]; usually negative.
         gravity: Of the weight of the links [N/m].
         load: Of the wrench at the tip [N/m].
+        springs: Of the joint springs [N/m].
     """
 
     _headline, _rows = "total", "cable"
@@ -44,6 +45,7 @@ class Shares(Result, Named):
     active: Array = field(metadata=unit("N/m", "cable"))
     gravity: float = field(metadata=unit("N/m"))
     load: float = field(metadata=unit("N/m"))
+    springs: float = field(metadata=unit("N/m"))
 
     @classmethod
     def of(cls, K: Stiffness, u: Array) -> Self:
@@ -58,7 +60,9 @@ class Shares(Result, Named):
             each = (at.length_jacobian @ motion) * (K.tension_gradient @ motion)
             passive = np.bincount(at.chains.cable, each).astype(np.float64)
             active = at.tension_stiffness(K.segment_tension) @ motion @ motion
-        weight, load = (float(motion @ term @ motion) for term in (K.gravity, K.load))
+        weight, load, springs = (
+            float(motion @ term @ motion) for term in (K.gravity, K.load, K.springs)
+        )
         return cls(
             stiffness=K,
             direction=u,
@@ -66,6 +70,7 @@ class Shares(Result, Named):
             active=frozen(active),
             gravity=weight,
             load=load,
+            springs=springs,
         )
 
     @property
@@ -85,10 +90,16 @@ class Shares(Result, Named):
         """Sum of the passive and active contributions of each cable, (C,) [N/m]."""
         return frozen(self.passive + self.active)
 
+    @property
+    def others(self) -> dict[str, float]:
+        """Contributions of gravity, of the load and, if there are any, of the springs [N/m]."""
+        found = {"gravity": self.gravity, "load": self.load}
+        return found | {"springs": self.springs} if self._posture.arm.has_springs else found
+
     @quantity("N/m")
     def total(self) -> float:
         """Sum of all contributions [N/m]: the stiffness along the direction."""
-        return float(self.passive.sum() + self.active.sum() + self.gravity + self.load)
+        return float(self.cables.sum() + sum(self.others.values()))
 
     @quantity("1")
     def is_stable(self) -> bool:
@@ -100,8 +111,9 @@ class Shares(Result, Named):
         return cdsm.plots.plot_shares(self)
 
     def __str__(self) -> str:
-        K, names = self.stiffness, [*self.keys(), "gravity", "load", "total"]
-        whole = without_rounding(np.array([*self.cables, self.gravity, self.load, self.total]))
+        K, others = self.stiffness, self.others
+        names = [*self.keys(), *others, "total"]
+        whole = without_rounding(np.array([*self.cables, *others.values(), self.total]))
         pairs = zip(names, whole, strict=True)
         rows = [[name, "", "", f"{k / 1e3:z.4g}", f"{k / self.total:z.1%}"] for name, k in pairs]
         for row, passive, active in zip(rows, self.passive, self.active, strict=False):

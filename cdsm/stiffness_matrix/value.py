@@ -1,4 +1,4 @@
-"""The stiffness of an arm as a frozen value: K_θ with its four terms, and the readings at the tip.
+"""The stiffness of an arm as a frozen value: K_θ with its terms, and the readings at the tip.
 
 The paper maps K_θ to Cartesian space with J_X⁻¹, which does not exist for a redundant arm. "The
 stiffness in x" then has three meanings, each with a name here: along, cartesian, pseudoinverse.
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cdsm.report import Report
 
 Friction = Literal["frictionless", "stuck", "sliding"]
-Term = Literal["active", "passive", "gravity", "load", "joint"]
+Term = Literal["active", "passive", "gravity", "load", "springs", "joint"]
 
 REGULAR = 1e-8  # least relative singular value of K_θ; its inverse has 6 correct digits there
 FLAT = 1e-6  # least relative singular value of J_v; a 3×3 stiffness has 4 correct digits there
@@ -58,7 +58,8 @@ class Stiffness(Result):
             is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the cable segments j, not symmetric if cables slide.
         gravity: ∂g/∂θ (nv, nv) [N m/rad].
         load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
-        joint: K_θ, sum of the four terms (nv, nv) [N m/rad]: row torque, column angle.
+        springs: diag k (nv, nv) [N m/rad] of the joint springs.
+        joint: K_θ, sum of the five terms (nv, nv) [N m/rad]: row torque, column angle.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
         cable_stiffness: Diagonal of K_L (C,) [N/m], of cables without friction; 0 for
@@ -78,6 +79,7 @@ class Stiffness(Result):
     passive: Array = field(metadata=_SQUARE)
     gravity: Array = field(metadata=_SQUARE)
     load: Array = field(metadata=_SQUARE)
+    springs: Array = field(metadata=_SQUARE)
     # in exports, a variable must not have the name of a dimension
     joint: Array = field(metadata={**_SQUARE, "name": "joint_stiffness"})
     tension: Array = field(metadata=unit("N", "cable"))
@@ -98,11 +100,11 @@ class Stiffness(Result):
 
     @quantity("torque", "joint")
     def residual(self) -> Array:
-        """J_Lᵀ F − (J_Xᵀ W − g) (nv,) [N m]; zero if the tensions balance the arm (Eq. 13)."""
+        """J_Lᵀ F − (J_Xᵀ W − g) + k (q − q_0) (nv,) [N m]; zero if the tensions balance the arm."""
         pose, F, J = self.posture, self.tension, self.posture.length_jacobian
         if self.segment_tension is not None:
             F, J = self.segment_tension, pose.segments.length_jacobian
-        return frozen(F @ J - self.wrench @ pose.jacobian + pose.gravity_torque)
+        return frozen(F @ J - self.wrench @ pose.jacobian + pose._own_torque)
 
     @quantity("joint stiffness")
     def margin(self) -> float:
@@ -179,6 +181,7 @@ class Stiffness(Result):
     def _inverse(self) -> Array:
         """K_θ⁻¹ (nv, nv), or SingularStiffness with the joint motion."""
         P = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
+        P += self.springs
         D = P.diagonal()
         if not D.min() > 0.0:
             raise _singular("next to nothing holds the arm", np.eye(D.size)[D.argmin()])
@@ -235,7 +238,8 @@ class Stiffness(Result):
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
         If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity and load, and so is along(u). SingularStiffness also if it is inf.
+        sum over cables, gravity, load and springs, and so is along(u). SingularStiffness also if
+        it is inf.
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)

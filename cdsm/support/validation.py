@@ -34,6 +34,7 @@ RANGES: Final = {
     "length": Range("m", 1e-6, 1e4),
     "mass": Range("kg", 1e-9, 1e6),
     "rigidity": Range("N", 1e-6, 1e12),
+    "spring": Range("N m/rad", 1e-9, 1e12),
     "stiffness": Range("N/m", 1e-6, 1e12),
     "tension": Range("N", 1e-9, 1e9),
     "time": Range("s", 1e-9, 1e9),

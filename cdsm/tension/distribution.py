@@ -67,7 +67,7 @@ def distribute_tension(
         held = quantity(f"fixed[{name!r}]", value, "tension", zero=True)
         low, high = (frozen(np.r_[each[:c], held, each[c + 1 :]]) for each in (low, high))
     wrench = wrench_vector("wrench", wrench)
-    torque = pose.jacobian.T @ wrench - pose.gravity_torque
+    torque = pose.jacobian.T @ wrench - pose._own_torque
     problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
     solution = solve(problem, solver)
     if isinstance(solution, str):

@@ -52,7 +52,7 @@ class Tension(Result, Named):
     def residual(self) -> Array:
         """Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m]."""
         at = self.posture
-        torque = at.jacobian.T @ self.wrench - at.gravity_torque
+        torque = at.jacobian.T @ self.wrench - at._own_torque
         return frozen(self.values @ at.length_jacobian - torque)
 
     def keys(self) -> tuple[str, ...]:
