@@ -105,6 +105,7 @@ from cdsm.statics.buckling import critical_load as critical_load
 from cdsm.statics.buckling import critical_tension as critical_tension
 from cdsm.statics.equilibrium import Equilibrium as Equilibrium
 from cdsm.statics.equilibrium import equilibrium as equilibrium
+from cdsm.statics.forward import forward_statics as forward_statics
 from cdsm.statics.load_cycle import LoadHistory as LoadHistory
 from cdsm.statics.load_cycle import load_cycle as load_cycle
 from cdsm.statics.modes import Modes as Modes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +45,9 @@ class Equilibrium(Result):
             is "unstrained", it equals :func:`~cdsm.stiffness` of this posture and tension.
         stop_torque: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit,
             negative at an upper limit, zero elsewhere.
+        motors: ``"locked"``: they hold the lengths, so the elasticity of the cables counts in K_θ;
+            ``"tension"``: they hold the tensions (:func:`~cdsm.forward_statics`).
+        branch: Share of load and pull up to which the arm followed without a jump; 1: all of it.
     """
 
     _headline, _rows = "moved", "cable"
@@ -53,6 +56,8 @@ class Equilibrium(Result):
     reference_tension: Array = field(metadata=unit("N", "cable"))
     stiffness: Stiffness
     stop_torque: Array = field(metadata=unit("torque", "joint"))
+    motors: Literal["locked", "tension"] = field(default="locked", metadata=unit("1"))
+    branch: float = field(default=1.0, metadata=unit("1"))
 
     @property
     def pose(self) -> Posture:
@@ -228,11 +233,13 @@ def locked_equilibrium(arm: LockedArm) -> Equilibrium:
     return as_equilibrium(arm, found)
 
 
-def as_equilibrium(arm: LockedArm, found: Point) -> Equilibrium:
+def as_equilibrium(arm: LockedArm, found: Point, branch: float = 1.0) -> Equilibrium:
     """Return a solution as an Equilibrium; ElasticityRangeError if a tension is outside its law."""
     return Equilibrium(
         reference=arm.reference,
         reference_tension=arm.tension,
         stiffness=arm.stiffness(found.state.pose),
         stop_torque=found.stop_torque,
+        motors="tension" if arm.tension_held else "locked",
+        branch=branch,
     )

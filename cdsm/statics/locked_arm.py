@@ -25,23 +25,30 @@ class LockedArm:
     """Arm under a wrench W (6,), its motors locked where the cables have the tensions F (C,) [N].
 
     They are locked at ``reference``, or hold the wires of ``rest_length`` (C,) [m], of an arm with
-    ``original_length="unstrained"``. Tensions may leave the domains of their laws: outside, a cable
-    has the stiffness of the nearest end of the domain, or is slack. :func:`require_domain` refuses
-    a result outside. Raises ElasticityRangeError if a law gives no strain at F, or if a series
-    spring is longer than its whole cable.
+    ``original_length="unstrained"``, or hold the tensions (``tension_held``). Tensions may leave
+    the domains of their laws: outside, a cable has the stiffness of the nearest end of the domain,
+    or is slack. :func:`require_domain` refuses a result outside. Raises ElasticityRangeError if a
+    law gives no strain at F, or if a series spring is longer than its whole cable.
     """
 
     def __init__(
-        self, reference: Posture, tension: Array, wrench: Array, rest_length: Array | None = None
+        self,
+        reference: Posture,
+        tension: Array,
+        wrench: Array,
+        rest_length: Array | None = None,
+        *,
+        tension_held: bool = False,
     ) -> None:
         self.reference, self.tension, self.wrench = reference, tension, wrench
+        self.tension_held = tension_held
         laws, L = reference.arm._laws, reference.cable_lengths
         self.rest_length = laws.original_lengths(L, tension)
         if rest_length is not None:
             held = reference.arm.cables.position_controlled
             self.rest_length = frozen(np.where(held, rest_length, L))
         self._laws = []
-        for law, of in laws.held:
+        for law, of in () if tension_held else laws.held:
             lengths = None if rest_length is not None else L[of]
             parts = (self.rest_length[of], laws.series[of], tension[of], lengths)
             try:

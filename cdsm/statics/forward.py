@@ -1,0 +1,168 @@
+"""Posture of an arm from what its motors do: tensions, rest lengths, or pulls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.statics.equilibrium import Equilibrium, as_equilibrium
+from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.solve import (
+    Balance,
+    Point,
+    continued,
+    equilibrium_error,
+    settle,
+    stable_between,
+)
+from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
+from cdsm.support.values import Array
+
+_SHORTEST = 2.0**-10  # shortest step, as a part of the load
+_HELD = 1e-9  # least stiffness of a joint without load, over the largest
+
+Model = Callable[[float], LockedArm]
+"""Arm under a share of the load and of the pull."""
+
+
+def forward_statics(
+    arm: Manipulator,
+    *,
+    tension: ArrayLike | None = None,
+    rest_lengths: ArrayLike | None = None,
+    pull: ArrayLike | None = None,
+    wrench: ArrayLike = NO_WRENCH,
+    start: ArrayLike | None = None,
+) -> Equilibrium:
+    """Compute where an arm comes to rest, from what its motors do.
+
+    Solve J_Lᵀ F + g + k (q − q_0) = J_Xᵀ W for q, between the joint limits. Joints that no cable
+    holds need springs. Exactly one of ``tension``, ``rest_lengths`` and ``pull`` is given. With
+    given tensions, cables add no stiffness of their own (k_c = 0); motors that hold lengths are
+    locked, and k_c counts. :attr:`Equilibrium.motors` says which: the two stiffnesses of one
+    posture can differ by a factor of ten.
+
+    Args:
+        arm: The arm.
+        tension: F (C,) [N] that the motors hold.
+        rest_lengths: Unstrained lengths l_0 (C,) [m] of the wires that the motors have left.
+        pull: How much wire each motor has taken in (C,) [m], from the lengths in which the cables
+            are just straight at the angles q_0 of the springs.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        start: Angles q (nv,) [rad] at which the search begins, under the whole load. None: load and
+            pull grow from nothing, from the angles q_0; :attr:`Equilibrium.branch` says if the arm
+            jumped on the way.
+
+    Raises:
+        InvalidInput: Not exactly one of the three is given, or an argument has the wrong shape; or
+            motors hold rest lengths, but ``original_length`` of the arm is ``"stretched"``.
+        ElasticityRangeError: A tension at the rest is outside the domain of its law.
+        EquilibriumError: No stable equilibrium was found, or nothing holds a joint.
+    """
+    instance("arm", arm, Manipulator)
+    given = {"tension": tension, "rest_lengths": rest_lengths, "pull": pull}
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) != 1:
+        said = f"give exactly one of {', '.join(given)}; {' and '.join(named) or 'none'} given."
+        raise InvalidInput("forward_statics", said)
+    W = wrench_vector("wrench", wrench)
+    free = np.clip(arm.springs.angle, arm.lower, arm.upper)
+    home = arm.at(free)
+    begin = home if start is None else arm.at(start)
+    value = given[named[0]]
+    assert value is not None
+    model = _model(arm, named[0], value, home, begin, W)
+    if start is not None:
+        f = _balance(model(1.0), begin)
+        found, converged = settle(f, begin.q)
+        if not converged:
+            raise equilibrium_error(begin, found, 0.0)
+        return as_equilibrium(model(1.0), found)
+    _require_held(model(0.0), home)
+    return _raised(model, home)
+
+
+def _model(
+    arm: Manipulator, name: str, value: ArrayLike, home: Posture, begin: Posture, wrench: Array
+) -> Model:
+    count = len(arm.cables)
+    if name == "tension":
+        F = vector("tension", value, count, "one tension [N] per cable", "tension")
+        if F.min() < 0.0:
+            c = int(F.argmin())
+            raise InvalidInput(
+                "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
+            )
+        return lambda share: LockedArm(begin, share * F, share * wrench, tension_held=True)
+    if arm.original_length != "unstrained":
+        said = "l_0 of this arm changes with the tension; use original_length='unstrained'."
+        raise InvalidInput(name, said)
+    least = np.array([cable.elasticity.rest for cable in arm.cables])
+    straight = arm._laws.original_lengths(home.cable_lengths, least)
+    if name == "pull":
+        taken = vector("pull", value, count, "the wire taken in [m] per cable", "length")
+        rest = straight - taken
+    else:
+        rest = vector("rest_lengths", value, count, "one length [m] per cable", "length")
+    if not (rest > 0.0).all():
+        c = int(rest.argmin())
+        said = f"leaves {rest[c]:.4g} m of {arm.cables[c].name}, which is {straight[c]:.4g} m long."
+        raise InvalidInput(name, said)
+
+    def model(share: float) -> LockedArm:
+        lengths = straight + share * (rest - straight)
+        return LockedArm(begin, least, share * wrench, lengths)
+
+    return model
+
+
+def _balance(arm: LockedArm, near: Posture) -> Balance:
+    return Balance(arm.at, arm.reference, arm.at_pose(near))
+
+
+def _require_held(arm: LockedArm, home: Posture) -> None:
+    """Raise EquilibriumError if a joint has no stiffness without load and pull."""
+    state = arm.at_pose(home)
+    values, vectors = np.linalg.eigh((state.stiffness + state.stiffness.T) / 2.0)
+    if values[0] > _HELD * abs(values).max():
+        return
+    worst = int(abs(vectors[:, 0]).argmax())
+    name = home.arm.joint_names[worst]
+    said = f"nothing holds {name} where the cables do not pull. Give it a spring: "
+    said += f'with_springs({{"{name}": k}}); or start= where the load acts already'
+    raise EquilibriumError(said, state.residual, 0.0, name)
+
+
+def _raised(model: Model, home: Posture) -> Equilibrium:
+    """Raise load and pull from nothing, step by step; go on from where the branch ends."""
+    f = _balance(model(0.0), home)
+    here, converged = settle(f, home.q)
+    if not converged:
+        raise equilibrium_error(home, here, 0.0)
+    share, step, branch = 0.0, 1.0, 1.0
+    while share < 1.0:
+        goal, before = min(1.0, share + step), here.state.pose
+        found = _next(model(goal), here, before)
+        if found is not None:
+            here, share, step = found, goal, 2.0 * step
+        elif step > _SHORTEST:
+            step /= 2.0
+        else:
+            branch, share = share, 1.0
+            here, converged = settle(_balance(model(1.0), before), before.q)
+            if not converged:
+                raise equilibrium_error(home, here, branch)
+    return as_equilibrium(model(1.0), here, branch)
+
+
+def _next(arm: LockedArm, here: Point, before: Posture) -> Point | None:
+    f = _balance(arm, before)
+    x = before.q / f.unit - here.stop_torque * f.unit / f.k
+    found = continued(f, (x,), before.q)
+    stable = found is not None and stable_between(arm.at, before.q, found.state.pose.q)
+    return found if stable else None
