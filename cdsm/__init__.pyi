@@ -33,7 +33,6 @@ from cdsm.design.variables import Variable as Variable
 from cdsm.errors import CableError as CableError
 from cdsm.errors import CdsmError as CdsmError
 from cdsm.errors import CdsmWarning as CdsmWarning
-from cdsm.errors import ClusterError as ClusterError
 from cdsm.errors import ElasticityRangeError as ElasticityRangeError
 from cdsm.errors import EquilibriumError as EquilibriumError
 from cdsm.errors import FileError as FileError
@@ -47,7 +46,6 @@ from cdsm.errors import MissingWire as MissingWire
 from cdsm.errors import SingularMass as SingularMass
 from cdsm.errors import SingularStiffness as SingularStiffness
 from cdsm.errors import SolverError as SolverError
-from cdsm.errors import StoreError as StoreError
 from cdsm.errors import UnknownName as UnknownName
 from cdsm.errors import UnreachableStiffness as UnreachableStiffness
 from cdsm.errors import UrdfError as UrdfError
@@ -117,15 +115,12 @@ from cdsm.stiffness_matrix import Stiffness as Stiffness
 from cdsm.stiffness_matrix import stiffness as stiffness
 from cdsm.stiffness_matrix.instability import Remedy as Remedy
 from cdsm.support.status import Status as Status
-from cdsm.sweeps.export import read_sweep as read_sweep
-from cdsm.sweeps.export import sweep_to_pandas as sweep_to_pandas
-from cdsm.sweeps.export import write_sweep as write_sweep
+from cdsm.sweeps.files import read_sweep as read_sweep
+from cdsm.sweeps.files import write_sweep as write_sweep
 from cdsm.sweeps.poses import GridPoses as GridPoses
 from cdsm.sweeps.poses import PathPoses as PathPoses
-from cdsm.sweeps.poses import PoseSet as PoseSet
 from cdsm.sweeps.poses import RandomPoses as RandomPoses
-from cdsm.sweeps.run import sweep as sweep
-from cdsm.sweeps.status import SweepStatus as SweepStatus
+from cdsm.sweeps.sweep import sweep as sweep
 from cdsm.tension import Tension as Tension
 from cdsm.tension import distribute_tension as distribute_tension
 from cdsm.tolerances import Tolerance as Tolerance

@@ -22,7 +22,7 @@ from cdsm.measures.rows import require
 from cdsm.support.format import plural
 from cdsm.support.validation import NO_WRENCH, instance, number_array, scalar, sequence_of
 from cdsm.support.values import Array, Given, ReadOnlyState, frozen
-from cdsm.sweeps.poses import PoseSet, poses_of
+from cdsm.sweeps.poses import PoseSet, joint_angles
 from cdsm.tension import checked_bounds
 from cdsm.tolerances import Tolerances
 from cdsm.wires.catalogue import as_wire
@@ -94,7 +94,7 @@ class DesignProblem(ReadOnlyState):
         postures = self.postures
         if not isinstance(postures, PoseSet):
             postures = frozen(number_array("postures", postures))
-        poses_of(self.arm, postures)  # raises for a wrong shape
+        joint_angles(self.arm, postures)  # raises for a wrong shape
         checked_bounds(self.arm, self.minimum, self.maximum)
         asked = {measure.of for measure in (*objectives, *constraints)}
         require(
@@ -232,8 +232,7 @@ class DesignProblem(ReadOnlyState):
 
     def postures_of(self, arm: Manipulator) -> Array:
         """Return the postures q (P, nv) [rad] of an arm; InvalidInput if they do not fit it."""
-        poses = poses_of(arm, self.postures)
-        return poses.angles({dim: slice(0, size) for dim, size in poses.sizes.items()})
+        return joint_angles(arm, self.postures)
 
     @cached_property
     def start(self) -> Array | None:

@@ -76,7 +76,6 @@ _MARKS: Final[dict[str, tuple[str, str, float]]] = {
     "immobile": ("s", "0.5", 10.0),
     "beyond_limits": ("v", "0.6", 10.0),
     "coincident_sites": ("*", BLACK, 18.0),
-    "worker_lost": ("1", BLACK, 20.0),
     "pending": ("2", "0.5", 20.0),
 }
 """Marker, colour and size [pt²] of entries without the quantity, by status."""
@@ -101,7 +100,7 @@ def plot_map(
     the values, and infinite values have a colour of their own, at the ends of the colour bar.
 
     Args:
-        dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
+        dataset: Result of :func:`~cdsm.sweep` with the output ``tip_position``. Use
             ``sel`` if it has more than 9 panels.
         quantity: Quantity with one number per entry: ``"softest"``, ``"stiffest"``,
             ``"isotropy"``, ``"margin"``; or ``"along"`` (a panel for each direction).

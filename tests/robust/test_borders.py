@@ -90,12 +90,10 @@ NAMES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], str]] = {
         cdsm.CableError,
         "name: .* character 5",
     ),
-    "law of a sweep": (
-        lambda: cdsm.sweep(
-            short_arm(), np.zeros((1, short_arm().nv)), minimum=20.0, elasticity={SURROGATE: STEEL}
-        ),
+    "load of a sweep": (
+        lambda: cdsm.sweep(short_arm(), np.zeros((1, 6)), wrench={SURROGATE: np.zeros(6)}),
         cdsm.InvalidInput,
-        "name of elasticity: .* character 5",
+        "name: .* character 5",
     ),
 }
 

@@ -63,7 +63,7 @@ def test_a_path_is_seen_whole_along_each_axis() -> None:
 
 
 def test_unstable_entries_are_marked_and_counted(planar: xr.Dataset) -> None:
-    unstable = (planar.status == cdsm.SweepStatus.UNSTABLE).values
+    unstable = (planar.status == cdsm.Status.UNSTABLE).values
     assert not unstable[..., 0].any()
     assert unstable[..., 2].all()
     tips = 1e3 * planar.tip_position.values.reshape(-1, 3)[:, [0, 2]]
@@ -95,7 +95,7 @@ def test_three_dimensions_sections_and_statuses() -> None:
     titles = [axes.get_title() for axes in figure.axes[:9]]
     assert [each.split(",")[0] for each in titles[::3]] == [f"direction {u}" for u in "xyz"]
     assert [each.split(", ")[1][0] for each in titles[:3]] == ["y", "z", "x"]  # slices of a cloud
-    infeasible = float((found.status == cdsm.SweepStatus.INFEASIBLE).mean())
+    infeasible = float((found.status == cdsm.Status.INFEASIBLE).mean())
     assert 0.0 < infeasible < 1.0
     told = [text.get_text() for text in figure.legends[0].get_texts()]
     assert f"infeasible: {100 * infeasible:.3g} %" in told
