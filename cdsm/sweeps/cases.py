@@ -225,4 +225,6 @@ class Cases:
 
 def _dims(name: str) -> list[str]:
     """Return the dimensions of an output or of ``status`` behind those of the postures."""
-    return [*CASES] if name == "status" else [*QUANTITIES[name].cases, *QUANTITIES[name].dims]
+    quantity = QUANTITIES.get(name)
+    cases = () if quantity and quantity.needs == "posture" else CASES
+    return [*cases, *(quantity.dims if quantity else ())]

@@ -18,11 +18,6 @@ class Quantity:
     units: str  # SI, in the notation of UDUNITS
     dims: tuple[str, ...]  # its own dimensions, after those of poses and cases
 
-    @property
-    def cases(self) -> tuple[str, ...]:
-        """Return the dimensions of the cases, loads and lower bounds, on which it depends."""
-        return () if self.needs == "posture" else CASES
-
 
 CASES: Final = ("wrench", "minimum")
 """Dimensions of the cases; each exists only if several values of the argument are given."""

@@ -21,6 +21,7 @@ from cdsm.sweeps.cases import Cases
 from cdsm.sweeps.files import stored
 from cdsm.sweeps.poses import PoseSet, angles_of, distinct
 from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
+from cdsm.tension import checked_bounds
 
 if TYPE_CHECKING:
     import xarray
@@ -89,20 +90,17 @@ def sweep(
         raise InvalidInput("outputs", f"{names} given; name some of {', '.join(QUANTITIES)}, once.")
     lows = distinct("minimum", minimum)
     for low in lows.tolist():
-        quantity("minimum", low, "tension", zero=True)
-    most = quantity("maximum", maximum, "tension", zero=True, infinite=True)
-    if most < lows.max():
-        raise InvalidInput("maximum", f"{most:g} N given, below a minimum of {lows.max():g} N.")
+        checked_bounds(instance("arm", arm, Manipulator), low, maximum)
     loads, wrenches = _named(wrench)
     ways, directions = _named(direction)
     W = given_wrench(wrenches, len(wrenches))
     u = unit_directions("direction", directions)
     cases = Cases(
-        arm=instance("arm", arm, Manipulator),
+        arm=arm,
         outputs=tuple(one_of("output", name, QUANTITIES) for name in names),
         wrench=np.atleast_2d(W),
         minimum=lows,
-        maximum=most,
+        maximum=quantity("maximum", maximum, "tension", zero=True, infinite=True),
         direction=np.atleast_2d(u),
         worst_friction=worst_friction,
         diameter=diameter,
