@@ -102,12 +102,13 @@ def stored(
 
     lazy: Any = dask  # untyped
     try:
-        if not path.exists():
+        if is_new := not path.exists():
             _make(path, cases.dataset(q))
         kept = read_sweep(path)
         sizes, dims = kept["status"].encoding["preferred_chunks"], q.dims[:-1]
         q = q.chunk({dim: sizes.get(dim, -1) for dim in dims})
-        _require_same(path, kept.chunk(sizes), cases.dataset(q))  # chunk by chunk
+        if not is_new:
+            _require_same(path, kept.chunk(sizes), cases.dataset(q))  # chunk by chunk
         status, names = kept["status"].load(), [*kept.coords]
         slices = lazy.array.core.slices_from_chunks(tuple(q.chunksizes[dim] for dim in dims))
         regions = [dict(zip(dims, part, strict=True)) for part in slices]
