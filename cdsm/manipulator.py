@@ -1,27 +1,27 @@
 """An arm with its cables.
 
 :class:`Manipulator` has all data that do not depend on the joint angles. :class:`Posture` has all
-results that depend only on them. A posture is frozen: :meth:`Manipulator.at` makes each one.
+results that depend only on them. Both are frozen: :meth:`Manipulator.at` makes each posture.
 """
 
 from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, final
+from typing import TYPE_CHECKING, Any, Self, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.arm_parts import ArmParts, CablesOrFile, checked_cables, checked_parts, doubts
-from cdsm.cable import Cables
+from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import CableError, InvalidInput, JointLimitError
-from cdsm.geometry import Geometry
+from cdsm.geometry import LONGEST, Geometry, doubts_about_units
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
@@ -30,7 +30,7 @@ from cdsm.segments import Chains
 from cdsm.support.directions import Direction, gravity_vector
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
-from cdsm.support.validation import flag, instance, vector
+from cdsm.support.validation import flag, instance, one_of, sequence_of, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.support.warning import warn
 from cdsm.tolerances import Tolerances
@@ -43,11 +43,18 @@ if TYPE_CHECKING:
 
     from cdsm.wires.catalogue import Wire
 
+CablesOrFile = Cable | Sequence[Cable] | str | os.PathLike[str]
+"""One or more cables, or the path of their file."""
+
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity in base axes [m/s²]."""
 
 LIMIT_SLACK = 1e-9
 """Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
+
+_FARTHEST = 5.0  # longest plausible lead and distance of a site [m]; or ten arm lengths, if more
+
+_OF_BODY = ("name", "nv", "joint_names", "slides", "lower", "upper")
 
 ANOTHER_ARM = (
     "another arm; distribute it for this one. with_cables, with_friction, with_gravity and "
@@ -57,6 +64,7 @@ ANOTHER_ARM = (
 
 
 @final
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Manipulator(Printed):
     """A cable-driven arm: rigid links, joints, cables.
 
@@ -73,6 +81,20 @@ class Manipulator(Printed):
             ``"stretched"``: ℓ, as in the paper's figures; K is then too low by the strain, 3–5 %
             for Eq. 19.
 
+    Attributes:
+        name: Name of the robot.
+        urdf: URDF text of the arm.
+        cables: Cables, in the order of every (C,) array; ``cables["cable1_1"]`` is one.
+        tip_link: Name of the link whose frame is the tip.
+        gravity: Gravity in base axes (3,) [m/s²].
+        original_length: Length of a wire that is l_0 in EA/l_0, as given.
+        tolerances: Uncertainties of dimensions and measured values; zero if none were given.
+        nv: Number of degrees of freedom.
+        joint_names: Names of the joints, in the order of every (nv,) array.
+        slides: Whether each joint is prismatic (nv,); its coordinate is then a length [m].
+        lower: Lower joint limits (nv,) [rad]; [m] for prismatic joints.
+        upper: Upper joint limits (nv,) [rad]; [m] for prismatic joints.
+
     Raises:
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
             not three numbers.
@@ -82,11 +104,23 @@ class Manipulator(Printed):
         MissingWire: The file of the cables names no wire for some of them.
     """
 
-    _parts: ArmParts
+    name: str
+    urdf: str
+    cables: Cables
+    tip_link: str
+    gravity: Array
+    original_length: OriginalLength
+    tolerances: Tolerances
+    nv: int
+    joint_names: tuple[str, ...]
+    slides: NDArray[np.bool_]
+    lower: Array
+    upper: Array
+    _geometry: Geometry | None
     _body: RigidBody
     _routing: Routing
     _laws: CableLaws
-    _doubts: list[str]
+    _doubts: tuple[str, ...]
 
     def __init__(
         self,
@@ -98,23 +132,18 @@ class Manipulator(Printed):
         original_length: OriginalLength = "unstrained",
     ) -> None:
         if isinstance(geometry, str | os.PathLike):
-            raise InvalidInput(
-                "geometry",
-                f"{str(geometry)!r} given; a Geometry is needed. "
-                "Read the file of a robot with Manipulator.from_urdf().",
-            )
+            said = f"{str(geometry)!r} given; a Geometry is needed. "
+            said += "Read the file of a robot with Manipulator.from_urdf()."
+            raise InvalidInput("geometry", said)
         described = instance("geometry", geometry, Geometry)
-        if elasticity is not None and cables is None:
-            cables = serpentine_cables(geometry, elasticity)
-        elif elasticity is not None or cables is None:
-            raise InvalidInput(
-                "elasticity",
-                "give one of elasticity= (for the cables of the geometry) and cables=; "
-                + ("both were given." if cables is not None else "neither was."),
-            )
-        self._build(
-            checked_parts(described, to_urdf(described), cables, TIP, gravity, original_length)
-        )
+        if (elasticity is None) == (cables is None):
+            said = "give one of elasticity= (for the cables of the geometry) and cables=; "
+            said += f"{'neither was' if cables is None else 'both were given'}."
+            raise InvalidInput("elasticity", said)
+        if elasticity is not None:
+            cables = serpentine_cables(described, elasticity)
+        assert cables is not None
+        self._define(to_urdf(described), cables, TIP, gravity, original_length, None, described)
 
     @classmethod
     def from_urdf(
@@ -141,8 +170,7 @@ class Manipulator(Printed):
             joint_names: The moving joints in the order of q. None: Pinocchio's order: branch by
                 branch, each from the base to its end, with the branches sorted by the names of
                 their joints.
-            gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s²
-                along it; (0, 0, 0) for none.
+            gravity: As for :class:`Manipulator`.
             check_inertia: Refuse moments of inertia that no rigid body can have. Stiffness does not
                 depend on them, but :func:`~cdsm.modes` do.
             original_length: As for :class:`Manipulator`.
@@ -157,8 +185,7 @@ class Manipulator(Printed):
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
-        given = None, text, cables, tip, gravity, original_length, joint_names
-        return cls.__new__(cls)._build(checked_parts(*given))
+        return cls.__new__(cls)._define(text, cables, tip, gravity, original_length, joint_names)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], wire: Wire | None = None) -> Manipulator:
@@ -180,7 +207,7 @@ class Manipulator(Printed):
         """
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
 
-        return cls.__new__(cls)._build(checked_parts(*read_arm(path, wire)))
+        return cls.__new__(cls)._define(**read_arm(path, wire))
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write an ARM.toml from which :meth:`read` builds an equal arm; return its path.
@@ -193,7 +220,7 @@ class Manipulator(Printed):
         """
         from cdsm.arm_file.arm import arm_text
 
-        return write_text(path, arm_text(self._parts))
+        return write_text(path, arm_text(self))
 
     def plot(self, q: ArrayLike | None = None) -> Figure:
         """Plot the arm in mm at q (nv,) [rad]; None: each angle is 0, or the limit nearest to 0.
@@ -222,7 +249,7 @@ class Manipulator(Printed):
         site = routing.sites(state.placement)
         spans = routing.spans(state.twist, site)
         self._require_apart(spans.length, q)
-        pose = Posture(
+        return Posture(
             arm=self,
             q=q,
             tip=frozen(state.tip),
@@ -233,9 +260,8 @@ class Manipulator(Printed):
             gravity_stiffness=frozen(state.gravity_stiffness),
             _twist=frozen(state.twist),
             _sites=frozen(site),
+            _spans=spans,
         )
-        pose.__dict__["_spans"] = spans  # a cached property
-        return pose
 
     def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
         """Compute only L(q) (C,) [m], lead included (Eq. 8); equal to ``at(q).cable_lengths``.
@@ -251,16 +277,12 @@ class Manipulator(Printed):
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
         """Check joint angles (nv,) [rad] and return them read-only."""
         q = vector("q", q, self.nv, self._meaning_of_q)
-        if flag("check_limits", check_limits):
-            out = np.flatnonzero(self._beyond_limits(q)).tolist()
-            if out:
-                names = [self.joint_names[i] for i in out]
-                limits = [(float(self.lower[i]), float(self.upper[i])) for i in out]
-                texts = [
-                    beyond(name, q[i], *limit, self.joint_units[i])
-                    for i, name, limit in zip(out, names, limits, strict=True)
-                ]
-                raise JointLimitError(texts, names, q[out].tolist(), limits)
+        if flag("check_limits", check_limits) and (out := self._beyond_limits(q)).any():
+            at = np.flatnonzero(out).tolist()
+            names, units = ([of[i] for i in at] for of in (self.joint_names, self.joint_units))
+            angles, low, high = (of[at].tolist() for of in (q, self.lower, self.upper))
+            texts = list(map(beyond, names, angles, low, high, units))
+            raise JointLimitError(texts, names, angles, [*zip(low, high, strict=True)])
         return q
 
     @cached_property
@@ -276,30 +298,22 @@ class Manipulator(Printed):
         """Raise CableError if a segment, of the ``length`` (S,) [m], has no direction."""
         if length.min(initial=math.inf) < SHORTEST_SEGMENT:
             cable = self.cables[int(self._routing.cable[length.argmin()])]
-            raise CableError(
-                cable.name,
-                f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
-                "direction there. Move a site, or change the posture.",
-            )
+            said = f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
+            said += "direction there. Move a site, or change the posture."
+            raise CableError(cable.name, said)
 
     @property
     def geometry(self) -> Geometry:
         """Geometry from which the arm was built; InvalidInput for an arm from a URDF."""
-        if self._parts.geometry is None:
-            raise InvalidInput(
-                "geometry", f"{self.name} was made from a URDF and has none; see arm.urdf."
-            )
-        return self._parts.geometry
+        if self._geometry is None:
+            said = f"{self.name} was made from a URDF and has none; see arm.urdf."
+            raise InvalidInput("geometry", said)
+        return self._geometry
 
     @property
     def is_serpentine(self) -> bool:
         """Whether the arm was built from a :class:`~cdsm.Geometry`."""
-        return self._parts.geometry is not None
-
-    @property
-    def name(self) -> str:
-        """Name of the robot."""
-        return self._body.name
+        return self._geometry is not None
 
     @cached_property
     def length(self) -> float:
@@ -313,55 +327,10 @@ class Manipulator(Printed):
         reach = float(np.linalg.norm(self._routing.point, axis=1).max())
         return max(self._body.length, reach)
 
-    @property
-    def tip_link(self) -> str:
-        """Name of the link whose frame is the tip."""
-        return self._parts.tip
-
-    @property
-    def urdf(self) -> str:
-        """URDF text of the arm."""
-        return self._parts.urdf
-
-    @property
-    def cables(self) -> Cables:
-        """Cables of the arm, in the order of every (C,) array; ``cables["cable1_1"]`` is one."""
-        return self._parts.cables
-
-    @cached_property
-    def gravity(self) -> Array:
-        """Gravity in base axes (3,) [m/s²]."""
-        return frozen(np.array(self._parts.gravity))
-
-    @property
-    def original_length(self) -> OriginalLength:
-        """Length of a wire that is l_0 in EA/l_0: ``"unstrained"``, or ``"stretched"`` (paper)."""
-        return self._parts.original_length
-
     @cached_property
     def has_friction(self) -> bool:
         """Whether any cable has friction in a hole. Results that neglect this friction say so."""
         return any(any(cable.friction) for cable in self.cables)
-
-    @property
-    def tolerances(self) -> Tolerances:
-        """Uncertainties of the arm's dimensions and measured values; zero if none were given."""
-        return self._parts.tolerances
-
-    @property
-    def nv(self) -> int:
-        """Number of degrees of freedom."""
-        return self._body.nv
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of every (nv,) array."""
-        return self._body.joint_names
-
-    @property
-    def slides(self) -> NDArray[np.bool_]:
-        """Whether each joint is prismatic (nv,); its coordinate is then a length [m]."""
-        return self._body.slides
 
     @property
     def joint_units(self) -> tuple[str, ...]:
@@ -376,16 +345,6 @@ class Manipulator(Printed):
         """Return the unit of eigenvalues of K_θ: "N m/rad", "N/m" or "N m/rad or N/m"."""
         return JointUnits(self.slides).stiffness()
 
-    @property
-    def lower(self) -> Array:
-        """Lower joint limits (nv,) [rad]; [m] for prismatic joints."""
-        return self._body.lower
-
-    @property
-    def upper(self) -> Array:
-        """Upper joint limits (nv,) [rad]; [m] for prismatic joints."""
-        return self._body.upper
-
     def __repr__(self) -> str:
         return f"<Manipulator {self}>"
 
@@ -395,20 +354,74 @@ class Manipulator(Printed):
             free = f"{plural(len(self.geometry.joints), 'joint')} ({free})"
         return f"{self.name}: {free}, {plural(len(self.cables), 'cable')}, {self.length:.6g} m long"
 
-    def _build(
-        self, parts: ArmParts, body: RigidBody | None = None, told: Sequence[str] = ()
+    def _define(
+        self,
+        urdf: str,
+        cables: CablesOrFile,
+        tip_link: str,
+        gravity: Direction,
+        original_length: OriginalLength,
+        joint_names: Sequence[str] | None = None,
+        geometry: Geometry | None = None,
+        tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
+        like: Manipulator | None = None,
     ) -> Self:
-        """Set all attributes; the user has seen the doubts ``told`` of another arm."""
-        if body is None:
-            body = RigidBody(parts.urdf, parts.tip, np.array(parts.gravity), parts.joint_names)
-        self._body, self._parts = body, parts._replace(joint_names=body.joint_names)
-        self._routing = Routing.of(body, parts.cables)
-        self._laws = CableLaws(parts.cables, parts.original_length)
-        self._doubts = doubts(parts, body)
+        """Check what defines an arm, and set all attributes; ``urdf`` has been checked before.
+
+        ``like`` is an arm of the same robot, whose doubts the user has seen.
+        """
+        one_of("original_length", original_length, get_args(OriginalLength))
+        gravity = gravity_vector("gravity", gravity)
+        if joint_names is not None:
+            joint_names = sequence_of("joint_names", joint_names, str)
+        cables = _checked(cables)
+        same = like is not None and np.array_equal(gravity, like.gravity)
+        body = like._body if like and same else RigidBody(urdf, tip_link, gravity, joint_names)
+        self.__dict__.update(urdf=urdf, cables=cables, tip_link=tip_link, gravity=gravity)
+        self.__dict__.update(original_length=original_length, tolerances=tolerances)
+        self.__dict__.update({name: getattr(body, name) for name in _OF_BODY})
+        self.__dict__.update(_geometry=geometry, _body=body, _routing=Routing.of(body, cables))
+        self.__dict__.update(_laws=CableLaws(cables, original_length), _doubts=_doubts(self))
         for doubt in self._doubts:
-            if doubt not in told:
+            if like is None or doubt not in like._doubts:
                 warn(f"{self.name}: {doubt}")
         return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what defines the arm: two arms are equal if these values are equal."""
+        names = ("urdf", "cables", "tip_link", "original_length", "joint_names", "tolerances")
+        state = {name: getattr(self, name) for name in names}
+        return state | {"geometry": self._geometry, "gravity": tuple(self.gravity.tolist())}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._define(**state)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Manipulator) and self.__getstate__() == other.__getstate__()
+
+    def __hash__(self) -> int:
+        return hash(self.urdf)
+
+    def _replace(self, **changes: Any) -> Manipulator:
+        """Return the same robot with other cables, gravity or tolerances."""
+        state = {**self.__getstate__(), **changes}
+        return Manipulator.__new__(Manipulator)._define(**state, like=self)
+
+    def with_cables(self, cables: CablesOrFile) -> Manipulator:
+        """Return an arm with the same robot and other cables, given as for :class:`Manipulator`."""
+        return self._replace(cables=cables)
+
+    def with_friction(self, friction: float) -> Manipulator:
+        """Return the same arm with one friction coefficient μ [-], from 0 to 2, in all holes."""
+        return self._replace(cables=[cable.with_friction(friction) for cable in self.cables])
+
+    def with_tolerances(self, tolerances: Tolerances) -> Manipulator:
+        """Return the same arm with other :class:`Tolerances`; InvalidInput for another type."""
+        return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
+
+    def with_gravity(self, gravity: Direction) -> Manipulator:
+        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis."""
+        return self._replace(gravity=gravity)
 
     @cached_property
     def _chains(self) -> Chains:
@@ -425,47 +438,37 @@ class Manipulator(Printed):
         """Elasticities of the segments of :attr:`_chains`."""
         return CableLaws(self._chains.segments, self.original_length)
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, type(self)) and self._parts == other._parts
 
-    def __hash__(self) -> int:
-        return hash(self.urdf)
+def _checked(cables: CablesOrFile) -> Cables:
+    """Return cables, given as such or as the path of their file; each needs a name of its own."""
+    if isinstance(cables, (str, os.PathLike)):
+        from cdsm.arm_file.cables import read_cables
 
-    def __getstate__(self) -> ArmParts:
-        return self._parts
+        return Cables(read_cables(cables))
+    given = [cables] if isinstance(cables, Cable) else cables
+    cables = Cables(sequence_of("cables", given, Cable))
+    if not cables:
+        raise InvalidInput("cables", "none given; an arm needs at least one.")
+    name, count = Counter(cables.names).most_common(1)[0]
+    if count > 1:
+        raise CableError(name, "the name is used twice; every cable needs its own.")
+    return cables
 
-    def __setstate__(self, parts: ArmParts) -> None:
-        self._build(parts)
 
-    def with_cables(self, cables: CablesOrFile) -> Self:
-        """Return an arm with the same robot and other cables, given as for :class:`Manipulator`."""
-        return self._replace(cables=checked_cables(cables))
-
-    def with_friction(self, friction: float) -> Self:
-        """Return the same arm with one friction coefficient μ [-], from 0 to 2, in all holes."""
-        return self._replace(cables=Cables(cable.with_friction(friction) for cable in self.cables))
-
-    def with_tolerances(self, tolerances: Tolerances) -> Self:
-        """Return the same arm with other :class:`Tolerances`; InvalidInput for another type."""
-        return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
-
-    def with_gravity(self, gravity: Direction) -> Self:
-        """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis."""
-        g = tuple(gravity_vector("gravity", gravity).tolist())
-        parts = self._parts._replace(gravity=g)
-        return type(self).__new__(type(self))._build(parts, told=self._doubts)
-
-    def _with_laws(self, laws: Sequence[Elasticity]) -> Self:
-        """Return the same arm with other laws, one per cable; faster, since the rest is kept."""
-        pairs = zip(self.cables, laws, strict=True)
-        cables = Cables(replace(cable, elasticity=law) for cable, law in pairs)
-        arm = type(self).__new__(type(self))
-        arm._body, arm._routing, arm._doubts = self._body, self._routing, self._doubts
-        arm._parts = self._parts._replace(cables=cables)
-        arm._laws = CableLaws(cables, self.original_length)
-        return arm
-
-    def _replace(self, **changes: Any) -> Self:
-        """Return the same robot with other parts that do not concern its rigid bodies."""
-        parts = self._parts._replace(**changes)
-        return type(self).__new__(type(self))._build(parts, self._body, self._doubts)
+def _doubts(arm: Manipulator) -> tuple[str, ...]:
+    """Return texts of warnings: lengths look as if not in metres, or no joint moves the tip."""
+    length = arm._body.length
+    # without lengths between the joints, the frame of the robot may be as long as any arm
+    most = max(_FARTHEST, 10.0 * length) if length > 0.0 else LONGEST
+    sizes = []
+    for each in arm.cables:
+        sizes.append((f"the lead of {each.name}", each.lead, most))
+        far = max(math.hypot(*site.position) for site in each.sites)
+        sizes.append((f"a site of {each.name}", far, most))
+    largest = max(sizes, key=lambda size: size[1])
+    # a geometry warns of its own length
+    found = doubts_about_units(0.0 if arm.is_serpentine else length, [largest])
+    if not arm._body.tip_joints.size:
+        said = f"no joint moves its tip {arm.tip_link}, so its stiffness is infinite"
+        found.append(f"{said}; give another link as tip.")
+    return tuple(found)

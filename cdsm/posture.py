@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import cdsm
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.contacts import overlapping
-from cdsm.routing import Spans
+from cdsm.routing import Spans, cross
 from cdsm.segments import Segments
 from cdsm.support.format import JointUnits, aligned, coordinates, plain
 from cdsm.support.result import Result, unit
@@ -57,6 +57,7 @@ class Posture(ReadOnlyState):
     gravity_stiffness: Array
     _twist: Array
     _sites: Array
+    _spans: Spans
 
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
@@ -82,11 +83,6 @@ class Posture(ReadOnlyState):
     def moment_arms(self) -> MomentArms:
         """Moment arm of each cable about each joint, found by their names."""
         return MomentArms(posture=self, values=frozen(0.0 - self.length_jacobian))  # no -0.0
-
-    @cached_property
-    def _spans(self) -> Spans:
-        """The cable segments whose length joints change."""
-        return self.arm._routing.spans(self._twist, self._sites)
 
     @cached_property
     def length_hessian(self) -> Array:
@@ -115,45 +111,37 @@ class Posture(ReadOnlyState):
     @property
     def bones(self) -> tuple[Array, ...]:
         """The links as a stick figure: lines (2, 3) [m] from joint to joint and to the tip."""
-        return tuple(bone for bones in self._bones for bone in bones)
+        return tuple(bone for _, bone in self._bones)
 
     @property
     def brackets(self) -> tuple[Array, ...]:
         """Lines (2, 3) [m] from each cable site to the nearest of the bones of the site's link."""
-        lines = []
-        for row, site in zip(self.arm._routing.row, self._sites.T, strict=True):
-            feet = [foot(site, bone) for bone in self._bones[row]] or [self._placements[row, :3, 3]]
-            nearest = min(feet, key=lambda each: float(np.linalg.norm(each - site)))
-            lines.append(frozen(np.array([site, nearest])))
-        return tuple(lines)
-
-    def _stick_figure(self, without: Collection[int]) -> tuple[list[Array], list[Array]]:
-        """Return :attr:`bones` and :attr:`brackets`, except those of the links in ``without``.
-
-        A link is given by the number of the joint that carries it, from 1; 0 is the base.
-        """
-        rows = self.arm._routing.row.tolist()
-        brackets = zip(rows, self.brackets, strict=True)
-        return (
-            [bone for row, each in enumerate(self._bones) if row not in without for bone in each],
-            [bracket for row, bracket in brackets if row not in without],
-        )
+        return tuple(self._stick_figure()[1])
 
     @cached_property
-    def _bones(self) -> tuple[tuple[Array, ...], ...]:
-        """Lines (2, 3) [m] from the base, and from each joint, to the next joints or the tip."""
+    def _bones(self) -> list[tuple[int, Array]]:
+        """The bones, each with the row of the joint that carries its link; row 0 is the base."""
         origin, body = self._placements[:, :3, 3], self.arm._body
-        ends = [*zip(body.parent[1:], origin[1:], strict=True)]
-        bones: list[list[Array]] = [[] for _ in origin]
-        last = int(body.tip_joints[-1]) + 1 if body.tip_joints.size else 0
-        for row, end in [*ends, (last, self.tip[:3, 3])]:
-            if (origin[row] != end).any():
-                bones[row].append(frozen(np.array([origin[row], end])))
-        return tuple(map(tuple, bones))
+        tip = ([0, *body.tip_joints + 1][-1], self.tip[:3, 3])
+        ends = [*zip(body.parent[1:], origin[1:], strict=True), tip]
+        bones = [(row, np.array([origin[row], end])) for row, end in ends]
+        return [(row, frozen(bone)) for row, bone in bones if (bone[0] != bone[1]).any()]
+
+    def _stick_figure(self, without: Collection[int] = ()) -> tuple[list[Array], list[Array]]:
+        """Return :attr:`bones` and :attr:`brackets`, except those of the rows in ``without``."""
+        brackets = []
+        for row, site in zip(self.arm._routing.row.tolist(), self._sites.T, strict=True):
+            if row not in without:
+                feet = [foot(site, bone) for at, bone in self._bones if at == row]
+                ends = feet or [self._placements[row, :3, 3]]
+                nearest = min(ends, key=lambda end: float(np.linalg.norm(end - site)))
+                brackets.append(frozen(np.array([site, nearest])))
+        return [bone for row, bone in self._bones if row not in without], brackets
 
     def link_pose(self, link: str) -> Array:
         """Compute the pose (4, 4) [m] of a link's frame in base axes, or raise UnknownName."""
-        return frozen(self.arm._body.placement(self.q, link))
+        poses = self.arm._body.link_placements(self.q)
+        return frozen(poses[one_of("link", link, poses)])
 
     @cached_property
     def self_contacts(self) -> tuple[tuple[str, str], ...]:
@@ -171,9 +159,7 @@ class Posture(ReadOnlyState):
     def remarks(self) -> tuple[str, ...]:
         """One text, which names overlapping links, if the arm passes through itself; else none."""
         pairs = [" and ".join(pair) for pair in self.self_contacts]
-        if not pairs:
-            return ()
-        return (f"the arm passes through itself: {listed(pairs, 3, '; ')}",)
+        return (f"the arm passes through itself: {listed(pairs, 3, '; ')}",) if pairs else ()
 
     @cached_property
     def segments(self) -> Segments:
@@ -204,18 +190,12 @@ def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp])
     """
     load = np.zeros((jacobian.shape[1],) * 2)
     if wrench.any():
-        J = jacobian[:, tip_joints]
+        v, z = np.split(jacobian[:, tip_joints], 2)
         later = np.tri(len(tip_joints), k=-1)
-        force = (1.0 - later) * (J[3:].T @ hat(wrench[:3]) @ J[:3])
-        moment = later * (J[3:].T @ hat(wrench[3:]) @ J[3:])
+        force = (1.0 - later) * (cross(z, wrench[:3, None]).T @ v)
+        moment = later * (cross(z, wrench[3:, None]).T @ z)
         load[np.ix_(tip_joints, tip_joints)] = force + force.T * later - moment
     return load
-
-
-def hat(a: Array) -> Array:
-    """Return the matrix of the cross product with a: its product with b is a × b."""
-    x, y, z = a.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 @final

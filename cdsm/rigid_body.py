@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from cdsm.errors import InvalidInput, UrdfError
+from cdsm.errors import InvalidInput, UrdfError, listed
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 
@@ -27,9 +27,7 @@ class State(NamedTuple):
     jacobian: Array  # J_X (6, nv) at the tip, linear rows first
     gravity_torque: Array  # g = ∂V/∂θ (nv,)
     gravity_stiffness: Array  # ∂g/∂θ (nv, nv)
-    twist: (
-        Array  # (v, z) of each joint (6, nv): a point x that joint j moves has ∂x/∂θ_j = v + z × x
-    )
+    twist: Array  # (v, z) (6, nv): a point x that joint j moves has ∂x/∂θ_j = v_j + z_j × x
     placement: Array  # poses (n, 4, 4) of the bodies that were asked for
 
 
@@ -71,11 +69,6 @@ class RigidBody:
             raise UrdfError(f"Pinocchio does not accept the URDF: {error}") from None
         model.gravity.linear = np.array(gravity)
         names = tuple(model.names)[1:]
-        if model.nq != len(names) or model.nv != len(names):
-            raise UrdfError(
-                "the URDF has a joint with more than one coordinate; cdsm takes revolute and "
-                "prismatic ones."
-            )
         self.joint_names = names if joint_names is None else _reordered(names, joint_names)
         # index in Pinocchio's order of each of our coordinates, and the inverse permutation
         self._theirs = frozen(np.array([names.index(name) for name in self.joint_names]))
@@ -91,6 +84,7 @@ class RigidBody:
             for index, frame in enumerate(model.frames)
             if frame.type == pin.FrameType.BODY
         }
+        self.link_names = tuple(self._frames)
         self._tip = self._frame(tip)
         self._scratch = threading.local()
         self.parent: list[int] = [self._row(model.parents[i]) for i in self._rows]
@@ -99,11 +93,6 @@ class RigidBody:
         )
         self._twists = frozen(self._local_twists())
         self.slides = frozen(np.asarray(~self._twists[1:, 3:].any(axis=1)))
-
-    @property
-    def link_names(self) -> tuple[str, ...]:
-        """Names of all links."""
-        return tuple(self._frames)
 
     def state(self, q: Array, rows: Sequence[int] = ()) -> State:
         """Compute everything at joint angles q (nv,), with the poses of the bodies in ``rows``."""
@@ -144,10 +133,6 @@ class RigidBody:
         data = self._data()
         pin.framesForwardKinematics(self._model, data, self._permuted(q))
         return {name: data.oMf[index].homogeneous for name, index in self._frames.items()}
-
-    def placement(self, q: Array, link: str) -> Array:
-        """Compute the pose (4, 4) of one link's frame in base axes, or raise UnknownName."""
-        return self.link_placements(q)[one_of("link", link, self._frames)]
 
     def potential_energy(self, q: Array) -> float:
         """Compute the gravitational energy V of all links [J] at joint angles (nv,) [rad]."""
@@ -203,11 +188,6 @@ class RigidBody:
             tip_point=tip.placement.translation.copy(),
         )
 
-    def pseudo_inertias(self) -> Array:
-        """Compute :func:`pseudo_inertia` (1 + nv, 4, 4) of what the base and the joints carry."""
-        bodies = [self._model.inertias[i] for i in self._rows]
-        return np.array([pseudo_inertia(each.mass, each.lever, each.inertia) for each in bodies])
-
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
         """Draw the visual shapes of a URDF below a node of a viser server, and return them.
 
@@ -261,29 +241,11 @@ class RigidBody:
 
 def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:
     """Return ``wanted``, the order of joints; InvalidInput unless it has each of ``names`` once."""
-    if sorted(wanted) != sorted(names):
-        missing = [name for name in names if name not in wanted]
-        others = [name for name in wanted if name not in names or wanted.count(name) > 1]
-        faults = ", ".join(
-            f"{what} {', '.join(map(repr, dict.fromkeys(some)))}"
-            for what, some in (("leaves out", missing), ("has too many of", others))
-            if some
-        )
-        raise InvalidInput("joint_names", f"{faults}; name each joint that moves once.")
+    faults = [f"leaves out {name!r}" for name in names if name not in wanted]
+    more = [name for name in dict.fromkeys(wanted) if wanted.count(name) > names.count(name)]
+    if faults := faults + [f"has too many of {name!r}" for name in more]:
+        raise InvalidInput("joint_names", f"{listed(faults)}; name each joint that moves once.")
     return tuple(wanted)
-
-
-def pseudo_inertia(mass: float, centre: Array, inertia: Array) -> Array:
-    """Compute the second moments ∫(r, 1)(r, 1)ᵀ dm (4, 4) of a body, which add up.
-
-    ``inertia`` (3, 3) is about the centre of mass.
-    """
-    moments = np.empty((4, 4))
-    about_centre = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    moments[:3, :3] = about_centre + mass * np.outer(centre, centre)
-    moments[:3, 3] = moments[3, :3] = mass * centre
-    moments[3, 3] = mass
-    return moments
 
 
 def accepts(urdf: str) -> bool:

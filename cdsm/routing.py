@@ -80,7 +80,7 @@ class Routing:
         row: list[int] = []
         point: list[Array] = []
         fixed = np.array([cable.lead for cable in cables])
-        segments: list[tuple[int, int, list[int], list[int]]] = []
+        segments: list[tuple[int, int, list[tuple[int, float]]]] = []
         for c, cable in enumerate(cables):
             for i, site in enumerate(cable.sites):
                 try:
@@ -94,34 +94,23 @@ class Routing:
                 if row[-2] == row[-1]:
                     length = math.dist(point[-2], point[-1])
                     if length < SHORTEST_SEGMENT:
-                        raise CableError(
-                            cable.name, f"sites {i} and {i + 1} coincide; leave one out."
-                        )
+                        said = f"sites {i} and {i + 1} coincide; leave one out."
+                        raise CableError(cable.name, said)
                     if not every:
                         fixed[c] += length
                         continue
                 to_a, to_b = body.joints_to(row[-2]), body.joints_to(row[-1])
-                up = [joint for joint in reversed(to_a) if joint not in to_b]
-                down = [joint for joint in to_b if joint not in to_a]
-                segments.append((c, len(row) - 1, up, down))
-        most = max((len(up) + len(down) for *_, up, down in segments), default=0)
-        path = np.zeros((len(segments), most), dtype=np.intp)
-        sign = np.zeros((len(segments), most))
-        for s, (_, _, up, down) in enumerate(segments):
-            count = len(up) + len(down)
-            path[s, :count] = np.array([*up, *down], dtype=np.intp) - 1
-            sign[s, :count] = [-1.0] * len(up) + [1.0] * len(down)
-        end = np.array([b for _, b, _, _ in segments], dtype=np.intp)
-        arrays = (
-            np.array(row, dtype=np.intp),
-            np.array(point),
-            np.array([c for c, *_ in segments], dtype=np.intp),
-            end - 1,
-            end,
-            path,
-            sign,
-            fixed,
-        )
+                way = [(joint - 1, -1.0) for joint in reversed(to_a) if joint not in to_b]
+                way += [(joint - 1, 1.0) for joint in to_b if joint not in to_a]
+                segments.append((c, len(row) - 1, way))
+        longest = max((len(way) for *_, way in segments), default=0)
+        path = np.zeros((len(segments), longest), np.intp)
+        sign = np.zeros(path.shape)
+        for s, (*_, way) in enumerate(segments):
+            for i, step in enumerate(way):
+                path[s, i], sign[s, i] = step
+        cable_of, end = (np.array([each[i] for each in segments], np.intp) for i in (0, 1))
+        arrays = np.array(row, np.intp), np.array(point), cable_of, end - 1, end, path, sign, fixed
         return cls(body.nv, *map(frozen, arrays))
 
     def sites(self, placement: Array) -> Array:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
 from typing import Self, final
 
@@ -61,33 +60,31 @@ class Chains:
     def of(cls, cables: Sequence[Cable]) -> Self:
         """Divide cables at their holes into segments."""
         segments: list[Cable] = []
-        cable_of, start, hole, where = [], [0], [], []
-        for c, cable in enumerate(cables):
+        start, holes = [0], []
+        for cable in cables:
             sites = list(cable.sites)
             if cable.lead > 0.0:
                 x, y, z = sites[0].position
                 sites.insert(0, replace(sites[0], position=(x - cable.lead, y, z)))
+            for i, site in enumerate(sites[1:-1]):
+                among = i + 1 + len(cable.sites) - len(sites)
+                holes.append((len(segments) + i, among, site.friction, site.wrap))
             pairs = list(pairwise(replace(site, friction=0.0, wrap=0.0) for site in sites))
             first = replace(cable, sites=pairs[0], lead=0.0)
             # without friction the motor holds the tension of all segments, and none is a spring
             control = "position" if any(cable.friction) else cable.control
             rest = replace(first, series_stiffness=math.inf, control=control)
-            own = [first, *(replace(rest, sites=pair) for pair in pairs[1:])]
-            passed = range(len(cable.sites) - len(pairs), len(cable.sites) - 1)
-            hole += [len(segments) + i for i in range(len(passed))]
-            where += [(c, i) for i in passed]
-            segments += own
-            cable_of += [c] * len(own)
+            segments += [first, *(replace(rest, sites=pair) for pair in pairs[1:])]
             start.append(len(segments))
-        at = [cables[c].sites[i] for c, i in where]
+        hole, places, friction, wrap = np.array(holes).reshape(-1, 4).T
         return cls(
             segments=tuple(segments),
-            cable=frozen(np.array(cable_of, dtype=np.intp)),
-            start=frozen(np.array(start, dtype=np.intp)),
-            hole=frozen(np.array(hole, dtype=np.intp)),
-            site=frozen(np.array([i for _, i in where], dtype=np.intp)),
-            friction=frozen(np.array([site.friction for site in at])),
-            wrap=frozen(np.array([site.wrap for site in at])),
+            cable=frozen(np.repeat(np.arange(len(cables)), np.diff(start))),
+            start=frozen(np.array(start)),
+            hole=frozen(hole.astype(np.intp)),
+            site=frozen(places.astype(np.intp)),
+            friction=frozen(friction.copy()),
+            wrap=frozen(wrap.copy()),
         )
 
 
@@ -111,8 +108,8 @@ class Segments(ReadOnlyState):
     wrap: Array
     wrap_jacobian: Array
     _routing: Routing
-    _twist: Array
     _sites: Array
+    _spans: Spans
 
     @classmethod
     def at(cls, chains: Chains, routing: Routing, twist: Array, sites: Array) -> Self:
@@ -142,22 +139,16 @@ class Segments(ReadOnlyState):
         np.subtract.at(gradient, (rows, routing.path[hole]), dot(p[:, :, None], back[:, hole]))
         turned = dot(q[:, :, None], spans.motion[:, hole + 1])
         np.subtract.at(gradient, (rows, routing.path[hole + 1]), turned)
-        segments = cls(
+        return cls(
             chains=chains,
             lengths=frozen(spans.length),
             length_jacobian=frozen(routing.jacobian(spans)),
             wrap=frozen(np.arctan2(sine, dot(u, v)) + chains.wrap),
             wrap_jacobian=frozen(gradient),
             _routing=routing,
-            _twist=frozen(twist),
             _sites=frozen(sites),
+            _spans=spans,
         )
-        segments.__dict__["_spans"] = spans  # a cached property
-        return segments
-
-    @cached_property
-    def _spans(self) -> Spans:
-        return self._routing.spans(self._twist, self._sites)
 
     def __repr__(self) -> str:
         return repr(self.chains)

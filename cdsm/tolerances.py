@@ -11,7 +11,8 @@ from typing import Any, Final, Literal, Self, final, get_args
 
 from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
-from cdsm.support.records import Number, parse, read_toml, record, toml_value
+from cdsm.support.records import Number, parse, read_toml, record
+from cdsm.support.toml import toml_text
 from cdsm.support.validation import one_of, scalar, sequence_of, text
 
 Distribution = Literal["normal", "uniform"]
@@ -132,7 +133,7 @@ class Tolerances:
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write a TOML file from which :meth:`read` builds equal tolerances, or FileError."""
         head = "# Tolerances of an arm, one sigma: rad, m, N, kg; rigidity and spring relative.\n"
-        return write_text(path, "\n".join([head, *tolerance_lines(self)]) + "\n")
+        return write_text(path, head + "\n" + toml_text(table_of(self)))
 
 
 SOURCES: Final = tuple(field.name for field in fields(Tolerances))
@@ -178,6 +179,8 @@ class _Entry:
 
 def from_table(table: Mapping[str, Any]) -> Tolerances:
     """Build tolerances from a parsed TOML table; raise GeometryError that lists every fault."""
+    if not isinstance(table, Mapping):
+        raise GeometryError([f"is {table!r}; give a table [tolerances]"])
     found, faults = {}, []
     for name, value in table.items():
         try:
@@ -195,12 +198,11 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
     return Tolerances(**found)
 
 
-def tolerance_lines(tolerances: Tolerances) -> list[str]:
-    """Return one TOML line for each source of ``tolerances`` that is not zero."""
-    tables = {name: ", ".join(map(_table, parts)) for name, parts in tolerances.given.items()}
-    return [f"{name} = [{entries}]" for name, entries in tables.items()]
-
-
-def _table(value: Tolerance) -> str:
-    shown = {name: x for name, x in vars(value).items() if x not in ("normal", EVERY)}
-    return f"{{{', '.join(f'{name} = {toml_value(x)}' for name, x in shown.items())}}}"
+def table_of(tolerances: Tolerances) -> dict[str, list[dict[str, Any]]]:
+    """Return the table of TOML from which :func:`from_table` builds equal tolerances."""
+    given = {name: map(vars, parts) for name, parts in tolerances.given.items()}
+    usual = "normal", EVERY
+    return {
+        name: [{key: x for key, x in part.items() if x not in usual} for part in parts]
+        for name, parts in given.items()
+    }

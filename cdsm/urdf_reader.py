@@ -1,9 +1,8 @@
 """Read URDFs of other programs.
 
-Pinocchio drops a mass that has a blank behind it, accepts links with two parents, impossible
-masses, zero axes and inverted limits, and prints the reason of a refusal only to standard error.
-This module therefore checks the text, writes each number anew for Pinocchio, and compares the
-masses and inertias that Pinocchio read with those of the text.
+Pinocchio drops a whole <inertial> whose mass has a blank behind it, accepts links with two parents,
+impossible masses, zero axes and inverted limits, and prints why it refuses a file only to standard
+error. So the text is checked, each number is written anew, and the masses that were read compared.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from lxml.builder import E
 
 from cdsm.errors import LINES, InvalidInput, UrdfError, listed
 from cdsm.geometry import MAXIMUM_JOINTS
-from cdsm.rigid_body import RigidBody, accepts, pseudo_inertia
+from cdsm.rigid_body import RigidBody, accepts
 from cdsm.support.files import read_text
 from cdsm.support.validation import RANGES, flag
 from cdsm.support.values import Array
@@ -33,26 +32,16 @@ _INSTEAD = {
     "planar": "write it as two prismatic and one revolute joint",
     "spherical": "write it as three revolute joints",
 }
-_NUMBERS = {  # attributes of an element, and how many numbers each has
-    "mass": ("value", 1),
-    "inertia": ("ixx ixy ixz iyy iyz izz", 1),
-    "origin": ("xyz rpy", 3),
-    "axis": ("xyz", 3),
-    "limit": ("lower upper effort velocity", 1),
-    "dynamics": ("damping friction", 1),
-    "box": ("size", 3),
-    "cylinder": ("radius length", 1),
-    "sphere": ("radius", 1),
-    "mesh": ("scale", 3),
-}
-_NEEDED = {"mass": "value", "inertia": _NUMBERS["inertia"][0], "axis": "xyz"}
+_ONE = "value ixx ixy ixz iyy iyz izz lower upper effort velocity damping friction radius length"
+_COUNTS = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(("xyz", "rpy", "size", "scale"), 3)
+_NEEDED = {"mass": "value", "inertia": "ixx ixy ixz iyy iyz izz", "axis": "xyz"}
 _NEEDED |= {"limit": "effort velocity", "parent": "link", "child": "link"}
 _INSIDE = {"joint": ("parent", "child"), "inertial": ("mass", "inertia")}
 _MODEL = ("inertial", "parent", "child", "origin", "axis", "limit", "dynamics", "mimic")
 _MOST_LINKS = 2000  # Pinocchio compares the name of each link with all others
 _LONGEST_CHAIN = 400  # joints in series, fixed ones included; 4000 crash Pinocchio
 _LOOSE = 1e-2  # people round inertias; relative to the largest principal moment
-_ROUNDING = 1e-9  # relative difference of the masses and inertias that Pinocchio reads
+_ROUNDING = 1e-9  # relative difference of the masses that Pinocchio reads
 
 
 def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> str:
@@ -79,11 +68,10 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
     faults += _text_faults([*links, *joints])
     faults = faults or [*_link_faults(links, check_inertia), *_joint_faults(joints)]
     faults = faults or _tree_faults([str(link.get("name")) for link in links], joints)
-    text = str(etree.tostring(robot, encoding="unicode"))
-    faults = faults or [*_reading_faults(text, links, joints)]
+    faults = faults or [*_reading_faults(robot)]
     if faults:
         raise UrdfError(f"{name} is no robot that cdsm takes:{listed(faults, 20, LINES)}")
-    return text
+    return str(etree.tostring(robot, encoding="unicode"))
 
 
 def _text_faults(parts: list[etree._Element]) -> Iterator[str]:
@@ -92,8 +80,8 @@ def _text_faults(parts: list[etree._Element]) -> Iterator[str]:
         if not name or count > 1:
             yield f"{tag} {name}: the name is used twice" if name else f"a <{tag}> has no name"
     for part in parts:
-        found, tags = [], Counter(child.tag for child in part)
-        found += [f"has {tags[tag]} <{tag}>; one is needed" for tag in _MODEL if tags[tag] > 1]
+        tags = Counter(child.tag for child in part)
+        found = [f"has {tags[tag]} <{tag}>; one is needed" for tag in _MODEL if tags[tag] > 1]
         for holder in (part, *part.findall("inertial")):
             needed = _INSIDE.get(holder.tag, ())
             found += [f"has no <{tag}>" for tag in needed if holder.find(tag) is None]
@@ -108,47 +96,39 @@ def _number_faults(element: etree._Element) -> Iterator[str]:
         if not element.get(key):
             remedy = f'; write {key}="0" if it is unknown' if element.tag == "limit" else ""
             yield f"<{element.tag}> has no {key}{remedy}"
-    keys, count = _NUMBERS.get(element.tag, ("", 0))
-    for key in keys.split():
-        if text := element.get(key):
-            try:
-                values = numbers(f"{key} of <{element.tag}>", text, count)
-                element.set(key, " ".join(map(repr, values)))
-            except XmlFault as error:
-                yield str(error)
+    for key in (key for key in element.attrib if key in _COUNTS):
+        try:
+            values = numbers(f"{key} of <{element.tag}>", element.get(key), _COUNTS[key])
+            element.set(key, " ".join(map(repr, values)))
+        except XmlFault as error:
+            yield str(error)
 
 
-def _vector(element: etree._Element | None, key: str, default: str = "0 0 0") -> Array:
-    text = default if element is None else element.get(key) or default
+def _number(element: etree._Element | None, key: str) -> float:
+    return 0.0 if element is None else float(element.get(key) or 0.0)
+
+
+def _vector(element: etree._Element | None, default: str = "0 0 0") -> Array:
+    text = default if element is None else element.get("xyz") or default
     return np.array([float(word) for word in text.split()])
 
 
-def _inertial(link: etree._Element) -> tuple[float, Array, Array]:
-    """Return mass, centre (3,) and inertia (3, 3) about the centre, in the axes of the link."""
-    from scipy.spatial.transform import Rotation  # slow to import
-
-    inertial = link.find("inertial")
-    if inertial is None:
-        return 0.0, np.zeros(3), np.zeros((3, 3))
-    origin, inertia = inertial.find("origin"), inertial.find("inertia")
-    keys = [[f"i{min(a, b)}{max(a, b)}" for b in "xyz"] for a in "xyz"]
-    own = np.array([[float(inertia.get(key)) for key in row] for row in keys])
-    turn = Rotation.from_euler("xyz", _vector(origin, "rpy")).as_matrix()
-    mass = float(inertial.find("mass").get("value"))
-    return mass, _vector(origin, "xyz"), turn @ own @ turn.T
+def _masses(links: list[etree._Element]) -> dict[str, float]:
+    return {str(link.get("name")): _number(link.find("inertial/mass"), "value") for link in links}
 
 
 def _link_faults(links: list[etree._Element], check_inertia: bool) -> Iterator[str]:
-    for link in links:
-        mass, _, inertia = _inertial(link)
-        least, mid, most = np.linalg.eigvalsh(inertia).tolist()
+    for link, (name, mass) in zip(links, _masses(links).items(), strict=True):
         if not 0.0 <= mass <= RANGES["mass"].high:
-            yield f"link {link.get('name')}: mass {mass:g} kg; 0 to 1e6 kg is needed"
+            yield f"link {name}: mass {mass:g} kg; 0 to 1e6 kg is needed"
+        own = link.find("inertial/inertia")
+        inertia = [[_number(own, "i" + min(a + b, b + a)) for b in "xyz"] for a in "xyz"]
+        least, mid, most = np.linalg.eigvalsh(inertia).tolist()
         if check_inertia and least + mid - most < -_LOOSE * max(most, -least):
             yield (
-                f"link {link.get('name')}: principal moments of inertia {least:g}, {mid:g}, "
-                f"{most:g} kg m², which no body has: none is negative, nor larger than the sum of "
-                "the others. Stiffness does not need them: check_inertia=False lets them pass"
+                f"link {name}: principal moments of inertia {least:g}, {mid:g}, {most:g} kg m², "
+                "which no body has: none is negative, nor larger than the sum of the others. "
+                "Stiffness does not need them: check_inertia=False lets them pass"
             )
 
 
@@ -163,19 +143,17 @@ def _joint_faults(joints: list[etree._Element]) -> Iterator[str]:
             yield f"{where}: type {kind!r} is not supported; {remedy}"
         if joint.find("mimic") is not None:
             yield f"{where}: mimics another joint, which is not supported; remove <mimic>"
-        if abs(_vector(joint.find("origin"), "xyz")).max() > RANGES["length"].high:
+        if abs(_vector(joint.find("origin"))).max() > RANGES["length"].high:
             yield f"{where}: its origin is further than {RANGES['length'].high:g} m away"
-        if joint in moving and np.linalg.norm(_vector(joint.find("axis"), "xyz", "1 0 0")) < 1e-6:
+        if joint in moving and np.linalg.norm(_vector(joint.find("axis"), "1 0 0")) < 1e-6:
             yield f"{where}: its axis has no direction"
-        low, high = (_vector(limit, key, "0").item() for key in ("lower", "upper"))
+        low, high = (_number(limit, key) for key in ("lower", "upper"))
         if joint in moving and (limit is None or low > high):
             fault = "has no <limit>" if limit is None else f"lower limit {low:g} above {high:g}"
             yield f"{where}: {fault}; a {kind} joint needs both ends"
         elif kind == "revolute" and max(abs(low), abs(high)) > 4.0 * math.pi:
-            warn(
-                f"{where}: limits {low:g} to {high:g} rad are more than two turns. Degrees? In "
-                f"radians they are {math.radians(low):.4g} to {math.radians(high):.4g}."
-            )
+            degrees = f"in radians they are {math.radians(low):.4g} to {math.radians(high):.4g}"
+            warn(f"{where}: limits {low:g} to {high:g} rad are over two turns. Degrees? {degrees}.")
 
 
 def _ends(joint: etree._Element) -> tuple[str, str]:
@@ -186,38 +164,36 @@ def _tree_faults(links: list[str], joints: list[etree._Element]) -> list[str]:
     """Return what is wrong: unknown links, two parents or roots, circles, too many in series."""
     if len(links) > _MOST_LINKS:
         return [f"has {len(links)} links; {_MOST_LINKS} are taken at most"]
-    faults, carriers, children = [], defaultdict(list), defaultdict(list)
+    faults, carriers = [], defaultdict(list)
     for joint in joints:
-        name, (parent, child) = joint.get("name"), _ends(joint)
-        unknown = [link for link in (parent, child) if link not in links]
-        faults += [f"joint {name}: there is no link {link}" for link in unknown]
-        faults += [f"joint {name}: joins link {child} to itself"] if parent == child else []
-        carriers[child].append(str(name))
-        children[parent].append(child)
-    twice = [(child, " and ".join(by)) for child, by in carriers.items() if len(by) > 1]
-    faults += [f"link {child}: has two parents, by the joints {by}" for child, by in twice]
+        name, ends = str(joint.get("name")), _ends(joint)
+        faults += [f"joint {name}: there is no link {link}" for link in ends if link not in links]
+        faults += [f"joint {name}: joins link {ends[1]} to itself"] * (ends[0] == ends[1])
+        carriers[ends[1]].append((name, ends[0]))
+    for link, by in carriers.items():
+        said = f"link {link}: has two parents, by the joints {' and '.join(name for name, _ in by)}"
+        faults += [said] * (len(by) > 1)
     roots = [link for link in links if link not in carriers]
     if faults or len(roots) != 1:
         said = f"has the roots {listed(roots) or 'none'}; one link that no joint carries is needed"
         return faults or [said]
-    reached, level, depth = set(roots), roots, -1
-    while level:
-        level, depth = [child for link in level for child in children[link]], depth + 1
-        reached.update(level)
-    if depth > _LONGEST_CHAIN:
-        return [f"has {depth} joints one behind the other; {_LONGEST_CHAIN} are taken at most"]
-    lost = [link for link in links if link not in reached]
-    return [f"the links {', '.join(lost)} hang on each other in a circle"] if lost else []
+    depths = {roots[0]: 0}
+    while level := [x for x in links if x not in depths and carriers[x][0][1] in depths]:
+        depths |= {link: 1 + depths[carriers[link][0][1]] for link in level}
+    if lost := [link for link in links if link not in depths]:
+        faults += [f"the links {', '.join(lost)} hang on each other in a circle"]
+    if (deepest := max(depths.values())) > _LONGEST_CHAIN:
+        count = f"{deepest} joints one behind the other"
+        faults += [f"has {count}; {_LONGEST_CHAIN} are taken at most"]
+    return faults
 
 
-def _reading_faults(
-    text: str, links: list[etree._Element], joints: list[etree._Element]
-) -> Iterator[str]:
+def _reading_faults(robot: etree._Element) -> Iterator[str]:
     """Yield what Pinocchio refuses or reads otherwise; warn of moving links without mass."""
-    bodies = {str(link.get("name")): pseudo_inertia(*_inertial(link)) for link in links}
-    root = next(link for link in bodies if link not in {_ends(joint)[1] for joint in joints})
+    masses, joints = _masses(robot.findall("link")), robot.findall("joint")
+    root = next(link for link in masses if link not in {_ends(joint)[1] for joint in joints})
     try:
-        arm = RigidBody(text, root, np.zeros(3))
+        arm = RigidBody(etree.tostring(robot, encoding="unicode"), root, np.zeros(3))
     except UrdfError as error:
         for joint in joints:
             alone = E.robot(*(E.link(name=end) for end in _ends(joint)), deepcopy(joint), name="r")
@@ -225,20 +201,15 @@ def _reading_faults(
                 yield f"joint {joint.get('name')}: {error}"
         yield str(error)
         return
-    given, names = np.zeros((1 + arm.nv, 4, 4)), defaultdict(list)
-    for link, body in bodies.items():
-        row, place = arm.locate(link)[0], np.eye(4)
-        place[:3, :3], place[:3, 3] = arm.locate(link)[1:]
-        given[row] += place @ body @ place.T
-        names[row].append(link)
-    for row, (ours, theirs) in enumerate(zip(given, arm.pseudo_inertias(), strict=True)):
-        size = np.sqrt([abs(ours.diagonal()[:3]).max()] * 3 + [ours[3, 3]])
-        if (abs(theirs - ours) > _ROUNDING * np.outer(size, size)).any():
-            masses = f"{theirs[3, 3]:g} kg instead of {ours[3, 3]:g} kg"
-            yield f"link {listed(names[row])}: Pinocchio read {masses}, or another inertia"
     turning = [joint for joint in joints if joint.get("type") != "fixed"]
     # the cross of a universal joint has no length and may have no mass
-    crosses = {_ends(j)[0] for j in turning if not _vector(j.find("origin"), "xyz").any()}
-    massless = [link for row in names if row and not given[row, 3, 3] for link in names[row]]
-    if bare := [link for link in massless if link not in crosses]:
+    crosses = {_ends(joint)[0] for joint in turning if not _vector(joint.find("origin")).any()}
+    bare: list[str] = []
+    for row, read in enumerate(arm.arrays().mass):
+        names = [link for link in masses if arm.locate(link)[0] == row]
+        mass = sum(masses[link] for link in names)
+        if abs(read - mass) > _ROUNDING * mass:
+            yield f"link {listed(names)}: Pinocchio read {read:g} kg instead of {mass:g} kg"
+        bare += [name for name in names if row and not mass and name not in crosses]
+    if bare:
         warn(f"links that move without mass: {listed(bare)}. Gravity does not act on them.")

@@ -24,6 +24,7 @@ PULL = cdsm.distribute_tension(POSE, minimum=10.0, wrench=random_wrench(2))
 K = cdsm.stiffness(POSE, PULL)
 
 RESULTS = (
+    POSE.arm,
     POSE,
     PULL,
     K,

@@ -1,48 +1,21 @@
-"""Read and write cables in TOML: sites, wire, lead, spring, control and tension bounds."""
+"""Read and write cables as TOML files."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Any
 
-from pydantic import Field
-
-from cdsm.arm_file.wires import (
-    SETTINGS,
-    CableKeys,
-    CableSettings,
-    FileWires,
-    read_wires,
-    wire_entries,
-)
+from cdsm.arm_file.model import SETTINGS, read_model
 from cdsm.cable import Cable, Site
-from cdsm.errors import (
-    LINES,
-    CableError,
-    FileError,
-    GeometryError,
-    InvalidInput,
-    MissingWire,
-    listed,
-)
-from cdsm.support.files import read_text, write_text
-from cdsm.support.records import (
-    Friction,
-    LengthOrZero,
-    Point,
-    Wrap,
-    parse,
-    read_toml,
-    record,
-    toml_lines,
-    toml_value,
-)
+from cdsm.errors import InvalidInput
+from cdsm.support.files import write_text
+from cdsm.support.toml import one_line_each, toml_text
 from cdsm.support.validation import sequence_of
-from cdsm.wires.catalogue import Wire, as_wire
-from cdsm.wires.laws import LinearElasticity
+from cdsm.wires.catalogue import Wire, name_of, table_of
+from cdsm.wires.elasticity import Elasticity
 
 _HEAD = """\
 # cdsm cables. Units: m, N, N/m.
@@ -52,49 +25,10 @@ _HEAD = """\
 # none if left out. control: what the motor holds, "position" or "force". minimum, maximum: tensions
 # that the cable may carry; 0 and none if left out. friction, wrap (of a site): coefficient, and an
 # angle [rad] that adds to the angle by which the cable turns there; 0 if left out.
+
 """
 
-_Label = Annotated[str, Field(min_length=1, max_length=200)]
-
-
-@record
-class _Site:
-    link: _Label
-    xyz: Point
-    friction: Friction | None = None
-    wrap: Wrap | None = None
-
-
-@record
-class _Entry(CableSettings):
-    name: _Label
-    lead: LengthOrZero = 0.0
-    friction: Friction = 0.0
-    sites: Annotated[tuple[_Site, ...], Field(strict=False, min_length=2)]
-
-
-@record
-class _Entries:
-    cables: Annotated[tuple[_Entry, ...], Field(strict=False, min_length=1)]
-
-
-def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
-    """Write cables to a TOML file. :func:`read_cables` returns equal cables.
-
-    Args:
-        cables: One or more cables.
-        path: The file. An existing file is replaced.
-
-    Raises:
-        InvalidInput: No cables are given, or an elasticity of this kind cannot be written.
-        FileError: The file cannot be written.
-    """
-    cables = sequence_of("cables", cables, Cable)
-    if not cables:
-        raise InvalidInput("cables", "none given; there is nothing to write.")
-    wires, tables = wire_entries(cables)
-    settings = [setting_lines(cable) for cable in cables]
-    return write_text(path, "\n".join([_HEAD, *tables, *cable_lines(cables, wires, settings)]))
+_USUAL = {field.name: field.default for field in fields(Cable) + fields(Site)}
 
 
 def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple[Cable, ...]:
@@ -121,125 +55,50 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
         FileError: The file cannot be read or does not describe cables. Every fault is listed.
         MissingWire: The file names no wire for some cables, and ``wire`` is not given.
     """
-    text = read_text(path)
-    forced = None if wire is None else as_wire(wire)
-    try:
-        keys = parse(CableKeys, read_toml(text))
-        wires = read_wires(keys, forced)
-        return build_cables(read_routed(keys.cables), keys, wires, path)
-    except GeometryError as error:
-        faults = error.faults
-    raise FileError(path, f"cannot be read as cables:{listed(faults, 20, LINES)}")
+    return tuple(read_model(path, wire, robot=False)[1])
 
 
-_ANY = LinearElasticity(1e5)
-"""Placeholder for a missing wire, so that all other faults of the file are found first."""
+def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
+    """Write cables to a TOML file. :func:`read_cables` returns equal cables.
+
+    Args:
+        cables: One or more cables.
+        path: The file. An existing file is replaced.
+
+    Raises:
+        InvalidInput: No cables are given, or an elasticity of this kind cannot be written.
+        FileError: The file cannot be written.
+    """
+    cables = sequence_of("cables", cables, Cable)
+    if not cables:
+        raise InvalidInput("cables", "none given; there is nothing to write.")
+    values, tables = wire_tables(cables)
+    entries = [routed(each, {"wire": values[each.elasticity], **settings(each)}) for each in cables]
+    return write_text(path, _HEAD + toml_text({"wires": tables, "cables": entries}))
 
 
-class UnwiredCable(NamedTuple):
-    """A cable as a file describes it: its sites are built, its wire is not read yet."""
+def wire_tables(cables: Sequence[Cable]) -> tuple[dict[Elasticity, Any], dict[str, Any]]:
+    """Return the value of the key ``wire`` for each law of the cables, and the tables [wires]."""
+    values: dict[Elasticity, Any] = {}
+    tables: dict[str, Any] = {}
+    for law in dict.fromkeys(cable.elasticity for cable in cables):
+        values[law] = name_of(law) or law._constant or f"wire{len(tables) + 1}"
+        if values[law] == f"wire{len(tables) + 1}":
+            tables[values[law]] = table_of(law)
+    return values, tables
 
-    where: str  # key in the file, which errors name
-    name: str
-    sites: tuple[Site, ...]
-    lead: float  # [m]
-    own: CableSettings  # settings of this cable alone
+
+def settings(cable: Cable) -> dict[str, Any]:
+    """Return the settings of a cable that are not the default."""
+    return {key: x for key in SETTINGS if (x := getattr(cable, key)) != _USUAL[key]}
 
 
-def read_routed(cables: object) -> list[UnwiredCable]:
-    """Read the cables of the parsed tables ``[[cables]]``; GeometryError lists every fault."""
-    entries = parse(_Entries, {"cables": cables} if cables is not None else {}).cables
-    names = [entry.name for entry in entries]
-    faults = [
-        f"cables[{i}].name: {name!r} is used twice"
-        for i, name in enumerate(names, start=1)
-        if name in names[: i - 1]
+def routed(cable: Cable, own: dict[str, Any]) -> dict[str, Any]:
+    """Return the TOML table of a cable with its sites and the settings ``own``."""
+    sites = [
+        {"link": site.link, "xyz": site.position}
+        | {key: x for key in ("friction", "wrap") if (x := getattr(site, key))}
+        for site in cable.sites
     ]
-    routed = []
-    for i, entry in enumerate(entries, start=1):
-        try:
-            routed.append(
-                UnwiredCable(f"cables[{i}]", entry.name, _sites(entry), entry.lead, entry)
-            )
-        except InvalidInput as error:
-            faults.append(f"cables[{i}]: {error}")
-    if faults:
-        raise GeometryError(faults)
-    return routed
-
-
-def _sites(entry: _Entry) -> tuple[Site, ...]:
-    """Build the sites of a cable. A hole without ``friction`` has the friction of the cable."""
-    passed = range(0 if entry.lead > 0.0 else 1, len(entry.sites) - 1)
-    sites = []
-    for i, site in enumerate(entry.sites):
-        usual = entry.friction if i in passed else 0.0
-        friction = usual if site.friction is None else site.friction
-        sites.append(Site(site.link, site.xyz, friction, site.wrap or 0.0))
-    return tuple(sites)
-
-
-def build_cables(
-    routed: Iterable[UnwiredCable],
-    settings: CableSettings,
-    wires: FileWires,
-    path: str | os.PathLike[str],
-) -> tuple[Cable, ...]:
-    """Build cables with the laws of ``wires``.
-
-    ``settings`` has the values for all cables without a setting of their own. Raises GeometryError,
-    which lists every fault, or MissingWire if wires are missing and nothing else is wrong.
-    """
-    cables: list[Cable] = []
-    faults: list[str] = []
-    without: list[str] = []
-    for where, name, sites, lead, own in routed:
-        given = {
-            key: getattr(each, key)
-            for each in (settings, own)
-            for key in SETTINGS
-            if getattr(each, key) is not None
-        }
-        try:
-            wire = wires.of(own.wire)
-            if wire is None:
-                without.append(name)
-            cables.append(Cable(name, sites, wire or _ANY, lead, **given))
-        except GeometryError as error:
-            faults += [f"{where}.{fault}" for fault in error.faults]
-        except (CableError, InvalidInput) as error:
-            faults.append(f"{where}: {error}")
-    if faults:
-        raise GeometryError(faults)
-    if without:
-        raise MissingWire(path, without if len(without) < len(cables) else ())
-    return tuple(cables)
-
-
-def setting_lines(cable: Cable) -> list[str]:
-    """Return a TOML line for each of :data:`SETTINGS` in which a cable differs from the default."""
-    defaults = {field.name: field.default for field in fields(Cable)}
-    given = {key: getattr(cable, key) for key in SETTINGS if getattr(cable, key) != defaults[key]}
-    return [f"{key} = {toml_value(value)}" for key, value in given.items()]
-
-
-def cable_lines(
-    cables: Sequence[Cable], wires: Sequence[str], settings: Sequence[Sequence[str]]
-) -> list[str]:
-    """Return the TOML lines of tables ``[[cables]]``, one table for each cable.
-
-    ``wires`` are values of the key ``wire`` (``""``: leave out the key), ``settings`` are lines of
-    :func:`setting_lines`, both for each cable.
-    """
-    lines = []
-    for cable, wire, given in zip(cables, wires, settings, strict=True):
-        lines += ["[[cables]]", f"name = {toml_value(cable.name)}"]
-        lines += [f"wire = {wire}"] if wire else []
-        lines += [f"lead = {toml_value(cable.lead)}"] if cable.lead else []
-        lines += [*given, "sites = ["]
-        for site in cable.sites:
-            own = {"friction": site.friction or None, "wrap": site.wrap or None}
-            entry = toml_lines(_Site(link=site.link, xyz=site.position, **own))
-            lines.append(f"    {{{', '.join(entry)}}},")
-        lines += ["]", ""]
-    return lines
+    lead = {"lead": cable.lead} if cable.lead else {}
+    return {"name": cable.name, **lead, **own, "sites": one_line_each(sites)}

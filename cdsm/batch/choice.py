@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 import os
 import sys
 import threading
@@ -13,13 +14,13 @@ from types import ModuleType
 import numpy as np
 
 import cdsm.batch.rows as rows
-from cdsm.support.progress import progress_bar
 
 PATIENCE = 20.0
 """Seconds that numpy may take for all batches of a process before the kernels are compiled."""
 
 _SECONDS = 1e-7  # that numpy takes for a number of a pose, with all that follows from it
 
+_log = logging.getLogger("cdsm")
 _lock = threading.Lock()
 _spent = 0.0
 
@@ -57,8 +58,9 @@ def compiled() -> ModuleType:
     """Import the compiled kernels, and compile those that numba has not kept."""
     from cdsm import kernels
 
-    with progress_bar("compiling kernels, once on this machine: half a minute"):
-        compile_ahead()
+    if not _is_kept():
+        _log.warning("compiling the kernels of batches, once on this machine: half a minute")
+    compile_ahead()
     return kernels
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,6 +16,7 @@ from cdsm.support.status import Status, summary
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 Codes = NDArray[np.uint8]
@@ -107,15 +107,17 @@ class OfPostures(Result):
         }
         return found
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with a row for each posture; needs pandas (MissingExtra)."""
+        table = super().to_pandas()
+        table["status"] = [Status(each).name.lower() for each in self.status]
+        return table
+
     def __len__(self) -> int:
         return len(self.q)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.arm.name}, {summary(self.status)}>"
-
-    @property
-    def _posture(self) -> Any:
-        return SimpleNamespace(arm=self.arm, _coordinates={})
 
     def _units(self) -> dict[str, str]:
         return {**super()._units(), "lever": JointUnits(self.arm.slides).joined("m/rad", "1")}

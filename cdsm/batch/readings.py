@@ -1,6 +1,6 @@
 """Readings of many K_θ by numpy: margin, compliance and Cartesian stiffness.
 
-The formulas and thresholds are those of :mod:`cdsm.stiffness_matrix.cartesian`.
+The formulas and thresholds are those of :mod:`cdsm.stiffness_matrix.value`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.stiffness_matrix.cartesian import FLAT, REGULAR, UNMOVED
+from cdsm.stiffness_matrix.value import FLAT, REGULAR, UNMOVED
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 

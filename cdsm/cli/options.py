@@ -134,7 +134,8 @@ class ArmOptions:
             k = quantity("--spring", 1000.0 * self.spring, "stiffness", infinite=True)
             arm = arm.with_cables([replace(cable, series_stiffness=k) for cable in arm.cables])
         if self.slack_below:
-            arm = arm._with_laws([cable.elasticity.slack_below() for cable in arm.cables])
+            slack = [replace(c, elasticity=c.elasticity.slack_below()) for c in arm.cables]
+            arm = arm.with_cables(slack)
         if self.friction is not None:
             arm = arm.with_friction(quantity("--friction", self.friction, "friction", zero=True))
         if self.gravity is not None:

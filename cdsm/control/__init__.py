@@ -1,26 +1,31 @@
-"""Closed-loop control of position and stiffness: motor laws, sensors, plants, estimation."""
+"""Parts of a closed loop: motor laws, what they get and return, protocol of plants.
+
+:func:`cdsm.track` runs the loop, with :class:`cdsm.Sensors` and a plant.
+"""
 
 from cdsm.control.laws import (
     Command,
+    ControlInput,
     Law,
-    Moment,
-    Reading,
     Reference,
     feedforward,
     limited,
     mixed,
     tension_control,
 )
-from cdsm.control.mujoco_plant import MuJoCoPlant
-from cdsm.control.plant import SlowPlant
-from cdsm.control.run import TrackingRun
-from cdsm.control.sensors import Sensors
-from cdsm.control.stiffness_loop import with_rigidity
-from cdsm.control.track import track
+from cdsm.control.observer import with_rigidity
+from cdsm.control.plants import Plant as Plant
+from cdsm.control.sensors import Measurement
 
-# fmt: off
 __all__ = [
-    "Command", "Law", "Moment", "MuJoCoPlant", "Reading", "Reference", "Sensors", "SlowPlant",
-    "TrackingRun", "feedforward", "limited", "mixed", "tension_control", "track", "with_rigidity",
+    "Command",
+    "ControlInput",
+    "Law",
+    "Measurement",
+    "Reference",
+    "feedforward",
+    "limited",
+    "mixed",
+    "tension_control",
+    "with_rigidity",
 ]
-# fmt: on

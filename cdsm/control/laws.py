@@ -1,11 +1,13 @@
-"""Motor laws: pure functions from references and readings to a command within the bounds.
+"""Motor laws: pure functions from references and measurements to a command within the bounds.
 
 The motor of a position-controlled cable keeps the length of wire that it has paid out, l_0,
-constant. A law computes the next l_0. At a constant posture, a change of l_0 changes the tension by
-−k Δl_0, so each command corresponds to a tension, F measured + k (l_0 measured − l_0 commanded). No
-law commands a tension below its lower bound, where the cable may be slack, or above its upper
-bound. A user-defined law is any function of a :class:`Moment` that returns
-``limited(moment, wire)``.
+constant; a law computes the next l_0. Every law ends in :func:`limited`, which predicts the
+tensions *after* the step. If the posture moves as planned, the plan's change of wire gives the
+plan's change of tension, and any other wire a tension that differs by k times the difference:
+
+    F after = F measured + ΔF planned + k (Δl_0 planned − Δl_0 commanded),
+
+with the cable stiffness k. So a plan within the bounds passes, however coarse its steps are.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm.control.sensors import Measurement
 from cdsm.errors import InvalidInput
 from cdsm.support.validation import vector
 from cdsm.support.values import Array
@@ -32,135 +35,105 @@ class Reference(NamedTuple):
     Attributes:
         angles: Joint angles (nv,) [rad]; [m] for prismatic joints.
         tension: F (C,) [N].
-        wire: l_0 paid out at these angles and tensions (C,) [m].
+        paid_out: l_0 at these angles and tensions (C,) [m].
         stiffness: k of each cable (C,) [N/m]; 0 for force-controlled cables.
     """
 
     angles: Array
     tension: Array
-    wire: Array
+    paid_out: Array
     stiffness: Array
-
-
-class Reading(NamedTuple):
-    """Readings of the sensors at one step.
-
-    Attributes:
-        wire: l_0 paid out by each motor (C,) [m], from its encoder.
-        tension: F at each motor (C,) [N].
-    """
-
-    wire: Array
-    tension: Array
 
 
 class Command(NamedTuple):
     """Command to the motors at one step.
 
     Attributes:
-        wire: l_0 to pay out (C,) [m].
-        tension: The tension that corresponds to ``wire`` (C,) [N], within the bounds.
+        paid_out: l_0 to pay out (C,) [m].
+        tension: Predicted tension after the step (C,) [N], within the bounds.
         saturated: Whether the command of each motor was changed to keep its tension within the
             bounds (C,).
     """
 
-    wire: Array
+    paid_out: Array
     tension: Array
     saturated: NDArray[np.bool_]
 
 
-class Moment(NamedTuple):
-    """Arguments of a motor law at one step of control: a moment of time, not a torque.
+class ControlInput(NamedTuple):
+    """Arguments of a motor law at one step of control.
 
     Attributes:
-        reference: Reference of this step.
-        reading: Readings of the sensors at this step.
-        reference_before: Reference of the previous step.
-        reading_before: Readings of the previous step.
-        command: Wire commanded at the previous step (C,) [m].
+        reference: Reference of this step, which the command is to reach.
+        reference_before: Reference of the previous step, after which the sensors were read.
+        measurement: What the sensors say.
+        error_before: :attr:`error` of the previous step (C,) [N].
+        paid_out: l_0 commanded at the previous step (C,) [m].
         minimum: Lower bounds of the tensions (C,) [N].
         maximum: Upper bounds of the tensions (C,) [N].
-        forced: True for each cable (C,) whose tension a mixed law controls; of the others it
-            controls the length of wire.
+        tension_controlled: True for each cable (C,) whose tension a mixed law controls; of the
+            others it controls the length of wire.
     """
 
     reference: Reference
-    reading: Reading
     reference_before: Reference
-    reading_before: Reading
-    command: Array
+    measurement: Measurement
+    error_before: Array
+    paid_out: Array
     minimum: Array
     maximum: Array
-    forced: NDArray[np.bool_]
+    tension_controlled: NDArray[np.bool_]
+
+    @property
+    def error(self) -> Array:
+        """Tension error e = F planned − F measured after the previous step (C,) [N]."""
+        return np.asarray(self.reference_before.tension - self.measurement.tension)
 
 
-Law = Callable[[Moment], Command]
+Law = Callable[[ControlInput], Command]
 """A motor law: it computes the command of one step."""
 
 
-def limited(moment: Moment, wire: Array) -> Command:
-    """Return the command to pay out ``wire`` (C,) [m], changed to keep tensions within bounds.
+def limited(given: ControlInput, paid_out: Array) -> Command:
+    """Return the command to pay out l_0 (C,) [m], changed to keep the tensions within the bounds.
 
-    The commanded tensions follow from the measured tensions and the change of wire at constant
-    posture. Raises InvalidInput if ``wire`` is not one number per cable.
+    The tensions after the step are predicted as the top of the module says. Raises InvalidInput if
+    ``paid_out`` is not one number per cable.
     """
-    reading, k = moment.reading, moment.reference.stiffness
-    wire = vector("wire of the law", wire, k.size, "one length [m] per cable")
-    asked = reading.tension + k * (reading.wire - wire)
-    return _clamped(moment, wire, np.where(k > 0.0, asked, moment.reference.tension))
+    now, before, k = given.reference, given.reference_before, given.reference.stiffness
+    length = vector("wire of the law", paid_out, k.size, "one length [m] per cable")
+    surplus = (now.paid_out - before.paid_out) - (length - given.measurement.paid_out)
+    predicted = given.measurement.tension + (now.tension - before.tension) + k * surplus
+    return _clamped(given, length, np.where(k > 0.0, predicted, now.tension))
 
 
-def checked_command(command: object, moment: Moment, names: Sequence[str]) -> Command:
-    """Check and return the ``command`` of a law to the motors ``names`` (C,).
-
-    Raises InvalidInput unless each commanded length of wire is positive, and each tension is within
-    the bounds.
-    """
-    if not isinstance(command, Command):
-        raise InvalidInput(
-            "law", f"returned {command!r}; a Command is needed: return limited(moment, wire)."
-        )
-    wire = vector("wire of the law", command.wire, len(names), "one length [m] per cable")
-    tension = vector("tension of the law", command.tension, len(names), "one [N] per cable")
-    low, high = moment.minimum - _ROUNDING, moment.maximum + _ROUNDING
-    wrong = ~((wire > 0.0) & (low <= tension) & (tension <= high))
-    if wrong.any():
-        c = int(wrong.argmax())
-        raise InvalidInput(
-            "law",
-            f"commanded {tension[c]:.6g} N and {wire[c]:.6g} m of wire for {names[c]}; a tension "
-            f"from {moment.minimum[c]:g} to {moment.maximum[c]:g} N and a positive length are "
-            "needed. Return limited(moment, wire).",
-        )
-    return command
-
-
-def feedforward(moment: Moment) -> Command:
+def feedforward(given: ControlInput) -> Command:
     """Pay out the lengths of wire of the plan; this law needs no sensor.
 
     The planned l_0 allow for the stretch of the wires under the planned tensions.
     """
-    return _clamped(moment, moment.reference.wire, moment.reference.tension)
+    return _clamped(given, given.reference.paid_out, given.reference.tension)
 
 
-def tension_control(moment: Moment) -> Command:
+def tension_control(given: ControlInput) -> Command:
     """Control all cable tensions by PI control, in addition to the planned changes of l_0.
 
-    In each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the error e = F planned − F measured,
-    its change Δe since the previous step, and the cable stiffness k. P and I are PROPORTIONAL and
-    INTEGRAL. Every cable needs a load cell. No motor controls a length, so an arm without springs
-    in its joints drifts slowly from its posture.
+    In each step, Δl_0 = Δl_0 planned − (P Δe + I e)/k with the tension error e, its change Δe since
+    the previous step, and the cable stiffness k. P and I are PROPORTIONAL and INTEGRAL. Every cable
+    needs a load cell. No motor controls a length, so an arm without springs in its joints drifts
+    slowly from its posture.
     """
-    return limited(moment, _regulated(moment))
+    return limited(given, _regulated(given))
 
 
-def mixed(moment: Moment) -> Command:
+def mixed(given: ControlInput) -> Command:
     """Control the tension of some cables, and pay out the wire of the plan for all others.
 
     In the paper's arm, the tension of one cable of each pair is controlled. Every cable needs a
     load cell, since the law keeps the tensions of all cables within their bounds.
     """
-    return limited(moment, np.where(moment.forced, _regulated(moment), moment.reference.wire))
+    planned = given.reference.paid_out
+    return limited(given, np.where(given.tension_controlled, _regulated(given), planned))
 
 
 LAWS: Final[dict[str, Law]] = {
@@ -172,22 +145,41 @@ LAWS: Final[dict[str, Law]] = {
 """Laws by name; ``stiffness`` is the mixed law inside the stiffness loop."""
 
 
-def _regulated(moment: Moment) -> Array:
-    """Return the wire (C,) [m] to pay out if PI control holds the tension of each cable.
+def checked_command(command: object, given: ControlInput, names: Sequence[str]) -> Command:
+    """Check and return the ``command`` of a law to the motors ``names`` (C,).
 
-    It is the previous command plus the planned change of wire and the correction of the tension
-    error, as :func:`tension_control` describes.
+    Raises InvalidInput unless each commanded length of wire is positive, and each tension is within
+    the bounds.
     """
-    now, before, k = moment.reference, moment.reference_before, moment.reference.stiffness
-    error = now.tension - moment.reading.tension
-    last = before.tension - moment.reading_before.tension
-    taken_in = PROPORTIONAL * (error - last) + INTEGRAL * error
-    shorter = np.divide(taken_in, k, out=np.zeros_like(k), where=k > 0.0)
-    return np.asarray(moment.command + (now.wire - before.wire) - shorter)
+    if not isinstance(command, Command):
+        said = f"returned {command!r}; a Command is needed: return limited(given, paid_out)."
+        raise InvalidInput("law", said)
+    wire = vector("wire of the law", command.paid_out, len(names), "one length [m] per cable")
+    tension = vector("tension of the law", command.tension, len(names), "one [N] per cable")
+    low, high = given.minimum - _ROUNDING, given.maximum + _ROUNDING
+    wrong = ~((wire > 0.0) & (low <= tension) & (tension <= high))
+    if wrong.any():
+        c = int(wrong.argmax())
+        raise InvalidInput(
+            "law",
+            f"commanded {tension[c]:.6g} N and {wire[c]:.6g} m of wire for {names[c]}; a tension "
+            f"from {given.minimum[c]:g} to {given.maximum[c]:g} N and a positive length are "
+            "needed. Return limited(given, paid_out).",
+        )
+    return command
 
 
-def _clamped(moment: Moment, wire: Array, asked: Array) -> Command:
-    tension = np.minimum(np.maximum(asked, moment.minimum), moment.maximum)
-    k = moment.reference.stiffness
-    slack = np.divide(asked - tension, k, out=np.zeros_like(k), where=k > 0.0)
-    return Command(np.asarray(wire + slack), tension, np.asarray(tension != asked))
+def _regulated(given: ControlInput) -> Array:
+    """Return l_0 (C,) [m] to pay out if PI control holds the tension of each cable."""
+    now, k, error = given.reference, given.reference.stiffness, given.error
+    correction = PROPORTIONAL * (error - given.error_before) + INTEGRAL * error
+    taken_in = np.divide(correction, k, out=np.zeros_like(k), where=k > 0.0)
+    planned = now.paid_out - given.reference_before.paid_out
+    return np.asarray(given.paid_out + planned - taken_in)
+
+
+def _clamped(given: ControlInput, paid_out: Array, predicted: Array) -> Command:
+    tension = np.minimum(np.maximum(predicted, given.minimum), given.maximum)
+    k = given.reference.stiffness
+    beyond = np.divide(predicted - tension, k, out=np.zeros_like(k), where=k > 0.0)
+    return Command(np.asarray(paid_out + beyond), tension, np.asarray(tension != predicted))

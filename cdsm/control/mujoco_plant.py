@@ -7,15 +7,16 @@ cable. So the arm has the same equilibria as in cdsm. Cables slide freely in hol
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 
-from cdsm.cable import Cable
-from cdsm.control.laws import Command, Reading
-from cdsm.control.plant import require_unstrained
-from cdsm.errors import ElasticityRangeError, InvalidInput, SolverError
+from cdsm.control.laws import Command
+from cdsm.control.plants import require_unstrained, tensions_of
+from cdsm.control.sensors import Measurement
+from cdsm.errors import InvalidInput, SolverError
 from cdsm.interchange.mjcf import to_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -29,9 +30,9 @@ _TANGENTS: Final = 10  # number of updates of the motors' tangents and of the lo
 class MuJoCoState(NamedTuple):
     """State of a :class:`MuJoCoPlant` after a step of control."""
 
-    model: Any  # mujoco.MjModel
+    model: Any  # mujoco.MjModel, never changed
     pose: Posture  # true posture
-    true: Reading  # true wire and tension at the motors
+    true_values: Measurement  # true wire and tension at the motors
     velocity: Array  # of the joints (nv,) [rad/s], in MuJoCo's order
 
 
@@ -66,17 +67,17 @@ class MuJoCoPlant:
                 "arm", "has friction, which MuJoCo's cables have not; give arm.with_friction(0.0)."
             )
 
-    def begin(self, q: Array, tension: Array, wrench: Array) -> MuJoCoState:
+    def initial(self, q: Array, tension: Array, wrench: Array) -> MuJoCoState:
         """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         import mujoco
 
         pose = self.arm.at(q)
         text = to_mjcf(self.arm, pose, tension, damping_ratio=self.damping_ratio)
-        wire = self.arm._laws.original_lengths(pose.cable_lengths, tension)
+        paid_out = self.arm._laws.original_lengths(pose.cable_lengths, tension)
         model = mujoco.MjModel.from_xml_string(text)
-        return MuJoCoState(model, pose, Reading(wire, tension), frozen(np.zeros(q.size)))
+        return MuJoCoState(model, pose, Measurement(paid_out, tension), frozen(np.zeros(q.size)))
 
-    def move(self, state: MuJoCoState, command: Command, wrench: Array) -> MuJoCoState:
+    def step_to(self, state: MuJoCoState, command: Command, wrench: Array) -> MuJoCoState:
         """Return the state one period after ``state``, under a command and a wrench (6,).
 
         Raises:
@@ -85,7 +86,8 @@ class MuJoCoPlant:
         """
         import mujoco
 
-        model, data = state.model, mujoco.MjData(state.model)
+        model = copy.copy(state.model)
+        data = mujoco.MjData(model)
         names = self.arm.joint_names
         address = np.array([model.joint(name).qposadr[0] for name in names])
         data.qpos[address], data.qvel[:] = state.pose.q, state.velocity
@@ -103,8 +105,9 @@ class MuJoCoPlant:
         if not np.isfinite(data.qpos).all() or data.warning.number.any():
             raise SolverError("mujoco", "diverges: the arm moves beyond all bounds")
         pose = self.arm.at(data.qpos[address].copy(), check_limits=False)
-        F = self._tensions(pose.cable_lengths, command)
-        return MuJoCoState(model, pose, Reading(command.wire, frozen(F)), data.qvel.copy())
+        F = tensions_of(self.arm, pose.cable_lengths, command.paid_out, command.tension)
+        true_values = Measurement(command.paid_out, frozen(F))
+        return MuJoCoState(state.model, pose, true_values, data.qvel.copy())
 
     def _set_motors(self, model: Any, lengths: Array, command: Command) -> None:
         """Set each actuator of ``model`` so that it has the force F + k (L' − L) at a length L'.
@@ -114,37 +117,10 @@ class MuJoCoPlant:
         """
         cables = self.arm.cables
         L = lengths + [cable.lead for cable in cables]
-        F = self._tensions(L, command)
+        F = tensions_of(self.arm, L, command.paid_out, command.tension)
         for c, cable in enumerate(cables):
             motor = model.actuator(cable.name).id
             taut = cable.control == "position" and F[c] > 0.0
-            k = float(cable.tangent_stiffness(F[c], command.wire[c])) if taut else 0.0
+            k = float(cable.tangent_stiffness(F[c], command.paid_out[c])) if taut else 0.0
             model.actuator_gainprm[motor, 0] = 0.0
             model.actuator_biasprm[motor, :3] = k * lengths[c] - F[c], -k, 0.0
-
-    def _tensions(self, lengths: Array, command: Command) -> Array:
-        """Compute F (C,) [N] from cable lengths (C,) [m], leads included, and the command.
-
-        A position-controlled cable has the commanded wire, a force-controlled one the commanded
-        tension. Raises ElasticityRangeError as :meth:`move` does.
-        """
-        F = command.tension.copy()
-        for c, cable in enumerate(self.arm.cables):
-            if cable.control == "position":
-                stretch, wire = float(lengths[c] - command.wire[c]), float(command.wire[c])
-                try:
-                    F[c] = _tension(cable, stretch, wire)
-                except ElasticityRangeError as error:
-                    raise ElasticityRangeError(error.problem, (), [c], [cable.name]) from None
-        return F
-
-
-def _tension(cable: Cable, elongation: float, wire: float) -> float:
-    """Compute F [N] of a cable; 0 N if it is slack.
-
-    A law that begins above 0 N is not defined for a slack cable: ElasticityRangeError is raised. A
-    law with a slack branch is slack only below the elongation at 0 N, which is negative.
-    """
-    if cable.elasticity.low == 0.0 and elongation <= float(cable.elongation(0.0, wire)):
-        return 0.0
-    return float(cable.tension(elongation, wire))

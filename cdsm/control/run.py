@@ -2,39 +2,44 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import TYPE_CHECKING, Any, Final, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.control.labelled import labelled, numbers, rows, table
+from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support.files import as_path
-from cdsm.support.format import aligned, plain, plural
-from cdsm.support.tidy import write_labelled
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.format import aligned, plural
+from cdsm.support.result import Result, quantity, unit
+from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
     import pandas
-    import xarray
     from matplotlib.figure import Figure
 
-    from cdsm.control.plant import Plant, PlantState
+    from cdsm.control.plants import Plant, PlantState
 
-Outcome = Literal["completed", "lost", "no rest", "wire"]
+Outcome = Literal["completed", "diverged", "no_equilibrium", "elasticity_range"]
 
+_ENDS: Final = {
+    "diverged": "UNSTABLE",
+    "no_equilibrium": "BUCKLES",
+    "elasticity_range": "OUTSIDE THE LAW",
+}
 _ROUNDING = 1e-9  # distance beyond a band [m] that counts as rounding
+_LISTED = 3  # largest number of motors whose names are printed
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class TrackingRun(ReadOnlyState):
+class TrackingRun(Result):
     """Result of :func:`track`: a closed loop along a path, step by step.
 
     There are n steps, C cables and D wanted directions. With friction, the true stiffness of a
@@ -48,16 +53,19 @@ class TrackingRun(ReadOnlyState):
         law: Name of the motor law.
         plant: The arm that was controlled.
         period: Time between two steps [s].
-        goals: Planned tip positions (n, 3) [m].
+        steps: Steps of control from one sample of the path to the next.
+        max_change_per_step: Largest change of each tension that the outer loop plans (C,) [N].
+        reference_tips: Planned tip positions (n, 3) [m].
         target: Wanted stiffness (n, D) [N/m].
         angles: True joint angles (n, nv) [rad]; [m] for prismatic joints.
         estimated_angles: Angles that the controller estimated before each step (n, nv) [rad].
         tips: True tip positions (n, 3) [m].
-        wanted_tension: Tensions at the motors (n, C) [N] that the outer loop plans; without such a
-            loop, those of the plan.
-        commanded_tension: Tensions that the motor commands give (n, C) [N], within the bounds.
-        commanded_wire: Commanded wire to pay out (n, C) [m].
-        measured_tension: Readings of the load cells before each step (n, C) [N].
+        reference_tension: Tensions at the motors (n, C) [N] that the outer loop plans; without such
+            a loop, those of the plan.
+        commanded_tension: Tensions that the motor commands are to give (n, C) [N], within the
+            bounds.
+        paid_out: Commanded wire to pay out (n, C) [m].
+        measured_tension: Measurements of the load cells before each step (n, C) [N].
         tension: True tensions at the motors (n, C) [N].
         saturated: Whether the command of each motor was changed to keep its tension within the
             bounds (n, C).
@@ -70,88 +78,122 @@ class TrackingRun(ReadOnlyState):
         wrench: Load (n, 6): force [N], then moment [N m].
         estimated_force: Force at the tip that the controller estimated (n, 3) [N].
         rigidity: Estimated rigidity of the wires, divided by the rigidity of their laws (n,) [-].
-        short: Whether the outer loop found no tensions within the bounds that give the target (n,).
-        refused: For each step at which the outer loop could not plan tensions and kept the previous
-            ones: the number of the step, and the reason.
-        outcome: ``"completed"``; ``"lost"``: the loop is unstable, so the tip left its path or the
-            plant diverged; ``"no rest"``: the arm buckled; ``"wire"``: a tension left the domain of
-            its law.
+        target_unreachable: Whether the outer loop found no tensions within the bounds that give the
+            target (n,).
+        change_limited: Whether ``max_change_per_step`` kept the outer loop from the tensions that
+            give the target (n,).
+        replan_failed: For each step at which the outer loop could not plan tensions and kept the
+            previous ones: the number of the step, and the reason.
+        outcome: ``"completed"``; ``"diverged"``: the loop is unstable, so the tip left its path or
+            the plant diverged; ``"no_equilibrium"``: the arm buckled; ``"elasticity_range"``: a
+            tension left the domain of its law.
         reason: What stopped the loop, in words; or empty.
         states: State of the plant after each step.
     """
 
+    _rows = "time"
+
     plan: PathPlan
-    law: str
+    law: str = field(metadata=unit("1"))
     plant: Plant[Any]
-    period: float
-    goals: Array
-    target: Array
-    angles: Array
-    estimated_angles: Array
-    tips: Array
-    wanted_tension: Array
-    commanded_tension: Array
-    commanded_wire: Array
-    measured_tension: Array
-    tension: Array
-    saturated: NDArray[np.bool_]
-    stiffness: Array
-    margin: Array
-    band: Array
-    displacement: Array
-    wrench: Array
-    estimated_force: Array
-    rigidity: Array
-    short: NDArray[np.bool_]
-    refused: dict[int, str]
-    outcome: Outcome
-    reason: str
+    period: float = field(metadata=unit("s"))
+    steps: int = field(metadata=unit("1"))
+    max_change_per_step: Array = field(metadata=unit("N", "cable"))
+    reference_tips: Array = field(metadata=unit("m", "time", "axis"))
+    target: Array = field(metadata=unit("N/m", "time", "direction"))
+    angles: Array = field(metadata=unit("joint", "time", "joint"))
+    estimated_angles: Array = field(metadata=unit("joint", "time", "joint"))
+    tips: Array = field(metadata=unit("m", "time", "axis"))
+    reference_tension: Array = field(metadata=unit("N", "time", "cable"))
+    commanded_tension: Array = field(metadata=unit("N", "time", "cable"))
+    paid_out: Array = field(metadata=unit("m", "time", "cable"))
+    measured_tension: Array = field(metadata=unit("N", "time", "cable"))
+    tension: Array = field(metadata=unit("N", "time", "cable"))
+    saturated: NDArray[np.bool_] = field(metadata=unit("1", "time", "cable"))
+    stiffness: Array = field(metadata=unit("N/m", "time", "direction"))
+    margin: Array = field(metadata=unit("joint stiffness", "time"))
+    band: Array = field(metadata=unit("m", "time"))
+    displacement: Array = field(metadata=unit("m", "time"))
+    wrench: Array = field(metadata=unit("N and N m", "time", "component"))
+    estimated_force: Array = field(metadata=unit("N", "time", "axis"))
+    rigidity: Array = field(metadata=unit("1", "time"))
+    target_unreachable: NDArray[np.bool_] = field(metadata=unit("1", "time"))
+    change_limited: NDArray[np.bool_] = field(metadata=unit("1", "time"))
+    replan_failed: dict[int, str] = field(metadata=unit("1"))
+    outcome: Outcome = field(metadata=unit("1"))
+    reason: str = field(metadata=unit("1"))
     states: tuple[PlantState, ...]
 
-    @cached_property
+    @property
+    def arm(self) -> Manipulator:
+        """The arm of the plan."""
+        return self.plan.arm
+
+    @quantity("s", "time")
     def time(self) -> Array:
         """Time of each step (n,) [s]."""
         return frozen(self.period * np.arange(len(self.tips), dtype=np.float64))
 
-    @property
+    @quantity("1", "direction", "axis")
     def directions(self) -> Array:
         """Wanted directions u (D, 3), base axes."""
         return self.plan.direction.reshape(-1, 3)
 
-    @cached_property
+    @quantity("m", "time")
     def tip_error(self) -> Array:
         """Distance of the tip from its planned position at each step (n,) [m]."""
-        off = self.tips - self.goals
-        return frozen(np.sqrt((off**2).sum(axis=1, dtype=np.float64)))
+        return frozen(np.linalg.norm(self.tips - self.reference_tips, axis=1))
 
-    @cached_property
+    @quantity("1", "time", "direction")
     def stiffness_error(self) -> Array:
         """Relative error of the true stiffness, stiffness/target − 1 (n, D) [-]; NaN if unknown."""
         return frozen(self.stiffness / self.target - 1.0)
 
-    @cached_property
+    @property
     def inside(self) -> NDArray[np.bool_]:
         """Whether the tip is inside the first-order band (B,), for the B steps that have a band."""
         known = np.isfinite(self.band)
         return frozen(abs(self.displacement[known]) <= self.band[known] + _ROUNDING)
 
     @property
+    def end(self) -> float:
+        """Time of the last completed step [s]; 0 if no step was completed."""
+        return float(self.time.max(initial=0.0))
+
+    @quantity("1")
+    def steps_needed(self) -> int:
+        """Steps between two samples with which the outer loop can follow the plan's tensions."""
+        changes = abs(np.diff(self.plan.tensions, axis=0)) / self.max_change_per_step
+        return max(math.ceil(float(changes.max(initial=0.0)) - _ROUNDING), 1)
+
+    @property
+    def saturated_motors(self) -> tuple[str, ...]:
+        """Names of the cables whose command was changed at some step because of a tension bound."""
+        names = self.arm.cables.names
+        return tuple(names[c] for c in np.flatnonzero(self.saturated.any(axis=0)))
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Faults of the run, worst first; empty if there are none."""
         said = []
         if self.outcome != "completed":
-            word = {"lost": "UNSTABLE", "no rest": "BUCKLES", "wire": "WIRE"}[self.outcome]
-            said.append(f"{word} at {self.end:.4g} s: {self.reason}")
+            said.append(f"{_ENDS[self.outcome]} at {self.end:.4g} s: {self.reason}")
         if unstable := np.flatnonzero(~(self.margin > 0.0)).tolist():
+            said.append(f"UNSTABLE {self._at(unstable)}: without friction the arm would buckle")
+        if failed := sorted(self.replan_failed):
+            said.append(f"NOT PLANNED {self._at(failed)}: {self.replan_failed[failed[0]]}")
+        if unreachable := np.flatnonzero(self.target_unreachable).tolist():
             said.append(
-                f"UNSTABLE AT REST {self._at(unstable)}: without friction the arm would give way"
+                f"OUT OF REACH {self._at(unreachable)}: within the bounds no tensions were found "
+                "that give the target"
             )
-        if refused := sorted(self.refused):
-            said.append(f"NOT PLANNED {self._at(refused)}: {self.refused[refused[0]]}")
-        if short := np.flatnonzero(self.short).tolist():
+        limited = np.flatnonzero(self.change_limited).tolist()
+        if limited and self.steps_needed > self.steps:
+            most = abs(np.diff(self.plan.tensions, axis=0)).max()
             said.append(
-                f"OUT OF REACH {self._at(short)}: within the bounds no tensions were found that "
-                "give the target"
+                f"TOO FEW STEPS {self._at(limited)}: tensions of the plan change by up to "
+                f"{most:.3g} N from sample to sample, and by max_change_per_step in one step; "
+                f"steps={self.steps_needed} would do"
             )
         return tuple(said)
 
@@ -159,40 +201,9 @@ class TrackingRun(ReadOnlyState):
         """Return text such as ``at 3 of 40 steps, from 0.2 s`` for these numbers of steps."""
         return f"at {len(steps)} of {len(self.time)} steps, from {self.period * steps[0]:.4g} s"
 
-    @property
-    def end(self) -> float:
-        """Time of the last completed step [s]; 0 if no step was completed."""
-        return float(self.time[-1]) if len(self.time) else 0.0
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return a labelled Dataset over time, in SI units; needs xarray (MissingExtra)."""
-        return labelled(self)
-
     def to_pandas(self) -> pandas.DataFrame:
-        """Return angles, tip, tensions and stiffness over time; needs pandas (MissingExtra)."""
-        return table(self)
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write :meth:`to_xarray` (``.nc``) or :meth:`to_pandas` (``.csv``); return the path.
-
-        ``cdsm view ARM.toml --path RUN.csv`` plays the table.
-
-        Raises:
-            InvalidInput: The path ends neither in ``.nc`` nor in ``.csv``.
-            MissingExtra: pandas or netCDF4 is not installed.
-            FileError: The file cannot be written.
-        """
-        return write_labelled(path, self.to_pandas, self.to_xarray)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the numbers of the printed table in SI for JSON, with units in the keys."""
-        return plain(numbers(self))
-
-    @property
-    def saturated_motors(self) -> tuple[str, ...]:
-        """Names of the cables whose command was changed at some step because of a tension bound."""
-        names = self.plan.arm.cables.names
-        return tuple(names[c] for c in np.flatnonzero(self.saturated.any(axis=0)))
+        """Return a table over time, which ``cdsm view`` plays; needs pandas (MissingExtra)."""
+        return super().to_pandas().rename(columns=lambda name: name.removeprefix("angles "))
 
     def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
         """Plot tip error, stiffness, tensions and the first-order band over time.
@@ -210,14 +221,35 @@ class TrackingRun(ReadOnlyState):
             InvalidInput: The path does not end in ``.gif``, or no step was completed.
             FileError: The file cannot be written.
         """
-        cdsm.plots.plot_path(
-            [state.pose for state in self.states], animate=path, tensions=self.tension
-        )
+        poses = [state.pose for state in self.states]
+        cdsm.plots.plot_path(poses, animate=path, tensions=self.tension)
         return as_path(path)
 
     def __repr__(self) -> str:
-        return f"<TrackingRun of {self.plan.arm.name}, law {self.law}, {self.outcome}>"
+        return f"<TrackingRun of {self.arm.name}, law {self.law}, {self.outcome}>"
 
     def __str__(self) -> str:
+        tip, off = 1e3 * self.tip_error, 100.0 * abs(self.stiffness_error)
+        known, motors = off[np.isfinite(off)], self.saturated_motors
+        clamped = ", ".join(motors) if len(motors) <= _LISTED else str(len(motors))
+        low, high = self.tension.min(initial=math.inf), self.tension.max(initial=0.0)
+        least = f"{np.nanmin(self.margin, initial=math.inf):.4g} {self.arm.stiffness_unit()}"
+        inside, bands = self.inside, plural(self.inside.size, "step")
+        rows = [
+            ("tip error, mean and largest", f"{_both(tip)} mm"),
+            ("frictionless stiffness error, mean and largest", f"{_both(known)} %"),
+            ("true tensions at the motors", f"{low:.4g} to {high:.4g} N"),
+            ("smallest joint stiffness", least),
+            ("motors clamped at a tension bound", clamped or "none"),
+            ("rigidity of the wires, as estimated", f"{100.0 * self.rigidity[-1:].sum():.4g} %"),
+            (
+                "inside the first-order band",
+                f"{100.0 * inside.mean():.4g} % of {bands}" if inside.size else "no step has one",
+            ),
+        ]
         head = f"law {self.law}: {plural(len(self.time), 'step')}, {self.outcome}"
-        return "\n".join([*self.warnings, head, *aligned(rows(self))])
+        return "\n".join([*self.warnings, head, *aligned(rows)])
+
+
+def _both(values: Array) -> str:
+    return f"{values.mean():.3g}, {values.max():.3g}" if values.size else "unknown"

@@ -3,33 +3,45 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import fields
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import qr
 
-from cdsm.control.assessment import Assessment, assess
-from cdsm.control.estimates import Estimate, Observer
-from cdsm.control.laws import LAWS, Command, Law, Moment, Reading, Reference, checked_command
-from cdsm.control.plant import Plant, PlantState, SlowPlant, require_unstrained
+from cdsm.control.laws import LAWS, ControlInput, Law, Reference, checked_command
+from cdsm.control.observer import Observer
+from cdsm.control.plants import (
+    Plant,
+    PlantState,
+    QuasiStaticPlant,
+    frictionless_stiffness,
+    require_unstrained,
+)
 from cdsm.control.run import Outcome, TrackingRun
-from cdsm.control.schedule import Schedule, checked_plan
-from cdsm.control.schedule import tension_controlled as choose_cables
 from cdsm.control.sensors import Sensors
-from cdsm.control.stiffness_loop import StiffnessLoop
+from cdsm.control.stiffness_loop import StiffnessLoop, reference_at
 from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, listed
-from cdsm.planning.path import checked_rate
+from cdsm.friction.stick import half_width
+from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
+from cdsm.posture import Posture
 from cdsm.support import progress
-from cdsm.support.validation import flag, instance, one_of, quantity, scalar, whole_number
+from cdsm.support.validation import bound, instance, one_of, quantity, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
 _MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
 
-_LOST: Final = 0.1
-"""Tip error, divided by the length of the arm [-], above which the loop counts as unstable."""
+_DIVERGED: Final = 0.1  # tip error over the length of the arm of a loop that is unstable
+_PLANNED: Final = {"target_unreachable": False, "change_limited": False}
+_OUTCOMES: Final[dict[type | None, Outcome]] = {
+    EquilibriumError: "no_equilibrium",
+    ElasticityRangeError: "elasticity_range",
+}
 
 
 def track(
@@ -41,180 +53,234 @@ def track(
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
     payload: float = 0.0,
-    payload_from: float = 0.5,
     steps: int = 5,
     period: float = 0.05,
-    rate: ArrayLike = 10.0,
-    replan: bool | None = None,
-    tension_controlled: Sequence[str] | None = None,
-    seed: int = 0,
+    max_change_per_step: ArrayLike = 10.0,
 ) -> TrackingRun:
     """Follow a planned path in closed loop, with a plant that may differ from the plan's arm.
 
     At each step the sensors are read, the posture and the rigidity of the wires are estimated, a
     motor law commands the motors, and the plant follows. ``"feedforward"`` pays out the wire of the
-    plan. ``"tension"`` controls all tensions. ``"mixed"`` controls the tensions of some cables, and
-    pays out the planned wire of the others. ``"stiffness"`` is the mixed law inside an outer loop,
-    which plans the tensions again at the estimated posture. No law commands a tension outside the
-    bounds.
+    plan. ``"tension"`` controls all tensions. ``"mixed"`` controls the tensions of C − nv cables,
+    and pays out the planned wire of the others, whose lengths determine the posture best.
+    ``"stiffness"`` is the mixed law inside an outer loop, which plans the tensions again at the
+    estimated posture. No law commands a tension outside the bounds, as predicted for the posture
+    after the step.
 
     The plan's arm, with its friction, is the model of the controller. The loop starts at rest at
-    the first sample with the planned tensions. An unstable loop, an arm that buckles and a target
-    that cannot be planned or reached raise no error: ``outcome``, ``reason`` and ``warnings`` of
-    the result report them.
+    the first sample with the planned tensions. Between two samples the joint angles change evenly,
+    and the tensions balance the arm. If plant and plan are the same arm and the sensors are exact,
+    every law holds the plan at the samples. An unstable loop, an arm that buckles and a target that
+    cannot be planned or reached raise no error: ``outcome``, ``reason`` and ``warnings`` of the
+    result report them.
 
     Args:
         plan: A complete plan along one or more directions.
-        law: The motor law: a name, or a function from a :class:`Moment` to a :class:`Command`.
-        plant: The true arm. Default: :class:`SlowPlant` of the plan's arm.
+        law: The motor law: a name, or a function from a :class:`ControlInput` to a
+            :class:`Command`.
+        plant: The true arm. Default: :class:`QuasiStaticPlant` of the plan's arm.
         sensors: The sensors; default: encoders of 10 µm, exact load cells.
         minimum: Lower bounds of the commanded tensions [N], for all cables or (C,).
         maximum: Upper bounds of the commanded tensions [N], for all cables or (C,).
-        payload: Mass [kg] that the controller does not know of; it hangs at the tip.
-        payload_from: Part of the path [-], from 0 to 1, after which the payload hangs at the tip.
+        payload: Mass [kg] that the controller does not know of; it hangs at the tip on the second
+            half of the path.
         steps: Steps of control from one sample of the path to the next.
         period: Time between two steps [s].
-        rate: Largest change of a tension per step that the outer loop plans [N], for all cables or
-            (C,).
-        replan: Whether the outer loop runs; default: for ``"stiffness"`` only.
-        tension_controlled: Names of the cables whose tension a mixed law controls. Default: C − nv
-            cables, chosen so that the lengths of the others determine the posture best.
-        seed: Seed of the noise; the same seed gives the same run, bit for bit.
+        max_change_per_step: Largest change of a tension per step that the outer loop plans [N], for
+            all cables or (C,). ``steps_needed`` of the result says how many steps that takes.
 
     Raises:
         InvalidInput: The plan is not complete; or another argument is invalid; or a law returns no
             :class:`Command` within the bounds.
-        UnknownName: There is no such law or cable.
+        UnknownName: There is no such law.
     """
-    arm = checked_plan(instance("plan", plan, PathPlan))
+    arm = instance("plan", plan, PathPlan).arm
+    if not plan.complete:
+        first, lacking = plan.infeasible[0], f"{len(plan.infeasible)} of {len(plan.target)}"
+        said = f"{lacking} samples are not planned, the first of them sample {first.index}"
+        raise InvalidInput("plan", f"{said}: {first.reason}")
     require_unstrained("plan", arm)
     low, high = checked_bounds(arm, minimum, maximum)
     name = law if isinstance(law, str) else getattr(law, "__name__", "custom")
     command_of = LAWS[one_of("law", law, LAWS)] if isinstance(law, str) else law
     sensors = Sensors() if sensors is None else instance("sensors", sensors, Sensors)
-    plant = SlowPlant(arm) if plant is None else plant
-    if not hasattr(plant, "begin"):  # an arm by itself, for example
-        raise InvalidInput("plant", f"{plant!r} given; a plant is needed, such as SlowPlant(arm).")
+    plant = QuasiStaticPlant(arm) if plant is None else plant
+    if not hasattr(plant, "step_to"):  # an arm by itself, for example
+        said = f"{plant!r} given; a plant is needed, such as QuasiStaticPlant(arm)."
+        raise InvalidInput("plant", said)
     own, its = ((*each.joint_names, *each.cables.names) for each in (arm, plant.arm))
     if own != its:
-        other = sorted({*own} ^ {*its}) or its
+        other = listed(sorted({*own} ^ {*its}) or its)
         raise InvalidInput(
-            "plant", f"its arm and that of the plan differ in joints or cables: {listed(other)}."
+            "plant", f"its arm and that of the plan differ in joints or cables: {other}."
         )
-    schedule = Schedule.of(plan, whole_number("steps", steps, 1, _MOST_STEPS))
-    size = len(schedule.references)
-    from_step = math.ceil(_share("payload_from", payload_from) * (size - 1))
-    wrenches = schedule.wrenches.copy()
-    wrenches[from_step:, :3] += quantity("payload", payload, "mass", zero=True) * arm.gravity
-    period = quantity("period", period, "time")
-    limit, outer = checked_rate(arm, rate), None
-    if flag("replan", name == "stiffness" if replan is None else replan):
-        outer = StiffnessLoop(arm, schedule.directions, low, high, limit)
-    forced = choose_cables(plan, tension_controlled)
-    random = np.random.default_rng(whole_number("seed", seed, 0))
-    observer = Observer(arm, sensors)
-
-    reference = schedule.references[0]
-    state = plant.begin(reference.angles, reference.tension, schedule.wrenches[0])
-    truth = [state.true]
-    last = sensors.read(truth, random)
-    estimate = observer.begin(reference.angles, last)
-    before, mean, wire = None, reference.tension, last.wire
-    records: list[_Step] = []
-    refused: dict[int, str] = {}
-    refusal, short = "", False
+    count = whole_number("steps", steps, 1, _MOST_STEPS)
+    change = bound("max_change_per_step", max_change_per_step, len(arm.cables))
+    if not (change > 0.0).all():
+        raise InvalidInput("max_change_per_step", f"{change.min():g} N given; it must be positive.")
+    outer = StiffnessLoop(plan, low, high, change) if name == "stiffness" else None
+    hung = quantity("payload", payload, "mass", zero=True) * arm.gravity
+    schedule = _schedule(plan, count, hung)
+    rows: list[dict[str, Any]] = []
     outcome: Outcome = "completed"
     reason = ""
-    for k in progress.track(range(size), "following the path"):
-        reading = sensors.read(truth, random)
-        estimate = observer.update(estimate, reading)
-        wanted = schedule.references[k]
-        if outer is not None:
-            planned = outer.next(wanted, schedule.targets[k], estimate, mean)
-            wanted, mean = planned.reference, planned.mean
-            refusal, short = planned.refused, planned.short
-        moment = Moment(wanted, reading, before or wanted, last, wire, low, high, forced)
-        command = checked_command(command_of(moment), moment, arm.cables.names)
-        try:
-            state = plant.move(state, command, wrenches[k])
-        except CdsmError as error:
-            outcome, reason = _stopped(error), str(error)
-            break
-        truth.append(state.true)
-        judged = assess(state, wrenches[k], schedule.directions)
-        records.append(_Step(wanted, short, reading, estimate, command, state, judged))
-        if refusal:
-            refused[k] = refusal
-        before, last, wire = wanted, reading, command.wire
-        off = float(np.linalg.norm(state.pose.tip[:3, 3] - schedule.tips[k]))
-        if off > _LOST * arm.length:
-            outcome, reason = "lost", f"the tip is {1e3 * off:.3g} mm off its path"
-            break
+    try:
+        for row in _follow(plan, command_of, plant, sensors, schedule, outer, (low, high)):
+            rows.append(row)
+            off = float(np.linalg.norm(row["tips"] - row["reference_tips"]))
+            if off > _DIVERGED * arm.length:
+                outcome, reason = "diverged", f"the tip is {1e3 * off:.3g} mm off its path"
+                break
+    except _PlantError as error:
+        outcome, reason = _OUTCOMES.get(type(error.__cause__), "diverged"), str(error)
     return TrackingRun(
         plan=plan,
         law=name,
         plant=plant,
-        period=period,
-        refused=refused,
+        period=quantity("period", period, "time"),
+        steps=count,
+        max_change_per_step=change,
+        replan_failed=outer.failed if outer else {},
         outcome=outcome,
         reason=reason,
-        states=tuple(record.state for record in records),
-        **_columns(schedule, wrenches, records),
+        states=tuple(row["states"] for row in rows),
+        **_columns(rows, arm, len(schedule[0].target)),
     )
 
 
-def _stopped(error: CdsmError) -> Outcome:
-    if isinstance(error, EquilibriumError):
-        return "no rest"
-    return "wire" if isinstance(error, ElasticityRangeError) else "lost"
+def _follow(
+    plan: PathPlan,
+    law: Law,
+    plant: Plant[Any],
+    sensors: Sensors,
+    schedule: list[_Wanted],
+    outer: StiffnessLoop | None,
+    bounds: tuple[Array, Array],
+) -> Iterator[dict[str, Any]]:
+    """Control step by step; yield the values of each field of TrackingRun at each step.
+
+    Raises _PlantError if the plant cannot follow a command.
+    """
+    last, load = schedule[0].reference, plan.stiffness[0].wrench
+    state = plant.initial(last.angles, last.tension, load)
+    random, true_values = np.random.default_rng(sensors.seed), [state.true_values]
+    measured = sensors.measure(true_values, random)
+    observer = Observer(plan.arm, sensors)
+    estimate = observer.initial(last.angles, measured)
+    paid_out, error, directions = measured.paid_out, 0.0 * last.tension, plan.direction
+    forced = _tension_controlled(plan.stiffness[0].posture)
+    for wanted in progress.track(schedule, "following the path"):
+        measured = sensors.measure(true_values, random)
+        estimate = observer.update(estimate, measured)
+        reference, before, flags = wanted.reference, last, _PLANNED
+        if outer is not None:
+            reference, before, flags = outer.next(reference, wanted.target, estimate, last)
+        given = ControlInput(reference, before, measured, error, paid_out, *bounds, forced)
+        command = checked_command(law(given), given, plan.arm.cables.names)
+        try:
+            state = plant.step_to(state, command, wanted.wrench)
+        except CdsmError as fault:
+            raise _PlantError(str(fault)) from fault
+        true_values.append(state.true_values)
+        last, paid_out, error = reference, command.paid_out, given.error
+        yield {
+            "reference_tips": wanted.tip,
+            "target": wanted.target,
+            "wrench": wanted.wrench,
+            "states": state,
+            "angles": state.pose.q,
+            "tips": state.pose.tip[:3, 3],
+            "tension": state.true_values.tension,
+            "estimated_angles": estimate.pose.q,
+            "estimated_force": estimate.force,
+            "rigidity": 1.0 / estimate.softness,
+            "reference_tension": reference.tension,
+            "measured_tension": measured.tension,
+            "commanded_tension": command.tension,
+            "paid_out": command.paid_out,
+            "saturated": command.saturated,
+            **flags,
+            **_assessed(state, wanted.wrench, directions.reshape(-1, 3)),
+        }
 
 
-def _share(name: str, value: float) -> float:
-    number = scalar(name, value)
-    if not 0.0 <= number <= 1.0:
-        raise InvalidInput(name, f"{number:g} given; a part of the path, from 0 to 1, is needed.")
-    return number
+class _PlantError(Exception):
+    """The plant cannot follow a command."""
 
 
-class _Step(NamedTuple):
-    wanted: Reference
-    short: bool
-    reading: Reading
-    estimate: Estimate
-    command: Command
-    state: PlantState
-    judged: Assessment
+class _Wanted(NamedTuple):
+    """What the plan wants at one step of control."""
+
+    reference: Reference
+    target: Array  # stiffness (D,) [N/m]
+    tip: Array  # position (3,) [m]
+    wrench: Array  # true load (6,): force [N], then moment [N m]
 
 
-def _columns(schedule: Schedule, wrenches: Array, records: list[_Step]) -> dict[str, Any]:
-    n, u = len(records), schedule.directions
+def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
+    """Divide a plan into ``steps`` equal steps from each sample to the next.
 
-    def rows(values: list[Any], *tail: int) -> Array:
-        return frozen(np.array(values, dtype=np.float64).reshape(n, *tail))
+    Angles, loads and targets are interpolated linearly. So are the tensions, which then get the
+    least change that balances the arm. The weight ``hung`` (3,) [N] acts on the second half.
+    """
+    arm, size = plan.arm, len(plan.planned)
+    at = np.linspace(0.0, size - 1.0, (size - 1) * steps + 1)
+    laws = [cable.elasticity for cable in arm.cables]
+    domains = [law.low for law in laws], [law.high for law in laws]
 
-    joints, cables = schedule.references[0].angles.size, schedule.references[0].wire.size
-    tips = rows([record.state.pose.tip[:3, 3] for record in records], 3)
-    rests = rows([record.judged.tip for record in records], 3)
-    return {
-        "goals": frozen(schedule.tips[:n].copy()),
-        "target": frozen(schedule.targets[:n].copy()),
-        "wrench": frozen(wrenches[:n].copy()),
-        "tips": tips,
-        "angles": rows([record.state.pose.q for record in records], joints),
-        "estimated_angles": rows([record.estimate.pose.q for record in records], joints),
-        "wanted_tension": rows([record.wanted.tension for record in records], cables),
-        "commanded_tension": rows([record.command.tension for record in records], cables),
-        "commanded_wire": rows([record.command.wire for record in records], cables),
-        "measured_tension": rows([record.reading.tension for record in records], cables),
-        "tension": rows([record.state.true.tension for record in records], cables),
-        "saturated": frozen(
-            np.array([record.command.saturated for record in records]).reshape(n, cables)
-        ),
-        "stiffness": rows([record.judged.stiffness for record in records], len(u)),
-        "margin": rows([record.judged.margin for record in records]),
-        "short": frozen(np.array([record.short for record in records], dtype=np.bool_)),
-        "band": rows([record.judged.band for record in records]),
-        "displacement": frozen((tips - rests) @ u[0]),
-        "estimated_force": rows([record.estimate.force for record in records], 3),
-        "rigidity": rows([1.0 / record.estimate.softness for record in records]),
-    }
+    def along(values: Any) -> Array:
+        rows = np.reshape(values, (size, -1)).T
+        return np.stack([np.interp(at, np.arange(size), row) for row in rows], axis=1)
+
+    wanted: list[_Wanted] = []
+    loads = [K.wrench for K in plan.stiffness]
+    parts = plan.angles, plan.tensions, plan.target, loads
+    for q, F, target, W in zip(*map(along, parts), strict=True):
+        pose = arm.at(q)
+        missing = pose.jacobian.T @ W - pose.gravity_torque - F @ pose.length_jacobian
+        F = np.clip(F + np.linalg.lstsq(pose.length_jacobian.T, missing)[0], *domains)
+        reference = reference_at(arm, q, F)
+        late = 2 * len(wanted) >= len(at) - 1
+        true_load = W + late * np.append(hung, np.zeros(3))
+        wanted.append(_Wanted(reference, target, pose.tip[:3, 3], true_load))
+    return wanted
+
+
+def _tension_controlled(pose: Posture) -> NDArray[np.bool_]:
+    """Return the C − nv cables (C,) of which the lengths of the others determine the posture."""
+    *_, order = qr(pose.length_jacobian.T, mode="economic", pivoting=True)
+    forced = np.ones(len(pose.arm.cables), dtype=np.bool_)
+    forced[order[: pose.arm.nv]] = False
+    return forced
+
+
+def _assessed(state: PlantState, wrench: Array, directions: Array) -> dict[str, Any]:
+    """Return the true stiffness, margin and band of a state, and how far its tip is off the band.
+
+    Values that do not exist are NaN.
+    """
+    found: dict[str, Any] = dict.fromkeys(("margin", "band", "displacement"), math.nan)
+    found["stiffness"] = np.full(len(directions), math.nan)
+    with suppress(CdsmError):
+        K = frictionless_stiffness(state, wrench)
+        found["margin"] = K.margin
+        off = state.pose.tip[:3, 3] - K.posture.tip[:3, 3]
+        found["displacement"] = off @ directions[0]
+        found["stiffness"] = np.array([K.along(u) for u in directions])
+        if K.posture.arm.has_friction and K.is_stable:
+            found["band"] = half_width(K, directions[0])
+    return found
+
+
+def _columns(rows: list[dict[str, Any]], arm: Manipulator, directions: int) -> dict[str, Any]:
+    """Stack the rows of a run, with the dimensions that the fields of TrackingRun tell."""
+    sizes = {"cable": len(arm.cables), "joint": arm.nv, "axis": 3, "component": 6}
+    sizes |= {"time": len(rows), "direction": directions}
+    found: dict[str, Any] = {}
+    for each in fields(TrackingRun):
+        dims = each.metadata.get("dims", ())
+        if dims[:1] == ("time",):
+            values = np.array([row[each.name] for row in rows])
+            kind = np.bool_ if "bool" in str(each.type) else np.float64
+            found[each.name] = frozen(values.astype(kind).reshape([sizes[dim] for dim in dims]))
+    return found

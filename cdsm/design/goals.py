@@ -17,7 +17,7 @@ MeasureName = Literal[
     "deflection",
     "motor_force",
     "payload",
-    "capacity_margin",
+    "force_radius",
     "tension_factor",
     "cable_clearance",
     "link_clearance",
@@ -59,7 +59,7 @@ KINDS: Final[dict[str, Kind]] = {
     ),
     "motor_force": Kind("largest tension", "N", ("N", 1.0), "least"),
     "payload": Kind("least payload along", "N", ("N", 1.0), "most", directed=True),
-    "capacity_margin": Kind("least payload in any direction", "N", ("N", 1.0), "most"),
+    "force_radius": Kind("least payload in any direction", "N", ("N", 1.0), "most"),
     "tension_factor": Kind("least tension factor", "1", _ONE, "most"),
     "cable_clearance": Kind("least clearance between cables", "m", _MM, "most"),
     "link_clearance": Kind("least clearance of cables from links", "m", _MM, "most"),
@@ -132,7 +132,7 @@ class Objective(Measure):
 
     Attributes:
         of: ``"stiffness"``, ``"softest"``, ``"margin"``, ``"deflection"``, ``"motor_force"``,
-            ``"payload"``, ``"capacity_margin"``, ``"tension_factor"``, ``"cable_clearance"``,
+            ``"payload"``, ``"force_radius"``, ``"tension_factor"``, ``"cable_clearance"``,
             ``"link_clearance"``, ``"disk_clearance"``, ``"workspace"``, ``"held"``, ``"mass"``,
             ``"length"`` or ``"wire_length"``. A posture is held under a load if tensions within
             the bounds balance it and the arm is stable. If the value depends on posture or load,
@@ -142,7 +142,7 @@ class Objective(Measure):
             without the load, since the motors are locked before the load acts, as in
             :func:`~cdsm.payload` and :func:`~cdsm.weight_test`. The deflection is inf if the arm is
             not held without load. ``payload`` is the largest force along u that tensions within the
-            bounds balance in addition to the load; ``capacity_margin`` is the largest force that
+            bounds balance in addition to the load; ``force_radius`` is the largest force that
             they balance in every direction. ``workspace`` is the volume of the convex hull of the
             tips of held postures, ``held`` the fraction of pairs of posture and load that are held.
             :func:`~cdsm.clearance` defines clearances.

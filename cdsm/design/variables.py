@@ -10,8 +10,8 @@ from typing import Final, Literal, final, get_args
 
 from cdsm.errors import InvalidInput
 from cdsm.geometry import CableRoute, Geometry
-from cdsm.geometry.checks import WIDEST, doubts_about_angle, doubts_about_units
 from cdsm.geometry.uniform import evenly_spaced, hinge_hole_angles
+from cdsm.geometry.units import WIDEST, doubts_about_angle, doubts_about_units
 from cdsm.support.format import place
 from cdsm.support.validation import one_of, quantity, scalar, whole_number
 from cdsm.support.warning import warn

@@ -3,11 +3,11 @@
 All units are SI (m, rad, kg). The straight arm lies along x, and all lengths are measured along x.
 """
 
-from cdsm.geometry.checks import LONGEST as LONGEST
-from cdsm.geometry.checks import doubts_about_units as doubts_about_units
 from cdsm.geometry.geometry import Geometry as Geometry
 from cdsm.geometry.parts import MAXIMUM_JOINTS as MAXIMUM_JOINTS
 from cdsm.geometry.parts import CableRoute as CableRoute
 from cdsm.geometry.parts import Disk as Disk
 from cdsm.geometry.parts import Joint as Joint
 from cdsm.geometry.parts import Link as Link
+from cdsm.geometry.units import LONGEST as LONGEST
+from cdsm.geometry.units import doubts_about_units as doubts_about_units

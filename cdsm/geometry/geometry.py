@@ -15,11 +15,11 @@ from typing import Annotated, Any, ParamSpec, Self
 
 from pydantic import Field, model_validator
 
-from cdsm.errors import GeometryError
+from cdsm.errors import GeometryError, listed
 from cdsm.geometry import toml
-from cdsm.geometry.checks import doubts_about, faults_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
-from cdsm.geometry.uniform import Hinged, Universal, fields_of, spread_out
+from cdsm.geometry.uniform import Hinged, Universal, fields_of, same_angle, spread_out
+from cdsm.geometry.units import WIDEST, doubts_about_angle, doubts_about_units
 from cdsm.support.files import read_text, write_text
 from cdsm.support.format import plural
 from cdsm.support.records import CrossFaults, Length, LengthOrZero, Name, read_toml, record
@@ -80,11 +80,59 @@ class Geometry(Printed):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if faults := faults_of(self):
+        if faults := [*self._faults()]:
             raise CrossFaults(faults)
-        for doubt in doubts_about(self):
+        for doubt in self._doubts():
             warn(f"{self.name}: {doubt}")
         return self
+
+    def _faults(self) -> Iterator[str]:
+        """Yield the faults that concern several parts, such as too short links."""
+        joints, links, n = self.joints, self.links, len(self.joints)
+        if len(links) != n:
+            yield f"links: {len(links)} given for {n} joints; give one for each"
+        offsets = [*(joint.disk_offset for joint in joints), 0.0]
+        short = [
+            f"link {k} is {link.length:g} m long, its disks need more than {needed:g} m"
+            for k, link in enumerate(links, start=1)
+            if link.length <= (needed := sum(offsets[k - 1 : k + 1]))
+        ]
+        if short:
+            remedy = "lower disk_offset, or lengthen the links"
+            yield f"disk_offset: too large: {listed(short, 1, '; ')}; {remedy}"
+        for c, cable in enumerate(self.cables, start=1):
+            if cable.joint > n:
+                said = f"{cable.joint} is past the last joint, {n}; give 1 to {n}"
+                yield f"cables[{c}].joint: {said}"
+        small = [
+            f"at joint {k} it is {joint.disk_radius:g} m, and the farthest hole is at {hole:g} m"
+            for k, (joint, hole) in enumerate(zip(joints, self._farthest_holes, strict=True), 1)
+            if joint.disk_radius is not None and joint.disk_radius <= hole
+        ]
+        if small:
+            yield f"disk_radius: too small: {listed(small, 1, '; ')}; give more"
+
+    def _doubts(self) -> Iterator[str]:
+        """Yield texts of warnings: lengths look like mm, angles like degrees; holes are shared."""
+        cables, disks, names = self.cables, self.disks, self.cable_names
+        offset = max(joint.disk_offset for joint in self.joints)
+        sizes = [("hole_radius", max(self.hole_radii), WIDEST), ("disk_offset", offset, WIDEST)]
+        yield from doubts_about_units(self.length, sizes)
+        # the angles of hinges grow by the twist, up to half a turn, from one to the next
+        most = math.pi * max(8, len(self.joints) + 4)
+        widest = max((cable.angle for cable in cables), key=abs)
+        yield from doubts_about_angle("a hole angle is", widest, most)
+        holes = defaultdict(list)
+        for i, group in enumerate(same_angle(cables)):
+            for c in group:
+                for d, disk in enumerate(disks[: 2 * cables[c].joint]):
+                    holes[i, d, disk.radius_of(cables[c])].append(c)
+        shared = {tuple(hole) for hole in holes.values() if len(hole) > 1}
+        whole = sorted(hole for hole in shared if not any(set(hole) < set(each) for each in shared))
+        if whole:
+            groups = listed([" and ".join(names[c] for c in hole) for hole in whole], 4, "; ")
+            remedy = "Cables in one hole rub: set them apart by spread=, phase= or hole_angles=."
+            yield f"cables share holes: {groups}. {remedy}"
 
     def __str__(self) -> str:
         joints, cables = plural(len(self.joints), "joint"), plural(len(self.cables), "cable")

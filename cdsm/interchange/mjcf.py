@@ -23,11 +23,11 @@ from lxml import etree
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.interchange.mjcf_bodies import add_bodies, row
+from cdsm.interchange.mjcf_bodies import Carried, add_bodies, mass_matrix, row
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.report.checks import TOLERANCE, balance_error
-from cdsm.statics.natural_modes import Carried, mass_matrix, motions
+from cdsm.statics.modes import vibrations
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.instability import verdict
 from cdsm.support.files import write_text
@@ -220,7 +220,7 @@ def _motion(
     unit = JointUnits(arm.slides).joined("N m s/rad", "N s/m")
     damped = f"{damping or 0.0:.4g} {unit} at every joint"
     if K is not None:
-        squares, shapes = motions(K, mass_matrix(K.posture, masses))
+        squares, shapes = vibrations(K, mass_matrix(K.posture, masses))
         fastest = math.sqrt(abs(squares).max())
         step = next((each for each in _STEPS if each * fastest <= _PHASE), _STEPS[-1])
         of = f"for frequencies up to {fastest / math.tau:.4g} Hz"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from lxml import etree
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from cdsm.manipulator import Manipulator
-from cdsm.statics.natural_modes import Carried
+from cdsm.posture import Posture
 from cdsm.support.values import Array
 from cdsm.support.xml import parse_xml
 
@@ -19,6 +20,32 @@ _SMALLEST = 1e-12  # a smaller mass [kg] or moment of inertia [kg m²] of a body
 _ROUNDING = 1e-9  # relative; MuJoCo refuses a moment of inertia above the sum of the other two
 _SITE, _STICK = 1e-3, 0.008  # radius [m] of a drawn hole; of a stick over the length of the arm
 _GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mass or contacts
+
+
+class Carried(NamedTuple):
+    """Rigid body that a link carries; its centre and inertia are in the frame of the link."""
+
+    link: str
+    mass: float  # m [kg]
+    centre: Array  # centre of mass (3,) [m]
+    inertia: Array  # I about the centre of mass (3, 3) [kg m²]
+
+
+def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
+    """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies ``carried`` alone.
+
+    M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω). J_v and J_ω are the Jacobians of the velocity of the centre of
+    mass and of the angular velocity of a body.
+    """
+    body, M = pose.arm._body, np.zeros((pose.arm.nv, pose.arm.nv))
+    for link, mass, centre, inertia in carried:
+        place = pose.link_pose(link)
+        joints = np.array(body.joints_to(body.locate(link)[0]), dtype=np.intp) - 1
+        angular, R = pose._twist[3:, joints], place[:3, :3]
+        linear = pose._twist[:3, joints] + np.cross(angular.T, R @ centre + place[:3, 3]).T
+        turned = angular.T @ R
+        M[np.ix_(joints, joints)] += mass * linear.T @ linear + turned @ inertia @ turned.T
+    return M
 
 
 def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> list[Carried]:

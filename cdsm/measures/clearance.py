@@ -1,39 +1,43 @@
-"""Clearance of the cables: between each other, to the links, to the edges of the disks."""
+"""Clearance of the cables from each other, from the links and from the disks, by coal."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple, final
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple, Self, final
 
+import coal
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
-from cdsm._former.arm_arrays import kernel_arrays, run_slices
-from cdsm._former.clearance import clearance_rows
-from cdsm._former.tree import Indices, Routing
-from cdsm.batch.inputs import checked_threads, postures
-from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.format import plain
+from cdsm.support.result import Result, unit
 from cdsm.support.validation import instance, quantity
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array
 
-KINDS = ("cable_clearance", "link_clearance", "disk_clearance")
-"""Names of the clearances, in the order of the columns of the kernel's result."""
-
-_BESIDE = np.array([1.0, 0.5, 0.5])
-"""Cable diameters from a cable axis to another axis, to a link, to a disk when they touch [-]."""
+KINDS: Final = ("cable_clearance", "link_clearance", "disk_clearance")
+"""Names of the clearances in sweeps and designs."""
 
 _BACKBONE = 0.2
 """Radius of a link's backbone, divided by the hole radius of its first disk, as in the URDF."""
 
 _ON = 1e-9  # a site this near to a disk [m] is on the disk
 
+_PRECISE = 1e-9  # tolerance of coal's iterations [m]
+_MARGIN = 1e-6  # rounding of the distances of centres is smaller [m]
+
+
+class Named(NamedTuple):
+    """A distance [m] and the names of the two bodies; inf and empty names if there is no pair."""
+
+    distance: float
+    bodies: tuple[str, str] = ("", "")
+
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Clearance(ReadOnlyState):
+class Clearance(Result):
     """Smallest signed distances of the cables of an arm; made by :func:`clearance`.
 
     A negative distance is the depth of an overlap. A distance is inf if the arm has no such pair.
@@ -41,6 +45,7 @@ class Clearance(ReadOnlyState):
     Attributes:
         posture: The posture.
         diameter: Diameter of all cables [m].
+        thickness: Thickness of all disks [m].
         cables: Smallest distance between the surfaces of two cables [m].
         links: Smallest distance between a cable and the backbone of a link [m].
         disks: Smallest distance between a cable and a disk [m]; for a disk through which the cable
@@ -49,178 +54,178 @@ class Clearance(ReadOnlyState):
             ``disks``; empty names for a distance of inf.
     """
 
+    _headline = "cables"
+
     posture: Posture
-    diameter: float
-    cables: float
-    links: float
-    disks: float
-    nearest: tuple[tuple[str, str], tuple[str, str], tuple[str, str]]
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the distances in SI for JSON, with units in the keys; inf as None."""
-        numbers: dict[str, object] = {**self.posture._coordinates, "diameter_m": self.diameter}
-        for kind, value, names in self._by_kind:
-            numbers |= {f"{kind}_m": value, f"{kind}_between": names}
-        return plain(numbers)
-
-    @property
-    def _by_kind(self) -> list[tuple[str, float, tuple[str, str]]]:
-        values = (self.cables, self.links, self.disks)
-        return list(zip(KINDS, values, self.nearest, strict=True))
-
-    def __repr__(self) -> str:
-        return f"<Clearance {1e3 * min(self.cables, self.links, self.disks):.4g} mm>"
+    diameter: float = field(metadata=unit("m"))
+    thickness: float = field(metadata=unit("m"))
+    cables: float = field(metadata=unit("m"))
+    links: float = field(metadata=unit("m"))
+    disks: float = field(metadata=unit("m"))
+    nearest: tuple[tuple[str, str], ...] = field(metadata=unit("1"))
 
     def __str__(self) -> str:
-        lines = []
-        for kind, value, (one, other) in self._by_kind:
-            what = kind.partition("_")[0]
-            said = f"{1e3 * value:.4g} mm, {one} and {other}" if one else "none near"
-            lines.append(f"cable to {what:<6} {said}")
-        return "\n".join(lines)
+        values = zip(("cable", "link", "disk"), (self.cables, self.links, self.disks), strict=True)
+        said = []
+        for (what, value), (one, other) in zip(values, self.nearest, strict=True):
+            found = f"{1e3 * value:.4g} mm, {one} and {other}" if one else "none near"
+            said.append(f"cable to {what:<6} {found}")
+        return "\n".join(said)
 
 
-def clearance(pose: Posture, diameter: float = 0.0) -> Clearance:
-    """Compute the smallest signed distances of the cables at a posture.
+def clearance(pose: Posture, diameter: float = 0.0, thickness: float = 0.0) -> Clearance:
+    """Compute the smallest signed distances of the cables at a posture, by coal.
 
-    Cables are straight between their sites, with round sections; leads are ignored. Links are bars
-    from joint to joint, as the generated URDF draws them: their radius is a fifth of the hole
-    radius. In an arm from your own URDF, links are lines, and there are no disks. Disks are plates
-    without thickness. If a cable runs through a hole of a disk, its distance from this disk is the
-    distance between its surface and the outer rim. If a cable pierces a disk elsewhere, the
-    distance is negative. A distance is inf if the arm has no such pair.
+    Cables are straight between their sites, with round sections and ends; leads are ignored. Links
+    are bars from joint to joint, as the generated URDF draws them: their radius is a fifth of the
+    hole radius. In an arm from your own URDF, links are lines, and there are no disks. Disks are
+    cylinders. If a cable runs through a hole of a disk, its distance from this disk is the distance
+    between its surface and the outer rim. If it cuts through a disk, this way is negative.
 
     Args:
         pose: The posture.
         diameter: Diameter of all cables [m].
+        thickness: Thickness of all disks [m].
 
     Raises:
-        InvalidInput: ``diameter`` is negative or not a length.
+        InvalidInput: ``diameter`` or ``thickness`` is negative or not a length.
     """
-    arm = instance("pose", pose, Posture).arm
     d = quantity("diameter", diameter, "diameter", zero=True)
-    distance, nearest = _rows(arm, pose.q[None], d, 1)
-    cables, links, disks = distance[0].tolist()
-    shape = _shape(arm)
-    segments = [arm.cables[c].name for c in shape.segment[:, 0]]
-    names = [
-        ("", "") if second < 0 else (segments[first], other[second])
-        for (first, second), other in zip(
-            nearest[0].tolist(), (segments, shape.bone_names, shape.disk_names), strict=True
-        )
-    ]
+    t = quantity("thickness", thickness, "length", zero=True)
+    found = distances(instance("pose", pose, Posture), d, t)
+    cables, links, disks = (found[kind][0] for kind in KINDS)
     return Clearance(
         posture=pose,
         diameter=d,
+        thickness=t,
         cables=cables,
         links=links,
         disks=disks,
-        nearest=(names[0], names[1], names[2]),
+        nearest=tuple(found[kind][1] for kind in KINDS),
     )
 
 
-def clearances(
-    arm: Manipulator, q: ArrayLike, diameter: float = 0.0, *, threads: int | None = None
-) -> dict[str, Array]:
-    """Compute the distances of :func:`clearance` at postures q (B, nv) [rad].
-
-    Returns ``cable_clearance``, ``link_clearance`` and ``disk_clearance``, (B,) [m] each.
-    All cables have the ``diameter`` [m]. ``threads`` is the largest number of threads, by default
-    one for each core. Raises InvalidInput as :func:`clearance` does, and if ``q`` is not (B, nv)
-    numbers.
-    """
-    angles = postures(instance("arm", arm, Manipulator), q)
-    d = quantity("diameter", diameter, "diameter", zero=True)
-    distance, _ = _rows(arm, angles, d, checked_threads(threads))
-    return dict(zip(KINDS, distance.T.copy(), strict=True))
-
-
-class _Shape(NamedTuple):
-    """Cable segments, backbones and disks of an arm: arguments of the kernel ``clearance_rows``."""
-
-    routing: Routing  # cable sites, ends of backbones, centres of disks and points on their axes
-    segment: Indices  # cable, and both ends among the points, of each segment (S, 3)
-    bone: Indices  # both ends of each backbone (n, 2)
-    bone_radius: Array  # (n,) [m]
-    disk: Indices  # centre of each disk, and a point on its axis 1 m away (D, 2)
-    disk_radius: Array  # (D,) [m]
-    own: Indices  # 1 or 2 if this end of a segment is in a hole of the disk, else 0 (S, D)
-    bone_names: list[str]
-    disk_names: list[str]
-
-
-def _rows(arm: Manipulator, q: Array, diameter: float, threads: int) -> tuple[Array, Indices]:
-    """Compute the distances of :data:`KINDS` (B, 3) [m] at postures q (B, nv) [rad].
-
-    Also returns the indices of the two nearest bodies for each distance (B, 3, 2).
-    """
-    distance, nearest = np.empty((len(q), 3)), np.empty((len(q), 3, 2), dtype=np.intp)
-    shape, tree = _shape(arm), kernel_arrays(arm).tree
-
-    def fill(part: slice) -> None:
-        clearance_rows(tree, *shape[:7], q[part], distance[part], nearest[part])
-
-    run_slices(fill, len(q), 1, threads)
-    return distance - diameter * _BESIDE, nearest
-
-
-@lru_cache(maxsize=8)
-def _shape(arm: Manipulator) -> _Shape:
-    """Collect the cable segments, backbones and disks of an arm.
-
-    This takes milliseconds, so the results for the last arms are cached.
-    """
-    model = kernel_arrays(arm)
-    rows = model.routing.row.tolist()
-    points = model.routing.point.tolist()
-    segment, start = [], 0
-    for c, cable in enumerate(arm.cables):
-        segment += [(c, start + i, start + i + 1) for i in range(len(cable.sites) - 1)]
-        start += len(cable.sites)
-
-    def add(row: int, point: Array) -> int:
-        rows.append(row)
-        points.append(point.tolist())
-        return len(rows) - 1
-
+def distances(
+    pose: Posture, diameter: float, thickness: float = 0.0, kinds: Collection[str] = KINDS
+) -> dict[str, Named]:
+    """Compute the distances of ``kinds`` out of :data:`KINDS`, with the names of the bodies."""
+    arm, paths = pose.arm, pose.cable_paths
+    cable = np.repeat(np.arange(len(paths)), [len(path) - 1 for path in paths])
+    ends = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
+    names = [arm.cables[c].name for c in cable.tolist()]
+    wires = _Bodies.bars(names, ends, np.full(cable.size, diameter / 2.0))
     disks = arm.geometry.disks if arm.is_serpentine else ()
-    # the radius of a link's backbone is that of its first disk
-    radii = {model.body.locate(d.link)[0]: _BACKBONE * d.hole_radius for d in reversed(disks)}
-    names = ("the base", *(f"the link after {name}" for name in arm.joint_names))
-    parents = [*model.tree.parent[1:].tolist(), int(model.masses.tip)]
-    bones = [
-        (add(row, np.zeros(3)), add(row, end), radii.get(row, 0.0), names[row])
-        for row, end in zip(parents, [*model.tree.translation[1:], model.masses.point], strict=True)
-        if np.any(end)
-    ]
-    plates, own = [], []
-    for number, disk in enumerate(disks, start=1):
-        row, rotation, translation = model.body.locate(disk.link)
-        place = translation + rotation @ np.array([disk.x, 0.0, 0.0])
-        ahead = place + rotation @ np.array([1.0, 0.0, 0.0])
-        plates.append((add(row, place), add(row, ahead), disk.radius, f"disk {number}"))
-        at = [
-            rows[p] == row and abs((np.array(points[p]) - place) @ (ahead - place)) < _ON
-            for p in range(start)
-        ]
-        own.append([1 if at[a] else 2 if at[b] else 0 for _, a, b in segment])
-    places = {"row": frozen(np.array(rows, dtype=np.intp)), "point": frozen(np.array(points))}
-    columns = np.array(own, dtype=np.intp).reshape(len(disks), len(segment))
-    return _Shape(
-        model.routing._replace(**places),
-        np.array(segment, dtype=np.intp),
-        *_arrays(bones),
-        *_arrays(plates),
-        np.ascontiguousarray(columns.T),
-        [bone[3] for bone in bones],
-        [plate[3] for plate in plates],
-    )
+    found = dict[str, Named]()
+    if "cable_clearance" in kinds:
+        later = np.triu(np.ones((cable.size, cable.size), dtype=np.bool_))
+        found["cable_clearance"] = _nearest(wires, wires, later & (cable[:, None] != cable))
+    if "link_clearance" in kinds:
+        radii = {arm._body.locate(d.link)[0]: _BACKBONE * d.hole_radius for d in reversed(disks)}
+        rows = [row for row, _ in pose._bones]
+        links = ["the base", *(f"the link after {name}" for name in arm.joint_names)]
+        radius = np.array([radii.get(row, 0.0) for row in rows])
+        lines = np.array(pose.bones).reshape(-1, 2, 3)
+        bones = _Bodies.bars([links[row] for row in rows], lines, radius)
+        found["link_clearance"] = _nearest(wires, bones, np.ones((cable.size, len(rows)), np.bool_))
+    if "disk_clearance" in kinds:
+        poses = arm._body.link_placements(pose.q)
+        place = np.array([poses[disk.link] for disk in disks]).reshape(-1, 4, 4)
+        x, radius = (np.array([getattr(disk, of) for disk in disks]) for of in ("x", "radius"))
+        axis = place[:, :3, 0]
+        centre = place[:, :3, 3] + x[:, None] * axis
+        across = np.sqrt(np.clip(1.0 - axis**2, 0.0, 1.0))
+        plates = _Bodies(
+            [f"disk {number + 1}" for number in range(len(disks))],
+            [coal.Cylinder(each, thickness) for each in radius.tolist()],
+            centre,
+            axis,
+            thickness / 2.0 * abs(axis) + radius[:, None] * across,
+        )
+        rim = _ways_to_the_rim(ends[:, :, None] - centre, axis, radius)
+        found["disk_clearance"] = _nearest(wires, plates, np.isinf(rim))
+        if rim.size:
+            i, j = divmod(int(rim.argmin()), len(disks))
+            way = Named(rim[i, j] - diameter / 2.0, (names[i], plates.names[j]))
+            found["disk_clearance"] = min(found["disk_clearance"], way)
+    return found
 
 
-def _arrays(bodies: list[tuple[int, int, float, str]]) -> tuple[Indices, Array]:
-    """Convert n bodies (point, point, radius, name) to arrays.
+def _ways_to_the_rim(away: Array, axis: Array, radius: Array) -> Array:
+    """Compute how far segments in a disk are from its rim (S, D) [m]; inf for those that are not.
 
-    Returns the indices of their points (n, 2) and their radii (n,) [m].
+    ``away`` (S, 2, D, 3) are the ends of the segments, seen from the centres of the disks. The way
+    is positive if the segment ends in a hole of the disk, and negative if it cuts through it.
     """
-    ends = np.array([body[:2] for body in bodies], dtype=np.intp).reshape(-1, 2)
-    return ends, np.array([body[2] for body in bodies])
+    height = (away * axis).sum(axis=3)
+    way = radius - np.linalg.norm(away - height[..., None] * axis, axis=3)
+    held = (abs(height) < _ON) & (way > 0.0)
+    own = np.where(held, way, np.inf).min(axis=1)
+    crosses = (height.prod(axis=1) < 0.0) & ~held.any(axis=1)
+    part = height[:, 0] / np.where(crosses, height[:, 0] - height[:, 1], 1.0)
+    cut = away[:, 0] + part[..., None] * (away[:, 1] - away[:, 0])
+    inside = radius - np.linalg.norm(cut, axis=2)
+    return np.asarray(np.where(crosses & (inside > 0.0), -inside, own))
+
+
+class _Bodies:
+    """Bodies in base axes: n shapes of coal with z along their axes, rounded by a radius.
+
+    Centres, axes and extents (halves of the boxes around the shapes) are (n, 3); lengths and
+    radii are (n,) [m].
+    """
+
+    def __init__(
+        self, names: list[str], shapes: list[Any], centre: Array, axis: Array, extent: Array
+    ) -> None:
+        self.names, self.centre, self.extent = names, centre, extent
+        self.radius, self._shapes = np.zeros(len(names)), shapes
+        # a reflection that takes z to the axis, up to the sign, and one that turns the hand back
+        v = axis + np.where(axis[:, 2:] > 0.0, 1.0, -1.0) * [0.0, 0.0, 1.0]
+        mirror = np.eye(3) - 2.0 * v[:, :, None] * v[:, None] / (v**2).sum(axis=1)[:, None, None]
+        self._turn = mirror * [1.0, -1.0, 1.0]
+        self._poses: dict[int, Any] = {}
+
+    @classmethod
+    def bars(cls, names: list[str], ends: Array, radius: Array) -> Self:
+        """Return round bars with round ends, along lines between points (n, 2, 3)."""
+        along = ends[:, 1] - ends[:, 0]
+        length = np.linalg.norm(along, axis=1)
+        shapes = [coal.Capsule(0.0, each) for each in length.tolist()]
+        made = cls(names, shapes, ends.mean(axis=1), along / length[:, None], abs(along) / 2.0)
+        made.radius = radius
+        return made
+
+    def __getitem__(self, i: int) -> tuple[Any, Any]:
+        if i not in self._poses:
+            self._poses[i] = coal.Transform3s(self._turn[i], self.centre[i])
+        return self._shapes[i], self._poses[i]
+
+
+def _nearest(one: _Bodies, other: _Bodies, pairs: NDArray[np.bool_]) -> Named:
+    """Return the smallest distance of the ``pairs`` (n, m) of bodies, the likeliest ones first.
+
+    The spheres and the boxes around two bodies bound their distance from below, the centres from
+    above.
+    """
+    best = Named(math.inf)
+    if not pairs.any():
+        return best
+    offset = one.centre.mean(axis=0)
+    a, b = one.centre - offset, other.centre - offset
+    square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * a @ b.T
+    apart = np.sqrt(np.maximum(square, 0.0)) - one.radius[:, None] - other.radius
+    reach = [np.linalg.norm(each.extent, axis=1) for each in (one, other)]
+    most = apart[pairs].min() + _MARGIN
+    i, j = np.nonzero(pairs & (apart - reach[0][:, None] - reach[1] < most))
+    gaps = np.maximum(abs(a[i] - b[j]) - one.extent[i] - other.extent[j], 0.0)
+    rounding = one.radius[i] + other.radius[j]
+    least = np.linalg.norm(gaps, axis=1) - rounding
+    request, result = coal.DistanceRequest(False), coal.DistanceResult()
+    request.gjk_tolerance, request.enable_signed_distance = _PRECISE, False
+    for k in np.argsort(least).tolist():
+        if least[k] >= best.distance:
+            break
+        result.clear()
+        distance = coal.distance(*one[int(i[k])], *other[int(j[k])], request, result) - rounding[k]
+        best = min(best, Named(float(distance), (one.names[i[k]], other.names[j[k]])))
+    return best

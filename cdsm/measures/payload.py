@@ -3,67 +3,71 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.measures.forces import ForcePolytope, force_polytope
-from cdsm.measures.program import Loads
+from cdsm.measures.polytope import Farthest, balanced, force_polytope
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.directions import Direction, unit_direction
-from cdsm.support.format import coordinates, plain
-from cdsm.support.validation import NO_WRENCH, instance, quantity, wrench_vector
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.format import coordinates
+from cdsm.support.result import Result, quantity, unit
+from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
+from cdsm.support.validation import quantity as checked
+from cdsm.support.values import Array, frozen
 from cdsm.tension import bounds_at, distribute_tension
-
-PayloadLimit = Literal["tension", "deflection", "none"]
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Payload(ReadOnlyState):
-    """Largest admissible force at the tip; made by :func:`payload`.
+class Payload(Result):
+    """Largest admissible force at the tip, by two limits; made by :func:`payload`.
+
+    The motors do different things at each limit. While the load comes they are locked, and the tip
+    yields: ``limits["deflection"]``. Afterwards they re-distribute the tensions, so that the arm is
+    in balance at its posture again: ``limits["tension"]``. An arm whose motors do both in turn
+    carries ``force``; one whose motors stay locked is not limited by ``limits["tension"]``.
 
     Attributes:
         posture: The posture.
         direction: Unit direction (3,) of the force, base axes.
         worst: Whether ``direction`` is the worst of all directions.
-        force: The largest force [N]: the smallest of ``limits``.
-        limit: Which limit gives ``force``, a key of ``limits``; ``"none"`` if the force is inf.
         limits: Largest force [N] that each limit alone allows: ``"tension"`` (the bounds of the
             tensions) and ``"deflection"`` (0 if the arm is unstable without the force); inf for a
             limit that does not restrict it.
     """
 
+    _headline = "force"
+
     posture: Posture
-    direction: Array
-    worst: bool
-    force: float
-    limit: PayloadLimit
-    limits: dict[str, float]
+    direction: Array = field(metadata=unit("1", "axis"))
+    worst: bool = field(metadata=unit("1"))
+    limits: dict[str, float] = field(metadata=unit("N"))
 
-    def to_dict(self) -> dict[str, object]:
-        """Return force, direction and limits in SI for JSON, with units in the keys."""
-        numbers = {
-            **self.posture._coordinates,
-            "direction": self.direction,
-            "worst": self.worst,
-            "force_N": self.force,
-            "limit": self.limit,
-            "limits_N": self.limits,
-        }
-        return plain(numbers)
+    @quantity("N")
+    def force(self) -> float:
+        """The smallest of ``limits`` [N]; inf if none restricts the force."""
+        return min(self.limits.values())
 
-    def __repr__(self) -> str:
-        return f"<Payload {self}>"
+    @quantity("1")
+    def limit(self) -> Literal["tension", "deflection", "none"]:
+        """Which limit gives ``force``, a key of ``limits``; ``"none"`` if the force is inf."""
+        if math.isinf(self.force):
+            return "none"
+        return "tension" if self.limits["tension"] == self.force else "deflection"
 
     def __str__(self) -> str:
         along = coordinates(np.round(self.direction, 3) + 0.0, ".3g")
         which = "the worst direction" if self.worst else "the direction"
-        return f"{self.force:.4g} N in {which} {along}, limit: {self.limit}"
+        by_tension, by_deflection = (f"{self.limits[name]:.4g} N" for name in self.limits)
+        return (
+            f"{self.force:.4g} N in {which} {along}, limit: {self.limit}\n"
+            f"tensions that the motors re-distribute allow {by_tension}, "
+            f"the deflection with locked motors {by_deflection}"
+        )
 
 
 def payload(
@@ -78,10 +82,13 @@ def payload(
 ) -> Payload:
     """Compute the largest admissible force f along u at the tip, added to the wrench W.
 
+    Two limits are reported apart. Tension: the motors re-distribute the tensions,
+
         max f  subject to  J_Lᵀ F = J_Xᵀ W + f J_vᵀ u − g,  minimum ≤ F ≤ maximum.
 
-    The deflection f |C_vv u| is at most ``deflection``. C_vv is the compliance without the force,
-    under the least tensions. :func:`critical_load` gives the force at which the arm buckles.
+    Deflection: the motors are locked at the least tensions without the force, and f |C_vv u| is at
+    most ``deflection``, with their compliance C_vv. :func:`critical_load` gives the force at which
+    the arm buckles.
 
     The worst direction has the smallest f. It is the normal of the nearest facet of the
     :func:`force_polytope`, or the softest direction of C_vv.
@@ -105,62 +112,31 @@ def payload(
         SolverError: A linear program fails.
     """
     instance("pose", pose, Posture)
-    allowed = quantity("deflection", deflection, "length", infinite=True)
+    allowed = checked("deflection", deflection, "length", infinite=True)
     W = wrench_vector("wrench", wrench)
-    bare = distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
-    K = stiffness(pose, bare)
-    compliance = K.compliance[:3, :3] if K.is_stable else np.zeros((3, 3))
-    low, high = bounds_at(pose, minimum, maximum, worst_friction)
-    if direction is None:
-        polytope = force_polytope(pose, minimum, maximum, W, worst_friction=worst_friction)
-        u, limits = _worst(polytope, compliance, allowed)
-    else:
-        u = unit_direction("direction", direction)
-        limits = {
-            "tension": largest_force(Loads.of(pose, low, high, W, u[:, None])),
-            "deflection": _ratio(allowed, float(np.linalg.norm(compliance @ u))),
-        }
-    if not K.is_stable:
-        limits["deflection"] = 0.0
-    reason = min(limits, key=lambda name: limits[name])
-    force = max(limits[reason], 0.0)
-    return Payload(
-        posture=pose,
-        direction=frozen(u),
-        worst=direction is None,
-        force=force,
-        limit="none" if math.isinf(force) else reason,  # type: ignore[arg-type]
-        limits=limits,
+    K = stiffness(
+        pose, distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
     )
+    C = K.compliance[:3, :3] if K.is_stable else np.zeros((3, 3))
+    low, high = bounds_at(pose, minimum, maximum, worst_friction)
+
+    def limits(u: Array) -> dict[str, float]:
+        yields = float(np.linalg.norm(C @ u))
+        locked = allowed / yields if yields > 0.0 else math.inf
+        tension = largest_force(balanced(pose, u[:, None], W, low, high))
+        return {"tension": tension, "deflection": locked if K.is_stable else 0.0}
+
+    if direction is not None:
+        u = unit_direction("direction", direction)
+        return Payload(posture=pose, direction=frozen(u), worst=False, limits=limits(u))
+    polytope = force_polytope(pose, minimum, maximum, W, worst_friction=worst_friction)
+    softest = np.linalg.svd(C)[2][0]
+    tried = [(u, limits(u)) for u in (polytope.worst_direction, softest, -softest)]
+    u, found = min(tried, key=lambda each: sorted(each[1].values()))
+    return Payload(posture=pose, direction=frozen(u), worst=True, limits=found)
 
 
-def largest_force(loads: Loads) -> float:
-    """Return the largest force [N] along the one direction of ``loads``; 0 if none is balanced."""
-    found = loads.largest(np.ones(1), positive=True)
-    return 0.0 if found is None else found[0]
-
-
-def _worst(
-    polytope: ForcePolytope, compliance: Array, allowed: float
-) -> tuple[Array, dict[str, float]]:
-    """Return the worst direction for tension and deflection, and the forces [N] that they allow.
-
-    ``polytope`` has the forces that tensions balance. ``compliance`` is C_vv (3, 3) [m/N], and
-    ``allowed`` the largest deflection [m].
-    """
-    tension = polytope.margin()
-    values, vectors = np.linalg.eigh(compliance.T @ compliance)
-    softest = _ratio(allowed, math.sqrt(max(float(values[-1]), 0.0)))
-    if softest >= tension:
-        u = polytope.worst_direction
-        deflection = _ratio(allowed, float(np.linalg.norm(compliance @ u)))
-        return u, {"tension": tension, "deflection": deflection}
-    u = vectors[:, -1]
-    slopes = polytope.normals @ u
-    facing = slopes > 0.0
-    margin = float((polytope.offsets[facing] / slopes[facing]).min(initial=math.inf))
-    return u, {"tension": margin, "deflection": softest}
-
-
-def _ratio(allowed: float, compliance: float) -> float:
-    return allowed / compliance if compliance > 0.0 and math.isfinite(allowed) else math.inf
+def largest_force(farthest: Farthest) -> float:
+    """Return the largest force [N] along the one direction of ``farthest``; 0 if there is none."""
+    found = farthest(np.ones(1))
+    return 0.0 if found is None else max(found[0], 0.0)

@@ -1,34 +1,30 @@
-"""Compute measures (clearances, payloads, …) of many postures from the arrays of a batch."""
+"""Compute measures (clearances, payloads, …) of many postures, for sweeps and designs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm._former.arm_arrays import kernel_arrays, run_slices
-from cdsm._former.chains import grip_rows
-from cdsm._former.tree import Routing
-from cdsm.batch import evaluate
-from cdsm.batch.inputs import checked_threads
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.measures.clearance import KINDS, clearances
-from cdsm.measures.closure import tension_factor_of
-from cdsm.measures.forces import directions_of
-from cdsm.measures.hull import hull_of
+from cdsm.measures.clearance import KINDS, distances
+from cdsm.measures.indices import tension_factor
 from cdsm.measures.payload import largest_force
-from cdsm.measures.program import Loads
-from cdsm.measures.simplex import payload_rows
+from cdsm.measures.polytope import balanced, polytope_of
+from cdsm.posture import Posture
 from cdsm.support.validation import flag, quantity
 from cdsm.support.values import Array
-from cdsm.tension import checked_bounds
+from cdsm.tension import checked_bounds, grip
 
 MEASURED: Final = ("tension_factor", *KINDS)
 """Measures that depend on the joint angles alone."""
+
+SLOW: Final = frozenset((*MEASURED, "payload", "force_radius"))
+"""Measures that take some milliseconds a posture."""
 
 
 def require(
@@ -50,45 +46,36 @@ def require(
             "friction = in ARM.toml, --friction, Manipulator.with_friction.",
         )
     quantity("diameter", diameter, "diameter", zero=True)
-    if "capacity_margin" in names and math.isinf(checked_bounds(arm, 0.0, maximum)[1].max()):
-        raise InvalidInput("maximum", "capacity_margin needs a finite one [N].")
+    if "force_radius" in names and math.isinf(checked_bounds(arm, 0.0, maximum)[1].max()):
+        raise InvalidInput("maximum", "force_radius needs a finite one [N].")
 
 
 def measured(
-    arm: Manipulator,
-    q: Array,
-    names: Sequence[str],
-    diameter: float = 0.0,
-    threads: int | None = None,
+    arm: Manipulator, q: Array, names: Sequence[str], diameter: float = 0.0
 ) -> dict[str, Array]:
-    """Compute measures, (B,) each, at postures q (B, nv) [rad].
+    """Compute measures, (B,) each, at postures q (B, nv) [rad], some milliseconds each.
 
     ``names`` are those wanted, out of :data:`MEASURED`. All cables have the ``diameter`` [m].
     """
-    found: dict[str, Array] = {}
-    if any(name in KINDS for name in names):
-        found |= clearances(arm, q, diameter, threads=threads)
-    if "tension_factor" in names:
-        J = evaluate(arm, q, outputs=("length_jacobian",), threads=threads)["length_jacobian"]
-        found["tension_factor"] = np.array([tension_factor_of(each) for each in J])
-    return {name: found[name] for name in names}
+    kinds = [name for name in names if name in KINDS]
+    found = {name: np.empty(len(q)) for name in names}
+    for n, row in enumerate(q):
+        pose = arm.at(row)
+        for kind, nearest in distances(pose, diameter, kinds=kinds).items():
+            found[kind][n] = nearest.distance
+        if "tension_factor" in found:
+            found["tension_factor"][n] = tension_factor(pose)
+    return found
 
 
-def friction_losses(arm: Manipulator, q: Array, threads: int | None = None) -> Array:
+def friction_losses(arm: Manipulator, q: Array) -> Array:
     """Compute exp(Σ μ φ) (B, C) [-] of each cable at postures q (B, nv) [rad].
 
     This is the largest ratio of two tensions along the cable. The sum is over its holes, with the
     friction coefficient μ and the wrap angle φ.
     """
-    model, grip = kernel_arrays(arm), np.empty((len(q), len(arm.cables)))
-    *routing, _, hole, own = model.chain_arrays
-    holes = hole, own, arm._chains.cable[hole], arm._chains.friction
-
-    def fill(part: slice) -> None:
-        grip_rows(model.tree, Routing(*routing), *holes, q[part], grip[part])
-
-    run_slices(fill, len(q), 1, checked_threads(threads))
-    return np.exp(grip)
+    found = [grip(arm.at(row)) for row in q]
+    return np.exp(np.reshape(found, (len(q), len(arm.cables))))
 
 
 def narrowed_bounds(
@@ -114,7 +101,6 @@ def payloads(
     minimum: ArrayLike,
     maximum: ArrayLike,
     directions: Array,
-    threads: int | None = None,
 ) -> Array:
     """Compute the largest forces (B, D) [N] at the tip that tensions within the bounds balance.
 
@@ -122,56 +108,32 @@ def payloads(
     own ``wrench`` (B, 6). The bounds are (), (B,) or (B, C) [N]. A force is 0 if tensions balance
     no force in its direction.
     """
-    JX, J, torque, low, high = _balances(arm, q, wrench, minimum, maximum, threads)
-    motion = np.einsum("nij,di->ndj", JX[:, :3], directions)
-    force = np.empty(motion.shape[:2])
-
-    def fill(part: slice) -> None:
-        ends = low[part], high[part]
-        payload_rows(J[part], torque[part], motion[part], *ends, arm.length, force[part])
-
-    run_slices(fill, len(q), 1, checked_threads(threads))
-    for n, d in np.argwhere(np.isnan(force)).tolist():  # what the kernel does not prove
-        loads = Loads.scaled(J[n], motion[n, d][:, None], torque[n], low[n], high[n], arm.length)
-        force[n, d] = largest_force(loads)
-    return force
+    rows = _balances(arm, q, wrench, minimum, maximum)
+    found = [
+        [largest_force(balanced(pose, u[:, None], *row)) for u in directions] for pose, *row in rows
+    ]
+    return np.reshape(found, (len(q), len(directions)))
 
 
-def capacity_margins(
+def force_radii(
     arm: Manipulator, q: Array, wrench: Array, minimum: ArrayLike, maximum: ArrayLike
 ) -> Array:
     """Compute how much more force the arm can balance in any direction, at postures q (B, nv).
 
-    The result (B,) [N] is the distance of the force zero from the nearest facet of the force
-    polytope (:meth:`ForcePolytope.margin`). It is 0 if tensions balance no force at all. Wrenches
-    and bounds are given as for :func:`payloads`. Each posture takes some milliseconds.
+    The result (B,) [N] is :attr:`ForcePolytope.radius`, or 0 if tensions balance no force at all.
+    Wrenches and bounds are given as for :func:`payloads`. Each posture takes some 20 ms.
     """
-    margin = np.empty(len(q))
-    rows = zip(*_balances(arm, q, wrench, minimum, maximum, None), strict=True)
-    for n, (JX, J, torque, low, high) in enumerate(rows):
-        basis, _ = directions_of(JX, arm.length)
-        hull = hull_of(Loads.scaled(J, JX[:3].T @ basis, torque, low, high, arm.length))
-        margin[n] = 0.0 if hull is None else hull.offsets.min(initial=math.inf)
-    return margin
+    found = [polytope_of(*row) for row in _balances(arm, q, wrench, minimum, maximum)]
+    return np.array([each.offsets.min(initial=math.inf) if each else 0.0 for each in found])
 
 
 def _balances(
-    arm: Manipulator,
-    q: Array,
-    wrench: Array,
-    minimum: ArrayLike,
-    maximum: ArrayLike,
-    threads: int | None,
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Return J_X (B, 6, nv), J_L (B, C, nv), J_Xᵀ W − g (B, nv) and both bounds (B, C) [N].
-
-    The arguments are as for :func:`payloads`.
-    """
-    names = ("jacobian", "length_jacobian", "gravity_torque")
-    found = evaluate(arm, q, outputs=names, check_limits=False, threads=threads)
-    JX, J, g = (found[name] for name in names)
-    low, high = _each_bound(arm, minimum, maximum, (len(q), len(arm.cables)))
-    return JX, J, np.einsum("nij,ni->nj", JX, wrench) - g, low, high
+    arm: Manipulator, q: Array, wrench: Array, minimum: ArrayLike, maximum: ArrayLike
+) -> Iterator[tuple[Posture, Array, Array, Array]]:
+    """Yield the posture, the wrench (6,) and both bounds (C,) of each of ``q`` (B, nv)."""
+    bounds = _each_bound(arm, minimum, maximum, (len(q), len(arm.cables)))
+    for row, *given in zip(q, wrench, *bounds, strict=True):
+        yield arm.at(row, check_limits=False), *given
 
 
 def _each_bound(

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from cdsm.plots.style import COLORS, expect, legend_below, panels
 
 if TYPE_CHECKING:
-    from cdsm.uncertainties.budget import Uncertainty
-    from cdsm.uncertainties.monte_carlo import MonteCarlo
+    from cdsm.tolerancing.budget import Uncertainty
+    from cdsm.tolerancing.monte_carlo import MonteCarlo
 
 
 def plot_uncertainty(budget: Uncertainty) -> Figure:
@@ -20,7 +20,7 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
     Raises InvalidInput if ``budget`` is not a result of :func:`~cdsm.uncertainty`.
     """
     expect("budget", budget, "Uncertainty")
-    unit, size = budget.question.unit
+    unit, size = budget.measurand.unit
     named = {source.replace("_", " "): u / size for source, u in budget.contributions.items() if u}
     bars = named | {"all together": budget.standard_uncertainty / size}
     figure, ((axes,),) = panels(7.0, 1.2 + 0.34 * len(bars), 1)
@@ -32,7 +32,7 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
     axes.set_axisbelow(True)
     axes.grid(visible=False, axis="y")
     axes.set(xlabel=f"standard uncertainty [{unit}]")
-    axes.set_title(f"{budget.question.name}: {budget.value / size:.4g} {unit}", fontsize=11)
+    axes.set_title(f"{budget.name}: {budget.value / size:.4g} {unit}", fontsize=11)
     return figure
 
 
@@ -44,7 +44,7 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
     Raises InvalidInput if ``run`` is not a result of :func:`~cdsm.monte_carlo`.
     """
     expect("run", run, "MonteCarlo")
-    (unit, size), first = run.budget.question.unit, run.budget
+    (unit, size), first = run.budget.measurand.unit, run.budget
     figure, ((axes,),) = panels(7.0, 4.0, 1)
     values, u = run.values / size, first.standard_uncertainty / size
     low, high = np.quantile(values, [0.0005, 0.9995])
@@ -58,7 +58,7 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
     for interval, color in ((run.interval(), COLORS[0]), (first.interval(), COLORS[1])):
         for end in interval:
             axes.axvline(end / size, color=color, linestyle="--", linewidth=1.0)
-    axes.set(xlabel=f"{first.question.name} [{unit}]", ylabel=f"probability density [1/({unit})]")
+    axes.set(xlabel=f"{first.name} [{unit}]", ylabel=f"probability density [1/({unit})]")
     axes.set_yticks([])
     legend_below(figure, axes, 2, title="dashed: 95 % intervals")
     return figure

@@ -13,7 +13,7 @@ from cdsm.plots.arm import frame_arms
 from cdsm.plots.style import BLACK, SKY, VERMILLION, expect, finish_picture, picture_axes
 
 if TYPE_CHECKING:
-    from cdsm.measures.forces import ForcePolytope
+    from cdsm.measures.polytope import ForcePolytope
 
 
 def plot_force_polytope(polytope: ForcePolytope) -> Figure:
@@ -33,13 +33,13 @@ def plot_force_polytope(polytope: ForcePolytope) -> Figure:
     axes.add_collection3d(
         Poly3DCollection(triangles, facecolor=SKY, edgecolor="0.4", linewidth=0.15, alpha=0.35)
     )
-    nearest = polytope.margin() * polytope.worst_direction
+    nearest = polytope.radius * polytope.worst_direction
     axes.plot([0.0], [0.0], [0.0], "+", color=BLACK, markersize=7, label="no load")
     axes.plot(
         *np.transpose([np.zeros(3), nearest]),
         color=VERMILLION,
         linewidth=1.4,
-        label=f"worst direction: {polytope.margin():.4g} N",
+        label=f"worst direction: {polytope.radius:.4g} N",
     )
     box = np.array([polytope.vertices.min(axis=0), polytope.vertices.max(axis=0)])
     frame_arms(axes, box.T, "force {} [N]")

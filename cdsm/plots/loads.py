@@ -31,8 +31,8 @@ from cdsm.support.format import plural
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
-    from cdsm.statics.load_history import LoadHistory
+    from cdsm.statics.buckling import CriticalLoad, CriticalTension
+    from cdsm.statics.load_cycle import LoadHistory
     from cdsm.statics.weight_test import WeightTest
 
 _ROOM = 0.08  # margin above and below all values, as a fraction of their range
@@ -50,20 +50,20 @@ def plot_weight_test(test: WeightTest) -> Figure:
     loads = np.concatenate([[0.0], test.loads])
     moved = np.vstack([np.zeros(3), test.displacements])
     for axis, color, marker, nonlinear, linear in zip(
-        XYZ, COLORS, "os^", moved.T, test.linear.displacement, strict=True
+        XYZ, COLORS, "os^", moved.T, test.tangent_displacement, strict=True
     ):
         left.plot(MM * nonlinear, loads, f"{marker}-", color=color, markersize=3, label=axis)
         left.plot([0.0, MM * linear], [0.0, loads[-1]], "--", color=color, linewidth=0.9)
     left.set(xlabel="displacement of the tip [mm]", ylabel="load [N]")
     left.locator_params("x", nbins=TICKS)
     legend(left, title="direction; dashed: linear")
-    names = test.without.pose.arm.cables.names
-    cable_lines(right, loads, np.vstack([test.without.tension, test.tensions]), names)
+    names = test.unloaded.pose.arm.cables.names
+    cable_lines(right, loads, np.vstack([test.unloaded.tension, test.tensions]), names)
     right.set(xlabel="load [N]", ylabel="tension at each motor [N]")
     right.set_ylim(bottom=0.0)
-    left_it = "; left its reference before the weight" if test.settled_first else ""
+    left_it = "; left its reference before the weight" if test.left_reference else ""
     weight = f"weight of {np.linalg.norm(test.force):.4g} N"
-    heading(figure, f"{test.without.pose.arm.name}: {weight}{left_it}")
+    heading(figure, f"{test.unloaded.pose.arm.name}: {weight}{left_it}")
     return figure
 
 
@@ -128,7 +128,7 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
     axes.set_ylim(min(0.0, *critical.margins) - 2.0 * room, max(0.0, *critical.margins) + room)
     unit = critical.posture.arm.stiffness_unit()
     axes.set(xlabel="factor of the load", ylabel=f"smallest joint stiffness [{unit}]")
-    load = " ".join(f"{x:.3g}" for x in critical.wrench[:3])
+    load = " ".join(f"{x:.3g}" for x in critical.load[:3])
     caption(axes, f"{critical.posture.arm.name}: load ({load}) N")
     return figure
 

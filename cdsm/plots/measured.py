@@ -31,7 +31,7 @@ from cdsm.support.format import plural
 
 if TYPE_CHECKING:
     from cdsm.identification.experiment_plan import ExperimentPlan
-    from cdsm.identification.loop import WeightLoop
+    from cdsm.identification.measurement import WeightLoop
     from cdsm.identification.result import Identification
     from cdsm.wires.tensile_fit import TensileFit
 
@@ -87,7 +87,7 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
 
     ``labels`` has a text for each residual; more than 30 residuals are numbered instead.
     """
-    rows = fit._rows
+    rows = [fit.measurements[i] for i in fit.measurement_of]
     loops: list[tuple[int, Any]] = [
         (i, each) for i, each in enumerate(fit.measurements) if hasattr(each, "forces")
     ]
@@ -128,7 +128,7 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
 
 def _plot_stiffnesses(axes: Any, fit: Identification, rows: Sequence[int]) -> None:
     measured, predicted = N_PER_MM * fit.measured[rows], N_PER_MM * fit.predicted[rows]
-    sigma = [N_PER_MM * fit._rows[k].std for k in rows]  # type: ignore[union-attr]
+    sigma = [N_PER_MM * fit.measurements[fit.measurement_of[k]].std for k in rows]
     ends = [min(measured.min(), predicted.min()), max(measured.max(), predicted.max())]
     axes.plot(ends, ends, color="0.6", linewidth=0.9)
     axes.errorbar(measured, predicted, xerr=sigma, fmt="o", color=BLUE, markersize=4, capsize=2)

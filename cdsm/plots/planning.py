@@ -38,7 +38,7 @@ from cdsm.support.values import Array
 if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
     from cdsm.planning.range import StiffnessRange
-    from cdsm.planning.saturation_curve import Saturation
+    from cdsm.planning.saturation import Saturation
 
 _SAME = 1e-9  # largest entry of a unit direction outside a plane in which it lies
 
@@ -91,7 +91,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
         axes.plot(*high, STYLES[k % len(STYLES)], color=to_hex(shade), label=f"stiffest, {label}")
     label, found = [*ranges.items()][-1]
     low = around(found, [one.low for one in found])
-    axes.fill(*low, color="0.85", label=f"softer than it can be, {label}")
+    axes.fill(*low, color="0.85", label=f"below the attainable range, {label}")
     axes.plot(*low, color="0.4", linewidth=0.8)
     letters = "xyz"[first], "xyz"[second]
     ends = [f"{sign}{letter}" for sign in "+-" for letter in letters]
@@ -104,33 +104,24 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 
 
 def plot_saturation(found: Saturation) -> Figure:
-    """Plot stiffness, and its slope [N/mm per N], against the lower bound of all tensions.
+    """Plot the stiffness against the lower bound of all tensions.
 
     Raises InvalidInput if ``found`` is not a result of :func:`~cdsm.saturation`.
     """
     expect("found", found, "Saturation")
-    bound, along, slope = found.curve.T
-    figure, ((left, right),) = panels(TWO_COLUMNS, 2.6, 2)
-    left.plot(bound, N_PER_MM * along, color=BLUE)
-    left.set(ylabel=f"stiffness along {direction_name(found.direction)} [N/mm]")
-    left.set_ylim(bottom=0.0)
-    gain = N_PER_MM * slope
-    right.semilogy(bound, np.where(gain > 0.0, gain, np.nan), color=BLUE)
-    right.set(ylabel="gain [N/mm per N]")
-    if found.steepest_slope > 0.0:
-        part = f"{100.0 * found.fraction:.3g} % of the largest gain"
-        level = N_PER_MM * found.fraction * found.steepest_slope
-        right.axhline(level, color="0.4", linestyle=":", label=part)
-    for axes in (left, right):
-        axes.set_xlabel("lower bound of tension [N]")
-        if np.isfinite(found.bound):
-            label = f"pays less above {found.bound:.4g} N"
-            axes.axvline(found.bound, color=VERMILLION, linestyle="--", label=label)
-        if bound[0] < found.stiffest < bound[-1]:
-            label = f"softer above {found.stiffest:.4g} N"
-            axes.axvline(found.stiffest, color=GREEN, linestyle="-.", label=label)
-    legend(right, loc="lower left")
-    heading(figure, found.tension.posture.arm.name)
+    figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
+    axes.plot(found.minimum, N_PER_MM * found.along, color=BLUE, label="least tensions")
+    axes.set(xlabel="lower bound of tension [N]")
+    axes.set_ylabel(f"stiffness along {direction_name(found.direction)} [N/mm]")
+    axes.set_ylim(bottom=0.0)
+    if np.isfinite(found.bound):
+        label = f"saturates at {found.bound:.4g} N"
+        axes.axvline(found.bound, color=VERMILLION, linestyle="--", label=label)
+    if found.minimum[0] < found.stiffest < found.minimum[-1]:
+        label = f"softer above {found.stiffest:.4g} N"
+        axes.axvline(found.stiffest, color=GREEN, linestyle="-.", label=label)
+    legend(axes, loc="lower right")
+    heading(figure, found.posture.arm.name)
     return figure
 
 

@@ -162,13 +162,12 @@ def _batch(K: Stiffness) -> Array:
 def _edges(K: Stiffness, c: int) -> list[str]:
     """Return why the tension of a cable cannot follow its length in both directions, if so."""
     cable, F = K.posture.arm.cables[c], float(K.tension[c])
-    law = cable.elasticity
+    low, high = cable.elasticity.low, cable.elasticity.high
     if F == 0.0:
         return [f"{cable.name} is slack (0 N), and K_θ counts it as if it were taut"]
-    if min(abs(F - law.low), abs(F - law.high)) > _EDGE * F:
-        return []
-    ends = f"an end of its law, {law.low:g} to {law.high:g} N"
-    return [f"{cable.name} at {F:.4g} N is within {_EDGE:.0%} of {ends}"]
+    said = f"{cable.name} at {F:.4g} N is within {_EDGE:.0%} of an end of its law"
+    near = min(abs(F - low), abs(F - high)) <= _EDGE * F
+    return [f"{said}, {low:g} to {high:g} N"] if near else []
 
 
 def _step(K: Stiffness, moved: list[int]) -> float:

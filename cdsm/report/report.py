@@ -1,10 +1,14 @@
-"""The report on a stiffness: is it right, balanced and stable, and how to read it."""
+"""The report on a stiffness: is it right, balanced and stable, and how to read it.
+
+It is printed as text and as HTML, both by rich.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from io import StringIO
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -13,12 +17,13 @@ import cdsm
 from cdsm.errors import CdsmError, SingularStiffness, listed
 from cdsm.report import checks
 from cdsm.report.checks import Comparison
-from cdsm.report.text import printed
 from cdsm.stiffness_matrix.prints import missing_leads
 from cdsm.support.format import plain
 from cdsm.support.result import Result, quantity, unit
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from cdsm.stiffness_matrix import Stiffness
 
 
@@ -81,14 +86,14 @@ class Report(Result):
 
     def to_html(self, about: str = "") -> str:
         """Return the report as a self-contained HTML page; ``about`` is text below the title."""
-        return printed(self, about).export_html()
+        return _printed(self, about).export_html()
 
     def __repr__(self) -> str:
         name = self._posture.arm.name
         return f"<Report on the stiffness of {name}: {'PASS' if self.passed else 'FAIL'}>"
 
     def __str__(self) -> str:
-        return "\n".join(map(str.rstrip, printed(self).export_text().splitlines()))
+        return "\n".join(map(str.rstrip, _printed(self).export_text().splitlines()))
 
 
 def report_on(K: Stiffness) -> Report:
@@ -185,3 +190,59 @@ def _stuck(K: Stiffness) -> str:
         return "Here no cable sticks."
     loads = ", ".join(f"{each.load:.2g}" for _, each in found)
     return f"Below {loads} N along x, y, z they stick, and a load measures {stuck} N/mm."
+
+
+def _printed(report: Report, about: str = "") -> Console:
+    """Return a console that has recorded the report; ``about`` is text below the title."""
+    from rich.console import Console  # slow to import
+    from rich.table import Table
+
+    console = Console(
+        record=True, file=StringIO(), width=100, markup=False, emoji=False, highlight=False
+    )
+    console.print(f"Stiffness check: {report._posture.arm.name}", style="bold")
+    if about:
+        console.print(about)
+    good = "PASS: agrees with finite differences, tensions balance the arm, arm is stable."
+    bad = "FAIL: do not use this stiffness as it is."
+    console.print(good if report.passed else bad, style="bold")
+    for fault in report.faults:
+        console.print(f"! {fault}", style="red")
+    for note in report.notes:
+        console.print(f"- {note}")
+    console.print(f"\n{report.stiffness}\n")
+    for head, *rows in _tables(report):
+        table = Table(box=None, header_style="bold", pad_edge=False)
+        for i, title in enumerate(head):
+            table.add_column(title, justify="right" if i else "left", no_wrap=True)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+        console.print()
+    said = "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
+    console.print(f"{said}torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes.")
+    if (arm := report._posture.arm).slides.any():
+        console.print(f"Sliding joints count with the arm's length, {arm.length:.4g} m, as lever.")
+    return console
+
+
+def _tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
+    """Yield the rows of each table; the first has the titles of its columns."""
+    rows = []
+    for each in report.comparisons:
+        size = each.largest or 1.0
+        off = ("-", "-") if each.reason else (f"{each.off / size:.0e}", f"{each.error / size:.0e}")
+        name = "cdsm.evaluate, all terms" if each.name == "batch" else each.name
+        rows.append((name, f"{each.largest:.4g} {each.unit}", *off, each.verdict))
+    yield ("against finite differences", "largest entry", "off by", "error bound", "verdict"), *rows
+    violation, kkt = (
+        "-" if x is None else f"{x:.1e}" for x in (report.bound_violation, report.kkt_residual)
+    )
+    yield (
+        ("balance, optimality, stability", ""),
+        ("residual of Eq. 13", f"{report.residual:.1e} N m at {report.residual_joint}"),
+        ("residual per torque", f"{report.imbalance:.1e}"),
+        ("violation of bounds", violation),
+        ("KKT residual (recomputed multipliers)", kkt),
+        ("condition of K_θ", f"{report.condition:.3g}"),
+    )

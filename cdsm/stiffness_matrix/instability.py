@@ -56,30 +56,28 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
     """Yield the remedies of an unstable arm; none if friction or another l_0 makes it unstable."""
     from cdsm.stiffness_matrix.assembly import stiffness  # here, since it needs this module
 
-    pose, cables, given = K.posture, K.posture.arm.cables, K.distribution
-    held = [c for c, cable in enumerate(cables) if cable.control == "position"]
+    pose, given = K.posture, K.distribution
+    cables = pose.arm.cables
 
     def stiffer(wire: float = 1.0, spring: float = 1.0) -> float:
-        changed = list(cables)
-        for c in held:
-            law, k = cables[c].elasticity.scaled(wire), spring * cables[c].series_stiffness
-            changed[c] = replace(cables[c], elasticity=law, series_stiffness=k)
+        stiff = [(each.elasticity.scaled(wire), spring * each.series_stiffness) for each in cables]
+        pairs = zip(cables, stiff, strict=True)
+        changed = [replace(c, elasticity=law, series_stiffness=k) for c, (law, k) in pairs]
         there = pose.arm.with_cables(changed).at(pose.q, check_limits=False)
         return stiffness(there, K.tension, K.wrench).margin
 
     if stiffness(pose, K.tension, K.wrench).margin > 0.0:
         return
-    if held:
+    if pose.arm._laws.held:
         yield Remedy("wire", _factor(stiffer, _STIFFER))
-    if any(math.isfinite(cables[c].series_stiffness) for c in held):
+    if pose.arm._laws.series[cables.position_controlled].any():
         yield Remedy("spring", _factor(lambda s: stiffer(spring=s), _STIFFER))
     if given is not None and given.least and given.minimum.any():
-        low, high = given.minimum, given.maximum
+        low, high, solver = given.minimum, given.maximum, given.solver
 
         def tension(s: float) -> float:
             least = np.where(low < high, s * low, low)
-            pull = distribute_tension(pose, least, high, K.wrench, given.solver)
-            return stiffness(pose, pull).margin
+            return stiffness(pose, distribute_tension(pose, least, high, K.wrench, solver)).margin
 
         yield Remedy("tension", _factor(tension, _MORE_OR_LESS))
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdsm.errors import SingularStiffness, listed
-from cdsm.stiffness_matrix.cartesian import axis_of
-from cdsm.support.format import MODEL, span
+from cdsm.support.format import MODEL, coordinates, span
+from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     from cdsm.stiffness_matrix.value import Stiffness
@@ -76,3 +76,8 @@ def model_of(K: Stiffness) -> str:
     mu = K.posture.segments.chains.friction
     said = span(mu, "{:g}".format) if mu.size else "0"
     return MODEL.replace("frictionless", f"cables {K.friction}, μ = {said}")
+
+
+def axis_of(u: Array) -> str:
+    """Write a direction (3,) as text; of u and −u, the one whose largest entry is positive."""
+    return coordinates(np.round(u * np.sign(u[abs(u).argmax()]), 9), "z.3g")

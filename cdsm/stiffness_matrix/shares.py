@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Self, final
 
 import numpy as np
 
@@ -44,6 +44,29 @@ class Shares(Result, Named):
     active: Array = field(metadata=unit("N/m", "cable"))
     gravity: float = field(metadata=unit("N/m"))
     load: float = field(metadata=unit("N/m"))
+
+    @classmethod
+    def of(cls, K: Stiffness, u: Array) -> Self:
+        """Compute the contributions to K.along(u), of a unit vector u (3,)."""
+        along, moved = K._along(u)
+        pose, motion = K.posture, moved * along
+        if K.segment_tension is None or K.tension_gradient is None:
+            passive = K.cable_stiffness * (pose.length_jacobian @ motion) ** 2
+            active = K.tension * (pose.length_hessian @ motion @ motion)
+        else:
+            at = pose.segments
+            each = (at.length_jacobian @ motion) * (K.tension_gradient @ motion)
+            passive = np.bincount(at.chains.cable, each).astype(np.float64)
+            active = at.tension_stiffness(K.segment_tension) @ motion @ motion
+        weight, load = (float(motion @ term @ motion) for term in (K.gravity, K.load))
+        return cls(
+            stiffness=K,
+            direction=u,
+            passive=frozen(passive),
+            active=frozen(active),
+            gravity=weight,
+            load=load,
+        )
 
     @property
     def _posture(self) -> Posture:

@@ -1,21 +1,28 @@
-"""The stiffness of an arm as a frozen value: K_θ with its four terms."""
+"""The stiffness of an arm as a frozen value: K_θ with its four terms, and the readings at the tip.
+
+The paper maps K_θ to Cartesian space with J_X⁻¹, which does not exist for a redundant arm. "The
+stiffness in x" then has three meanings, each with a name here: along, cartesian, pseudoinverse.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Literal, final
+from typing import TYPE_CHECKING, Literal, final, get_args
 
 import numpy as np
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
-from cdsm.stiffness_matrix.cartesian import CartesianReadings
 from cdsm.stiffness_matrix.instability import Remedy, find_remedies, verdict
 from cdsm.stiffness_matrix.shares import Shares
-from cdsm.support.directions import Direction, unit_direction
-from cdsm.support.format import plain
-from cdsm.support.result import quantity, unit
+from cdsm.support.directions import Direction, unit_direction, unit_directions
+from cdsm.support.format import coordinates, plain
+from cdsm.support.result import Result, quantity, unit
+from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
@@ -25,12 +32,24 @@ if TYPE_CHECKING:
     from cdsm.report import Report
 
 Friction = Literal["frictionless", "stuck", "sliding"]
+Term = Literal["active", "passive", "gravity", "load", "joint"]
+
+REGULAR = 1e-8  # least relative singular value of K_θ; its inverse has 6 correct digits there
+FLAT = 1e-6  # least relative singular value of J_v; a 3×3 stiffness has 4 correct digits there
+UNMOVED = 1e-10  # the tip cannot move along u if all entries of J_vᵀ u are below this part of J_v's
+_ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
+
+_SQUARE = unit("joint stiffness", "joint", "joint_column")
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Stiffness(CartesianReadings):
+class Stiffness(Result):
     """Joint stiffness and Cartesian stiffness (at ``tool0``, base axes) with all they depend on.
+
+    K_θ is singular, and SingularStiffness raised, if the smallest singular value of D^-½ K_θ D^-½
+    is at most 1e-8 of the largest entry of D^-½ P D^-½. P is the sum of the magnitudes of the
+    terms, which may cancel; its diagonal D makes the test free of units.
 
     Attributes:
         posture: The posture.
@@ -54,6 +73,13 @@ class Stiffness(CartesianReadings):
 
     _headline, _rows = "margin", "cable"
 
+    posture: Posture
+    active: Array = field(metadata=_SQUARE)
+    passive: Array = field(metadata=_SQUARE)
+    gravity: Array = field(metadata=_SQUARE)
+    load: Array = field(metadata=_SQUARE)
+    # in exports, a variable must not have the name of a dimension
+    joint: Array = field(metadata={**_SQUARE, "name": "joint_stiffness"})
     tension: Array = field(metadata=unit("N", "cable"))
     wrench: Array = field(metadata=unit("N and N m", "component"))
     cable_stiffness: Array = field(metadata=unit("N/m", "cable"))
@@ -96,6 +122,115 @@ class Stiffness(CartesianReadings):
         """Whether the symmetric part of K_θ is positive definite."""
         return self.margin > 0.0
 
+    @cached_property
+    def compliance(self) -> Array:
+        """Compliance C = J_X K_θ⁻¹ J_Xᵀ (6, 6): tip motion per wrench at the tip.
+
+        Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
+        """
+        J = self.posture.jacobian
+        return frozen(J @ self._inverse @ J.T)
+
+    @cached_property
+    def cartesian(self) -> Array:
+        """Matrix (C_vv)⁻¹ (3, 3) [N/m]: force per tip displacement, with the tip free to rotate.
+
+        A diagonal entry is the stiffness if the other two translations are *locked*. For a stable
+        arm it is never less than :meth:`along` that axis, and often several times larger.
+        SingularStiffness also if the tip hardly moves in some direction.
+        """
+        return self.cartesian_in(np.eye(3))
+
+    def cartesian_in(self, directions: Iterable[Direction]) -> Array:
+        """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in some directions only.
+
+        Use it for planar arms: their tip cannot leave a plane, so :attr:`cartesian` does not exist.
+        U are n orthogonal directions in base axes: names as ``("x", "z")``, or (n, 3); InvalidInput
+        if they are not. SingularStiffness also if the tip hardly moves in one of the directions.
+        """
+        U = unit_directions("directions", directions).reshape(-1, 3)
+        if abs(U @ U.T - np.eye(len(U))).max() > _ORTHOGONAL:
+            raise InvalidInput("directions", "are not orthogonal; give axes of a plane.")
+        A, V = self._decompose(U)
+        return frozen(A @ np.linalg.inv(V @ self._inverse @ V.T) @ A.T)
+
+    def along(self, direction: Direction) -> float:
+        """Compute 1/(uᵀ C_vv u) [N/m], the tangent stiffness that a tip weight measures (Eq. 20).
+
+        u is an axis such as ``"z"`` or ``"-z"``, or (3,) in base axes, any length, else
+        InvalidInput. A weight that is not small beside the tensions measures a secant:
+        :func:`~cdsm.weight_test`. The stiffness is inf if the tip cannot move along u, and may be
+        negative if the arm is unstable.
+        """
+        return self._along(unit_direction("direction", direction))[0]
+
+    def pseudoinverse(self, term: Term = "joint") -> Array:
+        """Compute J⁺ᵀ K J⁺ (3, 3) [N/m], J the linear rows of J_X: the paper's K_R, read literally.
+
+        The paper's figures use it, but J⁺ allows only the joint motion of least norm: the result is
+        4 % to over 100 % larger than :attr:`cartesian`. ``term`` is a part of K_θ, or ``"joint"``.
+        UnknownName if it is neither, SingularStiffness if the tip hardly moves in some direction.
+        """
+        matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
+        A, V = self._decompose(np.eye(3))
+        return frozen(A @ (V @ matrix @ V.T) @ A.T)
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """K_θ⁻¹ (nv, nv), or SingularStiffness with the joint motion."""
+        P = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
+        D = P.diagonal()
+        if not D.min() > 0.0:
+            raise _singular("next to nothing holds the arm", np.eye(D.size)[D.argmin()])
+        scale = 1.0 / np.sqrt(D)
+        both = scale * scale[:, None]
+        scaled, least = self.joint * both, REGULAR * float((P * both).max())
+        try:
+            inverse = np.linalg.inv(scaled)
+        except np.linalg.LinAlgError:
+            inverse = np.full_like(scaled, math.inf)
+        # 1/|A⁻¹| is a lower bound of the smallest singular value of A
+        if not least * math.sqrt(np.vdot(inverse, inverse)) < 1.0:
+            _, values, rows = np.linalg.svd(scaled)
+            if not values[-1] > least:
+                raise _singular("the arm is just about to buckle", rows[-1] * scale)
+        return inverse * both
+
+    def _decompose(self, U: Array) -> tuple[Array, Array]:
+        """Decompose U J_v = B S V; return A = B S⁻¹ (n, n) and V (n, nv).
+
+        Then (U C_vv Uᵀ)⁻¹ = A (V K_θ⁻¹ Vᵀ)⁻¹ Aᵀ, in which a stiff direction costs no digits.
+        """
+        rows = self.posture.jacobian[:3]
+        B, S, V = np.linalg.svd(U @ rows)
+        # two joints cannot move the tip in three directions
+        if len(S) < len(U) or not S[-1] > FLAT * np.linalg.norm(rows, 2):
+            u = frozen(B[:, -1] @ U)
+            said = f"the tip cannot move along {prints.axis_of(u)}, where the stiffness is infinite"
+            said += " or nearly so. Use along(direction), other directions, or bend the arm."
+            raise SingularStiffness(said, u)
+        return B / S, V[: len(U)]
+
+    def _along(self, u: Array) -> tuple[float, Array]:
+        """Return stiffness along a unit vector u [N/m] and joint motion per force along u (nv,)."""
+        torque = u @ self.posture.jacobian[:3]
+        if not self._moves(torque):
+            return math.inf, np.zeros_like(torque)
+        motion = self._inverse @ torque
+        compliance = float(torque @ motion)
+        return 1.0 / compliance if compliance else math.inf, motion
+
+    def _moves(self, torque: Array) -> bool:
+        """Return whether a tip force with joint torques J_vᵀ u (nv,) moves any joint."""
+        return bool(abs(torque).max() > UNMOVED * abs(self.posture.jacobian[:3]).max())
+
+    def _require_mobile(self, u: Array) -> None:
+        """Raise SingularStiffness if a tip force along a unit vector u (3,) moves no joint."""
+        if not self._moves(u @ self.posture.jacobian[:3]):
+            said = f"the tip cannot move along {coordinates(u)}: the stiffness there is infinite "
+            said += "under any tension. Choose another direction, or bend the arm."
+            raise SingularStiffness(said, u)
+
     def shares(self, direction: Direction) -> Shares:
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
@@ -104,24 +239,7 @@ class Stiffness(CartesianReadings):
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)
-        stiffness, moved = self._along(u)
-        pose, motion = self.posture, moved * stiffness
-        if self.segment_tension is None or self.tension_gradient is None:
-            passive = self.cable_stiffness * (pose.length_jacobian @ motion) ** 2
-            active = self.tension * (pose.length_hessian @ motion @ motion)
-        else:
-            of = pose.segments
-            each = (of.length_jacobian @ motion) * (self.tension_gradient @ motion)
-            passive = np.bincount(of.chains.cable, each).astype(np.float64)
-            active = of.tension_stiffness(self.segment_tension) @ motion @ motion
-        return Shares(
-            stiffness=self,
-            direction=u,
-            passive=frozen(passive),
-            active=frozen(active),
-            gravity=float(motion @ self.gravity @ motion),
-            load=float(motion @ self.load @ motion),
-        )
+        return Shares.of(self, u)
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
@@ -173,3 +291,9 @@ class Stiffness(CartesianReadings):
 
     def __str__(self) -> str:
         return "\n".join([*self.warnings, *prints.table(self), *prints.notes(self)])
+
+
+def _singular(why: str, motion: Array) -> SingularStiffness:
+    motion = frozen(motion / np.linalg.norm(motion))
+    said = f"K_θ is singular: {why} in the joint motion {coordinates(motion)}. "
+    return SingularStiffness(said + "Change the tensions or the posture.", motion)

@@ -30,8 +30,10 @@ def unit(unit: str, *dims: str, name: str = "") -> Mapping[str, Any]:
 
     ``unit`` is an SI unit, "1" for a plain number, or "torque", "joint stiffness" or "joint" for a
     unit that depends on whether joints turn or slide. ``dims`` name the axes of an array: "joint",
-    "cable", "axis", "component", or any other; a field that is called like its own and only
-    dimension is the coordinate of this dimension. ``name`` replaces the field's in the export.
+    "cable", "held_cable" (position-controlled), "axis", "component", or any other; a field that is
+    called like its own and only dimension is the coordinate of this dimension. The dimension
+    "direction" is left out of a value for one direction. ``name`` replaces the field's in the
+    export.
     """
     return {"unit": unit, "dims": dims, "name": name}
 
@@ -58,7 +60,7 @@ class Result(ReadOnlyState):
 
     Fields and properties without metadata are not exported. Subclasses write ``__str__`` and
     ``plot`` by hand, nothing else. ``_posture`` is the posture whose joint coordinates come first
-    in the JSON; its arm names joints and cables.
+    in the JSON; its arm, or the attribute ``arm``, names joints and cables.
     """
 
     _headline: ClassVar[str] = ""
@@ -70,6 +72,10 @@ class Result(ReadOnlyState):
     @property
     def _posture(self) -> Any:
         return getattr(self, "posture", None)
+
+    @property
+    def _arm(self) -> Any:
+        return self._posture.arm if self._posture else getattr(self, "arm", None)
 
     def to_dict(self) -> dict[str, object]:
         """Return all numbers in SI for JSON, with the unit in the keys; inf and NaN are None."""
@@ -84,8 +90,8 @@ class Result(ReadOnlyState):
         """Return all numbers as a labelled Dataset in SI; needs xarray (MissingExtra)."""
         variables, words = {}, {}
         for name, value, of, dims in self._quantities():
-            array = np.asarray(value)
-            if array.dtype.kind in "USO":
+            array = _array(value)
+            if array.dtype.kind in "USO" or array.ndim != len(dims):
                 words[name] = str(value)
             else:
                 variables[name] = (dims, array, of)
@@ -93,25 +99,22 @@ class Result(ReadOnlyState):
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a unit in the name of each column; needs pandas (MissingExtra)."""
-        labels, index = self._labels(), None
+        labels: dict[str, Any] = self._labels()
         columns: dict[str, Any] = {}
         for name, value, of, dims in self._quantities():
             suffix = "" if of == "1" else f" [{of}]"
-            if not self._rows:
-                if not dims:
-                    columns[name + suffix] = [value]
-            elif dims == (self._rows,) and name == self._rows:
-                index = np.asarray(value)
-            elif dims[:1] == (self._rows,):
-                array = np.asarray(value)
+            if not self._rows and not dims:
+                columns[name + suffix] = [value]
+            elif dims == (name,) == (self._rows,):
+                labels |= {name: np.asarray(value)}
+            elif self._rows and dims[:1] == (self._rows,):
+                array = _array(value)
                 for place in np.ndindex(array.shape[1:]):
-                    parts = [str(labels[d][i]) for d, i in zip(dims[1:], place, strict=True)]
+                    pairs = zip(dims[1:], place, strict=True)
+                    parts = [str(labels[d][i] if d in labels else i + 1) for d, i in pairs]
                     columns[" ".join([name, *parts]) + suffix] = array[(slice(None), *place)]
-        if self._rows in labels:
-            index = np.asarray(labels[self._rows])
-        if index is None:  # rows without names
-            index = np.arange(len(next(iter(columns.values()), (None,))))
-        return data_frame(columns, self._rows or "result", index)
+        numbers = np.arange(len(next(iter(columns.values()), ())))  # of rows without names
+        return data_frame(columns, self._rows or "result", labels.get(self._rows, numbers))
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write :meth:`to_pandas` (``.csv``) or :meth:`to_xarray` (``.nc``); return the path.
@@ -124,14 +127,12 @@ class Result(ReadOnlyState):
         return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def __repr__(self) -> str:
-        shown = ""
+        shown = "" if getattr(self, "is_stable", True) else ", UNSTABLE"
         for name, value, of, _ in self._quantities():
             if name == self._headline:
-                numbers = np.atleast_1d(value)
-                shown = f" {name} {span(numbers) if numbers.size else 'none'}"
-                shown += "" if of == "1" else f" {of}"
-        state = "" if getattr(self, "is_stable", True) else ", UNSTABLE"
-        return f"<{type(self).__name__}{shown}{state}>"
+                numbers = span(np.atleast_1d(value)) if np.size(value) else "none"
+                shown = f" {name} {numbers} {'' if of == '1' else of}".rstrip() + shown
+        return f"<{type(self).__name__}{shown}>"
 
     def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
         """Yield name, value, unit and dimensions of each number: fields first, then properties."""
@@ -142,14 +143,16 @@ class Result(ReadOnlyState):
         units = self._units()
         for name, metadata in told.items():
             of = metadata["unit"]
-            value = getattr(self, name)
-            yield metadata["name"] or name, value, units.get(of, of), metadata["dims"]
+            value, dims = getattr(self, name), metadata["dims"]
+            if "direction" in dims and np.ndim(value) < len(dims):
+                dims = tuple(dim for dim in dims if dim != "direction")
+            yield metadata["name"] or name, value, units.get(of, of), dims
 
     def _units(self) -> dict[str, str]:
         """Return the units that depend on the joints of the arm."""
-        if not self._posture:
+        if not self._arm:
             return {}
-        units = JointUnits(self._posture.arm.slides)
+        units = JointUnits(self._arm.slides)
         return {
             "joint": units.joined("rad", "m"),
             "torque": units.torque(),
@@ -159,16 +162,21 @@ class Result(ReadOnlyState):
     def _labels(self) -> dict[str, Sequence[object]]:
         """Return the names along each dimension that has names."""
         labels: dict[str, Sequence[object]] = {"axis": AXES, "component": COMPONENTS}
-        if self._posture:
-            arm = self._posture.arm
-            labels |= {"joint": arm.joint_names, "joint_column": arm.joint_names}
-            labels["cable"] = arm.cables.names
+        if self._arm:
+            joints, cables = self._arm.joint_names, self._arm.cables
+            labels |= {"joint": joints, "joint_column": joints, "cable": cables.names}
+            labels["held_cable"] = [each.name for each in cables if each.control == "position"]
         return labels
+
+
+def _array(value: Any) -> Any:
+    """Return a value as an array; of a mapping, its values."""
+    return np.asarray([*value.values()] if isinstance(value, Mapping) else value)
 
 
 def _by_name(value: Any, dims: Sequence[str], labels: Mapping[str, Sequence[object]]) -> Any:
     """Return an array as nested dictionaries by the labels of its dimensions."""
     if not dims:
         return value
-    pairs = zip(labels[dims[0]], value, strict=True)
+    pairs = zip(labels[dims[0]], np.asarray(value), strict=True)
     return {label: _by_name(each, dims[1:], labels) for label, each in pairs}

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any, Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm._former.principal import principal_stiffness
 from cdsm.batch.evaluation import OUTPUTS, evaluate
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures import rows as measures
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.directions import XYZ
 from cdsm.support.format import MODEL, JointUnits
+from cdsm.support.progress import progress_bar
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 from cdsm.sweeps.quantities import CASES, QUANTITIES
@@ -36,6 +37,8 @@ _BATCH_NAMES: Final = {
 
 _BLOCKS: Final[dict[str, Any]] = {"tip": np.s_[:, :3, 3], "compliance": np.s_[:, :3, :3]}
 """Parts of matrices of a batch."""
+
+_FAST, _SLOW = 2**14, 2**8  # rows that are computed together, also with measures of milliseconds
 
 
 @final
@@ -62,8 +65,17 @@ class Cases:
         """Return the number of cases at each posture."""
         return len(self.wrench) * len(self.minimum)
 
-    def dataset(self, q: xarray.DataArray) -> xarray.Dataset:
-        """Compute the cases at joint angles q (…, joint) [rad]; lazily if q is chunked."""
+    @property
+    def together(self) -> int:
+        """Return the number of postures that are computed together: some tenths of a second."""
+        slow = not measures.SLOW.isdisjoint(self.outputs)
+        return max(1, (_SLOW if slow else _FAST) // self.count)
+
+    def dataset(self, q: xarray.DataArray, progress: bool = False) -> xarray.Dataset:
+        """Compute the cases at joint angles q (…, joint) [rad], by all threads and with a bar.
+
+        If q is chunked, the Dataset is lazy; a chunk is then computed by one thread.
+        """
         import xarray
 
         names = (*self.outputs, "status")
@@ -79,6 +91,7 @@ class Cases:
         variables = xarray.apply_ufunc(
             self._compute,
             q,
+            kwargs={"threads": None, "progress": progress} if q.chunks is None else {},
             input_core_dims=[["joint"]],
             output_core_dims=dims,
             dask="parallelized",
@@ -98,20 +111,27 @@ class Cases:
         own |= {"wrench": len(self.wrench), "minimum": len(self.minimum)}
         return own | {"direction": len(self.direction), "joint": nv, "joint_column": nv}
 
-    def _compute(self, q: Array) -> tuple[NDArray[Any], ...]:
+    def _compute(
+        self, q: Array, threads: int | None = 1, progress: bool = False
+    ) -> tuple[NDArray[Any], ...]:
         """Compute all outputs, then ``status``, at joint angles q (…, nv) [rad]."""
-        rows = self._rows(q.reshape(-1, self.arm.nv))
+        flat, found = q.reshape(-1, self.arm.nv), []
+        with progress_bar("sweep", len(flat), wanted=progress) as advance:
+            for part in (flat[i : i + self.together] for i in range(0, len(flat), self.together)):
+                found.append(self._rows(part, threads))
+                advance(len(part))
         names = (*self.outputs, "status")
         sizes = [[self._sizes[dim] for dim in _dims(name)] for name in names]
+        rows = [np.concatenate([each[name] for each in found]) for name in names]
         shapes = [(*q.shape[:-1], *own) for own in sizes]
-        return tuple(rows[name].reshape(shape) for name, shape in zip(names, shapes, strict=True))
+        return tuple(row.reshape(shape) for row, shape in zip(rows, shapes, strict=True))
 
-    def _rows(self, q: Array) -> dict[str, NDArray[Any]]:
+    def _rows(self, q: Array, threads: int | None) -> dict[str, NDArray[Any]]:
         """Compute outputs and ``status`` at q (P, nv); a row is a posture, wrench and minimum."""
         arm, names, cases = self.arm, self.outputs, self.count
         wrench = np.tile(np.repeat(self.wrench, len(self.minimum), axis=0), (len(q), 1))
         at = np.repeat(q, cases, axis=0)
-        low, high, bounded = self._bounds(at)
+        low, high, bounded = self._bounds(q)
         kinds = {QUANTITIES[name].needs for name in names}
         asked = {_BATCH_NAMES.get(name, name) for name in names}
         asked |= {"tension"} if kinds - {"posture"} else set()
@@ -125,7 +145,7 @@ class Cases:
             direction=self.direction if "along" in asked else None,
             minimum=low,
             maximum=high,
-            threads=1,
+            threads=threads,
         )
         status = found.status.astype(np.int8)
         exist = ~np.isin(status, (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES))
@@ -146,13 +166,13 @@ class Cases:
                 else:
                     spread({name: values[bounded]}, bounded)
         posed, wanted = exist[::cases], [name for name in names if name in measures.MEASURED]
-        spread(measures.measured(arm, q[posed], wanted, self.diameter, 1), posed)
+        spread(measures.measured(arm, q[posed], wanted, self.diameter), posed)
         held = exist & ~np.isin(status, (Status.INFEASIBLE, Status.SOLVER_FAILED))
         bounds = arm, at[held], wrench[held], low[held], high[held]
         if "payload" in names:
-            spread({"payload": measures.payloads(*bounds, self.direction, 1)}, held)
-        if "capacity_margin" in names:
-            spread({"capacity_margin": measures.capacity_margins(*bounds)}, held)
+            spread({"payload": measures.payloads(*bounds, self.direction)}, held)
+        if "force_radius" in names:
+            spread({"force_radius": measures.force_radii(*bounds)}, held)
         if "margin" in found:
             known = np.isin(status, (Status.OK, Status.IMMOBILE))
             if "stable arm" in kinds:
@@ -163,12 +183,12 @@ class Cases:
 
     def _bounds(self, q: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return bounds (R, C) [N] of the tensions at the motors, and whether they exist (R,)."""
-        shape, low = (len(q), len(self.arm.cables)), np.resize(self.minimum, len(q))
-        if not self.worst_friction:
-            bounds = np.broadcast_to(low[:, None], shape), np.broadcast_to(self.maximum, shape)
-            return *bounds, np.full(len(q), True)
-        loss, exist = np.ones(shape), evaluate(self.arm, q, outputs=[], threads=1).ok
-        loss[exist] = measures.friction_losses(self.arm, q[exist], 1)
+        loss = np.ones((len(q), len(self.arm.cables)))
+        if self.worst_friction:
+            exist = evaluate(self.arm, q, outputs=[], threads=1).ok
+            loss[exist] = measures.friction_losses(self.arm, q[exist])
+        loss = np.repeat(loss, self.count, axis=0)
+        low = np.resize(self.minimum, len(loss))
         return measures.narrowed_bounds(self.arm, low, self.maximum, loss)
 
     def _coordinates(self, *dims: str) -> dict[str, Any]:
@@ -213,9 +233,9 @@ class Cases:
         from cdsm.arm_file.arm import arm_text  # pydantic: slow to import
 
         try:
-            arm = arm_text(self.arm._parts)
+            arm = arm_text(self.arm)
         except InvalidInput:  # laws made from functions cannot be written
-            arm = f"{self.arm._parts} {[*self.arm.cables]}"
+            arm = f"{self.arm.__getstate__() | {'cables': [*self.arm.cables]}}"
         about = {"Conventions": "CF-1.11", "title": f"stiffness sweep of {self.arm.name}"}
         about |= {"source": f"cdsm {version('cdsm-stiffness')}", "model": MODEL, "arm": arm}
         if self.worst_friction:

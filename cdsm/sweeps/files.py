@@ -116,11 +116,13 @@ def stored(
         if len(todo) < len(regions):
             shown = cases.arm.name, len(regions) - len(todo), len(regions)
             _log.warning("sweep of %s resumes: %d of %d chunks are kept", *shown)
-        scheduler = None if by_dask else "threads"
+        many = _AT_ONCE if by_dask else 1
         with progress_bar("sweep", len(todo), wanted=progress) as advance:
-            for some in (todo[i : i + _AT_ONCE] for i in range(0, len(todo), _AT_ONCE)):
-                parts = [cases.dataset(q.isel(region)).drop_vars(names) for region in some]
-                parts = lazy.compute(*parts, scheduler=scheduler)
+            for some in (todo[i : i + many] for i in range(0, len(todo), many)):
+                angles = [q.isel(region) for region in some]
+                if not by_dask:  # a Dataset of numbers is computed at once, by all threads
+                    angles = lazy.compute(*angles, scheduler="synchronous")
+                parts = lazy.compute(*(cases.dataset(each).drop_vars(names) for each in angles))
                 for region, part in zip(some, parts, strict=True):
                     for each in (part.drop_vars("status"), part[["status"]]):  # status last
                         each.to_zarr(path, region=region, consolidated=False)

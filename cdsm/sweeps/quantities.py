@@ -40,7 +40,7 @@ _TABLE: dict[Needs, dict[str, tuple[str, ...]]] = {  # words, unit and dimension
     "tension": {
         "tension": ("least cable tensions F in balance (Eq. 17)", "N", "cable"),
         "payload": ("largest force in a direction within the tension limits", "N", "direction"),
-        "capacity_margin": ("largest force in any direction within the tension limits", "N"),
+        "force_radius": ("largest force in any direction within the tension limits", "N"),
     },
     "stiffness": {
         "cable_stiffness": ("cable stiffness, diagonal of K_L", "N m-1", "cable"),

@@ -15,7 +15,6 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.directions import XYZ, Direction, unit_directions
 from cdsm.support.extras import need
 from cdsm.support.files import as_path
-from cdsm.support.progress import progress_bar
 from cdsm.support.validation import NO_WRENCH, flag, instance, one_of, quantity, sequence_of, text
 from cdsm.sweeps.cases import Cases
 from cdsm.sweeps.files import stored
@@ -26,7 +25,7 @@ from cdsm.tension import checked_bounds
 if TYPE_CHECKING:
     import xarray
 
-_CHUNK, _PART = 2**16, 2**14  # rows, a posture with a case each, of a chunk in a store, in memory
+_CHUNK = 4  # a chunk of a store has so many times the postures that are computed together
 
 
 def sweep(
@@ -111,13 +110,11 @@ def sweep(
         },
     )
     given = getattr(q, "chunks", None) is not None
-    angles = angles_of(arm, q, max(1, (_PART if store is None else _CHUNK) // cases.count))
-    if store is not None:
-        return stored(as_path(store), cases, angles, given, flag("progress", progress))
-    if given:
-        return cases.dataset(angles)
-    with progress_bar("sweep", wanted=flag("progress", progress)):
-        return cases.dataset(angles).compute(scheduler="threads")
+    shown = flag("progress", progress)
+    if store is None:
+        return cases.dataset(angles_of(arm, q), shown)
+    angles = angles_of(arm, q, _CHUNK * cases.together)
+    return stored(as_path(store), cases, angles, given, shown)
 
 
 def _named(value: Any) -> tuple[Sequence[str] | None, Any]:

@@ -58,10 +58,9 @@ def distribute_tension(
         UnknownName: The solver is not installed, or a fixed cable does not exist.
         SolverError: The solver's solution does not meet the optimality conditions.
     """
-    instance("pose", pose, Posture)
-    cables, fixed = pose.arm.cables, {} if fixed is None else fixed
+    cables = instance("pose", pose, Posture).arm.cables
     low, high = bounds_at(pose, minimum, maximum, worst_friction)
-    if not isinstance(fixed, Mapping):
+    if not isinstance(fixed := {} if fixed is None else fixed, Mapping):
         raise InvalidInput("fixed", f"{fixed!r} given; give a dict of tensions [N] by cable.")
     for name, value in fixed.items():
         c = cables.names.index(one_of("cable", name, cables.names))
@@ -72,7 +71,7 @@ def distribute_tension(
     problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
     solution = solve(problem, solver)
     if isinstance(solution, str):
-        free = np.array([cable.name not in fixed for cable in cables])
+        free = np.array([name not in fixed for name in cables.names])
         explain(pose, problem, solver, solution, free)
     F = frozen(solution * problem.force)
     return Tension(posture=pose, values=F, wrench=wrench, minimum=low, maximum=high, solver=solver)
@@ -99,11 +98,9 @@ def checked_bounds(
     if not 0.0 <= given < math.inf:
         only = "cables only pull, so it must be finite and not negative"
         raise InvalidInput("minimum", f"{given:g} N given for {cable}; {only}.")
-    raise InvalidInput(
-        "maximum",
-        f"{ceiling:g} N ({own * (ceiling < limit)}maximum) for {cable} is below {floor:g} N "
-        f"({own * (floor > given)}minimum); raise the one or lower the other.",
-    )
+    said = f"{ceiling:g} N ({own * (ceiling < limit)}maximum) for {cable} is below {floor:g} N"
+    said += f" ({own * (floor > given)}minimum); raise the one or lower the other."
+    raise InvalidInput("maximum", said)
 
 
 def bounds_at(
@@ -117,11 +114,9 @@ def bounds_at(
     low, high = frozen(low * loss), frozen(high / loss)
     c = int(np.argmax(low - high))
     if low[c] > high[c]:
-        raise InvalidInput(
-            "worst_friction",
-            f"{pose.arm.cables[c].name} would need {low[c]:.4g} N or more and {high[c]:.4g} N or "
-            "less at its motor; raise maximum= or lower minimum=.",
-        )
+        said = f"would need {low[c]:.4g} N or more and {high[c]:.4g} N or less at its motor"
+        remedy = f"{said}; raise maximum= or lower minimum=."
+        raise InvalidInput("worst_friction", f"{pose.arm.cables[c].name} {remedy}")
     return low, high
 
 

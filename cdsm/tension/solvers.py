@@ -1,6 +1,7 @@
-"""Solve min ½‖x‖² subject to A x = b and low ≤ x ≤ high by qpsolvers, and verify the solution.
+"""Programs of cable tensions, solved by qpsolvers.
 
-The problem is strictly convex, so x is its optimum exactly if A x = b and, for some multipliers y,
+:func:`solve` minimises ½‖x‖² subject to A x = b and low ≤ x ≤ high, and verifies the solution. The
+problem is strictly convex, so x is its optimum exactly if A x = b and, for some multipliers y,
 x = clip(−Aᵀ y, low, high). These are the Karush-Kuhn-Tucker conditions (stationarity, bounds and
 complementarity) with the multipliers z = −x − Aᵀ y of the bounds eliminated.
 """
@@ -9,12 +10,13 @@ from __future__ import annotations
 
 import math
 import warnings
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from cdsm.errors import SolverError
+from cdsm.support import linear_program
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array
 
@@ -22,7 +24,10 @@ DEFAULT_SOLVER: Final = "daqp"  # exact, and the fastest in measurements
 OPTIMALITY: Final = 1e-9  # largest accepted violation, relative to the largest force
 HINT: Final = "Try 'daqp' or 'osqp', or change the posture, the load or the bounds a little."
 _ROUNDING: Final = 1e-12  # a solution with a larger violation is corrected
-_NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are rounding
+_CURVATURE: Final = 1e-8  # ε that makes a linear program a quadratic one
+_FARTHEST: Final = 1e4  # variables of a linear program beyond this may be unbounded
+_FEASIBLE: Final = 1e-8  # largest accepted violation of A x = b by a linear program
+NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are rounding
 
 # DAQP is three times as fast with 60 cables if it eliminates the balance first; OSQP misses bounds
 # by newtons with its defaults, and its polishing can spoil a solution
@@ -48,7 +53,7 @@ def nondimensional(J: Array, torque: Array, low: Array, high: Array, length: flo
     """Scale the balance ``J``ᵀ F = ``torque`` of an arm, without rounding; J_L is (C, nv)."""
     arm = 2.0 ** math.frexp(abs(J).max())[1]
     A, b = J.T / arm, torque / arm
-    A[abs(A) < _NO_ARM * length / arm] = 0.0
+    A[abs(A) < NO_ARM * length / arm] = 0.0
     force = 2.0 ** math.frexp(max(abs(b).max(), low.max()))[1]
     return Problem(A, b / force, low / force, high / force, arm, force)
 
@@ -107,3 +112,37 @@ def _corrected(problem: Problem, x: Array, y: Array) -> tuple[Array, Array]:
     x = np.where(free, 0.0, x)
     x[free] = np.linalg.lstsq(A[:, free], b - A @ x)[0]
     return x, y - np.linalg.lstsq(A[:, free].T, x[free] + y @ A[:, free])[0]
+
+
+def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[float, Array] | None:
+    """Maximise cost · x subject to A x = b and low ≤ x ≤ high; return the maximum and x (n,).
+
+    DAQP solves the quadratic program −cost · x + ½ε ‖x‖², which for ε = 1e-8 ends in the vertex of
+    the linear one; another ε moves it, or fails near straight postures. A, b, the finite bounds and
+    x must be of order one. Where DAQP finds nothing, or beyond 1e4, HiGHS decides. The result is
+    None if no x is feasible, and (inf, NaN) if cost · x is unbounded.
+    """
+    import qpsolvers
+
+    least, most = np.maximum(low, -_FARTHEST), np.minimum(high, _FARTHEST)
+    unit = float(abs(cost).max()) or 1.0
+    qp = qpsolvers.Problem(
+        _CURVATURE * np.eye(cost.size), -cost / unit, A=A, b=b, lb=least, ub=most
+    )
+    with suppress(qpsolvers.SolverError):
+        found = qpsolvers.solve_problem(qp, DEFAULT_SOLVER, primal_tol=1e-11, dual_tol=1e-11)
+        x = np.full_like(cost, np.nan) if found.x is None else np.asarray(found.x)
+        if abs(A @ x - b).max() < _FEASIBLE and abs(x).max() < 0.9 * _FARTHEST:
+            return float(cost @ x), x
+    lever = abs(A).max(axis=0)  # HiGHS drops entries below 1e-9
+    lever[lever == 0.0] = 1.0
+    bounds = np.column_stack([low * lever, high * lever])
+    program = linear_program.least(-cost / lever, A_eq=A / lever, b_eq=b, bounds=bounds)
+    if program.status == linear_program.INFEASIBLE:
+        return None
+    if program.status == linear_program.UNBOUNDED:
+        return math.inf, np.full_like(cost, np.nan)
+    if program.status != linear_program.OPTIMAL:
+        raise SolverError("highs", f"finds no largest load: {program.message}")
+    x = program.x / lever
+    return float(cost @ x), x

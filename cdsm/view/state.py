@@ -11,19 +11,16 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm._former.principal import principal_stiffness
 from cdsm.errors import CdsmError, EquilibriumError, InvalidInput
-from cdsm.friction.sticking import holding
-from cdsm.friction.stuck import stuck_stiffness
+from cdsm.friction.stick import can_stick, stuck_stiffness
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium
-from cdsm.statics.load_cycle import load_cycle
-from cdsm.statics.load_history import LoadHistory
-from cdsm.statics.rest_search import equilibrium
+from cdsm.statics.equilibrium import Equilibrium, equilibrium
+from cdsm.statics.load_cycle import LoadHistory, load_cycle
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.instability import verdict
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array, ReadOnlyState, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
@@ -164,7 +161,7 @@ class Shown(ReadOnlyState):
     def principal(self) -> dict[str, Array] | None:
         """Softest and stiffest direction, and the stiffness along each [N/m]; None if not stable.
 
-        The keys are those of :func:`~cdsm._former.principal.principal_stiffness`.
+        The keys are those of :func:`~cdsm.stiffness_matrix.principal.principal_stiffness`.
         """
         return None if self.compliance is None else principal_stiffness(self.compliance)
 
@@ -200,7 +197,7 @@ class Shown(ReadOnlyState):
         along = spans[:, 1] - spans[:, 0]
         along *= _BEAD * pose.arm.length / np.linalg.norm(along, axis=1, keepdims=True)
         lines = spans[:, :1] + np.stack([-along, along], axis=1)
-        return frozen(lines[holding(pose) & ~slides]), frozen(lines[slides])
+        return frozen(lines[can_stick(pose) & ~slides]), frozen(lines[slides])
 
     @cached_property
     def ellipsoid(self) -> Ellipsoid | None:
@@ -260,12 +257,9 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
 
 def _rest(history: LoadHistory) -> Equilibrium:
     """Return the last state of ``history`` as an equilibrium, with the tangent K_θ there."""
-    K, reaction = history.stiffness(-1), history.reaction[-1].copy()
     return Equilibrium(
         reference=history.reference,
         reference_tension=history.reference_tension,
-        wrench=K.wrench,
-        stiffness=K,
-        reaction=frozen(reaction),
-        residual=frozen(K.residual - reaction),
+        stiffness=history.stiffness(-1),
+        stop_torque=frozen(history.stop_torque[-1].copy()),
     )

@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
-import re
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.polynomial.polynomial import polyder, polyint, polyval
+from numpy.typing import ArrayLike, NDArray
 
 import cdsm
-from cdsm.errors import ElasticityRangeError, FileError, GeometryError, InvalidInput, listed
-from cdsm.support.files import read_text, write_text
-from cdsm.support.records import read_toml
-from cdsm.support.validation import number_array, quantity, scalar
+from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.support.validation import number_array, scalar
 from cdsm.support.values import Array
-from cdsm.wires.table import Table, horner, tabulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SHORTEST: Final = 0.5  # length of a slack wire over that at the low end of its law
-_UNITS: Final = "# Elasticity of a wire: tensions and rigidity in N, strains without unit"
-_MEASURED = re.compile(r'^"?[-+]?\d[\d.,eE+-]*"?\s*[;,\t]\s*"?[-+]?\d', re.MULTILINE)  # of a CSV
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,10 +44,12 @@ class Elasticity:
     low: float
     high: float
     rest: float
-    _kind: str
-    _given: dict[str, Any]  # arguments that the law was made of
-    _factor: float  # EA over that of the table
-    _table: Table
+    _kind: str  # in TOML; empty if the law was made from a function
+    _given: dict[str, Any]  # arguments that the law was made from
+    _factor: float  # EA over that of the polynomials
+    _knots: Array  # tensions (n + 1,) [N], from ``rest`` on
+    _coefficients: Array  # of ε in F − knot (k, n), lowest power first
+    _cells: NDArray[np.intp] | None = None  # piece of each cell, even in (F − rest)^¼
 
     @staticmethod
     def from_rigidity(
@@ -62,15 +59,15 @@ class Elasticity:
 
         ``rigidity`` returns EA [N] at an array of tensions from ``low`` to ``high`` [N]; corners of
         EA(F), at the tensions ``joins`` [N], are rounded off within about 1 N. Raises InvalidInput
-        if the function fails, is not positive, jumps or has other corners, or not 0 <= low < high.
+        if the function fails, is not positive, jumps or has other corners, or if 0 <= low < joins <
+        high does not hold.
         """
-        low, high = quantity("low", low, "tension", zero=True), quantity("high", high, "tension")
-        if not low < high:
-            raise InvalidInput("low", f"low < high needed, but are {low:g} and {high:g} N.")
-        table = tabulate(rigidity, low, high, joins)
-        digest = hashlib.sha256(table.coefficients.tobytes()).hexdigest()[:16]
-        given = {"low": low, "high": high, "digest": digest}
-        return Elasticity(low, high, low, "", given, 1.0, table)
+        from cdsm.wires.laws import rising, tabulate
+
+        low, *_, high = ends = rising(low, joins, high)
+        table = tabulate(rigidity, ends)
+        given = {"low": low, "high": high, "checksum": zlib.crc32(table[1].tobytes())}
+        return Elasticity(low, high, low, "", given, 1.0, *table)
 
     @staticmethod
     def read(path: str | os.PathLike[str]) -> Elasticity:
@@ -81,25 +78,18 @@ class Elasticity:
         [-]). The last two may have a ``factor`` (:meth:`scaled`) and ``slack_below = true``.
         FileError lists all faults.
         """
-        from cdsm.wires.catalogue import from_table
+        from cdsm.wires.catalogue import read_law
 
-        text = read_text(path, any_encoding=True)  # to know a table of a testing machine
-        if _MEASURED.search(text):
-            raise FileError(path, "looks like measured points. Fit it first: `cdsm fit`.")
-        try:
-            return from_table(read_toml(text))
-        except (GeometryError, InvalidInput) as error:
-            faults = getattr(error, "faults", (str(error),))
-        raise FileError(path, f"is not an elasticity, {len(faults)} found:{listed(faults)}")
+        return read_law(path)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the law to a TOML file, from which :meth:`read` makes an equal one.
 
         Raises InvalidInput for a law of :meth:`from_rigidity`, and FileError.
         """
-        from cdsm.wires.catalogue import table_of
+        from cdsm.wires.catalogue import write_law
 
-        return write_text(path, "\n".join([_UNITS, *table_of(self), ""]))
+        return write_law(self, path)
 
     def plot(self) -> Figure:
         """Plot tangent and secant rigidity [kN] against the tension [N]."""
@@ -110,9 +100,9 @@ class Elasticity:
 
         Raises InvalidInput if the factor [-] is not positive.
         """
-        if not 0.0 < scalar("factor", factor) < math.inf:
+        if scalar("factor", factor) <= 0.0:
             raise InvalidInput("factor", f"{factor:g} given; a positive number is needed.")
-        return self._changed(self.low, self._factor * float(factor))
+        return Elasticity(**vars(self) | {"_factor": self._factor * float(factor)})
 
     def slack_below(self) -> Elasticity:
         """Return the law continued to 0 N with the rigidity of its low end F_0 (an assumption).
@@ -122,12 +112,12 @@ class Elasticity:
         """
         low, EA = self.low, float(self.rigidity(self.low))
         if low > _SHORTEST * EA:
-            raise InvalidInput(
-                "slack_below",
-                f"EA is only {EA:.4g} N at {low:g} N: a wire that keeps it would be slack after "
-                f"shortening by {100.0 * low / EA:.3g} %. Begin the law at another tension.",
+            slack = f"would be slack after shortening by {100.0 * low / EA:.3g} %"
+            said = (
+                f"EA is only {EA:.4g} N at {low:g} N: a wire that keeps it {slack}. Begin higher."
             )
-        return self._changed(0.0, self._factor) if low > 0.0 else self
+            raise InvalidInput("slack_below", said)
+        return Elasticity(**vars(self) | {"low": 0.0}) if low > 0.0 else self
 
     def rigidity(self, tension: ArrayLike) -> Array:
         """Compute the tangent rigidity EA [N] at F [N], any shape (Fig. 5 of the paper)."""
@@ -144,18 +134,17 @@ class Elasticity:
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
         """Compute dEA/dF [-] at F [N], any shape; zero below :attr:`rest`."""
-        F, c = self._inside(number_array("tension", tension)), self._table.coefficients
-        powers = np.arange(len(c) - 1.0, 1.0, -1.0)[:, None]
-        bend = horner(c[:-2] * powers * (powers - 1.0), *self._table.place(F.clip(self.rest)))
+        F = self._inside(number_array("tension", tension))
+        bend = self._polynomial(polyder(self._coefficients, 2), F)
         return np.where(self.rest > F, 0.0, -bend * self._evaluate(F)[1] ** 2 / self._factor)
 
     def energy(self, tension: ArrayLike) -> Array:
         """Compute ∫ F dε [N] = [J/m], from :attr:`rest` to F [N], any shape."""
-        F = self._inside(number_array("tension", tension))
-        strain, EA = self._evaluate(F)
-        moment = horner(self._table.moments(), *self._table.place(F.clip(self.rest)))
-        below = np.minimum(F - self.rest, 0.0)  # by parts, with the moment ∫ε dF
-        return np.asarray(F * strain - moment / self._factor - below**2 / (2.0 * EA))
+        F, moment = self._inside(number_array("tension", tension)), polyint(self._coefficients)
+        moment[0, 1:] = np.cumsum(polyval(np.diff(self._knots), moment, tensor=False))[:-1]
+        (strain, EA), below = self._evaluate(F), np.minimum(F - self.rest, 0.0)
+        area = self._polynomial(moment, F) / self._factor + below**2 / (2.0 * EA)
+        return np.asarray(F * strain - area)  # by parts
 
     def secant_rigidity(self, tension: ArrayLike) -> Array:
         """Compute the secant rigidity (F − rest)/ε [N] of Eq. 18 at F [N], any shape."""
@@ -177,11 +166,11 @@ class Elasticity:
         return hash((self._kind, self._factor, self.low, self.high))
 
     def __repr__(self) -> str:
-        kind, factor = self._kind.capitalize(), self._factor
-        given = {"rigidity": factor} if kind == "Linear" else self._given
-        scaled = f".scaled({factor!r})" if given is self._given and factor != 1.0 else ""
+        given = self._given | ({"rigidity": self._factor} if self._constant else {})
         text = ", ".join(f"{name}={value!r}" for name, value in given.items())
-        return f"{kind}Elasticity({text}){scaled}" + ".slack_below()" * self._slack
+        scaled = "" if self._constant or self._factor == 1.0 else f".scaled({self._factor!r})"
+        slack = ".slack_below()" * (self.low < self.rest)
+        return f"{self._kind.capitalize()}Elasticity({text}){scaled}{slack}"
 
     @property
     def _constant(self) -> float | None:
@@ -189,39 +178,30 @@ class Elasticity:
         return self._factor if self._kind == "linear" else None
 
     @property
-    def _slack(self) -> bool:
-        return self.low < self.rest
-
-    @property
     def _span(self) -> str:
         """The tensions of the law, as text."""
         return f"[{self.low:g} N, {self.high:g} N{')' if math.isinf(self.high) else ']'}"
-
-    def _changed(self, low: float, factor: float) -> Elasticity:
-        same = self.high, self.rest, self._kind, self._given
-        return Elasticity(low, *same, factor, self._table)
 
     def _inside(self, F: Array) -> Array:
         """Return the tensions F [N], or raise ElasticityRangeError."""
         if F.size and not (F.min() >= self.low and F.max() <= self.high):
             outside = (self.low > F) | (self.high < F)
             below = "; slack_below() continues one to 0 N" if F.min() < self.low else ""
-            problem = (
-                f"outside the domain {self._span} of the elasticity. Keep the tension inside it "
-                f"(minimum=, maximum=), or use an elasticity that covers it{below}."
-            )
             raise ElasticityRangeError(
-                problem, F[outside].tolist(), np.flatnonzero(outside).tolist()
+                f"outside the domain {self._span} of the elasticity. Keep the tension inside it "
+                f"(minimum=, maximum=), or use an elasticity that covers it{below}.",
+                F[outside].tolist(),
+                np.flatnonzero(outside).tolist(),
             )
         return F
 
     def _evaluate(self, F: Array) -> tuple[Array, Array]:
         """Compute ε [-] and EA [N] at tensions F [N] of the law, any shape."""
         inside = F if self.low == self.rest else np.maximum(F, self.rest)
-        piece, x = self._table.place(inside)
-        rows = self._table.coefficients.take(piece, axis=1)
-        softness, strain = rows[0], rows[0] * x + rows[1]
-        for row in rows[2:]:  # in place, which is twice as fast
+        piece, x = self._place(inside)
+        softness, *rows = self._coefficients.take(piece, axis=1)[::-1]
+        strain = softness * x + rows[0]
+        for row in rows[1:]:  # in place, which is twice as fast
             softness *= x
             softness += strain
             strain *= x
@@ -230,11 +210,23 @@ class Elasticity:
         EA = self._factor / softness
         return (strain, EA) if inside is F else (strain + (F - inside) / EA, EA)
 
-    def _tension_of(
-        self, wanted: Array, name: str, length: float = 1.0, series: float = 0
-    ) -> Array:
+    def _polynomial(self, coefficients: NDArray[Any], F: Array) -> Array:
+        """Evaluate polynomials (k, n) of the pieces at F [N], but not below the rest."""
+        piece, x = self._place(F.clip(self.rest))
+        return np.asarray(polyval(x, coefficients[:, piece], tensor=False))
+
+    def _place(self, F: Array) -> tuple[Any, Array]:
+        """Return the piece of each tension [N] and the distance from the knot before it."""
+        if self._cells is None:
+            piece = self._knots[1:-1].searchsorted(F)
+        else:
+            count = (len(self._cells) - 1.0) ** 4 / (self.high - self.rest)
+            piece = self._cells.take(np.sqrt(np.sqrt((F - self.rest) * count)).astype(np.intp))
+        return piece, F - self._knots.take(piece)
+
+    def _tension_of(self, wanted: Array, name: str, length: float = 1, series: float = 0) -> Array:
         """Return F [N] at which ``length`` · ε + ``series`` · (F − rest) is ``wanted``."""
-        knots = np.append(0.0, self._table.knots) if self._slack else self._table.knots
+        knots = np.union1d(self.low, self._knots)
         reached = length * self._evaluate(knots)[0] + series * (knots - self.rest)
         if (outside := (wanted < reached[0]) | (wanted > reached[-1] * (1.0 + 1e-15))).any():
             given = f"the {name} {wanted[outside][0]:.6g}; it reaches {reached[-1]:.6g}."

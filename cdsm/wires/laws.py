@@ -3,29 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Final, final
+from typing import Any, Final, final
 
 import numpy as np
-from numpy.polynomial.polynomial import polyval
-from numpy.typing import ArrayLike
+from numpy.polynomial.legendre import leggauss
+from numpy.polynomial.polynomial import polyder, polyval
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm.errors import InvalidInput
+from cdsm.support.format import span
 from cdsm.support.validation import LARGEST, RANGES, SMALLEST, number_array, quantity, scalar
 from cdsm.support.values import Array
 from cdsm.support.warning import warn
 from cdsm.wires.elasticity import Elasticity
-from cdsm.wires.table import Table, tabulate
 
 EQ19: Final = (
     (-556.89, 377.99, -70.49, 8.74, -0.46, 1.12e-2, -9.946263022943622e-05),
     (-1924.5, 493.34505, -2.26495, 5.38168e-3, -6.93505e-6, 4.58495e-9, -1.21505e-12),
 )
 """Coefficients of Eq. 19 with more digits, so that the branches meet; see eq19_repaired."""
-_USUAL: Final = 1e3, 1e9  # EA [N] of real wires
 _MEET: Final = 1e-9  # relative difference of two polynomials at their join that is rounding
-_LINE: Final = Table(np.array([0.0, RANGES["tension"].high]), np.array([[1.0], [0.0]]))
+_LINE: Final = np.array([0.0, RANGES["tension"].high]), np.array([[0.0], [1.0]])
+_CELLS: Final = 800  # pieces of a function EA(F), to 1e-9 of Eq. 19
+_ACCURACY: Final = 1e-8  # of EA between two knots
+_NEAR: Final = 1.0  # distance [N] from a join within which there is no knot
+_NODES, _WEIGHTS = (leggauss(8)[0] + 1.0) / 2.0, leggauss(8)[1] / 2.0
+_POWERS: Final = np.arange(3.0, 6.0)
+_QUINTIC = np.linalg.inv([_POWERS**0, _POWERS, _POWERS * (_POWERS - 1.0)])  # by value, slope, bend
 
 
 @final
@@ -38,10 +44,10 @@ class LinearElasticity(Elasticity):
 
     def __init__(self, rigidity: float) -> None:
         EA = quantity("rigidity", rigidity, "rigidity")
-        if not _USUAL[0] <= EA <= _USUAL[1]:
-            doubt = "kN" if _USUAL[0] > EA else "E instead of EA"
+        if not 1e3 <= EA <= 1e9:
+            doubt = "kN" if EA < 1e3 else "E instead of EA"
             warn(f"a wire with EA = {EA:g} N is unusual: {doubt}? EA is needed in N.")
-        super().__init__(0.0, math.inf, 0.0, "linear", {}, EA, _LINE)
+        super().__init__(0.0, math.inf, 0.0, "linear", {}, EA, *_LINE)
 
     @classmethod
     def of_wire(cls, young_modulus: float, diameter: float) -> LinearElasticity:
@@ -76,27 +82,22 @@ class StrandElasticity(Elasticity):
         low: float,
         high: float,
     ) -> None:
-        if not isinstance(coefficients, (list, tuple)):
+        if not isinstance(coefficients, (list, tuple)) or not coefficients:
             raise InvalidInput("coefficients", f"{coefficients!r} given; give a tuple per range.")
-        rows, joins = tuple(_row("coefficients", row) for row in coefficients), _row("joins", joins)
-        low, high = scalar("low", low), scalar("high", high)
-        if not rows or not all(rows):
-            raise InvalidInput("coefficients", "need at least one range with one coefficient.")
+        rows = tuple(_row("coefficients", row, 1) for row in coefficients)
+        low, *joins, high = ends = rising(low, joins, high)
         if len(joins) != len(rows) - 1:
             raise InvalidInput("joins", f"{len(joins)} given for {len(rows)} ranges; one fewer.")
-        if low < 0.0 or any(a >= b for a, b in pairwise((low, *joins, high))):
-            found = f"{low:g}, {joins}, {high:g} N"
-            raise InvalidInput("joins", f"0 <= low < joins < high must rise, but are {found}.")
-        for join, (before, after) in zip(joins, pairwise(rows), strict=True):
-            below, above = polyval(join, before), polyval(join, after)
+        for join, ranges in zip(joins, pairwise(rows), strict=True):
+            below, above = (polyval(join, row) for row in ranges)
             if abs(above - below) > _MEET * abs(below):
-                problem = f"the ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} "
-                raise InvalidInput(
-                    "coefficients", f"{problem}N above. Give more digits, or a TabulatedElasticity."
+                said = (
+                    f"ranges do not meet at {join:g} N: {below:.7g} N below, {above:.7g} N above. "
                 )
-        given = {"coefficients": rows, "joins": joins, "low": low, "high": high}
-        table = tabulate(lambda F: _piecewise(F, rows, joins), low, high, joins)
-        super().__init__(low, high, low, "strand", given, 1.0, table)
+                raise InvalidInput("coefficients", f"{said}More digits, or a TabulatedElasticity.")
+        given = {"coefficients": rows, "joins": tuple(joins), "low": low, "high": high}
+        table = tabulate(lambda F: _piecewise(F, rows, joins), ends)
+        super().__init__(low, high, low, "strand", given, 1.0, *table)
 
     @classmethod
     def eq19_repaired(cls) -> StrandElasticity:
@@ -131,17 +132,17 @@ class TabulatedElasticity(Elasticity):
     def __init__(self, tensions: Sequence[float], strains: Sequence[float]) -> None:
         from scipy.interpolate import CubicHermiteSpline, CubicSpline  # import slowly
 
-        given = {"tensions": _row("tensions", tensions), "strains": _row("strains", strains)}
-        F, strain = np.array(given["tensions"]), np.array(given["strains"])
-        if F.size != strain.size or F.size < 2:
-            raise InvalidInput("strains", f"{strain.size} given for {F.size} tensions; 2 or more.")
-        for name, row, least in (("tensions", F, SMALLEST), ("strains", strain, 0.0)):
-            if (steps := np.diff(row)).min() <= least:
-                at = int(steps.argmin()) + 1
-                rise = f"entry [{at}] is {row[at]:g} after {row[at - 1]:g}; they must rise."
-                raise InvalidInput(name, rise)
+        given = {"tensions": _row("tensions", tensions, 2), "strains": _row("strains", strains, 2)}
+        F, strain = map(np.array, given.values())
+        if F.size != strain.size:
+            raise InvalidInput("strains", f"{strain.size} given for {F.size} tensions.")
         if F[0] < 0.0:
             raise InvalidInput("tensions", f"{F[0]:g} N is negative; cables only pull.")
+        for name, row, least in (("tensions", F, SMALLEST), ("strains", strain, 0.0)):
+            at = int(np.diff(row).argmin()) + 1
+            if row[at] - row[at - 1] <= least:
+                rise = f"entry [{at}] is {row[at]:g} after {row[at - 1]:g}; they must rise."
+                raise InvalidInput(name, rise)
         chords, strain = np.diff(strain) / np.diff(F), strain - strain[0]
         if not 1.0 / LARGEST < chords.min() <= chords.max() < LARGEST:
             raise InvalidInput("strains", "rise so steeply, or so little, that EA is no rigidity.")
@@ -150,19 +151,80 @@ class TabulatedElasticity(Elasticity):
             middles = (strain[1:] + strain[:-1]) / 2.0
             ln = CubicSpline(middles, np.log(chords), bc_type="natural")(strain)
             slopes = np.exp(np.clip(ln, np.log(least / 2.0), np.log(2.5 * least)))
-        low, high, table = (
-            float(F[0]),
-            float(F[-1]),
-            Table(F, CubicHermiteSpline(F, strain, slopes).c),
-        )
-        super().__init__(low, high, low, "tabulated", given, 1.0, table)
+        low, high, curve = float(F[0]), float(F[-1]), CubicHermiteSpline(F, strain, slopes)
+        super().__init__(low, high, low, "tabulated", given, 1.0, F, curve.c[::-1])
 
 
 def _piecewise(F: Array, rows: Sequence[Sequence[float]], joins: Sequence[float]) -> Array:
     return np.choose(np.searchsorted(joins, F), [polyval(F, row) for row in rows])
 
 
-def _row(name: str, values: ArrayLike) -> tuple[float, ...]:
-    if (numbers := number_array(name, values)).ndim != 1:
-        raise InvalidInput(name, f"{values!r} given; a sequence of numbers is needed.")
+def rising(low: float, joins: Sequence[float], high: float) -> tuple[float, ...]:
+    """Return the ends of the ranges of a law [N], if they rise from 0 or more."""
+    ends = scalar("low", low), *_row("joins", joins), scalar("high", high)
+    if ends[0] < 0.0 or min(np.diff(ends)) <= 0.0:
+        said = f"0 <= low < high needed, with joins between that rise, but are {ends} N."
+        raise InvalidInput("joins" if joins else "low", said)
+    return ends
+
+
+def _row(name: str, values: ArrayLike, least: int = 0) -> tuple[float, ...]:
+    numbers = number_array(name, values)
+    if numbers.ndim != 1 or numbers.size < least:
+        raise InvalidInput(name, f"{values!r} given; a sequence of {least} or more numbers needed.")
     return tuple(numbers.tolist())
+
+
+def tabulate(
+    rigidity: Callable[[Array], ArrayLike], ends: Sequence[float]
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Tabulate ε = ∫ dF/EA from a function EA(F) [N] as quintics with ε, EA and dEA/dF of knots.
+
+    Return knots (n + 1,), coefficients (6, n) and the piece of each cell, even in (F − low)^¼: so
+    knots are dense at the low end, where wires are soft. No knot is near a join: a quintic bridges
+    it. Raises InvalidInput.
+    """
+    low, *joins, high = ends
+
+    def near(F: Array, distance: float) -> Any:
+        return np.min([abs(F - join) for join in joins], axis=0, initial=np.inf) <= distance
+
+    F = low + (high - low) * np.linspace(0.0, 1.0, _CELLS + 1) ** 4
+    F[-1] = high
+    kept = ~near(F, _NEAR) | (low == F) | (high == F)
+    F = F[kept]
+    sides = np.union1d(F, joins)  # the integral over a corner is that of its two sides
+    width = np.diff(sides)[:, None]
+    steps = (width * _WEIGHTS / _checked(rigidity, sides[:-1, None] + width * _NODES)).sum(axis=1)
+    rise = np.add.reduceat(steps, np.flatnonzero(np.isin(sides[:-1], F)))
+    before, after = np.maximum(F - 1e-5 * (F + 1.0), low), np.minimum(F + 1e-5 * (F + 1.0), high)
+    slope = (_checked(rigidity, after) - _checked(rigidity, before)) / (after - before)
+    EA, h = _checked(rigidity, F), np.diff(F)
+    slope[-1] += (slope[-1] - slope[-2]) / h[-1] * (high - before[-1]) / 2.0  # one-sided there
+    a, b = 1.0 / EA, -slope / EA**2  # ε′ and ε″
+    start, first, second = np.append(0.0, np.cumsum(rise)[:-1]), a[:-1] * h, b[:-1] * h**2
+    more = _QUINTIC @ [rise - first - second / 2.0, np.diff(a) * h - second, np.diff(b) * h**2]
+    c = np.vstack([start, a[:-1], b[:-1] / 2.0, more / h ** _POWERS[:, None]])
+    test, softness = F[:-1] + 0.3 * h, polyval(0.3 * h, polyder(c), tensor=False)
+    wrong = abs(softness * _checked(rigidity, test) - 1.0) > _ACCURACY
+    if (wrong & ~near(test, 3.0 * _NEAR)).any():
+        raise InvalidInput(
+            "rigidity",
+            f"jumps or bends too sharply for {_CELLS} pieces from {low:g} to {high:g} N. EA must "
+            "be continuous; give the tensions of its corners as joins=.",
+        )
+    return F, c, (np.cumsum(kept) - 1).clip(max=len(h) - 1)
+
+
+def _checked(rigidity: Callable[[Array], ArrayLike], F: Array) -> Array:
+    """Return EA [N] of a function; InvalidInput if it fails or gives anything but rigidities."""
+    _, least, most = RANGES["rigidity"]
+    try:
+        values = np.broadcast_to(np.asarray(rigidity(F), dtype=np.float64), F.shape)
+    except Exception as error:
+        problem = f"the function fails at {span(F)} N: {error!r}. It must return an array of the "
+        raise InvalidInput("rigidity", f"{problem}shape of the tensions it gets.") from error
+    if (bad := ~((values >= least) & (values <= most))).any():
+        problem = f"is {values[bad][0]:.6g} N at {F[bad][0]:.6g} N, not {least:g} to {most:g} N. "
+        raise InvalidInput("rigidity", f"{problem}Narrow the domain, or correct the law.")
+    return values

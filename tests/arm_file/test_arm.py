@@ -177,7 +177,7 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
         (
             "minimum = 5.0",
             "minimum = 5.0\nmaximum = 2.0",
-            "arm:\n  - minimum: 5 N given, above the maximum of 2 N",
+            "arm:\n  - maximum: 2 N given, below the minimum of 5 N",
         ),
         ("minimum = 5.0", 'original_length = "long"', "original_length"),
         ("minimum = 5.0", "lead = 5.0", "lead: stands outside [universal]"),
@@ -195,7 +195,16 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
         ("joints = 2", "joints = 0", "joints"),
         ("joints = 2", "jonits = 2", "jonits: is not a key that is known here; did you mean joi"),
         ("[universal]", "[hinged]\n[universal]", "stands outside"),
-        ("[universal]", "[urdf]\ntip = 'a'\n[universal]", "urdf: is given beside universal"),
+        (
+            "[universal]",
+            "[urdf]\ntip = 'a'\nfile = 'b'\n[universal]",
+            "urdf: is given beside a geometry",
+        ),
+        (
+            "joints = 2",
+            "joints = 2\nminimum = 3.0",
+            "minimum: is not a key that is known here; it ",
+        ),
         ("[universal]", "[universal", "is not TOML"),
     ],
 )

@@ -9,7 +9,8 @@ import pytest
 import cdsm
 from cdsm import control
 from cdsm.control import Command
-from tests.support.tracking import small_path
+from cdsm.control.plants import tensions_of
+from tests.support.tracking import paid_out, small_path
 
 pytest.importorskip("mujoco")
 
@@ -19,18 +20,18 @@ PAYLOAD = np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
 def test_both_plants_rest_at_the_same_place() -> None:
     """Far from where the model was linearised, and under a load: within a thousandth."""
     plan = small_path()
-    wire = plan.unstrained_lengths[-1] + 2e-5 * np.arange(6)
+    wire = paid_out(plan)[-1] + 2e-5 * np.arange(6)
     command = Command(wire, plan.tensions[-1], np.zeros(6, dtype=np.bool_))
-    slow, fast = cdsm.SlowPlant(plan.arm), cdsm.MuJoCoPlant(plan.arm, damping_ratio=0.7)
+    slow, fast = cdsm.QuasiStaticPlant(plan.arm), cdsm.MuJoCoPlant(plan.arm, damping_ratio=0.7)
     begin = plan.angles[0], plan.tensions[0], np.zeros(6)
-    wanted = slow.move(slow.begin(*begin), command, PAYLOAD)
-    state = fast.begin(*begin)
+    wanted = slow.step_to(slow.initial(*begin), command, PAYLOAD)
+    state = fast.initial(*begin)
     for _ in range(40):
-        state = fast.move(state, command, PAYLOAD)
+        state = fast.step_to(state, command, PAYLOAD)
     moved = wanted.pose.q - plan.angles[0]
     assert np.linalg.norm(moved) > np.deg2rad(2.0)
     assert np.linalg.norm(state.pose.q - wanted.pose.q) < 1e-3 * np.linalg.norm(moved)
-    np.testing.assert_allclose(state.true.tension, wanted.true.tension, rtol=1e-3)
+    np.testing.assert_allclose(state.true_values.tension, wanted.true_values.tension, rtol=1e-3)
     assert abs(state.velocity).max() < 1e-3
 
 
@@ -39,7 +40,7 @@ def test_stiffness_loop_holds_an_arm_with_inertia() -> None:
     plant = cdsm.MuJoCoPlant(control.with_rigidity(plan.arm, 0.9))
     sensors = cdsm.Sensors(tension_noise=0.2)
     bounds = {"minimum": 10.0, "maximum": 250.0}
-    run = cdsm.track(plan, "stiffness", plant, sensors, steps=10, payload=0.1, **bounds)  # type: ignore[arg-type]
+    run = cdsm.track(plan, "stiffness", plant, sensors, steps=10, payload=0.1, **bounds)
     assert run.outcome == "completed"
     assert run.rigidity[-1] == pytest.approx(0.9, abs=5e-3)
     assert abs(run.stiffness_error[8:]).max() < 0.03
@@ -67,21 +68,20 @@ def test_without_mujoco_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_slack_branch_pulls_below_the_range_of_its_law() -> None:
     arm = small_path().arm
     slack = cdsm.Manipulator(arm.geometry, arm.cables[0].elasticity.slack_below())
-    plant, lengths = cdsm.MuJoCoPlant(slack), slack.cable_lengths(np.zeros(slack.nv))
+    lengths = slack.cable_lengths(np.zeros(slack.nv))
     for force in (2.3, 1.5, 0.5, 0.0):
         F = np.full(6, force)
         wire = slack._laws.original_lengths(lengths, F)
-        command = Command(wire, F, np.zeros(6, dtype=np.bool_))
-        np.testing.assert_allclose(plant._tensions(lengths, command), F, atol=1e-9)
+        np.testing.assert_allclose(tensions_of(slack, lengths, wire, F), F, atol=1e-9)
 
 
 def test_a_law_that_begins_above_0_n_ends_where_its_cable_would_be_slack() -> None:
     """The strand is defined from 2.2 N; a wire longer than its cable has no tension there."""
     plan = small_path()
-    plant, wire = cdsm.MuJoCoPlant(plan.arm), plan.unstrained_lengths[0].copy()
+    plant, wire = cdsm.MuJoCoPlant(plan.arm), paid_out(plan)[0].copy()
     wire[1] = plan.arm.cable_lengths(plan.angles[0])[1] + 1e-3
-    state = plant.begin(plan.angles[0], plan.tensions[0], np.zeros(6))
+    state = plant.initial(plan.angles[0], plan.tensions[0], np.zeros(6))
     command = Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
     with pytest.raises(cdsm.ElasticityRangeError, match=r"cable.*elongation -0\.001") as refused:
-        plant.move(state, command, np.zeros(6))
+        plant.step_to(state, command, np.zeros(6))
     assert refused.value.cables == (plan.arm.cables.names[1],)

@@ -8,10 +8,9 @@ import pytest
 import cdsm
 from cdsm import presets
 from cdsm.control import with_rigidity
-from cdsm.control.estimates import Observer
-from cdsm.control.laws import Reading
-from cdsm.control.schedule import Schedule
-from cdsm.control.stiffness_loop import StiffnessLoop
+from cdsm.control.observer import Observer
+from cdsm.control.sensors import Measurement
+from cdsm.control.stiffness_loop import StiffnessLoop, reference_at
 from tests.support.tracking import small_path
 
 
@@ -39,12 +38,14 @@ def test_scaled_arm_is_the_arm_that_is_built_with_scaled_laws(factor: float) -> 
 
 def test_an_estimate_that_is_no_rigidity_keeps_the_last_tensions() -> None:
     plan = small_path()
-    schedule = Schedule.of(plan, 1)
-    wanted, F = schedule.references[0], plan.tensions[0]
-    low, high = np.full(6, 10.0), np.full(6, 250.0)
-    loop = StiffnessLoop(plan.arm, schedule.directions, low, high, np.full(6, 10.0))
-    estimate = Observer(plan.arm, cdsm.Sensors()).begin(wanted.angles, Reading(wanted.wire, F))
-    assert not loop.next(wanted, schedule.targets[0], estimate, F).refused
-    planned = loop.next(wanted, schedule.targets[0], estimate._replace(softness=-0.5), F)
-    assert planned.refused == "rigidity: estimated as -2 times that of the wires' laws."
-    np.testing.assert_array_equal(planned.mean, F)
+    F = plan.tensions[0]
+    reference = reference_at(plan.arm, plan.angles[0], F)
+    loop = StiffnessLoop(plan, np.full(6, 10.0), np.full(6, 250.0), np.full(6, 10.0))
+    measured = Measurement(reference.paid_out, F)
+    estimate = Observer(plan.arm, cdsm.Sensors()).initial(reference.angles, measured)
+    target = plan.target[:1]
+    loop.next(reference, target, estimate, reference)
+    assert not loop.failed
+    planned = loop.next(reference, target, estimate._replace(softness=-0.5), reference)
+    assert loop.failed == {1: "rigidity: estimated as -2 times that of the wires' laws."}
+    np.testing.assert_allclose(planned.reference.tension, F, rtol=1e-5)

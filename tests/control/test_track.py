@@ -21,7 +21,7 @@ def test_feedforward_on_the_arm_it_believes_in_follows_to_rounding() -> None:
     run = cdsm.track(plan, "feedforward", sensors=cdsm.Sensors(encoder=0.0), **BOUNDS)
     assert run.outcome == "completed"
     assert not run.warnings
-    assert not run.short.any()
+    assert not run.target_unreachable.any()
     at_samples = run.tip_error[::5]
     assert at_samples.max() < 1e-11
     assert run.tip_error.max() < 1e-5  # in between, wires and angles move evenly
@@ -29,10 +29,43 @@ def test_feedforward_on_the_arm_it_believes_in_follows_to_rounding() -> None:
     np.testing.assert_allclose(run.tension[::5], plan.tensions, rtol=1e-8)
 
 
+def steep_path() -> cdsm.PathPlan:
+    """Four joints that bend by 5 degrees from sample to sample, 1.7 mm of cable, 34 N at rest."""
+    geometry = cdsm.Geometry.universal(
+        joints=4, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.005,
+        hole_radius=0.02, link_mass=0.05, lead=0.1,
+    )  # fmt: skip
+    arm = cdsm.Manipulator(geometry, presets.STRAND_1X19)
+    angles = np.deg2rad([[bend, 0.0, bend] + 5 * [0.0] for bend in (0.0, 5.0, 10.0)])
+    target = [3e3, 3e3, 4e3]
+    return cdsm.plan_path(arm, "z", target, 10.0, 200.0, angles=angles)
+
+
+@pytest.mark.parametrize("law", ["feedforward", "tension", "mixed", "stiffness"])
+@pytest.mark.parametrize("steps", [1, 5, 50])
+def test_every_law_holds_the_plan_of_the_arm_it_believes_in(law: str, steps: int) -> None:
+    """However coarse the steps are, none is clamped: all tensions are far from their bounds."""
+    given: Any = {"sensors": cdsm.Sensors(encoder=0.0), "minimum": 10.0, "maximum": 200.0}
+    if law == "stiffness" and steps == 1:
+        run = cdsm.track(steep_path(), law, steps=1, **given)
+        assert abs(run.stiffness_error[-1]) > 0.01
+        assert (run.steps_needed, run.change_limited.sum()) == (2, 1)
+        assert "TOO FEW STEPS at 1 of 3 steps" in str(run)
+        assert "steps=2 would do" in str(run)
+        steps = run.steps_needed
+    run = cdsm.track(steep_path(), law, steps=steps, **given)
+    assert run.outcome == "completed"
+    assert not run.warnings
+    assert not run.saturated.any()
+    assert abs(run.stiffness_error).max() < 0.01
+    assert abs(run.stiffness_error[::steps]).max() < 1e-6
+    assert run.tip_error.max() < 1e-7
+
+
 def test_same_seed_same_bits() -> None:
     def run(seed: int) -> cdsm.TrackingRun:
-        sensors = cdsm.Sensors(tension_noise=0.5)
-        return cdsm.track(small_path(0.1), sensors=sensors, steps=2, seed=seed, **BOUNDS)
+        sensors = cdsm.Sensors(tension_noise=0.5, seed=seed)
+        return cdsm.track(small_path(0.1), sensors=sensors, steps=2, **BOUNDS)
 
     one, again, other = run(3), run(3), run(4)
     for field in dataclasses.fields(one):
@@ -45,7 +78,7 @@ def test_same_seed_same_bits() -> None:
 def test_stiffness_loop_calibrates_its_wire_and_holds_the_stiffness() -> None:
     """A wire a tenth softer than believed; feed-forward loses most of the stiffness."""
     plan = small_path()
-    plant = cdsm.SlowPlant(control.with_rigidity(plan.arm, 0.9))
+    plant = cdsm.QuasiStaticPlant(control.with_rigidity(plan.arm, 0.9))
     sensors = cdsm.Sensors(tension_noise=0.5)
     runs = {
         law: cdsm.track(plan, law, plant, sensors, steps=8, **BOUNDS)
@@ -59,22 +92,22 @@ def test_stiffness_loop_calibrates_its_wire_and_holds_the_stiffness() -> None:
 
 
 def test_payload_that_nobody_told_of_is_felt() -> None:
-    run = cdsm.track(small_path(), payload=0.2, payload_from=0.5, steps=10, **BOUNDS)
+    run = cdsm.track(small_path(), payload=0.2, steps=10, **BOUNDS)
     loaded = run.wrench[:, 2] != 0.0
     assert loaded.sum() == 11
     assert run.wrench[-1, 2] == pytest.approx(-0.2 * 9.81)
     np.testing.assert_allclose(run.estimated_force[-1, 1:], [0.0, -0.2 * 9.81], atol=0.05)
-    # along the arm, x, a force is hardly felt in the cables
-    assert abs(run.estimated_force[~loaded, 1:]).max() < 0.05
+    # along the arm, x, a force is hardly felt in the cables; counts of 10 µm are some 0.05 N
+    assert abs(run.estimated_force[~loaded, 1:]).max() < 0.1
     assert abs(run.stiffness_error[5:]).max() < 0.02
 
 
 def test_own_law_is_called_with_what_is_wanted_and_measured() -> None:
     seen = []
 
-    def patient(moment: control.Moment) -> control.Command:
-        seen.append(moment)
-        return control.limited(moment, moment.reading.wire)
+    def patient(given: control.ControlInput) -> control.Command:
+        seen.append(given)
+        return control.limited(given, given.measurement.paid_out)
 
     run = cdsm.track(small_path(), patient, steps=2, **BOUNDS)
     assert run.law == "patient"
@@ -86,16 +119,16 @@ def test_own_law_is_called_with_what_is_wanted_and_measured() -> None:
 @pytest.mark.parametrize(
     ("law", "said"),
     [
-        (lambda moment: moment.command, "law: returned array.* return limited"),
-        (lambda moment: None, "law: returned None"),
-        (lambda moment: control.limited(moment, moment.command * math.nan), "wire of the law"),
-        (lambda moment: control.limited(moment, moment.command[:2]), "wire of the law"),
+        (lambda given: given.paid_out, "law: returned array.* return limited"),
+        (lambda given: None, "law: returned None"),
+        (lambda given: control.limited(given, given.paid_out * math.nan), "wire of the law"),
+        (lambda given: control.limited(given, given.paid_out[:2]), "wire of the law"),
         (
-            lambda moment: control.Command(0.0 * moment.command, moment.maximum, moment.forced),
+            lambda at: control.Command(0.0 * at.paid_out, at.maximum, at.tension_controlled),
             "0 m of wire for cable1_1; .* a positive length",
         ),
         (
-            lambda moment: control.Command(moment.command, moment.maximum + 1.0, moment.forced),
+            lambda at: control.Command(at.paid_out, at.maximum + 1.0, at.tension_controlled),
             "law: commanded 251 N .* from 10 to 250 N .* Return limited",
         ),
     ],
@@ -115,13 +148,13 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
     run = cdsm.track(
         plan,
         "tension",
-        cdsm.SlowPlant(cdsm.Manipulator(plan.arm.geometry, wire)),
+        cdsm.QuasiStaticPlant(cdsm.Manipulator(plan.arm.geometry, wire)),
         cdsm.Sensors(delay=4),
         steps=12,
         payload=0.3,
         **BOUNDS,
     )
-    assert run.outcome == "lost"
+    assert run.outcome == "diverged"
     assert run.tip_error[-1] > 0.1 * plan.arm.length > run.tip_error[-2]
     assert run.time[-1] == pytest.approx(0.05 * (len(run.time) - 1))
     assert run.warnings[0].startswith(f"UNSTABLE at {run.time[-1]:.4g} s: the tip is ")
@@ -131,7 +164,7 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
 
 def test_payload_that_is_too_heavy_is_named() -> None:
     run = cdsm.track(small_path(), payload=40.0, steps=4, **BOUNDS)
-    assert run.outcome in ("lost", "no rest", "wire")
+    assert run.outcome in ("diverged", "no_equilibrium", "elasticity_range")
     assert run.warnings
     assert run.reason
     assert len(run.time) >= 4  # what came before is kept
@@ -144,7 +177,7 @@ def tabulated_path(friction: float) -> cdsm.PathPlan:
     angles = small_path().angles
     K = cdsm.stiffness(arm.at(angles[0]), cdsm.distribute_tension(arm.at(angles[0]), 10.0))
     target = 1.05 * K.along("z")
-    return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles, progress=False)
+    return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles)
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
@@ -161,37 +194,30 @@ def test_tensions_beyond_the_law_of_the_plant_end_the_loop() -> None:
     plan = tabulated_path(0.1)
     weak = cdsm.TabulatedElasticity((0.0, 50.0), (0.0, 0.0015))
     assert plan.tensions.max() < 50.0
-    plant = cdsm.SlowPlant(cdsm.Manipulator(plan.arm.geometry, weak).with_friction(0.1))
+    plant = cdsm.QuasiStaticPlant(cdsm.Manipulator(plan.arm.geometry, weak).with_friction(0.1))
     run = cdsm.track(plan, "feedforward", plant, **BOUNDS)
     assert run.outcome == "completed"
     run = cdsm.track(plan, "feedforward", plant, payload=2.0, **BOUNDS)
-    assert run.outcome == "wire"
+    assert run.outcome == "elasticity_range"
     assert "after the step" in run.reason
     assert run.tension.max() <= 50.0
 
 
 def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() -> None:
     plan = small_path()
-    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, rate=20.0)
+    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, max_change_per_step=20.0)
     assert (run.commanded_tension <= 60.0).all()
     assert run.saturated.any()
     assert abs(run.stiffness_error).max() > 0.05
-    assert run.short[-1]  # plan_stiffness finds none either
+    assert run.target_unreachable[-1]  # plan_stiffness finds none either
     with pytest.raises(cdsm.UnreachableStiffness):
         cdsm.plan_stiffness(
             plan.arm.at(plan.angles[-1]), plan.direction, plan.target[-1], 10.0, 60.0
         )
-    assert run.warnings[0].startswith(f"OUT OF REACH at {run.short.sum()} of {len(run.time)} steps")
-    assert set(run.saturated_motors) <= set(plan.arm.cables.names)
-
-
-def test_a_step_that_was_not_planned_may_be_the_one_that_failed() -> None:
-    run = cdsm.track(small_path(), "feedforward", steps=2, **BOUNDS)
-    count = len(run.time)
-    cut = dataclasses.replace(run, refused={count: "no tensions"})
-    assert cut.warnings == (
-        f"NOT PLANNED at 1 of {count} steps, from {count * run.period:.4g} s: no tensions",
+    assert run.warnings[0].startswith(
+        f"OUT OF REACH at {run.target_unreachable.sum()} of {len(run.time)} steps"
     )
+    assert set(run.saturated_motors) <= set(plan.arm.cables.names)
 
 
 @pytest.mark.parametrize(
@@ -199,14 +225,11 @@ def test_a_step_that_was_not_planned_may_be_the_one_that_failed() -> None:
     [
         ({"law": "pid"}, "law"),
         ({"payload": -1.0}, "payload"),
-        ({"payload_from": 2.0}, "payload_from"),
         ({"steps": 0}, "steps"),
         ({"period": 0.0}, "period"),
-        ({"rate": -1.0}, "rate"),
-        ({"tension_controlled": ["cable9"]}, "cable9"),
-        ({"seed": -1}, "seed"),
+        ({"max_change_per_step": 0.0}, "max_change_per_step"),
         ({"payload": float("nan")}, "payload"),
-        ({"plant": small_path().arm}, r"plant: .* such as SlowPlant"),
+        ({"plant": small_path().arm}, r"plant: .* such as QuasiStaticPlant"),
     ],
 )
 def test_wrong_arguments_are_refused(wrong: dict[str, object], said: str) -> None:
@@ -216,17 +239,15 @@ def test_wrong_arguments_are_refused(wrong: dict[str, object], said: str) -> Non
 
 def test_plan_with_gaps_is_refused() -> None:
     plan = small_path()
-    broken = cdsm.plan_path(
-        plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2], progress=False
-    )
+    broken = cdsm.plan_path(plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2])
     with pytest.raises(cdsm.InvalidInput, match=r"1 of 2 samples are not planned.*sample 1"):
         cdsm.track(broken)
 
 
 def test_payload_that_no_tensions_within_the_bounds_balance_is_named() -> None:
     plan = small_path()
-    run = cdsm.track(plan, payload=3.0, steps=6, minimum=10.0, maximum=150.0)
-    assert run.refused
+    run = cdsm.track(plan, payload=4.0, steps=6, minimum=10.0, maximum=150.0)
+    assert run.replan_failed
     assert any(text.startswith("NOT PLANNED at ") for text in run.warnings)
     assert (run.commanded_tension <= 150.0).all()
 
@@ -243,13 +264,13 @@ def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
     assert data["time"].attrs["units"] == "s"
     path = run.write(tmp_path / "run.nc")
     with xr.open_dataset(path) as again:
-        np.testing.assert_array_equal(again["tip"], run.tips)
+        np.testing.assert_array_equal(again["tips"], run.tips)
         assert again.attrs["outcome"] == "completed"
     with pytest.raises(cdsm.InvalidInput, match=r"\.nc"):
         run.write(tmp_path / "run.txt")
-    assert run.to_dict()["share_inside_first_order_band"] == 1.0
+    assert run.inside.all()
     assert "100 % of 5 steps" in str(run)
-    assert data["first_order_band"].attrs["units"] == "m"
+    assert data["band"].attrs["units"] == "m"
 
 
 def test_table_over_time_is_a_path_that_can_be_played(tmp_path: Path) -> None:
@@ -283,7 +304,7 @@ def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() 
     Feed-forward alone has a fifth of the wanted stiffness, tension control up to 13 % less.
     """
     plan = circle(0.1)
-    plant = cdsm.SlowPlant(control.with_rigidity(plan.arm, 0.9))
+    plant = cdsm.QuasiStaticPlant(control.with_rigidity(plan.arm, 0.9))
     sensors = cdsm.Sensors(encoder=1e-5, tension_noise=0.5)
     worst = {}
     for law in ("feedforward", "tension", "stiffness"):

@@ -11,8 +11,7 @@ from lxml import etree
 from scipy.linalg import eigh
 
 import cdsm
-from cdsm.interchange.mjcf_bodies import add_bodies
-from cdsm.statics.natural_modes import mass_matrix
+from cdsm.interchange.mjcf_bodies import add_bodies, mass_matrix
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture, random_wrench, readme_geometry
 from tests.support.foreign import POSTURE, TENSION, crab
@@ -203,6 +202,19 @@ HELD: dict[str, tuple[cdsm.Manipulator, Array, float]] = {
     "massless links": (universal(2, 0.0), np.deg2rad([5.0, -3, 5, -3]), 20.0),
 }
 SECONDS = 2.0
+
+
+def test_simulation_under_a_weight_settles_where_the_weight_test_says() -> None:
+    """Stiff linear cables that stay taut: MuJoCo's springs and ours are the same far away, too."""
+    arm = hinged(3, twist=0.5, link_length=0.05, disk_offset=0.01, hole_radius=0.02, link_mass=0.3)
+    pose, force = arm.at([0.1, -0.1, 0.2]), np.array([0.0, 1.0, -2.0])
+    pull = cdsm.distribute_tension(pose, 20.0)
+    test = cdsm.weight_test(pose, pull, force)
+    model, data = loaded(arm, pose, pull, damping=0.05)
+    data.xfrc_applied[model.body("tool0").id, :3] = force
+    mujoco.mj_step(model, data, round(8.0 / model.opt.timestep))
+    assert abs(data.qvel).max() < 1e-9
+    np.testing.assert_allclose(data.body("tool0").xpos, test.states[-1].pose.tip[:3, 3], atol=1e-8)
 
 
 def mass(model: Any, data: Any) -> Array:

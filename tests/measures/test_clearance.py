@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 import cdsm
-from cdsm.measures.clearance import clearances
+from cdsm.measures.clearance import KINDS
+from cdsm.measures.rows import measured
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture
 
@@ -118,21 +119,35 @@ def test_trimesh_measures_the_same_way_to_a_disk() -> None:
 
 def test_batch_is_the_single_posture_and_diameters_count() -> None:
     arm = mixed_arm()
-    rng = np.random.default_rng(0)
-    q = rng.uniform(-0.3, 0.3, (20, arm.nv))
-    rows = clearances(arm, q, 1e-3)
+    q = np.random.default_rng(0).uniform(-0.3, 0.3, (5, arm.nv))
+    rows = measured(arm, q, KINDS, 1e-3)
     for n in range(len(q)):
         one, thin = cdsm.clearance(arm.at(q[n]), 1e-3), cdsm.clearance(arm.at(q[n]))
         assert (one.cables, one.links, one.disks) == tuple(each[n] for each in rows.values())
         assert thin.cables - one.cables == pytest.approx(1e-3)
         assert thin.links - one.links == pytest.approx(0.5e-3)
+        assert thin.disks - one.disks == pytest.approx(0.5e-3)
+
+
+def test_a_thick_disk_is_nearer() -> None:
+    """In a straight arm a cable ends at a disk 20 mm before the next one, beside its axis."""
+    geometry = cdsm.Geometry.universal(
+        joints=2, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.01,
+        hole_radius=0.02, link_mass=0.05,
+    )  # fmt: skip
+    pose = cdsm.Manipulator(geometry, cdsm.presets.ELASTIC_STAGE).at(np.zeros(4))
+    # the rim is 2 mm from the holes; thick disks come nearer along the axis
+    assert cdsm.clearance(pose).disks == pytest.approx(2e-3, abs=1e-9)
+    assert cdsm.clearance(pose, 0.0, 0.038).disks == pytest.approx(0.02 - 0.019, abs=1e-8)
+    with pytest.raises(cdsm.InvalidInput, match="thickness"):
+        cdsm.clearance(pose, 0.0, -1e-3)
 
 
 def test_a_cable_through_a_plate_has_a_negative_clearance() -> None:
     arm = cdsm.presets.virtual_prototype()
     # both angles of a joint near their limit: the disks beside it overlap
-    q = np.random.default_rng(0).uniform(-0.6, 0.6, (300, 10))
-    worst = int(clearances(arm, q)["disk_clearance"].argmin())
+    q = np.random.default_rng(0).uniform(-0.6, 0.6, (30, 10))
+    worst = int(measured(arm, q, KINDS)["disk_clearance"].argmin())
     pose = arm.at(q[worst])
     found = cdsm.clearance(pose)
     assert found.disks < -1e-3

@@ -7,6 +7,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import cdsm
+from cdsm.measures.polytope import balanced
+from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture
 
@@ -50,7 +52,7 @@ def test_vertices_are_those_of_an_exhaustive_search(seed: int) -> None:
     assert gaps.max() < 1e-7 * size
     zero = -expected.equations[:, 3].max() if (expected.equations[:, 3] > 0).any() else None
     distance = (-expected.equations[:, 3]).min() if zero is None else zero
-    assert found.margin() == pytest.approx(distance, rel=1e-6)
+    assert found.radius == pytest.approx(distance, rel=1e-6)
 
 
 @pytest.mark.parametrize("arm", [mixed_arm(), cdsm.presets.virtual_prototype()])
@@ -119,7 +121,7 @@ def test_pycapacity_finds_the_same_polytope() -> None:
     # pycapacity 2.1.9, human.force_polytope(J_v, J_Lᵀ, 15, 800, 1e-9, −g)
     assert len(found.vertices) == 48
     assert found.volume == pytest.approx(VOLUME, rel=1e-9)
-    assert found.margin() == pytest.approx(MARGIN, rel=1e-9)
+    assert found.radius == pytest.approx(MARGIN, rel=1e-9)
     human = pytest.importorskip("pycapacity.human")
     theirs = human.force_polytope(
         pose.jacobian[:3],
@@ -144,7 +146,7 @@ def test_where_the_tip_cannot_move_the_links_hold_any_force() -> None:
     assert np.isinf(polytope.volume)
     assert cdsm.payload(pose, "x", 15.0, 800.0).limits["tension"] == np.inf
     side = cdsm.payload(pose, polytope.worst_direction, 15.0, 800.0)
-    assert side.force == pytest.approx(polytope.margin(), rel=1e-7)
+    assert side.force == pytest.approx(polytope.radius, rel=1e-7)
 
 
 def test_a_pair_holds_a_segment_of_forces() -> None:
@@ -156,7 +158,7 @@ def test_a_pair_holds_a_segment_of_forces() -> None:
     pose = cdsm.Manipulator(geometry, law, gravity=(0.0, 0.0, 0.0)).at([0.0])
     polytope = cdsm.force_polytope(pose, 10.0, 110.0)
     # one cable 110 N, the other 10 N, on 20 mm; the tip is 100 mm away
-    assert polytope.margin() == pytest.approx(100.0 * 0.02 / 0.1, rel=1e-9)
+    assert polytope.radius == pytest.approx(100.0 * 0.02 / 0.1, rel=1e-9)
     assert sorted(polytope.vertices[:, 2]) == pytest.approx([-20.0, 20.0])
     assert len(polytope.unbounded) == 2
 
@@ -170,4 +172,37 @@ def test_errors_name_what_is_missing() -> None:
     with pytest.raises(cdsm.InvalidInput, match="deflection"):
         cdsm.payload(pose, "z", 15.0, 100.0, deflection=-1.0)
     with pytest.raises(cdsm.InvalidInput, match="force"):
-        cdsm.force_polytope(pose, 15.0, 800.0).margin([1.0, 2.0])
+        cdsm.force_polytope(pose, 15.0, 800.0).radius_at([1.0, 2.0])
+
+
+@pytest.mark.parametrize("reach", [0.5, 1e-2, 1e-4, 0.0])
+def test_programs_end_where_highs_does(reach: float) -> None:
+    """Also near the straight arm, where the tip hardly moves along x and forces there are huge."""
+    for seed in range(4):
+        arm = random_arm(seed, 3)
+        pose = random_posture(arm, seed, reach)
+        low, high = np.full(len(arm.cables), 5.0), np.full(len(arm.cables), 5e3)
+        A = np.column_stack([pose.length_jacobian.T, -pose.jacobian[:3].T])
+        lever = np.where((A == 0.0).all(axis=0), 1.0, abs(A).max(axis=0))  # HiGHS wants order one
+        ends = (
+            np.append(low, np.full(3, -np.inf)) * lever,
+            np.append(high, np.full(3, np.inf)) * lever,
+        )
+        for u in (*np.eye(3), np.ones(3)):
+            cost, bounds = np.append(np.zeros(low.size), -u) / lever, np.transpose(ends)
+            expected = least(cost, A_eq=A / lever, b_eq=-pose.gravity_torque, bounds=bounds)
+            found = balanced(pose, np.eye(3), np.zeros(6), low, high)(u)
+            status = INFEASIBLE if found is None else UNBOUNDED if np.isinf(found[0]) else OPTIMAL
+            assert status == expected.status
+            if found is not None and status == OPTIMAL:
+                assert found[0] == pytest.approx(-expected.fun, rel=1e-6)
+
+
+def test_a_flat_polytope_holds_nothing_across_it() -> None:
+    pose = random_posture(random_arm(0, 2), 0, 0.3)
+    low = cdsm.distribute_tension(pose, 20.0).values
+    # four joints, two tensions that change: the forces are on a plane
+    polytope = cdsm.force_polytope(pose, low, low + np.repeat([0.0, 20.0], [low.size - 2, 2]))
+    size = np.ptp(polytope.vertices, axis=0).max()
+    assert abs(polytope.radius) < 1e-6 * size
+    assert not len(polytope.faces)

@@ -185,7 +185,8 @@ class Own(cdsm.Elasticity):
     off: tuple[float, float]
 
     def __init__(self, rigidity: float = 1.0, energy: float = 1.0) -> None:
-        super().__init__(0.0, 500.0, 0.0, "", {"off": (rigidity, energy)}, 1.0, OWN._table)
+        table = OWN._knots, OWN._coefficients, OWN._cells
+        super().__init__(0.0, 500.0, 0.0, "", {"off": (rigidity, energy)}, 1.0, *table)
         object.__setattr__(self, "off", (rigidity, energy))
 
     def _evaluate(self, F: Array) -> tuple[Array, Array]:

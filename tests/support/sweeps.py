@@ -7,7 +7,7 @@ import numpy as np
 import cdsm
 from cdsm.sweeps.quantities import QUANTITIES
 
-EVERYTHING = tuple(name for name in QUANTITIES if name != "capacity_margin")
+EVERYTHING = tuple(name for name in QUANTITIES if name != "force_radius")
 """All quantities that need no upper bound of the tensions."""
 
 STEEL = cdsm.LinearElasticity(48e3)

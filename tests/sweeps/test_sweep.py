@@ -9,7 +9,7 @@ import xarray as xr
 
 import cdsm
 from cdsm.measures.payload import largest_force
-from cdsm.measures.program import Loads
+from cdsm.measures.polytope import balanced
 from cdsm.support.values import Array
 from cdsm.sweeps.quantities import QUANTITIES
 from cdsm.tension import checked_bounds
@@ -57,7 +57,7 @@ def single(
         return {Status.INFEASIBLE}, found
     found["tension"] = pull.values
     low, high = checked_bounds(arm, minimum, maximum)
-    ways = [Loads.of(pose, low, high, wrench, u[:, None]) for u in np.eye(3)]
+    ways = [balanced(pose, u[:, None], wrench, low, high) for u in np.eye(3)]
     found["payload"] = np.array([largest_force(each) for each in ways])
     try:
         K = cdsm.stiffness(pose, pull)
@@ -142,7 +142,7 @@ def test_every_output_can_be_asked_for_alone(everything: xr.Dataset) -> None:
 def test_worst_friction_narrows_the_bounds_as_at_one_posture(worst: bool) -> None:
     arm, poses = short_arm().with_friction(0.1), cdsm.RandomPoses(8, 1)
     given: dict[str, Any] = {"maximum": 150.0, "diameter": 1.2e-3}
-    outputs = ("tension", "capacity_margin", "cable_clearance")
+    outputs = ("tension", "force_radius", "cable_clearance")
     found = cdsm.sweep(
         arm, poses, minimum=[5.0, 149.9], outputs=outputs, worst_friction=worst, **given
     )
@@ -162,7 +162,7 @@ def test_worst_friction_narrows_the_bounds_as_at_one_posture(worst: bool) -> Non
         assert entry.status == 0
         np.testing.assert_allclose(entry.tension, pull.values, rtol=1e-9)
         polytope = cdsm.force_polytope(pose, *bounds, worst_friction=worst)
-        np.testing.assert_allclose(entry.capacity_margin, polytope.margin(), rtol=1e-7)
+        np.testing.assert_allclose(entry.force_radius, polytope.radius, rtol=1e-7)
 
 
 # --- labels ----------------------------------------------------------------------------------

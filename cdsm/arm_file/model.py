@@ -1,0 +1,242 @@
+"""ARM.toml and files of cables as one pydantic model, which builds the cables.
+
+A check of several keys is a validator of the last of them: so all faults of a file come at once.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Annotated, Any, Final, cast
+
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WrapValidator
+from pydantic import ValidationInfo as Info
+
+from cdsm.cable import Cable, Cables, Control, Site
+from cdsm.cable_laws import OriginalLength
+from cdsm.errors import LINES, CdsmError, FileError, GeometryError, MissingWire, listed
+from cdsm.geometry import Geometry, toml
+from cdsm.geometry.cables import serpentine_cables
+from cdsm.manipulator import GRAVITY
+from cdsm.support import records
+from cdsm.support.files import read_text
+from cdsm.support.records import EACH, ONE, CrossFaults, record
+from cdsm.support.validation import RANGES, one_of
+from cdsm.tolerances import Tolerances
+from cdsm.tolerances import from_table as read_tolerances
+from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table
+from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.laws import LinearElasticity
+
+SETTINGS: Final = "series_stiffness", "control", "minimum", "maximum"
+"""Keys that are attributes of a :class:`Cable` with the same name."""
+
+_ROBOT: Final = ONE  # key of the geometry, of which files have only the parts; no fault prints it
+_FORMS: Final = "universal", "hinged", "sections", "geometry", "joints", "links"
+_NO_WIRE: Final = LinearElasticity(1e5)  # of cables whose wire is missing
+
+
+def _ordered(high: float | None, info: Info) -> float | None:
+    low = info.data.get("minimum")
+    if low is not None and high is not None and low > high:
+        raise ValueError(f"{high:g} N given, below the minimum of {low:g} N")
+    return high
+
+
+def _one_source(text: str | None, info: Info) -> str | None:
+    if "file" in info.data and (info.data["file"] is None) == (text is None):
+        raise ValueError("give file (a path, from the folder of this one) or text")
+    return text
+
+
+def _alone(urdf: object, info: Info) -> object:
+    if urdf is not None and info.data.get("geometry") is not None:
+        raise ValueError("is given beside a geometry; an arm has one of them")
+    return urdf
+
+
+def _described(tables: dict[str, Any]) -> Geometry:
+    """Build the geometry; a key of the whole file that stands in one of its tables is told so."""
+    try:
+        return toml.build(Geometry, tables)
+    except GeometryError as error:
+        keys = "|".join(ArmFile.__dataclass_fields__)
+        known = re.compile(rf"((^|\.)({keys}): is not a key that is known here).*")
+        raise CrossFaults(
+            known.sub(r"\1; it belongs at the top of the file", fault) for fault in error.faults
+        ) from None
+
+
+def _one_of(kind: str, name: str, known: Iterable[str], remedy: str = "") -> str:
+    try:
+        return one_of(kind, name, known, remedy)
+    except CdsmError as error:  # it is no ValueError, as pydantic needs it
+        raise ValueError(str(error)) from None
+
+
+def _name_of_one(cable: str, info: Info) -> str:
+    geometry = info.data.get("geometry")
+    return _one_of("cable", cable, geometry.cable_names) if geometry else cable
+
+
+def _new_names(wires: dict[str, Elasticity]) -> dict[str, Elasticity]:
+    if known := wires.keys() & WIRES:
+        raise CrossFaults(f"{name}: cdsm knows a wire of this name; another" for name in known)
+    return wires
+
+
+def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
+    """Return the law of a key ``wire``; ``known`` has the valid keys before. Or a ValueError."""
+    if isinstance(wire, dict):
+        return from_table(wire)
+    if not isinstance(wire, str):
+        return as_wire(wire)
+    # with faulty tables of wires, any name is right
+    laws: dict[str, Elasticity] = WIRES | known.get("wires", {wire: _NO_WIRE})
+    return laws[_one_of("wire", wire, laws, "Or give EA in N, or a table [wires.NAME].")]
+
+
+_G = Annotated[records.Number, Field(ge=-RANGES["gravity"].high, le=RANGES["gravity"].high)]
+_Label = Annotated[str, Field(min_length=1, max_length=200)]
+_Law = Annotated[Any, PlainValidator(from_table)]
+
+
+@record
+class _Settings:
+    wire: Any = None
+    series_stiffness: records.SpringStiffness | None = None
+    control: Control | None = None
+    minimum: records.Tension | None = None
+    maximum: Annotated[records.Tension | None, AfterValidator(_ordered)] = None
+
+
+@record
+class _Site:
+    link: _Label
+    xyz: records.Point
+    friction: records.Friction | None = None
+    wrap: records.Wrap = 0.0
+
+
+@record
+class _Routed(_Settings):
+    name: _Label
+    lead: records.LengthOrZero = 0.0
+    friction: records.Friction = 0.0
+    sites: Annotated[tuple[_Site, ...], Field(strict=False, min_length=2)]
+
+    def built(self) -> Cable:
+        """Return the cable; a hole without ``friction`` has that of the cable."""
+        first, last = 0 if self.lead else 1, len(self.sites) - 1
+        usual = [self.friction * (first <= i < last) for i in range(len(self.sites))]
+        sites = [
+            Site(each.link, each.xyz, mu if each.friction is None else each.friction, each.wrap)
+            for each, mu in zip(self.sites, usual, strict=True)
+        ]
+        return Cable(self.name, tuple(sites), _NO_WIRE, self.lead)
+
+
+@record
+class _Urdf:
+    tip: str
+    joint_names: Annotated[tuple[str, ...], Field(strict=False)] | None = None
+    check_inertia: bool = True
+    file: str | None = None
+    text: Annotated[str | None, AfterValidator(_one_source), Field(validate_default=True)] = None
+
+
+_Tables = Annotated[
+    Annotated[dict[Annotated[str, AfterValidator(_name_of_one)], _Settings], Tag(ONE)]
+    | Annotated[tuple[_Routed, ...], Field(strict=False), Tag(EACH)],
+    Discriminator(records.one_or_each),
+]
+
+
+def _built(given: Any, check: Callable[[Any], Any], info: Info) -> Cables:
+    """Build all cables; tables of single cables change those of the geometry."""
+    known = info.data
+    if known.get("geometry", ...) is None and not isinstance(given, list):
+        raise ValueError("give tables [[cables]], one for each cable")
+    tables, faults = check(given or {}), list[str]()
+    routes: dict[str, Any]
+    if isinstance(tables, tuple):
+        routes = {f"[{i}]": each for i, each in enumerate(tables, start=1)}
+        names = [each.name for each in tables]
+        twice = [i for i, name in enumerate(names) if name in names[:i]]
+        faults = [f"[{i + 1}].name: {names[i]!r} is used twice" for i in twice]
+    elif geometry := known.get("geometry"):
+        routes = {each.name: each for each in serpentine_cables(geometry, _NO_WIRE)}
+    else:
+        return Cables()  # its faults are told
+    shared = _given(known)
+    cables = []
+    for where, route in routes.items():
+        own = route if isinstance(route, _Routed) else tables.get(where, _Settings())
+        place = f"{where}.wire"
+        try:
+            law = known.get("wire") if own.wire is None else _law_of(own.wire, known)
+            place, cable = where, route.built() if own is route else route
+            cables.append(replace(cable, elasticity=law or _NO_WIRE, **shared | _given(vars(own))))
+        except ValueError as error:
+            faults += records.faults_at(place, error)
+    if faults:
+        raise CrossFaults(faults)
+    return Cables(cables)
+
+
+def _given(known: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: known[key] for key in SETTINGS if known.get(key) is not None}
+
+
+@record
+class _Wires:
+    wires: Annotated[dict[str, _Law], AfterValidator(_new_names)] = Field(
+        default_factory=dict, kw_only=True
+    )
+
+
+@record
+class ArmFile(_Settings, _Wires):
+    """The keys of an ARM.toml, or of a file of cables; bases give ``wires`` and ``wire`` first."""
+
+    wire: Annotated[Any, AfterValidator(lambda wire, info: _law_of(wire, info.data))] = None
+    gravity: Annotated[tuple[_G, _G, _G], Field(strict=False)] = GRAVITY
+    original_length: OriginalLength = "unstrained"
+    tolerances: Annotated[Tolerances, PlainValidator(read_tolerances)] = Tolerances()
+    geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None
+    urdf: Annotated[_Urdf | None, AfterValidator(_alone)] = None
+    cables: Annotated[_Tables, WrapValidator(_built), Field(validate_default=True)] = None  # type: ignore[assignment]
+
+
+def read_model(
+    path: str | os.PathLike[str], wire: Wire | None, *, robot: bool
+) -> tuple[ArmFile, Cables]:
+    """Read a file of cables, or of an arm (``robot``); all cables get the ``wire`` if it is given.
+
+    Raises FileError, which lists every fault, or MissingWire.
+    """
+    text, forced = read_text(path), None if wire is None else as_wire(wire)
+    if robot and text.lstrip().startswith("<"):
+        why = (
+            "is XML, no ARM.toml. Give a URDF to Manipulator.from_urdf, with a tip and cables, or "
+        )
+        raise FileError(path, f"{why}name it in the table [urdf] of an ARM.toml.")
+    try:
+        data = records.read_toml(text)
+        described, rest = toml.split_geometry(data)
+        if robot and ("urdf" not in rest or any(key in described for key in _FORMS)):
+            data = {_ROBOT: described, **rest}
+        file, faults = records.parse(ArmFile, data), ""
+    except GeometryError as error:
+        faults = listed(error.faults, 20, LINES)
+    if faults:  # not inside except: its context could not be pickled
+        raise FileError(path, f"cannot be read as {'an arm' if robot else 'cables'}:{faults}")
+    cables = cast(Cables, file.cables)  # see _built
+    if forced is not None:
+        return file, Cables(replace(cable, elasticity=forced) for cable in cables)
+    without = [cable.name for cable in cables if cable.elasticity is _NO_WIRE]
+    if without:
+        raise MissingWire(path, without if len(without) < len(cables) else ())
+    return file, cables

@@ -1,0 +1,173 @@
+"""Estimate joint angles from wire and tension at the motors, with stretch and friction.
+
+A cable with the paid-out wire l_0 and the tension F at its motor has the length
+
+    L(q) = l_0 (1 + ε̄/s) + (F − F_0)/k_series,   ε̄ = Σ_j l_j ε(ρ_j F)/Σ_j l_j,
+
+with the length l_j and the tension ρ_j F of segment j, the strain ε of the law, the stiffness
+k_series of the series spring, and the tension F_0 at which this spring has no elongation. The
+rigidity factor s is the actual rigidity of all wires divided by the rigidity of their laws. There
+are more cables than joints, so the cable lengths give the angles and s: the rigidity is calibrated
+while the arm moves. All steps together give s (recursive least squares); the last step gives the
+angles.
+
+ρ_j is the tension of segment j divided by the tension at the motor; friction makes it differ from
+1. The estimate contains the rest length of each segment. At each step wire slides through the holes
+according to the friction law.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cdsm.control.sensors import Measurement, Sensors
+from cdsm.friction.capstan import ChainProblem
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.support.values import Array
+from cdsm.tension import grip
+
+_UNSURE: Final = 0.3  # standard deviation of 1/s before the first measurement
+_FINEST: Final = 1e-9  # smallest assumed error of a length [m], also with exact sensors
+_LEAST_SPREAD: Final = 1e-3  # smallest assumed error of a tension [N], also with exact load cells
+_STEPS, _CONVERGED = 8, 1e-8  # most Gauss–Newton steps, and the step [rad] that ends them
+
+
+class Estimate(NamedTuple):
+    """State of the arm as the controller estimates it."""
+
+    pose: Posture  # of the controller's arm, within its joint limits
+    ratio: Array  # mean tension along each cable divided by that at the motor (C,) [-]
+    force: Array  # force at the tip (3,) [N], base axes
+    softness: float  # 1/s: strain divided by that of the law [-]
+    variance: float  # variance of ``softness`` [-]
+    rest_length: Array  # of the wire in each segment (S,) [m]; it depends on all past sliding
+    shares: Array  # ρ: tension of each segment divided by that at the motor (S,) [-]
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """Estimator of joint angles, rigidity factor s and tip force from measurements.
+
+    ``arm`` is the controller's model. ``sensors`` say how large the errors of measurements are.
+    """
+
+    arm: Manipulator
+    sensors: Sensors
+
+    def initial(self, q: Array, measured: Measurement) -> Estimate:
+        """Return the first estimate, at known joint angles (nv,), with even tensions of cables."""
+        pose = self.arm.at(q)
+        cable = pose.segments.chains.cable
+        T = np.clip(measured.tension, *self._domains)[cable]
+        rest_length = self._problem.rest_lengths(pose.segments.lengths, T)
+        one, shares = np.ones(len(self.arm.cables)), np.ones(cable.size)
+        force = self._tip_force(pose, T)
+        return Estimate(pose, one, force, 1.0, _UNSURE**2, rest_length, shares)
+
+    def update(self, before: Estimate, measured: Measurement) -> Estimate:
+        """Return the estimate after one more measurement; ``before`` is the previous estimate."""
+        locked, laws = self.arm.cables.position_controlled, self.arm._laws
+        F, wire = np.clip(measured.tension, *self._domains), measured.paid_out
+        pose, q, x = before.pose, before.pose.q, before.softness
+        strain, soft = self._mean_strain(pose, before.shares, F), np.array(laws.series)
+        for law, of in self._problem.laws:
+            soft[of] += x * wire[of] / law.rigidity(F[of])
+        spring = laws.series * (F - laws.rest)
+        # an error of the tension stretches the cable; the encoder rounds by half a count at most
+        counting = max(self.sensors.encoder / math.sqrt(12.0), _FINEST)
+        spread = np.hypot(self._tension_spread * soft, counting)[locked]
+        sure = math.sqrt(before.variance)
+        prior = np.append(np.zeros(q.size), 1.0) / sure
+        for _ in range(_STEPS):
+            pose = self.arm.at(q, check_limits=False)
+            missing = (wire * (1.0 + x * strain) + spring - pose.cable_lengths)[locked] / spread
+            rows = np.c_[pose.length_jacobian[locked], -(wire * strain)[locked]] / spread[:, None]
+            scaled = np.vstack([rows, prior])
+            right = np.append(missing, (before.softness - x) / sure)
+            step = np.linalg.lstsq(scaled, right, rcond=None)[0]
+            q, x = q + step[:-1], x + float(step[-1])
+            if abs(step).max() < _CONVERGED:
+                break
+        covariance = np.linalg.pinv(scaled)
+        pose = self.arm.at(np.clip(q, self.arm.lower, self.arm.upper))
+        return self._after_sliding(before, pose, F)._replace(
+            softness=x, variance=float(covariance[-1] @ covariance[-1])
+        )
+
+    def _after_sliding(self, before: Estimate, pose: Posture, F: Array) -> Estimate:
+        """Return the estimate at a new posture, after wire has slid through the holes.
+
+        ``F`` (C,) [N] are the tensions at the motors.
+        """
+        segments = pose.segments
+        chains = segments.chains
+        motor = F[chains.cable]
+        near = before.shares * motor
+        chain = self._problem.settle(segments.lengths, before.rest_length, segments.ratio, F, near)
+        # in a slack cable all tensions are 0: their ratio is taken as even
+        shares = np.divide(chain.tension, motor, out=np.ones_like(motor), where=motor > 0.0)
+        ratio = np.add.reduceat(shares * segments.lengths, chains.start[:-1]) / pose.cable_lengths
+        force = self._tip_force(pose, chain.tension)
+        return before._replace(
+            pose=pose, ratio=ratio, force=force, rest_length=chain.rest_length, shares=shares
+        )
+
+    def _tip_force(self, pose: Posture, tension: Array) -> Array:
+        """Compute the force f (3,) [N] at the tip that best balances the tensions T (S,) [N].
+
+        T are the tensions of all segments. f solves J_vᵀ f = Σ_j T_j g_j + g by weighted least
+        squares, with the translational rows J_v of the tip Jacobian, the gravity torque g and the
+        gradient g_j of the length of segment j. What is out of balance counts as an error of the
+        tensions at the motors, relative to the errors of load cells and friction.
+        """
+        segments = pose.segments
+        F = tension[segments.chains.start[:-1]]
+        spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), grip(pose) * F)
+        weights = np.linalg.pinv(pose.length_jacobian.T * spread)
+        torque = tension @ segments.length_jacobian + pose.gravity_torque
+        found = np.linalg.lstsq(weights @ pose.jacobian[:3].T, weights @ torque, rcond=None)
+        return np.asarray(found[0])
+
+    def _mean_strain(self, pose: Posture, shares: Array, F: Array) -> Array:
+        """Compute the mean strain ε̄ (C,) [-] of each cable by its law.
+
+        ``F`` (C,) [N] are the tensions at the motors, ``shares`` ρ (S,).
+        """
+        segments = pose.segments
+        chains = segments.chains
+        T, strain = shares * F[chains.cable], np.zeros(segments.lengths.size)
+        for law, of in self._problem.laws:
+            mine = np.isin(chains.cable, of)
+            strain[mine] = law.strain(np.clip(T[mine], law.low, law.high))
+        total = np.add.reduceat(strain * segments.lengths, chains.start[:-1])
+        return np.asarray(total / pose.cable_lengths)
+
+    @cached_property
+    def _problem(self) -> ChainProblem:
+        arm = self.arm
+        chains = arm.at(np.clip(0.0, arm.lower, arm.upper)).segments.chains
+        even = np.zeros(len(arm.cables))
+        return ChainProblem(arm.cables, chains.start, even, unstrained=True)
+
+    @cached_property
+    def _domains(self) -> Array:
+        laws = [cable.elasticity for cable in self.arm.cables]
+        return np.array([[law.low for law in laws], [law.high for law in laws]])
+
+    @property
+    def _tension_spread(self) -> float:
+        return math.hypot(self.sensors.tension_noise, self.sensors.tension_bias)
+
+
+def with_rigidity(arm: Manipulator, factor: float) -> Manipulator:
+    """Return the arm with ``factor`` times the rigidity of all its wires."""
+    laws = {id(cable.elasticity): cable.elasticity.scaled(factor) for cable in arm.cables}
+    return arm.with_cables(
+        [replace(cable, elasticity=laws[id(cable.elasticity)]) for cable in arm.cables]
+    )

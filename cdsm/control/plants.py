@@ -1,0 +1,163 @@
+"""Plants: the arms that a control loop moves. Protocol, and a quasi-static arm with friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, TypeVar, final
+
+import numpy as np
+
+import cdsm
+from cdsm.control.laws import Command
+from cdsm.control.sensors import Measurement
+from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.statics import quasi_static
+from cdsm.statics.quasi_static import Load, QuasiStaticArm
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.validation import instance, whole_number
+from cdsm.support.values import Array, frozen
+
+
+class PlantState(Protocol):
+    """Immutable state of a plant; each move of the plant returns a new state."""
+
+    @property
+    def pose(self) -> Posture:
+        """The true posture."""
+
+    @property
+    def true_values(self) -> Measurement:
+        """True length of the wire paid out [m] and tension [N] at each motor, both (C,)."""
+
+
+AnyState = TypeVar("AnyState", bound=PlantState)
+
+
+class Plant(Protocol[AnyState]):
+    """An arm whose motors :func:`~cdsm.track` commands."""
+
+    @property
+    def arm(self) -> Manipulator:
+        """The true arm."""
+
+    def initial(self, q: Array, tension: Array, wrench: Array) -> AnyState:
+        """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
+
+    def step_to(self, state: AnyState, command: Command, wrench: Array) -> AnyState:
+        """Return the state after ``state``, when the motors have executed ``command``.
+
+        ``wrench`` (6,) is the load: force [N], then moment [N m].
+
+        Raises:
+            CdsmError: No equilibrium was found, or a tension leaves the domain of its law.
+        """
+
+
+class QuasiStaticState(NamedTuple):
+    """State of a :class:`QuasiStaticPlant`: the wire in each segment depends on earlier loads."""
+
+    loading: QuasiStaticArm
+    initial_paid_out: Array  # l_0 (C,) [m] at the posture where the plant began
+    state: quasi_static.QuasiStaticState  # posture, load and wire in each segment
+
+    @property
+    def pose(self) -> Posture:
+        """The true posture."""
+        return self.state.arm_state.pose
+
+    @property
+    def true_values(self) -> Measurement:
+        """True length of the wire paid out [m] and tension [N] at each motor, both (C,)."""
+        taken_in = np.where(self.loading.forced, 0.0, self.state.load.motors)
+        tension = self.state.arm_state.tension[self.loading.start[:-1]]
+        return Measurement(frozen(self.initial_paid_out - taken_in), frozen(tension))
+
+
+@final
+@dataclass(frozen=True)
+class QuasiStaticPlant:
+    """Quasi-static arm whose cables stick and slide in their holes, as in :func:`~cdsm.load_cycle`.
+
+    Its motors follow each command exactly and slowly. Its wire, friction, dimensions and load may
+    differ from those in the controller's model.
+
+    Attributes:
+        arm: The true arm.
+        substeps: Number of equal sub-steps of a step, as in :func:`~cdsm.load_cycle`.
+
+    Raises:
+        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``, or ``substeps`` is not
+            a positive whole number.
+    """
+
+    arm: Manipulator
+    substeps: int = 1
+
+    def __post_init__(self) -> None:
+        require_unstrained("arm", self.arm)
+        whole_number("substeps", self.substeps, 1)
+
+    def initial(self, q: Array, tension: Array, wrench: Array) -> QuasiStaticState:
+        """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
+        pose = self.arm.at(q)
+        loading = QuasiStaticArm(pose, tension)
+        paid_out = self.arm._laws.original_lengths(pose.cable_lengths, tension)
+        return QuasiStaticState(loading, paid_out, loading.initial(wrench))
+
+    def step_to(self, state: QuasiStaticState, command: Command, wrench: Array) -> QuasiStaticState:
+        """Return the state after ``state``, as :meth:`Plant.step_to` describes.
+
+        Raises EquilibriumError if the arm buckles.
+        """
+        loading = state.loading
+        taken_in = state.initial_paid_out - command.paid_out
+        motors = np.where(loading.forced, command.tension, taken_in)
+        load = Load(wrench, np.zeros(self.arm.nv), motors)
+        moved, *_ = loading.step_to(state.state, load, self.substeps, "the step")
+        return state._replace(state=moved)
+
+
+def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
+    """Return K_θ at the equilibrium that the arm of ``state`` would have without friction.
+
+    With friction the measured stiffness depends on the size and on the history of the load: small
+    weights measure the stuck arm, which is several times stiffer. Here the wire of ``state`` slides
+    freely, and ``wrench`` (6,) is the load.
+
+    Raises:
+        EquilibriumError: There is no equilibrium: the arm buckles.
+        ElasticityRangeError: A tension leaves the domain of its law.
+    """
+    pose, true = state.pose, state.true_values
+    F = true.tension
+    if pose.arm.has_friction:
+        F = tensions_of(pose.arm, pose.cable_lengths, true.paid_out, F)
+    return cdsm.equilibrium(pose, F, wrench).stiffness
+
+
+def tensions_of(arm: Manipulator, lengths: Array, paid_out: Array, tension: Array) -> Array:
+    """Compute F (C,) [N] from lengths and wire of the cables (C,) [m], without friction.
+
+    A force-controlled cable has its ``tension`` (C,). Raises ElasticityRangeError, which names the
+    cable, where a law is not defined; a law that begins at 0 N or below is slack there.
+    """
+    F = np.array(tension)
+    for c, (cable, wire) in enumerate(zip(arm.cables, paid_out.tolist(), strict=True)):
+        if cable.control == "position":
+            elongation = float(lengths[c]) - wire
+            slack = cable.elasticity.low == 0.0 and elongation <= cable.elongation(0.0, wire)
+            try:
+                F[c] = 0.0 if slack else cable.tension(elongation, wire)
+            except ElasticityRangeError as error:
+                raise ElasticityRangeError(error.problem, (), [c], [cable.name]) from None
+    return F
+
+
+def require_unstrained(name: str, arm: Manipulator) -> None:
+    """Raise InvalidInput unless ``arm``, called ``name``, has "unstrained" original lengths."""
+    if instance(name, arm, Manipulator).original_length != "unstrained":
+        raise InvalidInput(
+            name, 'has original_length = "stretched"; motors pay out unstrained lengths.'
+        )

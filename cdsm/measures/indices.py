@@ -1,0 +1,61 @@
+"""Wrench closure, tension factor (evenness of the tensions) and isotropy of the tip stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdsm.errors import SolverError
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.stiffness_matrix.principal import principal_stiffness
+from cdsm.support.linear_program import OPTIMAL, least
+from cdsm.support.validation import instance
+
+_CLOSED = 1e-9  # smaller ratios are rounding of the linear program
+
+
+def tension_factor(pose: Posture) -> float:
+    """Compute the tension factor [-]: the largest min(F)/max(F) of F ≥ 0 with J_Lᵀ F = 0.
+
+    It is 1 if equal tensions cause no joint torque, and 0 without wrench closure
+    (:func:`has_wrench_closure`). Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57
+    (2009), use the ratio of one solution, so their factor may be smaller. Raises SolverError if the
+    linear program fails.
+    """
+    J = instance("pose", pose, Posture).length_jacobian
+    count, nv = J.shape
+    if np.linalg.matrix_rank(J) < nv:
+        return 0.0
+    found = least(  # variables: F, then its least entry
+        np.append(np.zeros(count), -1.0),
+        A_eq=np.column_stack([J.T / abs(J).max(), np.zeros(nv)]),
+        b_eq=np.zeros(nv),
+        A_ub=np.column_stack([-np.eye(count), np.ones(count)]),
+        b_ub=np.zeros(count),
+        bounds=(0.0, 1.0),
+    )
+    if found.status != OPTIMAL:
+        raise SolverError("highs", f"finds no tension factor: {found.message}")
+    ratio = float(found.x[-1])
+    return ratio if ratio > _CLOSED else 0.0
+
+
+def has_wrench_closure(pose: Posture) -> bool:
+    """Return whether unlimited tensions F ≥ 0 can balance every joint torque.
+
+    They can if J_Lᵀ has full rank and some F > 0 has J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE
+    T-RO 22, 2006). For limited tensions, see :func:`force_polytope`. Raises SolverError if the
+    linear program fails.
+    """
+    return tension_factor(pose) > 0.0
+
+
+def isotropy(stiffness: Stiffness) -> float:
+    """Compute the ratio of the least to the largest tip stiffness of all directions, 0 to 1 [-].
+
+    The stiffness along u is 1/(uᵀ C_vv u), Eq. 20; the arm must be stable. The ratio is 0 if the
+    stiffness is infinite in some directions, and 1 if it is infinite in all. Raises
+    SingularStiffness if K_θ is singular.
+    """
+    K = instance("stiffness", stiffness, Stiffness)
+    return float(principal_stiffness(K.compliance[:3, :3])["isotropy"])

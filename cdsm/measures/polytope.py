@@ -1,0 +1,255 @@
+"""Forces at the tip that tensions balance: the largest along a direction, and all of them.
+
+Forces x (k,) [N] act at the tip along the columns of U (3, k), besides the wrench W. They balance
+if J_Lᵀ F − J_vᵀ U x = J_Xᵀ W − g (Eq. 13) with minimum ≤ F ≤ maximum. All such x are a polytope;
+its largest a · x is a linear program.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import cdsm
+from cdsm.errors import InvalidInput, SolverError
+from cdsm.posture import Posture
+from cdsm.support.format import coordinates
+from cdsm.support.result import Result, quantity, unit
+from cdsm.support.validation import NO_WRENCH, instance, number_array, wrench_vector
+from cdsm.support.values import Array, frozen
+from cdsm.tension import bounds_at, distribute_tension, solvers
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NO_MOTION = 1e-9
+"""Smaller singular values of J_v, divided by the arm length, count as zero: no tip motion there."""
+
+_OUTSIDE = 1e-8  # smaller distances from a hull, relative to its size, count as zero
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class ForcePolytope(Result):
+    """All forces at the tip that an arm can balance; made by :func:`force_polytope`.
+
+    The forces f (3,) [N] in base axes act at the tip besides ``wrench``. The polytope is the set of
+    all f with ``normals`` @ f ≤ ``offsets``.
+
+    Attributes:
+        posture: The posture.
+        wrench: W (6,) that always acts: force [N], then moment [N m], base axes.
+        minimum: Lower bounds of the tensions (C,) [N].
+        maximum: Upper bounds of the tensions (C,) [N].
+        vertices: Corners (n, 3) [N].
+        faces: Triangles of the surface (m, 3), as indices of ``vertices``; (0, 3) for a flat
+            polytope.
+        normals: Outward unit normals of the n facets (n, 3) [-].
+        offsets: Distance of each facet from the force zero (n,) [N]; negative if zero is outside.
+        unbounded: Unit directions (n, 3) in which the tip cannot move, as many as there are; the
+            links balance any force along them, and ``vertices`` have no component along them.
+    """
+
+    _headline = "radius"
+
+    posture: Posture
+    wrench: Array = field(metadata=unit("N and N m", "component"))
+    minimum: Array = field(metadata=unit("N", "cable"))
+    maximum: Array = field(metadata=unit("N", "cable"))
+    vertices: Array = field(metadata=unit("N", "vertex", "axis"))
+    faces: NDArray[np.intp]
+    normals: Array = field(metadata=unit("1", "facet", "axis"))
+    offsets: Array = field(metadata=unit("N", "facet"))
+    unbounded: Array = field(metadata=unit("1", "immobile", "axis"))
+
+    @quantity("N")
+    def radius(self) -> float:
+        """Distance of the force zero from the nearest facet [N]; negative if zero is outside.
+
+        The arm balances every force up to ``radius``, in all directions.
+        """
+        return self.radius_at(np.zeros(3))
+
+    @quantity("1", "axis")
+    def worst_direction(self) -> Array:
+        """Unit direction (3,) in which the largest force that the arm can balance is smallest."""
+        nearest = self.normals[self.offsets == self.offsets.min(initial=math.inf)]
+        return np.asarray(np.vstack([nearest, self.unbounded])[0])
+
+    @property
+    def volume(self) -> float:
+        """Volume of the polytope [N³]; inf if it is unbounded, 0 if it is flat."""
+        if len(self.unbounded):
+            return math.inf
+        corners = self.vertices[self.faces] - self.vertices.mean(axis=0)
+        return float(abs(np.linalg.det(corners)).sum()) / 6.0
+
+    def radius_at(self, force: ArrayLike) -> float:
+        """Compute the distance of a force f from the nearest facet [N]: min_i (b_i − n_i·f).
+
+        n_i and b_i are the rows of ``normals`` and ``offsets``. Every force up to this one may be
+        added to f. The distance is negative if the arm cannot balance f.
+
+        Args:
+            force: f (3,) [N], or several (n, 3): then the smallest of their distances.
+
+        Raises:
+            InvalidInput: ``force`` is not (3,) or (n, 3) numbers.
+        """
+        loads = number_array("force", force, "force")
+        if loads.ndim not in (1, 2) or loads.shape[-1] != 3 or not loads.size:
+            raise InvalidInput("force", f"shape {loads.shape} given, (3,) or (n, 3) needed [N].")
+        apart = self.offsets - np.atleast_2d(loads) @ self.normals.T
+        return float(apart.min(initial=math.inf))
+
+    def plot(self) -> Figure:
+        """Plot the polytope [N]."""
+        return cdsm.plots.plot_force_polytope(self)
+
+    def __str__(self) -> str:
+        return (
+            f"{len(self.vertices)} vertices; holds {self.radius:.4g} N in any direction, least "
+            f"along {coordinates(self.worst_direction, '.3g')}"
+        )
+
+
+def force_polytope(
+    pose: Posture,
+    minimum: ArrayLike = 0.0,
+    maximum: ArrayLike = math.inf,
+    wrench: ArrayLike = NO_WRENCH,
+    *,
+    worst_friction: bool = False,
+) -> ForcePolytope:
+    """Compute all forces f at the tip that tensions within the bounds balance, besides W (Eq. 13).
+
+    The posture is fixed: the motors re-distribute the tensions for each force.
+
+    Args:
+        pose: The posture.
+        minimum: Lower bound of the tensions [N], for all cables or (C,).
+        maximum: Upper bound of the tensions [N], for all cables or (C,); finite.
+        wrench: W (6,) at ``tool0`` in base axes that always acts: force [N], then moment [N m].
+        worst_friction: Narrow the bounds for friction, as :func:`~cdsm.distribute_tension` does.
+
+    Raises:
+        InvalidInput: An argument has the wrong shape, or a cable has no upper bound, so that the
+            polytope is unbounded.
+        InfeasibleTension: No tensions within the bounds balance any force at the tip, not even
+            zero; the error gives the smallest violation.
+        SolverError: A linear program fails.
+    """
+    instance("pose", pose, Posture)
+    low, high = bounds_at(pose, minimum, maximum, worst_friction)
+    W = wrench_vector("wrench", wrench)
+    if not np.isfinite(high).all():
+        cable = pose.arm.cables[int(np.isinf(high).argmax())].name
+        raise InvalidInput("maximum", f"{cable} has none; give a finite one [N].")
+    found = polytope_of(pose, W, low, high)
+    if found is None:
+        distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
+        raise SolverError("highs", "finds no force, though tensions balance none. Change a bound.")
+    return found
+
+
+def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForcePolytope | None:
+    """Compute the polytope of all forces that a posture balances; None if there are none.
+
+    Convex hull method (Lassez and Lassez, 1992; for robots Skuric, Padois and Daney, RA-L 2022) in
+    the directions in which the tip moves: take the hull of the known corners, find the farthest
+    point along the normal of each facet, and repeat until no point is outside.
+    """
+    axes, size, _ = np.linalg.svd(pose.jacobian[:3])
+    k = int((size > _NO_MOTION * pose.arm.length).sum())
+    basis, unbounded = axes[:, :k], axes[:, k:].T
+    farthest = balanced(pose, basis, wrench, low, high)
+    if farthest(np.zeros(k)) is None:
+        return None
+    points, normals = np.zeros((0, k)), np.vstack([np.eye(k), -np.eye(k)])
+    tried: set[tuple[float, ...]] = set()
+    while True:
+        reached = (points @ normals.T).max(axis=0, initial=-math.inf)
+        least = _OUTSIDE * float(np.ptp(points, axis=0).max() if len(points) else 0.0)
+        new = []
+        for normal, known in zip(normals, reached.tolist(), strict=True):
+            seen = tuple(np.round(normal, 9).tolist())
+            if seen not in tried:
+                tried.add(seen)
+                found = farthest(normal)
+                if found is None or math.isinf(found[0]):
+                    raise SolverError("highs", "finds no end of the balanced forces.")
+                new += [found[1]] if found[0] > known + least else []
+        if not new:
+            break
+        points = np.vstack([points, *new])
+        corners, faces, normals = _hull(points)
+    if k == 0:
+        corners, faces, points = np.zeros(1, np.intp), np.zeros((0, 3), np.intp), np.zeros((1, 0))
+    return ForcePolytope(
+        posture=pose,
+        wrench=wrench,
+        minimum=low,
+        maximum=high,
+        vertices=frozen(points[corners] @ basis.T),
+        faces=frozen(faces),
+        normals=frozen(normals @ basis.T),
+        offsets=frozen((normals @ points.T).max(axis=1, initial=-math.inf)),
+        unbounded=frozen(unbounded),
+    )
+
+
+def _hull(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Return which of ``points`` (n, k) are corners, the triangles of these, and the normals."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    none = np.zeros((0, 3), np.intp)
+    if points.shape[1] == 1:
+        return np.array([points.argmin(), points.argmax()]), none, np.array([[-1.0], [1.0]])
+    size = max(np.ptp(points, axis=0).max(), _OUTSIDE * abs(points).max()) or 1.0
+    scaled = (points - points[0]) / size
+    try:
+        hull, flat = ConvexHull(scaled), points.shape[1] < 3
+    except QhullError:  # a flat polytope is made a little thick
+        hull, flat = ConvexHull(scaled, qhull_options="QJ"), True
+    normals = np.unique(np.round(hull.equations[:, :-1], 9), axis=0)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    corners = np.sort(hull.vertices).astype(np.intp)
+    return corners, none if flat else np.searchsorted(corners, hull.simplices), normals
+
+
+Farthest = Callable[[Array], tuple[float, Array] | None]
+"""Function of a (k,): the largest a · x [N] of all balanced forces x (k,) [N], and this x.
+
+If a · x is unbounded, the result is inf, and x is NaN. It is None if no force is balanced.
+"""
+
+
+def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) -> Farthest:
+    """Return the function that maximises over the forces along U that a posture balances.
+
+    ``low`` and ``high`` (C,) [N] are the bounds of the tensions, ``wrench`` is W (6,). The function
+    raises SolverError if its linear program fails.
+    """
+    A = np.column_stack([pose.length_jacobian.T, -pose.jacobian[:3].T @ U])
+    lever = abs(A).max(axis=1)
+    lever[lever == 0.0] = 1.0
+    A /= lever[:, None]
+    b = (pose.jacobian.T @ wrench - pose.gravity_torque) / lever
+    count, free = low.size, np.full(U.shape[1], math.inf)
+    # near the straight arm, forces along it are huge: each counts by what it does to the joints
+    scale = abs(A[:, count:]).max(axis=0)
+    scale[scale == 0.0] = 1.0
+    A[:, count:] /= scale
+    force = float((high if np.isfinite(high).all() else np.append(low, abs(b))).max()) or 1.0
+    bounds = np.append(low / force, -free), np.append(high / force, free)
+
+    def farthest(along: Array) -> tuple[float, Array] | None:
+        found = solvers.largest(np.append(np.zeros(count), along / scale), A, b / force, *bounds)
+        return found and (found[0] * force, found[1][count:] / scale * force)
+
+    return farthest

@@ -1,0 +1,85 @@
+"""Angles, rigidity and tip force from wire and tension, against arms that know them."""
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.control import with_rigidity
+from cdsm.control.laws import Command
+from cdsm.control.observer import Estimate, Observer
+from cdsm.control.plants import QuasiStaticState
+from cdsm.control.sensors import Measurement
+from tests.support.tracking import paid_out, small_path
+
+Pairs = list[tuple[QuasiStaticState, Estimate]]
+
+NONE = np.zeros(6)
+EXACT = cdsm.Sensors(encoder=0.0)
+FORCE = np.array([0.3, -0.5, -1.0, 0.0, 0.0, 0.0])
+
+
+def moved(friction: float, rigidity: float = 0.9) -> tuple[cdsm.PathPlan, list[QuasiStaticState]]:
+    """A plan, and states of an arm with another wire that is driven along it and then loaded."""
+    plan = small_path(friction)
+    plant = cdsm.QuasiStaticPlant(with_rigidity(plan.arm, rigidity))
+    state = plant.initial(plan.angles[0], plan.tensions[0], NONE)
+    states, first = [state], state.true_values.paid_out
+    for wire in paid_out(plan):
+        command = Command(
+            first + wire - paid_out(plan)[0], plan.tensions[0], np.zeros(len(wire), dtype=np.bool_)
+        )
+        state = plant.step_to(state, command, NONE)
+        states.append(state)
+    states.append(plant.step_to(state, command, FORCE))
+    return plan, states
+
+
+def observed(friction: float, sensors: cdsm.Sensors = EXACT, seed: int = 0) -> Pairs:
+    plan, states = moved(friction)
+    random = np.random.default_rng(seed)
+    true_values: list[Measurement] = [states[0].true_values]
+    observer, pairs = Observer(plan.arm, sensors), []
+    estimate = observer.initial(plan.angles[0], sensors.measure(true_values, random))
+    for state in states:
+        true_values.append(state.true_values)
+        estimate = observer.update(estimate, sensors.measure(true_values, random))
+        pairs.append((state, estimate))
+    return pairs
+
+
+def test_without_friction_exact_sensors_give_angles_rigidity_and_force() -> None:
+    """Stretch is accounted for although the wire is a tenth softer than its law says."""
+    for state, estimate in observed(0.0)[1:]:
+        np.testing.assert_allclose(estimate.pose.q, state.pose.q, atol=1e-9)
+        assert 1.0 / estimate.softness == pytest.approx(0.9, abs=1e-6)
+    np.testing.assert_allclose(estimate.force, FORCE[:3], atol=1e-5)
+
+
+def test_lengths_alone_are_wrong_where_tensions_count() -> None:
+    """Without the stretch the lengths would be those of another posture."""
+    state, _ = observed(0.0)[-1]
+    alone = cdsm.solve_joint_angles(
+        state.pose.arm, state.true_values.paid_out, guess=state.pose.q, tolerance=0.5
+    )
+    assert abs(alone.angles - state.pose.q).max() > 1e-3
+
+
+def test_model_of_the_wire_in_the_holes_finds_angles_and_force_under_friction() -> None:
+    pairs = observed(0.1)
+    for state, estimate in pairs[1:]:
+        assert abs(estimate.pose.q - state.pose.q).max() < np.deg2rad(0.05)
+        assert 1.0 / estimate.softness == pytest.approx(0.9, abs=2e-3)
+    state, estimate = pairs[-1]
+    cable = state.pose.segments.chains.cable
+    inner = state.state.arm_state.chain.tension
+    found = estimate.shares * state.true_values.tension[cable]
+    even = state.true_values.tension[cable]
+    # half of what friction changes is found, and more
+    assert np.linalg.norm(found - inner) < 0.5 * np.linalg.norm(even - inner)
+
+
+def test_noise_averages_out_of_the_rigidity() -> None:
+    noisy = cdsm.Sensors(encoder=1e-5, tension_noise=0.5)
+    rigidity = [1.0 / observed(0.0, noisy, seed)[-1][1].softness for seed in range(8)]
+    assert np.mean(rigidity) == pytest.approx(0.9, abs=3e-3)
+    assert np.std(rigidity) < 0.01

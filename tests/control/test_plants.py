@@ -1,0 +1,75 @@
+"""The quasi-static plant against the loads and equilibria that it is made of."""
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.control import Command
+from tests.support.tracking import paid_out, small_path
+
+NONE = np.zeros(6)
+
+
+def moved(plan: cdsm.PathPlan, by: float) -> Command:
+    wire = paid_out(plan)[0] + by * np.arange(6)
+    return Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
+
+
+def test_plant_begins_with_the_wire_that_a_plan_pays_out() -> None:
+    plan = small_path()
+    state = cdsm.QuasiStaticPlant(plan.arm).initial(plan.angles[0], plan.tensions[0], NONE)
+    np.testing.assert_allclose(state.true_values.paid_out, paid_out(plan)[0], rtol=1e-14)
+    np.testing.assert_allclose(state.true_values.tension, plan.tensions[0], rtol=1e-14)
+    np.testing.assert_array_equal(state.pose.q, plan.angles[0])
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
+    plan = small_path(friction)
+    plant, wrench = cdsm.QuasiStaticPlant(plan.arm), np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+    before = plant.initial(plan.angles[0], plan.tensions[0], NONE)
+    command = moved(plan, 1e-5)
+    state = plant.step_to(before, command, wrench)
+    pose = plan.arm.at(plan.angles[0])
+    taken_in = paid_out(plan)[0] - command.paid_out
+    history = cdsm.load_cycle(
+        pose, plan.tensions[0], [wrench], motors=[taken_in], substeps=plant.substeps
+    )
+    np.testing.assert_allclose(state.pose.q, history.angles[0], atol=1e-12)
+    np.testing.assert_allclose(state.true_values.paid_out, command.paid_out, rtol=1e-14)
+    first = [T[0, 0] for T in history.tensions]
+    np.testing.assert_allclose(state.true_values.tension, first, rtol=1e-9)
+    np.testing.assert_array_equal(before.pose.q, plan.angles[0])  # a state does not change
+
+
+def test_paying_wire_out_slackens_its_cable() -> None:
+    plan = small_path()
+    plant = cdsm.QuasiStaticPlant(plan.arm)
+    state = plant.initial(plan.angles[0], plan.tensions[0], NONE)
+    wire = paid_out(plan)[0].copy()
+    wire[2] += 1e-4
+    command = Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
+    assert plant.step_to(state, command, NONE).true_values.tension[2] < plan.tensions[0, 2] - 1.0
+
+
+def test_stretched_lengths_are_refused() -> None:
+    arm = small_path().arm
+    stretched = cdsm.Manipulator(
+        arm.geometry, elasticity=arm.cables[0].elasticity, original_length="stretched"
+    )
+    with pytest.raises(cdsm.InvalidInput, match="stretched"):
+        cdsm.QuasiStaticPlant(stretched)
+
+
+def test_plant_of_something_else_than_an_arm_is_refused() -> None:
+    with pytest.raises(cdsm.InvalidInput, match="arm: None given; a Manipulator is needed"):
+        cdsm.QuasiStaticPlant(None)  # type: ignore[arg-type]
+    with pytest.raises(cdsm.InvalidInput, match="substeps: 0 given"):
+        cdsm.QuasiStaticPlant(small_path().arm, substeps=0)
+
+
+def test_plant_with_other_cables_is_refused() -> None:
+    plan = small_path()
+    fewer = cdsm.QuasiStaticPlant(plan.arm.with_cables(plan.arm.cables[:-1]))
+    with pytest.raises(cdsm.InvalidInput, match=f"cables: {plan.arm.cables[-1].name}"):
+        cdsm.track(plan, plant=fewer)
