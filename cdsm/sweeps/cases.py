@@ -38,7 +38,7 @@ _BATCH_NAMES: Final = {
 _BLOCKS: Final[dict[str, Any]] = {"tip": np.s_[:, :3, 3], "compliance": np.s_[:, :3, :3]}
 """Parts of matrices of a batch."""
 
-_FAST, _SLOW = 2**14, 2**8  # rows that are computed together, also with measures of milliseconds
+_FAST, _SLOW = 2**15, 2**8  # rows that are computed together, also with measures of milliseconds
 
 
 @final
@@ -67,7 +67,7 @@ class Cases:
 
     @property
     def together(self) -> int:
-        """Return the number of postures that are computed together: some tenths of a second."""
+        """Return the number of postures that are computed together, in about a second at most."""
         slow = not measures.SLOW.isdisjoint(self.outputs)
         return max(1, (_SLOW if slow else _FAST) // self.count)
 

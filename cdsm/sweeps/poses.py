@@ -1,7 +1,7 @@
 """Pose sets: grids over named joints, paths along a polyline, Sobol points within the limits.
 
-A pose set does not depend on an arm. Its joint angles are computed where they are needed, part by
-part, so a large set is never in memory.
+A pose set does not depend on an arm. In chunks, its joint angles are computed where they are
+needed, so a large set is never in memory.
 """
 
 from __future__ import annotations

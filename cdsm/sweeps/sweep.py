@@ -25,7 +25,7 @@ from cdsm.tension import checked_bounds
 if TYPE_CHECKING:
     import xarray
 
-_CHUNK = 4  # a chunk of a store has so many times the postures that are computed together
+_CHUNK = 2  # a chunk of a store has so many times the postures that are computed together
 
 
 def sweep(
@@ -67,9 +67,10 @@ def sweep(
             within the bounds, whatever loads came before. Then the bounds at the motors are
             narrower.
         diameter: Diameter of the cables [m], for clearances.
-        store: Zarr folder to which results are written chunk by chunk. A new run with the same
-            arguments computes only the chunks that are missing. The returned Dataset reads from
-            the store when needed. The chunks of a chunked DataArray are those of the store.
+        store: Zarr folder to which results are written chunk by chunk, so that they need not fit
+            into memory. A new run with the same arguments computes only the chunks that are
+            missing. The returned Dataset reads from the store when needed. The chunks of a chunked
+            DataArray are those of the store.
         progress: Show a bar, if there is a terminal.
 
     Returns:

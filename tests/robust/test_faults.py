@@ -60,7 +60,7 @@ def test_an_interrupted_command_says_so_in_one_line_and_goes_on(tmp_path: Path) 
         "--wire",
         "1x19-1.2mm",
         "--random",
-        300_000,
+        140_000,
         "--out",
         out,
         "--resume",
@@ -74,10 +74,10 @@ def test_an_interrupted_command_says_so_in_one_line_and_goes_on(tmp_path: Path) 
     assert said == ""
     assert [line.partition(":")[0] for line in complained.splitlines()] == ["interrupted"]
     left = pending(path)
-    assert 0 < left < 300_000
+    assert 0 < left < 140_000
     assert out.read_text(encoding="utf-8") == "old"
     assert {each.name for each in tmp_path.iterdir()} == {"arm.toml", "s.zarr", "s.csv"}
-    poses = cdsm.RandomPoses(300_000, 0)
+    poses = cdsm.RandomPoses(140_000, 0)
     described = cdsm.Manipulator(cdsm.Geometry.read(arm), cdsm.presets.STRAND_1X19)
     again = cdsm.sweep(described, poses, minimum=10.0, store=path, progress=False)
     assert pending(path) == 0
