@@ -5,7 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
+
+import cdsm
+
+if TYPE_CHECKING:
+    from matplotlib import figure
 
 HEADER = (
     *("figure", "quantity", "paper", "computed", "difference", "original length", "hung weight"),
@@ -77,6 +82,10 @@ class Figure(ABC):
     name: str
     title: str
     claims: tuple[Claim, ...]
+
+    def plot(self) -> figure.Figure:
+        """Plot the curves, with the numbers that the paper prints."""
+        return cdsm.plots.plot_paper(self)
 
     @abstractmethod
     def numbers(self) -> dict[str, object]:

@@ -18,20 +18,8 @@ from tests.view.test_state import DEGREES, INFEASIBLE, STABLE, UNSTABLE, along, 
 
 pytest.importorskip("viser", reason="the extra [view] is not installed")
 
-CHROMIUM = next(
-    (
-        path
-        for name in (
-            "chromium",
-            "chromium-browser",
-            "google-chrome",
-            "/Applications/Chromium.app/Contents/MacOS/Chromium",
-            "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
-        )
-        if (path := shutil.which(name))
-    ),
-    None,
-)
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
 PATIENCE = 1e3 * HANGS
 """Milliseconds that a condition may take to come; a busy machine draws a frame in seconds."""
 

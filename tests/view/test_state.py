@@ -94,17 +94,6 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     assert said["largest compliance"] == f"{1e3 * largest / 1e3:.3g}"
 
 
-def test_the_ellipsoid_is_where_forces_of_one_size_move_the_tip() -> None:
-    arm = soft_arm()
-    shown = show(arm, setting(arm))
-    assert shown.stiffness is not None
-    assert shown.ellipsoid is not None
-    C = shown.stiffness.compliance[:3, :3]
-    moved = shown.ellipsoid.surface.reshape(3, -1) - shown.stiffness.posture.tip[:3, 3:]
-    force = np.linalg.solve(shown.ellipsoid.scale * C, moved)
-    np.testing.assert_allclose(np.linalg.norm(force, axis=0), 1.0, rtol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("minimum", "force", "condition"),
     [
@@ -207,18 +196,6 @@ def test_without_an_equilibrium_there_is_no_number() -> None:
     assert len(set(shown.cable_colors)) == 1  # grey
 
 
-def test_a_search_that_fails_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
-        raise cdsm.EquilibriumError("no place to rest", np.zeros(6), 0.5, "joint1_1")
-
-    monkeypatch.setattr("cdsm.equilibrium", fails, raising=False)
-    shown = sagged(soft_arm())
-    assert shown.condition is Condition.NO_EQUILIBRIUM
-    assert "no place to rest" in shown.problem
-    assert shown.stiffness is None
-    assert shown.tensions is None
-
-
 def test_joints_on_their_stops_are_named_and_do_not_yield() -> None:
     shown = sagged(soft_arm(), 5.0, (0.0, 0.0, -12.0))
     assert shown.rest is not None
@@ -253,14 +230,6 @@ def test_an_arm_with_friction_sags_less_and_shows_which_holes_slide() -> None:
     # a held arm has no history: nothing slides
     assert [len(each) for each in show(arm, setting(arm)).holes] == [len(history.holes), 0]
     assert [len(each) for each in free.holes] == [0, 0]
-
-
-def test_below_breakaway_no_hole_slides() -> None:
-    arm = soft_arm().with_friction(0.3)
-    pose = arm.at(setting(arm).q)
-    load = cdsm.breakaway(pose, cdsm.distribute_tension(pose, STABLE, 200.0), "z").load
-    assert len(sagged(arm, force=(0.0, 0.0, 0.99 * load)).holes[1]) == 0
-    assert len(sagged(arm, force=(0.0, 0.0, 1.01 * load)).holes[1]) == 1
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
