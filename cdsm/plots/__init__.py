@@ -12,9 +12,14 @@ from cdsm.plots.loads import plot_load_history as plot_load_history
 from cdsm.plots.loads import plot_tracking_run as plot_tracking_run
 from cdsm.plots.loads import plot_weight_test as plot_weight_test
 from cdsm.plots.maps import plot_map
+from cdsm.plots.measured import plot_designs as plot_designs
+from cdsm.plots.measured import plot_elasticity as plot_elasticity
 from cdsm.plots.measured import plot_experiment_plan as plot_experiment_plan
+from cdsm.plots.measured import plot_force_polytope as plot_force_polytope
 from cdsm.plots.measured import plot_identification as plot_identification
+from cdsm.plots.measured import plot_monte_carlo as plot_monte_carlo
 from cdsm.plots.measured import plot_tensile_fit as plot_tensile_fit
+from cdsm.plots.measured import plot_uncertainty as plot_uncertainty
 from cdsm.plots.paper import plot_paper as plot_paper
 from cdsm.plots.path import plot_modes as plot_modes
 from cdsm.plots.path import plot_path
@@ -26,11 +31,6 @@ from cdsm.plots.planning import plot_stiffness_range as plot_stiffness_range
 from cdsm.plots.planning import plot_stiffness_ranges
 from cdsm.plots.planning import plot_tensions as plot_tensions
 from cdsm.plots.style import save_figure
-from cdsm.plots.summary import plot_designs as plot_designs
-from cdsm.plots.summary import plot_elasticity as plot_elasticity
-from cdsm.plots.summary import plot_force_polytope as plot_force_polytope
-from cdsm.plots.summary import plot_monte_carlo as plot_monte_carlo
-from cdsm.plots.summary import plot_uncertainty as plot_uncertainty
 
 __all__ = ["plot_arm", "plot_map", "plot_path", "plot_stiffness_ranges", "save_figure"]
 

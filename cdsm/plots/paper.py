@@ -117,17 +117,14 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
         ]
         rows.append((f"{reading} [N/mm]", lines))
     end = N_PER_MM * (1.0 + np.array(stated)) * curve.pseudoinverse[:1]
-    label = "paper: stated increment, from the first computed value"
+    times = ", ".join(f"+{each:g}" for each in stated)
+    label = f"paper: {times} times the first computed value"
     rows[0][1].append((curve.tension[-1:, 1], end, {**_DOT, "label": label}))
     figure, grid = _multiples(result, 4.4, rows)
     for name, panels in zip(_READINGS, grid, strict=True):
         _draw_bars(panels, curve, getattr(curve, name))
-        for axes, times in zip(panels, stated, strict=True):
-            axes.set_ylim(bottom=0.0)
-            if name == "pseudoinverse":
-                axes.text(
-                    0.97, 0.05, f"paper: +{times:g} times", ha="right", transform=axes.transAxes
-                )
+    for axes in grid.flat:
+        axes.set_ylim(bottom=0.0)
     style.legend_below(figure, grid[0, 0], 3, title=_NOTE)
     return figure
 

@@ -51,8 +51,17 @@ def plot_path(
             end in ``.gif``.
         FileError: The animation cannot be written.
     """
-    poses, pulls = _postures(path)
-    pulls = pulls if tensions is None else number_array("tensions", tensions)
+    poses: Sequence[Posture] = path if isinstance(path, Sequence) else []
+    pulls = tensions
+    if not isinstance(path, Sequence):
+        style.expect("path", path, "PathPlan")
+        poses = [K.posture for K in path.stiffness]
+        pulls = path.tensions if tensions is None else tensions
+    for pose in poses:
+        style.expect("path", pose, "Posture")
+    if not poses or any(pose.arm != poses[0].arm for pose in poses):
+        said = "give postures of one arm, or a plan that reaches its target at some samples."
+        raise InvalidInput("path", said)
     figure, axes = picture()
     *ghosts, last = _some(poses, _GHOSTS)
     for k, shade in zip(ghosts, np.linspace(0.8, 0.5, len(ghosts)), strict=True):
@@ -64,7 +73,7 @@ def plot_path(
     title = f"{poses[0].arm.name}: the last of {len(poses)} postures, others pale"
     finish(figure, title)
     if animate is not None:
-        _animate(animate, poses, pulls, axes)
+        _animate(animate, poses, None if pulls is None else number_array("tensions", pulls), axes)
     return figure
 
 
@@ -87,25 +96,6 @@ def plot_modes(modes: Modes) -> Figure:
         axes.plot([], [], [], color=color, label=name)
     unstable = "" if modes.is_stable else "UNSTABLE: "
     return finish(figure, f"{unstable}{pose.arm.name}, enlarged modes")
-
-
-def _postures(path: PathPlan | Sequence[Posture]) -> tuple[list[Posture], Array | None]:
-    """Return the P postures of a path, and their tensions (P, C) [N] if it is a plan."""
-    tensions = None
-    if isinstance(path, Sequence):
-        poses = list(path)
-    else:
-        style.expect("path", path, "PathPlan")
-        poses, tensions = [K.posture for K in path.stiffness], path.tensions
-    for pose in poses:
-        style.expect("path", pose, "Posture")
-        if pose.arm != poses[0].arm:
-            raise InvalidInput("path", "has postures of two arms; give those of one.")
-    if not poses:
-        raise InvalidInput(
-            "path", "has no posture to draw; give one, or a plan that reaches its target."
-        )
-    return poses, tensions
 
 
 def _some(poses: Sequence[Posture], most: int) -> Sequence[int]:

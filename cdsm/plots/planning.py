@@ -53,20 +53,18 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
         style.expect("ranges", one, "StiffnessRange")
     if not every or not all(ranges.values()):
         raise InvalidInput("ranges", "is empty; give ranges of several directions by label.")
-    u = np.array([one.direction for one in every])
-    normal = int(abs(u).max(axis=0).argmin())
-    if abs(u[:, normal]).max() > _SAME:
+    u = abs(np.array([one.direction for one in every])).max(axis=0)
+    if u.min() > _SAME:
         raise InvalidInput("ranges", "has directions that are in no plane of two base axes.")
-    plane = [axis for axis in range(3) if axis != normal]
+    first, second = plane = sorted(np.argsort(u)[1:].tolist())
     figure = Figure(figsize=(style.ONE_COLUMN, 4.2))
     axes: Any = figure.add_subplot(projection="polar")
 
     def around(found: Sequence[StiffnessRange], values: Sequence[float]) -> tuple[Array, Array]:
-        y, x = np.array([one.direction for one in found])[:, plane[::-1]].T
-        half, radius = np.mod(np.arctan2(y, x), np.pi), N_PER_MM * np.array(values)
-        order = np.argsort(half)
-        turn = np.concatenate([half[order], half[order] + np.pi, half[order][:1] + 2.0 * np.pi])
-        return turn, np.concatenate([radius[order], radius[order], radius[order][:1]])
+        v = np.array([one.direction for one in found])
+        half = np.mod(np.arctan2(v[:, second], v[:, first]), np.pi)
+        turn, radius = np.sort(half), N_PER_MM * np.array(values)[np.argsort(half)]
+        return np.append(turn, [*(turn + np.pi), turn[0]]), np.append(radius, [*radius, radius[0]])
 
     shades = colormaps[style.COLOR_MAP](np.linspace(0.0, 0.85, len(ranges)))
     for k, (label, found) in enumerate(ranges.items()):

@@ -123,8 +123,8 @@ def test_what_cannot_be_drawn_is_named(tmp_path: Path) -> None:
         (lambda: plots.plot_arm(3), "pose: 3 given; a Posture is needed"),  # type: ignore[arg-type]
         (lambda: plots.plot_arm(other, PULL), "tension: belongs to another arm"),
         (lambda: plots.plot_arm(other, stiffness=K), "stiffness: belongs to another posture"),
-        (lambda: plots.plot_path([]), "path: has no posture"),
-        (lambda: plots.plot_path([POSE, other]), "postures of two arms"),
+        (lambda: plots.plot_path([]), "path: give postures of one arm"),
+        (lambda: plots.plot_path([POSE, other]), "path: give postures of one arm"),
         (lambda: plots.plot_path([POSE], animate=tmp_path / "a.mp4"), r"must end in \.gif"),
         (lambda: plots.plot_stiffness_ranges({}), "ranges: is empty"),
         (
