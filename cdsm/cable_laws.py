@@ -14,8 +14,6 @@ from cdsm.wires.elasticity import Elasticity
 
 OriginalLength = Literal["unstrained", "stretched"]
 
-_STEP = 1e-5  # relative step of the finite difference of the slope of EA (1 + ε)
-
 
 class CableLaws:
     """Elasticities of all C cables of an arm.
@@ -71,9 +69,19 @@ class CableLaws:
         if self.nonlinear and stretched.min() < 0.0:
             for law, of in self.nonlinear:
                 self._evaluate(law, of, tension[of])
-        wire = lengths - self.series * (tension - self.rest)
+        return frozen(self.stiffness_of(lengths, tension, stretched))
+
+    def stiffness_of(
+        self, lengths: Array, tension: Array, stretched: Array, series: Array | None = None
+    ) -> Array:
+        """Compute the same (…, C) from EA (1 + ε) (…, C), as :meth:`rigidities` gives it.
+
+        −1 stays where a tension is outside its law. ``series`` replaces the arm's own 1/k_series.
+        """
+        series = self.series if series is None else series
+        wire = lengths - series * (tension - self.rest)
         with np.errstate(divide="ignore"):
-            return frozen(np.where(stretched > 0.0, 1.0 / (wire / stretched + self.series), 0.0))
+            return np.where(stretched > 0.0, 1.0 / (wire / stretched + series), stretched)
 
     def rigidities(self, tension: Array) -> Array:
         """Compute EA (1 + ε) (…, C) [N] at F (…, C): 0: force-controlled; −1: outside, or NaN."""
@@ -97,34 +105,21 @@ class CableLaws:
             wire[of] /= self._evaluate(law, of, tension[of])[0]
         return frozen(wire)
 
-    def slopes(self, tension: Array, stiffness: Array) -> tuple[Array, Array]:
-        """Compute dk/dF (C,) [1/m] and d²k/dF² (C,) [1/(N m)] at a constant posture.
+    def stiffness_slope(self, tension: Array, stiffness: Array) -> Array:
+        """Compute dk/dF (C,) [1/m] at a constant posture, at which l_0 changes with F.
 
-        F (C,) [N] is ``tension``, k (C,) [N/m] the ``stiffness`` of each cable at F. The cable
-        length is constant, so l_0 changes with F. A prime is d/dF, R = EA (1 + ε), G = R′/R, and
-        the spring's share of the compliance of the cable is s = k/k_series. Then
+        F (C,) [N] is ``tension``, k (C,) [N/m] the ``stiffness`` of each cable at F. With R =
+        EA (1 + ε) and the spring's share of the compliance of the cable, s = k/k_series,
 
-            k′ = k A,  k″ = k (A² + A′),  A = s/R + (1 − s) G,
-            A′ = s (A/R − G/R − A G) + (1 − s) G′.
-
-        G′ is computed by finite differences and has about five correct digits.
+            dk/dF = k (s/R + (1 − s) R′/R),      R′ = EA′ (1 + ε) + 1.
         """
-        first, second = np.zeros_like(stiffness), np.zeros_like(stiffness)
+        slope = np.zeros_like(stiffness)
         for law, of in self.held:
-            F, k, s = tension[of], stiffness[of], stiffness[of] * self.series[of]
-            step = _STEP * np.maximum(F, 1.0)
-            beside = np.where(F + step <= law.high, F + step, F - step)
-            both = np.stack([F, beside])
-            stretch, EA = self._evaluate(law, of, both)
-            # (EA (1 + ε))′ = EA′ (1 + ε) + 1
-            slopes = law.rigidity_slope(both) * stretch + float(self._unstrained)
-            R = EA[0] * stretch[0]
-            G = slopes[0] / R
-            bend = (slopes[1] - slopes[0]) / (beside - F) / R - G**2
-            A = s / R + (1.0 - s) * G
-            first[of] = k * A
-            second[of] = k * (A**2 + s * (A / R - G / R - A * G) + (1.0 - s) * bend)
-        return frozen(first), frozen(second)
+            stretch, EA = self._evaluate(law, of, tension[of])
+            share = stiffness[of] * self.series[of]
+            rise = law.rigidity_slope(tension[of]) * stretch + float(self._unstrained)
+            slope[of] = stiffness[of] * (share + (1.0 - share) * rise) / (EA * stretch)
+        return frozen(slope)
 
     def _evaluate(
         self, law: Elasticity, of: slice | NDArray[np.intp], tension: Array

@@ -160,6 +160,7 @@ class InfeasibleTension(CdsmError):
     leave, and ``joint`` the name of the joint with most of it. Of the cables without a fixed
     tension, ``binding`` names those at a bound then, and ``relaxation`` [N] is the least widening
     of all bounds that helps, or inf. ``fixed`` names the cables if their fixed tensions prevent it.
+    ``hint`` becomes part of the message.
     """
 
     def __init__(
@@ -170,22 +171,24 @@ class InfeasibleTension(CdsmError):
         binding: Texts,
         units: tuple[str, str] = ("N m", "N m"),
         fixed: Texts = (),
+        hint: str = "",
     ) -> None:
         self.missing, self.joint, self.relaxation = missing, joint, relaxation
         self.binding, self.fixed = tuple(binding), tuple(fixed)
         if fixed:
-            remedy = f"Beside the fixed tensions no bounds help: change or free {', '.join(fixed)}."
+            advice = f"Beside the fixed tensions no bounds help: change or free {', '.join(fixed)}."
         elif relaxation == math.inf:
-            remedy = "No bounds would help: the cables cannot exert this torque at all. Change the "
-            remedy += "posture, the load, or the routing (in Python, print(pose.moment_arms))."
+            advice = f"No bounds would help: the cables cannot exert this torque at all. {hint}"
+            advice += "Change the posture, the load, or the routing (in Python, "
+            advice += "print(pose.moment_arms))."
         else:
             step = 10.0 ** (math.floor(math.log10(relaxation or 1.0)) - 3)
             wider, at = math.ceil(relaxation / step) * step, ", ".join(binding) or "none"
-            remedy = f"Widening every bound by {wider:.4g} N would be enough (cables at a bound: "
-            remedy += f"{at}). Lower minimum=, raise maximum=, or reduce the load."
+            advice = f"Widening every bound by {wider:.4g} N would be enough (cables at a bound: "
+            advice += f"{at}). Reduce the load{hint and f', or {hint}'}."
         said = f"no tension within the bounds balances the arm: {abs(missing).sum():.4g} {units[0]}"
         said += f" are missing, most of it ({abs(missing).max():.4g} {units[1]}) at {joint}. "
-        super().__init__(said + remedy)
+        super().__init__(said + advice)
 
 
 class SolverError(CdsmError):
@@ -236,19 +239,27 @@ class UnreachableStiffness(CdsmError):
     """A stiffness ``target`` [N/m] along ``direction`` that no admissible cable tensions give.
 
     ``low`` and ``high`` (or inf) [N/m] are the ends of the range, ``nearest`` the end next to the
-    target, or the values that were found below and above it.
+    target, or the values that were found below and above it. ``hint``, which may say how to widen
+    the range, becomes part of the message.
     """
 
     def __init__(
-        self, direction: Array, target: float, low: float, high: float, nearest: Numbers
+        self,
+        direction: Array,
+        target: float,
+        low: float,
+        high: float,
+        nearest: Numbers,
+        hint: str = "",
     ) -> None:
         self.direction, self.target, self.low, self.high = direction, target, low, high
         self.nearest = tuple(map(float, nearest))
         wanted, least, most, *near = _distinct([x / 1e3 for x in (target, low, high, *nearest)])
         if low <= target <= high:
-            remedy = f", but only {' and '.join(near)} N/mm found. Raise starts=, ask for these."
+            remedy = f", but only {' and '.join(near)} N/mm found. Ask for one of these."
         else:
-            remedy = ". Ask for one within it, or change the bounds, load, posture or cables."
+            remedy = f". Ask for one within it, {hint and f'{hint}, '}or change the load, posture "
+            remedy += "or cables."
             if low <= 1e3 * target <= high:
                 remedy += " It looks as if the target is in N/mm: give it in N/m."
         along = f"({', '.join(f'{each:.4g}' for each in direction)})"

@@ -362,13 +362,18 @@ def along(K: Array, size: Array, JX: Array, u: Array, skew: bool, out: Array, pi
 
 
 @lane
-def _paired(J: Array, p: int, q: int, i: int, j: int, out: Array) -> None:
-    """Copy the moment arms of cables p and q about the axes i and j; of p alone if i = j."""
-    for w in each(out):
-        out[0, 0, w] = J[p, i, w]
-        out[0, 1, w] = J[p, j, w] if i != j else 0.0
-        out[1, 0, w] = J[q, i, w] if i != j else 0.0
-        out[1, 1, w] = J[q, j, w] if i != j else 1.0
+def _paired(J: Array, p: int, q: int, i: int, j: int, least: float, out: Array) -> None:
+    """Copy the moment arms of cables p and q about axes i and j, or of p alone if i = j.
+
+    Those below ``least`` are rounding: the cable crosses the axis.
+    """
+    for n in range(2):
+        c = q if n else p
+        for m in range(2):
+            axis = j if m else i
+            for w in each(out):
+                lever = J[c, axis, w] if i != j or m == n == 0 else 1.0 * (m == n)
+                out[n, m, w] = pick(np.abs(lever) < least, 0.0, lever)
 
 
 @lane
@@ -438,7 +443,7 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
             best[0], best[1] = np.inf, -1.0
             for m in range(arm.pair_ends[n], arm.pair_ends[n + 1]):
                 p, q = arm.pairs[m, 0], arm.pairs[m, 1]
-                _paired(J, p, q, i, j, J2)
+                _paired(J, p, q, i, j, arm.least, J2)
                 _weighed(J2, rest, low[b, p], low[b, q] if i != j else none, m, best)
             for m in range(arm.pair_ends[n], arm.pair_ends[n + 1]):
                 p, q = arm.pairs[m, 0], arm.pairs[m, 1]
@@ -459,7 +464,7 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
             both[:] = 0.0
             for m in range(arm.pair_ends[n], arm.pair_ends[n + 1]):
                 p, q = arm.pairs[m, 0], arm.pairs[m, 1]
-                _paired(J, p, q, i, j, J2)
+                _paired(J, p, q, i, j, arm.least, J2)
                 _multiplied(J2, left[p], left[q] if i != j else none, chosen[n], m, both)
             y[j], y[i] = both[1], both[0]
             for c in own:

@@ -188,11 +188,6 @@ class RigidBody:
             tip_point=tip.placement.translation.copy(),
         )
 
-    def pseudo_inertias(self) -> Array:
-        """Compute :func:`pseudo_inertia` (1 + nv, 4, 4) of what the base and the joints carry."""
-        bodies = [self._model.inertias[i] for i in self._rows]
-        return np.array([pseudo_inertia(each.mass, each.lever, each.inertia) for each in bodies])
-
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
         """Draw the visual shapes of a URDF below a node of a viser server, and return them.
 
@@ -251,19 +246,6 @@ def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]
     if faults := faults + [f"has too many of {name!r}" for name in more]:
         raise InvalidInput("joint_names", f"{listed(faults)}; name each joint that moves once.")
     return tuple(wanted)
-
-
-def pseudo_inertia(mass: float, centre: Array, inertia: Array) -> Array:
-    """Compute the second moments ∫(r, 1)(r, 1)ᵀ dm (4, 4) of a body, which add up.
-
-    ``inertia`` (3, 3) is about the centre of mass.
-    """
-    moments = np.empty((4, 4))
-    about_centre = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    moments[:3, :3] = about_centre + mass * np.outer(centre, centre)
-    moments[:3, 3] = moments[3, :3] = mass * centre
-    moments[3, 3] = mass
-    return moments
 
 
 def accepts(urdf: str) -> bool:

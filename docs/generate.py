@@ -39,7 +39,7 @@ CHAPTERS = {
     "sweeps": "Many postures",
     "support": "Many postures",
     "planning": "Planning",
-    "uncertainties": "Uncertainty",
+    "tolerancing": "Uncertainty",
     "identification": "Identification",
     "interchange": "Other programs",
     "control": "Control",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -119,10 +118,6 @@ class OfPostures(Result):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.arm.name}, {summary(self.status)}>"
-
-    @property
-    def _posture(self) -> Any:
-        return SimpleNamespace(arm=self.arm, _coordinates={})
 
     def _units(self) -> dict[str, str]:
         return {**super()._units(), "lever": JointUnits(self.arm.slides).joined("m/rad", "1")}

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from itertools import combinations
 from typing import NamedTuple, TypeVar
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array, frozen
+from cdsm.tension.solvers import NO_ARM
 
 Indices = NDArray[np.intp]
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
@@ -34,6 +34,7 @@ class Arm(NamedTuple):
     tip: int  # frame of the tip
     tip_rotation: Array  # (3, 3)
     gravity: Array  # (3,) [m/s²]
+    least: float  # moment arms below this are rounding [m]
     axes: NDArray[np.intp]  # joints of the K blocks of the kernel guess, from base to tip (nv,)
     axis_ends: NDArray[np.intp]  # where each block begins in axes, and the last ends (K+1,)
     cables: NDArray[np.intp]  # cables of the blocks (C,)
@@ -117,6 +118,7 @@ class ArmRows:
             tip=int(frame[tree.tip]),
             tip_rotation=frozen(tree.tip_rotation),
             gravity=frozen(np.array(arm.gravity)),
+            least=NO_ARM * arm.length,
             **_blocks(pulls),
         )
         self.dimensions = Body(
@@ -155,14 +157,10 @@ class ArmRows:
         return sum(math.prod(shape) for shape in self.shapes.values())
 
 
-_made: WeakKeyDictionary[Manipulator, ArmRows] = WeakKeyDictionary()
-
-
+@lru_cache(maxsize=16)
 def rows_of(arm: Manipulator) -> ArmRows:
     """Return the arrays of an arm, which are made once."""
-    if arm not in _made:
-        _made[arm] = ArmRows(arm)
-    return _made[arm]
+    return ArmRows(arm)
 
 
 def side_by_side(values: Array, width: int) -> Array:

@@ -32,14 +32,15 @@ from cdsm.batch.search import explained, search
 from cdsm.manipulator import LIMIT_SLACK, Manipulator
 from cdsm.routing import SHORTEST_SEGMENT
 from cdsm.support.status import Status
-from cdsm.support.values import Array
+from cdsm.support.values import Array, frozen
 
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
+_Result = TypeVar("_Result")
 Springs = Callable[[Array, Array, slice], Array]
 
 # numbers of the poses of a chunk, compiled and by numpy, where a chunk has one block; 64 postures
 # side by side are fastest, or 32 of long arms
-_CACHE, _WIDE = 2**18, 2**21
+_CACHE, _WIDE = 2**19, 2**21
 _LOST = (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES)
 _NO_TENSION = (*_LOST, Status.INFEASIBLE, Status.SOLVER_FAILED)
 _NO_STIFFNESS = (*_NO_TENSION, Status.OUTSIDE_ELASTICITY)
@@ -81,9 +82,6 @@ class Rows:
         """Compute the quantities by name (N, …); set the ``status`` (N,) of rows that are OK."""
         arm, table, count = self.arm, rows_of(self.arm), len(self.q)
         kernels = kernels_for(table, count)
-        if self.check_limits:
-            beyond = (self.q < arm.lower - LIMIT_SLACK) | (self.q > arm.upper + LIMIT_SLACK)
-            status[beyond.any(axis=1)] = Status.BEYOND_LIMITS
         width, size = 32 if arm.nv >= 80 else 64, min(max(1, _WIDE // table.size), 2048)
         if kernels.COMPILED:
             size = width * max(1, _CACHE // (table.size * width))
@@ -91,12 +89,13 @@ class Rows:
         shapes = shapes_of(arm.nv, len(arm.cables), len(self.directions))
         values = {name: np.empty((count, *shapes[name])) for name in self.names}
 
-        scratch = threading.local()
+        # to pass on the interpreter's lock at each small call would take longer than the call
+        scratch, turn = threading.local(), threading.Lock()
 
         def fill(part: slice) -> None:
             memory = scratch.__dict__.setdefault("of", {})
-            with np.errstate(all="ignore"):
-                found = _Chunk(self, kernels, part, width, status[part], memory).quantities()
+            with turn, np.errstate(all="ignore"):
+                found = _Chunk(self, kernels, part, width, status[part], memory, turn).quantities()
             for name in self.names:
                 values[name][part] = found[name]
 
@@ -121,9 +120,10 @@ class _Chunk:
         width: int,
         status: Codes,
         memory: dict[str, Array],
+        turn: threading.Lock,
     ) -> None:
         self._rows, self._kernels, self._part, self._status = rows, kernels, part, status
-        self._memory = memory
+        self._memory, self._turn = memory, turn
         self._table, self._names = rows_of(rows.arm), set(rows.names)
         self._q = rows.q[part]
         self._width = width if kernels.COMPILED else len(self._q)
@@ -131,19 +131,26 @@ class _Chunk:
     def quantities(self) -> dict[str, Array]:
         """Compute the quantities (n, …); NaN where one does not exist, as the status says."""
         table, rows, status = self._table, self._rows, self._status
+        if rows.check_limits:
+            low, high = rows.arm.lower - LIMIT_SLACK, rows.arm.upper + LIMIT_SLACK
+            beyond = ((self._q < low) | (self._q > high)).any(axis=1)
+            status[beyond] = Status.BEYOND_LIMITS
         W, q = self._lanes(rows.wrench), side_by_side(self._q[:, table.order], self._width)
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
-        self._kernels.pose(table.arm, self._body(), q, W, at)
+        self._aside(self._kernels.pose, table.arm, self._body(), q, W, at)
         short = self._alone(at.shortest) < SHORTEST_SEGMENT
         status[short & (status == Status.OK)] = Status.COINCIDENT_SITES
         found = self._of_posture(at)
         if not self._names <= found.keys():
             F = self._tensions(at)
             L, pull = self._alone(at.length), self._alone(F)
+            laws = rows.arm._laws
             if self._names <= {*OF_POSTURE, *OF_TENSION}:
                 k = np.zeros_like(pull)
+            elif rows.springs is not None:
+                k = rows.springs(L, pull, self._part)
             else:
-                k = (rows.springs or springs_of(rows.arm))(L, pull, self._part)
+                k = laws.stiffness_of(L, pull, laws.rigidities(pull))
             if k.min(initial=0.0) < 0.0:
                 outside = (k < 0.0).any(axis=1) & (status == Status.OK)
                 status[outside] = Status.OUTSIDE_ELASTICITY
@@ -184,7 +191,7 @@ class _Chunk:
         low, high = map(self._lanes, rows.bounds)
         F, good = np.empty(shape), np.zeros((shape[0], shape[2]), dtype=np.bool_)
         if len(self._table.arm.pairs):
-            self._kernels.guess(self._table.arm, at, low, high, F, good)
+            self._aside(self._kernels.guess, self._table.arm, at, low, high, F, good)
         for n in np.flatnonzero(~self._alone(good) & (status == Status.OK)):
             b, w = divmod(int(n), self._width)
             at_row = at.jacobian[b, ..., w], at.torque[b, :, w], low[b, :, w], high[b, :, w]
@@ -208,14 +215,17 @@ class _Chunk:
         if not wanted:
             return found
         if not fused:
-            read_off, status[fine] = read(wanted, terms[fine], _jacobian(at, fine), u)
+            of_tip = _jacobian(at, fine)
+            read_off, status[fine] = self._aside(read, wanted, terms[fine], of_tip, u)
             for name, value in read_off.items():
                 found[name] = np.full((len(status), *value.shape[1:]), np.nan)
                 found[name][fine] = value
             return found
         shape = len(F), len(u), self._width
         along, pivot, moment = np.empty(shape), np.empty(shape[::2]), bool(W[:, 3:].any())
-        self._kernels.along(K, size, at.tip_jacobian, u, moment, along, pivot)
+        # a copy is writable, whatever u is: the kernel compiles once
+        kernel = self._kernels.along
+        self._aside(kernel, K, size, at.tip_jacobian, u.copy(), moment, along, pivot)
         found["along"] = self._alone(along)
         doubtful = fine[~(self._alone(pivot)[fine] > _PIVOT)]
         if doubtful.size:
@@ -231,7 +241,7 @@ class _Chunk:
         B, nv, _ = at.gravity.shape
         K = self._empty("K", B, 4 if apart else 1, nv, nv)
         size = self._empty("size", B, nv)
-        self._kernels.stiffness(self._table.arm, at, F, k, W, K, size)
+        self._aside(self._kernels.stiffness, self._table.arm, at, F, k, W, K, size)
         return K, size
 
     def _finished(self, name: str, value: Array) -> Array:
@@ -248,6 +258,14 @@ class _Chunk:
         lost = np.isin(status, kinds)
         return np.where(lost.reshape(-1, *[1] * (value.ndim - 1)), np.nan, value)
 
+    def _aside(self, function: Callable[..., _Result], *arguments: object) -> _Result:
+        """Compute while another thread has its turn at the small calls of numpy in between."""
+        self._turn.release()
+        try:
+            return function(*arguments)
+        finally:
+            self._turn.acquire()
+
     def _empty(self, name: str, blocks: int, *shape: int) -> Array:
         """Return memory that the next chunk uses again: fresh pages cost as much as kernels."""
         kept = self._memory.get(name)
@@ -258,7 +276,8 @@ class _Chunk:
     def _body(self) -> Body:
         if self._rows.body is None:
             return self._table.body(self._width if self._kernels.COMPILED else 1)
-        return Body(*(side_by_side(x[self._part], self._width) for x in self._rows.body))
+        rows = (side_by_side(x[self._part], self._width) for x in self._rows.body)
+        return Body(*map(frozen, rows))  # as those of the arm: kernels compile once
 
     def _lanes(self, x: Array) -> Array:
         """Put the rows of an array side by side, or repeat its only row."""
@@ -272,18 +291,6 @@ class _Chunk:
     def _picked(self, x: Array, rows: NDArray[np.intp]) -> Array:
         b, w = np.divmod(rows, self._width)
         return side_by_side(x[b, ..., w], self._width)
-
-
-def springs_of(arm: Manipulator) -> Springs:
-    """Return the stiffness of the cables of an arm, by numpy for all of its laws."""
-    laws = arm._laws
-
-    def stiffness(L: Array, F: Array, _: slice) -> Array:
-        stretched = laws.rigidities(F)
-        wire = L - laws.series * (F - laws.rest)
-        return np.where(stretched > 0.0, 1.0 / (wire / stretched + laws.series), stretched)
-
-    return stiffness
 
 
 def _jacobian(at: Pose, rows: NDArray[np.intp]) -> Array:

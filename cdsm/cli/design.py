@@ -44,7 +44,7 @@ def design(
         bool,
         typer.Option(
             "--refine",
-            help="Improve the chosen design by exact derivatives: one objective, continuous "
+            help="Improve the chosen design by SLSQP: one objective, continuous "
             "variables. Only designs.csv still has the designs of the search.",
         ),
     ] = False,

@@ -15,7 +15,7 @@ from cdsm.cli.output import answer, write_picture
 from cdsm.cli.values import misuse
 
 if TYPE_CHECKING:
-    from cdsm.identification.arm_parameters import ArmParameters
+    from cdsm.parameters import ArmParameters
 
 Range = tuple[float, float]
 
@@ -64,8 +64,9 @@ def identify(
     loop of force and displacement. The answer gives each parameter with a 95 % interval, and warns
     of parameters that the tests do not determine.
     """
-    from cdsm.identification.arm_parameters import ArmParameters
-    from cdsm.identification.experiment import plan_tests
+    from cdsm.identification.experiment_plan import plan_tests
+    from cdsm.parameters import ArmParameters
+    from cdsm.support.format import aligned, plain
 
     described = arm.read()
     ranges = _ranges(free)
@@ -83,9 +84,16 @@ def identify(
     start = shown.present
     inside = all(low <= start[label] <= high for label, (low, high) in bounds.items())
     found = cdsm.identify(shown.arm_of, read, bounds, start=start if inside else None)
+    intervals = found.confidence()
     write_picture(figure, found.plot)
     warnings = [f"warning: {sentence}" for sentence in found.warnings]
-    answer(as_json, found.to_dict, found, warnings=warnings)
+    rows = [("95 % by the profile of χ²", "from", "to")]
+    rows += [(name, f"{low:.4g}", f"{high:.4g}") for name, (low, high) in intervals.items()]
+
+    def as_dict() -> dict[str, object]:
+        return found.to_dict() | plain({"interval_95": intervals})
+
+    answer(as_json, as_dict, found, "\n".join(aligned(rows)), warnings=warnings)
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:

@@ -51,7 +51,7 @@ def weigh(
     test = cdsm.weight_test(pose, tension, force, steps=steps)
     write_picture(figure, test.plot)
     without = " without friction" if pose.arm.has_friction else ""
-    loaded = f"at the full load{without}:\n{test.loaded[-1]}"
+    loaded = f"at the full load{without}:\n{test.states[-1]}"
     warnings = (*cdsm.stiffness(pose, tension).warnings, *test.warnings)
     conditions = tensions.conditions(pose, friction=True)
     answer(as_json, test.to_dict, conditions, test, loaded, warnings=warnings)
@@ -93,7 +93,7 @@ def buckle(
         least = 10.0 if min_tension is None else min_tension
         most = math.inf if max_tension is None else max_tension
         low = (least,)
-        found.append(cdsm.critical_load(pose, multiplied, least, most, carried=carried))
+        found.append(cdsm.critical_load(pose, multiplied, least, most, wrench=carried))
     write_picture(figure, tension.plot)
     answer(
         as_json,

@@ -25,8 +25,8 @@ def reproduce(
 ) -> None:
     """Recompute Figs. 3 to 8, 10, 12 and 13 of the paper: figures, table and numbers.
 
-    Prints, for each figure, the number that deviates most from the paper. reproduction.md has
-    all numbers, what was assumed, and what other interpretations of the paper's text give.
+    Prints every number of the paper beside ours. reproduction.md also has what was assumed, and
+    what other interpretations of the paper's text give.
     """
     from cdsm.support.files import make_folder, write_text
     from cdsm.support.format import aligned
@@ -45,7 +45,7 @@ def reproduce(
     if as_json:
         typer.echo(numbers)
         return
-    rows = [paper.SUMMARY, *paper.to_summary(results)]
-    typer.echo("\n".join(aligned(rows)))
+    rows = [(f"{row[0]}: {row[1]}", *row[2:5]) for row in paper.to_rows(results)]
+    typer.echo("\n".join(aligned([("quantity", *paper.HEADER[2:5]), *rows])))
     typer.echo(f"\nall numbers, and what each is: {out / 'reproduction.md'}")
     typer.echo("written: " + ", ".join(map(str, written)))

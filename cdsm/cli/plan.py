@@ -84,7 +84,13 @@ def plan(
         targets = one_target(wanted, file.target, "--target")
         bounds = min_tension, max_tension, load.at_tip(robot)
         plan = cdsm.plan_path(
-            robot, u, targets, *bounds, angles=file.angles, tips=file.tips, rate=rate
+            robot,
+            u,
+            targets,
+            *bounds,
+            angles=file.angles,
+            tips=file.tips,
+            max_change_per_sample=rate,
         )
         write(out, plan.write)
         write_picture(figure, plan.plot)
@@ -100,14 +106,13 @@ def plan(
         raise misuse("--target", "give it, or --path.")
     elif math.isfinite(rate) or animation is not None:
         option = "--rate" if math.isfinite(rate) else "--animation"
-        raise misuse(option, "is of a path; give --path, too.")
+        raise misuse(option, "needs --path.")
     else:
         pose = arm.at("0" if angles is None else angles)
         bounds = min_tension, max_tension, load.at_tip(pose.arm)
         attainable = cdsm.stiffness_range(pose, u, *bounds)
         best = cdsm.plan_stiffness(pose, u, wanted, *bounds)
-        if out is not None:  # repeats the search as a path of one sample
-            write(out, cdsm.plan_path(pose.arm, u, wanted, *bounds, angles=[pose.q]).write)
+        write(out, best.write)
         write_picture(figure, lambda: best.plot(attainable))
         conditions = Conditions(pose, (min_tension,), planned=True)
         results = [attainable, best]

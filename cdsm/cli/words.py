@@ -19,6 +19,7 @@ _OPTIONS: Final = {name: f"--{name.replace('_', '-')}" for name in _ALIKE} | {
     "displacement_std": "--reading-std",
     "maximum": "--max-tension",
     "minimum": "--min-tension",
+    "max_change_per_sample": "--rate",
     "outputs": "--quantities",
     "q": "--angles",
     "store": "--resume",
@@ -27,7 +28,6 @@ _OPTIONS: Final = {name: f"--{name.replace('_', '-')}" for name in _ALIKE} | {
 
 _PYTHON: Final = (
     (", or, in Python, pass check_limits=False to compute beyond them.", "."),
-    ("Raise starts=, ask", "Ask"),
     ("expected value. Give a small one.", "expected value. Give a small one: --friction 0.05."),
     ("by its slack_below()", "with --slack-below"),
     ("slack_below()", "--slack-below"),

@@ -3,14 +3,29 @@
 :func:`cdsm.track` runs the loop, with :class:`cdsm.Sensors` and a plant.
 """
 
-from cdsm.control.laws import Command as Command
-from cdsm.control.laws import ControlInput as ControlInput
-from cdsm.control.laws import Law as Law
-from cdsm.control.laws import Reference as Reference
-from cdsm.control.laws import feedforward as feedforward
-from cdsm.control.laws import limited as limited
-from cdsm.control.laws import mixed as mixed
-from cdsm.control.laws import tension_control as tension_control
-from cdsm.control.observer import with_rigidity as with_rigidity
+from cdsm.control.laws import (
+    Command,
+    ControlInput,
+    Law,
+    Reference,
+    feedforward,
+    limited,
+    mixed,
+    tension_control,
+)
+from cdsm.control.observer import with_rigidity
 from cdsm.control.plants import Plant as Plant
-from cdsm.control.sensors import Measurement as Measurement
+from cdsm.control.sensors import Measurement
+
+__all__ = [
+    "Command",
+    "ControlInput",
+    "Law",
+    "Measurement",
+    "Reference",
+    "feedforward",
+    "limited",
+    "mixed",
+    "tension_control",
+    "with_rigidity",
+]

@@ -26,7 +26,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cdsm.control.sensors import Measurement, Sensors
-from cdsm.friction.chain_problem import ChainProblem
+from cdsm.friction.capstan import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.values import Array
@@ -65,7 +65,7 @@ class Observer:
         pose = self.arm.at(q)
         cable = pose.segments.chains.cable
         T = np.clip(measured.tension, *self._domains)[cable]
-        rest_length = self._problem.natural(pose.segments.lengths, T)
+        rest_length = self._problem.rest_lengths(pose.segments.lengths, T)
         one, shares = np.ones(len(self.arm.cables)), np.ones(cable.size)
         force = self._tip_force(pose, T)
         return Estimate(pose, one, force, 1.0, _UNSURE**2, rest_length, shares)
@@ -115,7 +115,7 @@ class Observer:
         ratio = np.add.reduceat(shares * segments.lengths, chains.start[:-1]) / pose.cable_lengths
         force = self._tip_force(pose, chain.tension)
         return before._replace(
-            pose=pose, ratio=ratio, force=force, rest_length=chain.natural, shares=shares
+            pose=pose, ratio=ratio, force=force, rest_length=chain.rest_length, shares=shares
         )
 
     def _tip_force(self, pose: Posture, tension: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple, Protocol, TypeVar, final
+from typing import NamedTuple, Protocol, TypeVar, final
 
 import numpy as np
 
@@ -13,13 +13,11 @@ from cdsm.control.sensors import Measurement
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.load_cycle import slow_loading
-from cdsm.statics.slow_loading import Load, SlowLoading, State
+from cdsm.statics import quasi_static
+from cdsm.statics.quasi_static import Load, QuasiStaticArm
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import instance
+from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
-
-_ACCURACY: Final = 0.1  # of the energy balance of a step, as in cdsm.load_cycle
 
 
 class PlantState(Protocol):
@@ -60,20 +58,20 @@ class Plant(Protocol[AnyState]):
 class QuasiStaticState(NamedTuple):
     """State of a :class:`QuasiStaticPlant`: the wire in each segment depends on earlier loads."""
 
-    loading: SlowLoading  # the arm
+    loading: QuasiStaticArm
     initial_paid_out: Array  # l_0 (C,) [m] at the posture where the plant began
-    state: State  # posture, load and wire in each segment
+    state: quasi_static.QuasiStaticState  # posture, load and wire in each segment
 
     @property
     def pose(self) -> Posture:
         """The true posture."""
-        return self.state.pose
+        return self.state.arm_state.pose
 
     @property
     def true_values(self) -> Measurement:
         """True length of the wire paid out [m] and tension [N] at each motor, both (C,)."""
         taken_in = np.where(self.loading.forced, 0.0, self.state.load.motors)
-        tension = self.state.settled.chain.tension[self.loading.start[:-1]]
+        tension = self.state.arm_state.tension[self.loading.start[:-1]]
         return Measurement(frozen(self.initial_paid_out - taken_in), frozen(tension))
 
 
@@ -87,22 +85,26 @@ class QuasiStaticPlant:
 
     Attributes:
         arm: The true arm.
+        substeps: Number of equal sub-steps of a step, as in :func:`~cdsm.load_cycle`.
 
     Raises:
-        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``.
+        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``, or ``substeps`` is not
+            a positive whole number.
     """
 
     arm: Manipulator
+    substeps: int = 1
 
     def __post_init__(self) -> None:
         require_unstrained("arm", self.arm)
+        whole_number("substeps", self.substeps, 1)
 
     def initial(self, q: Array, tension: Array, wrench: Array) -> QuasiStaticState:
         """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         pose = self.arm.at(q)
-        loading = slow_loading(pose, tension, wrench, _ACCURACY)
+        loading = QuasiStaticArm(pose, tension)
         paid_out = self.arm._laws.original_lengths(pose.cable_lengths, tension)
-        return QuasiStaticState(loading, paid_out, loading.begin(tension, wrench))
+        return QuasiStaticState(loading, paid_out, loading.initial(wrench))
 
     def step_to(self, state: QuasiStaticState, command: Command, wrench: Array) -> QuasiStaticState:
         """Return the state after ``state``, as :meth:`Plant.step_to` describes.
@@ -113,7 +115,8 @@ class QuasiStaticPlant:
         taken_in = state.initial_paid_out - command.paid_out
         motors = np.where(loading.forced, command.tension, taken_in)
         load = Load(wrench, np.zeros(self.arm.nv), motors)
-        return state._replace(state=loading.carry(state.state, load, "the step")[0])
+        moved, *_ = loading.step_to(state.state, load, self.substeps, "the step")
+        return state._replace(state=moved)
 
 
 def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:

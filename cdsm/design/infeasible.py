@@ -8,10 +8,11 @@ import numpy as np
 
 from cdsm.design.evaluation import Designs
 from cdsm.design.goals import KINDS
-from cdsm.design.quantities import balanced, quiet_arm, with_margin
+from cdsm.design.quantities import quiet_arm, with_margin
 from cdsm.errors import CdsmError, InfeasibleDesign, JointLimitError
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.format import plural
+from cdsm.tension import distribute_tension
 
 
 def explain(designs: Designs) -> NoReturn:
@@ -70,15 +71,19 @@ def _first_reason(designs: Designs, best: int) -> str:
     is raised. If all postures are held here, the text says that the tensions are at the edge.
     """
     problem, row = designs.problem, designs.designs[best]
-    held, loads = 0, len(problem.loads)
+    bounds, worst = (problem.minimum_of(row), problem.maximum), problem.worst_friction
+    number = 0
     try:
-        for tension, _ in balanced(problem, row, quiet_arm(problem, row), problem.loads):
-            K = stiffness(tension.posture, tension)
-            if not K.is_stable:
-                margin = f"{KINDS['margin'].words} {K.margin:.3g} N m/rad"
-                return f"posture {held // loads}: UNSTABLE, {margin}"
-            held += 1
+        arm = quiet_arm(problem, row)
+        for number, q in enumerate(problem.postures_of(arm)):
+            pose = arm.at(q)
+            for load in problem.loads:
+                tension = distribute_tension(pose, *bounds, load, worst_friction=worst)
+                K = stiffness(pose, tension)
+                if not K.is_stable:
+                    margin = f"{KINDS['margin'].words} {K.margin:.3g} N m/rad"
+                    return f"posture {number}: UNSTABLE, {margin}"
     except CdsmError as error:
         why = error.problem if isinstance(error, JointLimitError) else error
-        return f"posture {held // loads}: {why}"
+        return f"posture {number}: {why}"
     return "its tensions are at the edge"

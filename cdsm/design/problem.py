@@ -216,12 +216,13 @@ class DesignProblem(ReadOnlyState):
             )
             for cable, kept in zip(routed, like, strict=True)
         ]
-        return Manipulator(
+        made = Manipulator(
             geometry,
             cables=cables,
             gravity=self.arm.gravity,
             original_length=self.arm.original_length,
         )
+        return made.with_tolerances(self.arm.tolerances)
 
     def minimum_of(self, design: ArrayLike) -> float:
         """Return the lower bound of the tensions [N] in a design (n,); see :meth:`values`."""

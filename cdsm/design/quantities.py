@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,19 +23,20 @@ from cdsm.measures.rows import (
     narrowed_bounds,
     payloads,
 )
+from cdsm.stiffness_matrix import stiffness
 from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array
-from cdsm.tension import Tension, distribute_tension, grip
-from cdsm.uncertainties.budget import uncertainty
-from cdsm.uncertainties.readings import Reading
+from cdsm.tension import distribute_tension
+from cdsm.tolerancing.budget import propagate
+from cdsm.tolerancing.measurand import Measurand, MeasurandName
 
-_SURE: dict[str, tuple[Reading, float]] = {
+_SURE: dict[str, tuple[MeasurandName, float]] = {
     "stiffness": ("along", -1.0),
     "margin": ("margin", -1.0),
     "motor_force": ("tension", 1.0),
 }
-"""For each quantity with a margin: the reading with this uncertainty, and the margin's sign."""
+"""For each quantity with a margin: the measurand that it is, and the margin's sign."""
 
 
 class Found(NamedTuple):
@@ -50,12 +51,25 @@ class Found(NamedTuple):
 
 def measure(problem: DesignProblem, row: Array) -> Found:
     """Compute the quantities of one design ``row`` (n,), in the order of ``problem.measures``."""
+    return measure_cases(problem, row, ())[0]
+
+
+def measure_cases(
+    problem: DesignProblem, row: Array, goals: Sequence[Measure]
+) -> tuple[Found, list[Array] | None]:
+    """Compute the quantities of a design, and each of ``goals`` at all postures and loads.
+
+    A goal that has a margin for tolerances has it everywhere. The list is None if no arm can be
+    built from the design, or if one posture is not held.
+    """
     try:
         arm = quiet_arm(problem, row)
     except CdsmError as error:
         fault = "; ".join(error.faults) if isinstance(error, GeometryError) else str(error)
-        return Found(np.full(len(problem.measures), math.nan), fault)
-    return Found(_Arm(problem, row, arm).values())
+        return Found(np.full(len(problem.measures), math.nan), fault), None
+    found = _Arm(problem, row, arm)
+    held = found.held.all()
+    return Found(found.values()), [found.sure(each) for each in goals] if held else None
 
 
 def quiet_arm(problem: DesignProblem, design: Array) -> Manipulator:
@@ -63,22 +77,6 @@ def quiet_arm(problem: DesignProblem, design: Array) -> Manipulator:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CdsmWarning)
         return problem.arm_of(design)
-
-
-def balanced(
-    problem: DesignProblem, design: Array, arm: Manipulator, loads: Array
-) -> Iterator[tuple[Tension, Array]]:
-    """Yield the least tensions at each posture under each of ``loads`` (n, 6) [N, N m].
-
-    Each item also has exp(Σ μ φ) of the cables (C,), the factor by which friction (coefficient μ,
-    wrap angle φ) narrows their bounds. It is 1 without ``worst_friction``.
-    """
-    bounds, worst = (problem.minimum_of(design), problem.maximum), problem.worst_friction
-    for q in problem.postures_of(arm):
-        pose = arm.at(q)
-        loss = np.exp(grip(pose)) if worst else np.ones(len(arm.cables))
-        for load in loads:
-            yield distribute_tension(pose, *bounds, load, worst_friction=worst), loss
 
 
 class _Arm:
@@ -96,6 +94,7 @@ class _Arm:
         )
         self.found, stable = self._evaluated(self.loads)
         self.held = held & stable
+        self.margins: dict[tuple[str, int], Array] = {}
         self.of_pose: dict[str, Array] = {}
         wanted = {each.of for each in problem.measures} & {*CLEARANCES, "tension_factor"}
         if wanted:
@@ -124,68 +123,85 @@ class _Arm:
     def values(self) -> Array:
         return np.array([self._value(each) for each in self.problem.measures])
 
-    def rows(self, each: Measure) -> Array:
-        """Return a quantity that depends on tensions, in SI, for each held posture and load.
+    def cases(self, each: Measure) -> Array:
+        """Return a quantity in SI (n, k) for each held posture and load; k = 1.
 
-        They are held if tensions within the bounds balance the arm, and the arm is stable.
+        They are held if tensions within the bounds balance the arm, and the arm is stable. For
+        ``motor_force``, k counts the cables. What depends on neither is one case.
         """
-        held = self.held
+        held, links = self.held, self.arm.geometry.links
         C = self.found["compliance"][held][:, :3, :3]
-        if each.of == "stiffness":
-            u = np.array(each.direction)
-            with np.errstate(divide="ignore"):
-                return np.asarray(1.0 / np.maximum(np.einsum("i,nij,j->n", u, C, u), 0.0))
-        if each.of == "deflection":
-            unloaded, stable = self._evaluated(np.zeros_like(self.loads))
-            C = unloaded["compliance"][:, :3, :3]
-            moved = np.linalg.norm(np.einsum("nij,nj->ni", C, self.loads[:, :3]), axis=1)
-            return np.where(stable, moved, math.inf)[held]
-        if each.of == "margin":
-            return np.asarray(self.found["margin"][held])
-        if each.of == "softest":
-            return principal_stiffness(C)["softest"]
         bounds = self.q[held], self.loads[held], self.low[held], self.high[held]
-        if each.of == "payload":
-            return payloads(self.arm, *bounds, np.array(each.direction)[None])[:, 0]
-        if each.of == "force_radius":
-            return force_radii(self.arm, *bounds)
-        assert each.of == "motor_force"
-        along_cables = self.found["tension"][held] * self.loss[held]
-        return np.asarray(along_cables.max(axis=1))
+        match each.of:
+            case "mass":
+                found = np.array([sum(link.mass for link in links)])
+            case "length":
+                found = np.array([self.arm.geometry.length])
+            case "stiffness":
+                u = np.array(each.direction)
+                with np.errstate(divide="ignore"):
+                    found = 1.0 / np.maximum(np.einsum("i,nij,j->n", u, C, u), 0.0)
+            case "deflection":
+                unloaded, stable = self._evaluated(np.zeros_like(self.loads))
+                moved = np.einsum(
+                    "nij,nj->ni", unloaded["compliance"][:, :3, :3], self.loads[:, :3]
+                )
+                found = np.where(stable, np.linalg.norm(moved, axis=1), math.inf)[held]
+            case "margin":
+                found = self.found["margin"][held]
+            case "softest":
+                found = principal_stiffness(C)["softest"]
+            case "payload":
+                found = payloads(self.arm, *bounds, np.array(each.direction)[None])[:, 0]
+            case "force_radius":
+                found = force_radii(self.arm, *bounds)
+            case _:
+                return np.asarray(self.found["tension"][held] * self.loss[held])
+        return found[:, None]
+
+    def sure(self, each: Measure) -> Array:
+        """Return :meth:`cases` with the margin for tolerances of each, if the quantity has one."""
+        found = self.cases(each)
+        if has_margin(self.problem, each):
+            found = found + [self._margin(each, case) for case in range(len(found))]
+        return found
 
     def _value(self, each: Measure) -> float:
-        arm, held = self.arm, self.held
+        held = self.held
         if each.of == "held":
             return float(held.mean())
-        if each.of == "mass":
-            return sum(link.mass for link in arm.geometry.links)
-        if each.of == "length":
-            return arm.geometry.length
         if each.of == "workspace":
             return _volume(self.found["tip"][held][:, :3, 3])
-        if not held.any():
+        if not held.any() and each.of not in ("mass", "length"):
             return math.nan
         if each.of in self.of_pose:
             return float(self.of_pose[each.of].min())
         if each.of == "wire_length":
             return float(self.found["cable_lengths"][held].max(axis=0).sum())
-        rows = self.rows(each)
-        worst = int(rows.argmax() if KINDS[each.of].best == "least" else rows.argmin())
-        return float(rows[worst]) + self._margin(each, worst)
+        found = self.cases(each)
+        worst = found.argmax() if KINDS[each.of].best == "least" else found.argmin()
+        case, cable = divmod(int(worst), found.shape[1])
+        extra = self._margin(each, case)[cable] if has_margin(self.problem, each) else 0.0
+        return float(found[case, cable] + extra)
 
-    def _margin(self, each: Measure, worst: int) -> float:
-        """Return the margin for tolerances of a quantity, ± coverage · u, or 0 if it has none.
+    def _margin(self, each: Measure, case: int) -> Array:
+        """Compute the margin for tolerances (k,) of a quantity in one case, ± coverage · u.
 
-        u is the standard uncertainty at the worst posture and load, which have the index ``worst``
-        in :meth:`rows`.
+        The sign is that for which adding the margin makes the quantity worse. The arm is not built
+        yet: its tensions are the least ones of its dimensions, within bounds that do not change.
         """
-        if not has_margin(self.problem, each):
-            return 0.0
-        n = int(np.flatnonzero(self.held)[worst])
-        pose = self.arm.at(self.q[n])
-        F = distribute_tension(pose, self.low[n], self.high[n], self.loads[n])
-        c = int((F.values * self.loss[n]).argmax()) if each.of == "motor_force" else None
-        return margin(self.problem, each, F, self.loss[n], c)
+        if (each.key, case) not in self.margins:
+            n, (of, sign) = int(np.flatnonzero(self.held)[case]), _SURE[each.of]
+            bounds, pose = (self.low[n], self.high[n]), self.arm.at(self.q[n])
+            K = stiffness(pose, distribute_tension(pose, *bounds, self.loads[n]))
+            u = None if each.direction is None else np.array(each.direction)
+            tolerances, loss = self.problem.tolerances, self.loss[n] if of == "tension" else 1.0
+            assert tolerances is not None
+            measurand = Measurand(of, K, u, redistribute=True)
+            variances, *_ = propagate(measurand, measurand.inputs.groups(tolerances), {})
+            found = np.sqrt(sum(variances.values(), 0.0 * measurand.value()))
+            self.margins[each.key, case] = sign * self.problem.coverage * loss * found
+        return self.margins[each.key, case]
 
 
 def has_margin(problem: DesignProblem, each: Measure) -> bool:
@@ -206,28 +222,6 @@ def with_margin(problem: DesignProblem, each: Measure, words: str) -> str:
     if not has_margin(problem, each):
         return words
     return f"{words} {'+' if _SURE[each.of][1] > 0.0 else '-'} {problem.coverage:g} u"
-
-
-def margin(
-    problem: DesignProblem, each: Measure, tension: Tension, loss: Array, cable: int | None
-) -> float:
-    """Compute the margin for tolerances of a quantity, ± coverage · u.
-
-    u is its standard uncertainty. The sign is that for which adding the margin makes the quantity
-    worse. ``cable`` is the index of a cable for ``motor_force``, else None. ``loss`` (C,) has the
-    factor exp(Σ μ φ) of each cable, the largest ratio of tensions along it.
-    """
-    of, sign = _SURE[each.of]
-    found = uncertainty(
-        tension.posture,
-        tension,
-        problem.tolerances,
-        of=of,
-        cable=None if cable is None else tension.posture.arm.cables.names[cable],
-        direction=each.direction,
-    )
-    factor = 1.0 if cable is None else float(loss[cable])
-    return sign * problem.coverage * factor * found.standard_uncertainty
 
 
 def _volume(tips: Array) -> float:

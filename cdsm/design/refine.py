@@ -1,48 +1,43 @@
-"""Refine a design by SLSQP of scipy, with derivatives at each posture and load."""
+"""Refine a design by SLSQP of scipy, on its quantities at each posture and load."""
 
 from __future__ import annotations
 
-from contextlib import suppress
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.design.evaluation import evaluate_designs
-from cdsm.design.goals import KINDS, Measure
-from cdsm.design.gradients import SMOOTH, rows_and_gradients
+from cdsm.design.evaluation import gathered
+from cdsm.design.goals import KINDS
 from cdsm.design.problem import DesignProblem
+from cdsm.design.quantities import Found, measure_cases
 from cdsm.design.result import DesignSearch
 from cdsm.design.search import best_of, progress_of
-from cdsm.errors import CdsmError, InvalidInput
+from cdsm.errors import InvalidInput
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array
 
-_SAFE = 1e-7
-"""Relative distance of a refined design from each limit, so that rounding violates none."""
+SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "length")
+"""Quantities that are smooth functions of the design at one posture and load."""
 
-_FAR = 10.0
-"""Violation of every condition that is passed to SLSQP if a design does not hold all postures."""
-
-_AT_END = 1e-9  # distance from the end of a range, over the range, that is rounding
-_ROUNDS = 2  # number of times that a design is improved and then moved inside its limits
+_SAFE = 1e-7  # relative distance from each limit, so that rounding violates none
+_NOT_HELD = -10.0  # condition of a design that does not hold all postures
+_DIGITS = 12  # of scaled variables: next to the end of a range is at it, such as no lead
 
 
 def refine_design(
     problem: DesignProblem, start: ArrayLike | None = None, *, iterations: int = 100
 ) -> DesignSearch:
-    """Improve a design of continuous variables by SLSQP (Kraft, 1988), with exact derivatives.
+    """Improve a design of continuous variables by SLSQP (Kraft, 1988).
 
     The objective is the worst value over postures and loads, which has kinks. So SLSQP solves a
     smooth problem: it minimises t, where t is at least the objective (negated if it is maximised)
-    at every posture and load, and each constraint is met at all of them. A step to a design that
-    does not hold all postures is shortened. The result is a minimum near the start; see
-    :func:`search_designs` for the whole range.
-
-    The derivatives are exact, including those of the bounds that ``worst_friction`` narrows. If a
-    cable goes straight through a hole, its wrap angle has a kink; the mean of the derivatives on
-    both sides is then used. With ``tolerances``, each posture and load keeps its own margin,
-    coverage · u; its derivative is a central difference of u, which is computed from exact first
-    derivatives.
+    at every posture and load, and each constraint is met at all of them. Derivatives are central
+    differences. The least tensions have kinks where a cable reaches a bound, and wrap angles where
+    a cable goes straight through a hole; the mean of both sides is used there. A step to a design
+    that does not hold all postures is shortened. With ``tolerances``, each posture and load has its
+    own margin, coverage · u. The result is the best of all designs evaluated, near a minimum that
+    is near the start; see :func:`search_designs` for the whole range.
 
     Args:
         problem: The problem. Its variables are continuous. It has one objective, with the default
@@ -52,8 +47,8 @@ def refine_design(
         iterations: Maximum number of iterations.
 
     Raises:
-        InvalidInput: The problem is not of this kind, or ``start`` is missing or outside the
-            ranges.
+        InvalidInput: The problem is not of this kind, or ``start`` is missing, outside the ranges,
+            or does not hold all postures.
         InfeasibleDesign: No design met all constraints; see :func:`search_designs`.
     """
     from scipy.optimize import minimize
@@ -66,112 +61,48 @@ def refine_design(
         raise InvalidInput("start", "is needed: the given arm is outside the ranges.")
     problem.values(begin)
     low, high = problem.bounds.T
-    first = rows_and_gradients(problem, begin, problem.objectives[0])[0]
-    smooth = _SmoothProblem(problem, float(abs(first).max()) or 1.0)
-    y = (begin - low) / (high - low)
-    inside = [(0.0, 1.0)] * len(y)
-    up = np.append(np.zeros(len(y)), 1.0)
-    # if smaller steps do not help either, the best design so far is the result
-    with suppress(_PostureNotHeld):
-        for _ in range(_ROUNDS):
-            found = minimize(
-                lambda z: z[-1],
-                np.append(y, -smooth.rows(y)[0][: len(first)].min()),
-                jac=lambda z: up,
-                bounds=[*inside, (None, None)],
-                constraints={"type": "ineq", "fun": smooth.conditions, "jac": smooth.slopes},
-                method="SLSQP",
-                options={"maxiter": iterations, "ftol": 1e-9},
-            )
-            # where the worst posture or the cables at a bound change, SLSQP may end a little
-            # outside: the nearest design inside is close
-            y = ended = found.x[:-1]
-            if problem.constraints:
-                limits = {
-                    "fun": lambda y: smooth.conditions(np.append(y, 0.0))[len(first) :],
-                    "jac": lambda y: smooth.rows(y)[1][len(first) :],
-                }
-                y = minimize(
-                    lambda y, to: 0.5 * float((y - to) @ (y - to)),
-                    ended,
-                    (ended,),
-                    jac=lambda y, to: y - to,
-                    bounds=inside,
-                    constraints={"type": "ineq"} | limits,
-                    method="SLSQP",
-                    options={"maxiter": iterations, "ftol": 1e-12},
-                ).x
-    whole = evaluate_designs(problem, np.array(smooth.visited), progress=False)
-    counts = range(1, len(whole) + 1)
-    return best_of(whole, 0, (progress_of(problem, n, whole.values[:n]) for n in counts))
+    objective, limits = problem.objectives[0], problem.constraints
+    visited: list[tuple[Array, Found]] = []
+    known: dict[bytes, list[Array] | None] = {}
 
+    def cases(y: Array) -> list[Array] | None:
+        y = y.round(_DIGITS)
+        if y.tobytes() not in known:
+            design = np.clip(low + (high - low) * y, low, high)
+            found, each = measure_cases(problem, design, (objective, *limits))
+            visited.append((design, found))
+            exist = each is not None and all(np.isfinite(x).all() for x in each)
+            known[y.tobytes()] = each if exist else None
+        return known[y.tobytes()]
 
-class _PostureNotHeld(Exception):
-    """SLSQP has tried a design that does not hold all postures."""
+    y = (begin - low) / (high - low)  # each variable from 0 to 1
+    first = cases(y)
+    if first is None:
+        raise InvalidInput("start", "does not hold all postures; give another one.")
+    scale = objective.sign * (float(abs(first[0]).max()) or 1.0)
 
+    def conditions(z: Array) -> Array:
+        found = cases(z[:-1])
+        if found is None:  # the line search then takes a smaller step
+            return np.full(sum(each.size for each in first), _NOT_HELD)
+        parts = [z[-1] - found[0] / scale]
+        for limit, each in zip(limits, found[1:], strict=True):
+            parts.append((each - limit.limit) / limit._scale - _SAFE)
+        return np.concatenate([part.ravel() for part in parts])
 
-class _SmoothProblem:
-    """The smooth problem of SLSQP: min t with c(y) + a t ≥ 0 at every posture and load.
-
-    y (n,) is the design, with each variable scaled to 0…1. The first conditions have a = 1 and
-    belong to the objective: t − s · objective/``scale`` ≥ 0, with s = −1 if it is maximised, else
-    1. The others have a = 0 and belong to the constraints: c is the distance of a quantity from its
-    limit, divided by the limit.
-
-    Attributes:
-        visited: All designs (n,) for which the conditions were computed.
-    """
-
-    def __init__(self, problem: DesignProblem, scale: float) -> None:
-        goal = problem.objectives[0]
-        self.visited: list[Array] = []
-        self._problem = problem
-        self._goals: list[tuple[Measure, float, float]] = [(goal, 0.0, -goal.sign * scale)]
-        self._goals += [(each, each.limit, each._scale) for each in problem.constraints]
-        self._found: dict[bytes, tuple[Array, Array] | None] = {}
-
-    def rows(self, y: Array) -> tuple[Array, Array]:
-        """Return c (R,) and ∂c/∂y (R, n) of the R conditions, for a scaled design y (n,).
-
-        Raises _PostureNotHeld if the design does not hold all postures; see :class:`DesignProblem`.
-        """
-        key = y.tobytes()
-        if key not in self._found:
-            low, high = self._problem.bounds.T
-            part = np.where(y < _AT_END, 0.0, np.where(y > 1.0 - _AT_END, 1.0, y))
-            self.visited.append(np.clip(low + (high - low) * part, low, high))
-            self._found[key] = self._rows(self.visited[-1])
-        found = self._found[key]
-        if found is None:
-            raise _PostureNotHeld
-        return found
-
-    def conditions(self, z: Array) -> Array:
-        """Compute the conditions c + a t (R,) at z = (y, t); −10 if a posture is not held."""
-        try:
-            return np.asarray(self.rows(z[:-1])[0] + z[-1] * self._raised)
-        except _PostureNotHeld:  # the line search then takes a smaller step
-            return np.full(self._raised.size, -_FAR)
-
-    def slopes(self, z: Array) -> Array:
-        """Compute the derivatives (R, n + 1) of :meth:`conditions` with respect to z = (y, t)."""
-        return np.column_stack([self.rows(z[:-1])[1], self._raised])
-
-    def _rows(self, design: Array) -> tuple[Array, Array] | None:
-        """Compute c and ∂c/∂y of a design (n,); None if it does not hold all postures."""
-        try:
-            each = {goal.key: goal for goal, *_ in self._goals}
-            found = {key: rows_and_gradients(self._problem, design, of) for key, of in each.items()}
-        except CdsmError:
-            return None
-        size = np.ptp(self._problem.bounds, axis=1)
-        values = [(found[goal.key][0] - limit) / scale for goal, limit, scale in self._goals]
-        slopes = [found[goal.key][1] * size / scale for goal, _, scale in self._goals]
-        count = len(values[0])
-        c = np.concatenate(values)
-        c[count:] -= _SAFE
-        self._raised = np.append(np.ones(count), np.zeros(len(c) - count))
-        return c, np.vstack(slopes)
+    minimize(
+        lambda z: z[-1],
+        np.append(y, (first[0] / scale).max()),
+        bounds=[*[(0.0, 1.0)] * y.size, (None, None)],
+        constraints={"type": "ineq", "fun": conditions},
+        method="SLSQP",
+        jac="3-point",
+        options={"maxiter": iterations, "ftol": 1e-9},
+    )
+    designs, quantities = zip(*visited, strict=True)
+    values = np.array([each.values for each in quantities])
+    history = (progress_of(problem, n, values[:n]) for n in range(1, len(values) + 1))
+    return best_of(gathered(problem, np.array(designs), quantities), 0, history)
 
 
 def require_smooth(problem: DesignProblem) -> None:
@@ -186,6 +117,4 @@ def require_smooth(problem: DesignProblem) -> None:
         raise InvalidInput("problem", f"{objective.of} at its {objective.goal} is not smooth.")
     for each in (*problem.objectives, *problem.constraints):
         if each.of not in SMOOTH:
-            raise InvalidInput(
-                "problem", f"{each.of} has no exact derivatives; use search_designs."
-            )
+            raise InvalidInput("problem", f"{each.of} is not smooth; use search_designs.")

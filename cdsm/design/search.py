@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cdsm._former.tree import Indices
 from cdsm.design.evaluation import Designs, gathered, violations, workers
 from cdsm.design.infeasible import explain
 from cdsm.design.problem import DesignProblem
@@ -103,7 +103,7 @@ def best_of(evaluated: Designs, seed: int, history: Iterable[DesignProgress]) ->
     )
 
 
-def pareto(designs: Designs) -> Indices:
+def pareto(designs: Designs) -> NDArray[np.intp]:
     """Return the indices (m,) of the feasible designs that no other feasible design dominates.
 
     They are sorted by the first objective, the best first. Of designs with equal objectives, only

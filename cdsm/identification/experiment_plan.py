@@ -1,36 +1,43 @@
-"""Plan of an experiment: which weight tests to make, how often, and the expected uncertainties."""
+"""Plan weight tests that determine parameters of an arm, before anything is built or measured."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination
-from cdsm.identification.loop import WeightLoop
-from cdsm.support.format import aligned, plain, plural
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.identification.measurement import WeightLoop
+from cdsm.identification.problem import Problem
+from cdsm.manipulator import Manipulator
+from cdsm.support.directions import AXES, Direction, unit_directions
+from cdsm.support.format import aligned, coordinates
+from cdsm.support.progress import track
+from cdsm.support.result import Result, quantity, unit
+from cdsm.support.validation import number_array, scalar, whole_number
+from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_WIDTH = 1.959964  # half a 95 % interval in standard deviations
+_MOST = 5000  # largest number of candidates and of tests
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class ExperimentPlan(ReadOnlyState):
+class ExperimentPlan(Result):
     """Weight tests that determine parameters of an arm best; made by :func:`plan_experiment`.
 
     There are n candidates and P parameters. All arrays are read-only.
 
     Attributes:
         names: Names of the parameters, in the order of every (P,) array.
-        values: Expected values (P,) [m, kg, N/m, …].
+        values: Expected values (P,), each in its own unit.
         candidates: The candidates that can be tested.
         counts: Number of repetitions of each candidate (n,).
         jacobians: One matrix [-] for each candidate, with a row (P,) for each of its readings: the
@@ -41,10 +48,12 @@ class ExperimentPlan(ReadOnlyState):
         failures: Label and reason of each candidate that cannot be tested.
     """
 
-    names: tuple[str, ...]
-    values: Array
+    _rows = "parameter"
+
+    names: tuple[str, ...] = field(metadata=unit("1", "parameter"))
+    values: Array = field(metadata=unit("own unit", "parameter"))
     candidates: tuple[WeightLoop, ...]
-    counts: NDArray[np.intp]
+    counts: NDArray[np.intp] = field(metadata=unit("1", "candidate"))
     jacobians: tuple[Array, ...]
     open_combinations: tuple[str, ...]
     failures: tuple[tuple[str, str], ...]
@@ -55,42 +64,27 @@ class ExperimentPlan(ReadOnlyState):
         pairs = zip(self.candidates, self.counts.tolist(), strict=True)
         return tuple(loop for loop, count in pairs for _ in range(count))
 
-    @cached_property
+    @quantity("1")
+    def repetitions(self) -> dict[str, int]:
+        """Number of repetitions of each test to make, by its label."""
+        pairs = zip(self.candidates, self.counts.tolist(), strict=True)
+        return {loop.label: count for loop, count in pairs if count}
+
+    @quantity("own unit", "parameter")
     def std(self) -> Array:
-        """Expected standard deviations of the parameters (P,) after the planned tests [m, kg, …].
+        """Expected standard deviations of the parameters (P,) after the planned tests.
 
         They are inf for an undetermined parameter.
         """
         pairs = zip(self.jacobians, self.counts.tolist(), strict=True)
         rows = np.vstack([math.sqrt(count) * J for J, count in pairs if count])
-        determination = Determination(self.names, rows, np.ones(len(self.names)))
-        return frozen(np.sqrt(np.diag(determination.covariance)) * abs(self.values))
+        covariance = Determination(self.names, rows, np.ones(len(self.names))).covariance
+        return frozen(np.sqrt(np.diag(covariance)) * abs(self.values))
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Names of the parameters that the planned tests do not determine."""
         return tuple(n for n, std in zip(self.names, self.std, strict=True) if math.isinf(std))
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the plan as plain numbers for JSON; parameters in their own units."""
-        return plain(
-            {
-                "tests": [
-                    {
-                        "label": loop.label,
-                        "times": int(count),
-                        "angles": loop.angles,
-                        "direction": loop.direction,
-                        "forces_N": loop.forces,
-                    }
-                    for loop, count in zip(self.candidates, self.counts, strict=True)
-                    if count
-                ],
-                "parameters": dict(zip(self.names, self.values, strict=True)),
-                "std": dict(zip(self.names, self.std, strict=True)),
-                "undetermined": self.undetermined,
-            }
-        )
 
     def plot(self) -> Figure:
         """Plot the expected 95 % intervals, and how often each candidate is tested."""
@@ -98,26 +92,151 @@ class ExperimentPlan(ReadOnlyState):
 
         return plot_experiment_plan(self)
 
-    def __repr__(self) -> str:
-        return f"<ExperimentPlan of {plural(len(self.tests), 'test')} for {', '.join(self.names)}>"
-
     def __str__(self) -> str:
-        made = [
-            (loop.label, f"{count}×")
-            for loop, count in zip(self.candidates, self.counts.tolist(), strict=True)
-            if count
-        ]
-        rows = [*aligned([("test", "times"), *made]), ""]
-        shares = 100.0 * _WIDTH * self.std / abs(self.values)
-        cells = [
-            (name, f"{x:.4g}", "not determined" if math.isinf(share) else f"± {share:.3g} %")
-            for name, x, share in zip(self.names, self.values, shares, strict=True)
-        ]
-        rows += [*aligned([("parameter [own unit]", "expected", "95 %"), *cells]), ""]
+        times = ((label, f"{count}×") for label, count in self.repetitions.items())
+        rows = aligned([("test", "times"), *times])
+        shares, cells = 196.0 * self.std / abs(self.values), list[tuple[str, ...]]()
+        for name, x, share in zip(self.names, self.values, shares, strict=True):
+            said = "not determined" if math.isinf(share) else f"± {share:.3g} %"
+            cells.append((name, f"{x:.4g}", said))
+        rows += ["", *aligned([("parameter [own unit]", "expected", "95 %"), *cells]), ""]
         for combination in self.open_combinations:
             rows.append(f"not determined by any candidate: {combination} (relative)")
         if self.undetermined and not self.open_combinations:
             rows.append(f"too few tests to determine {', '.join(self.undetermined)}")
-        for label, reason in self.failures:
-            rows.append(f"left out: {label}: {reason}")
-        return "\n".join(rows)
+        return "\n".join([*rows, *(f"left out: {name}: {why}" for name, why in self.failures)])
+
+    def _labels(self) -> dict[str, Sequence[object]]:
+        return {"parameter": self.names, "candidate": [loop.label for loop in self.candidates]}
+
+
+def plan_experiment(
+    model_of: Callable[..., Manipulator],
+    parameters: Mapping[str, float],
+    *,
+    postures: ArrayLike,
+    directions: Direction | Sequence[Direction],
+    weights: ArrayLike,
+    minimum: float | ArrayLike,
+    tests: int,
+    displacement_std: float,
+    steps: int = 4,
+    progress: bool = True,
+) -> ExperimentPlan:
+    """Choose the weight tests that determine parameters of an arm best; see :func:`identify`.
+
+    Each combination of posture, direction and weight is a candidate: a :class:`WeightLoop` from
+    zero force to the weight and back. The plan gives the number of repetitions of each candidate.
+    One test after the other is added, each time the one that reduces det C of the covariance C of
+    the parameters most (D-optimal; det C is the squared volume of their confidence region). Such a
+    plan is good, not proved the best.
+
+    The plan uses derivatives at the expected values. If the identified values differ much from
+    them, plan again.
+
+    Args:
+        model_of: Function that builds the arm from the parameters, as for :func:`identify`.
+        parameters: Expected value of each parameter, not 0.
+        postures: Candidate joint angles (n, nv) [rad].
+        directions: Directions of the weights: names of axes, or (n, 3) in base axes.
+        weights: Largest forces of the loops (n,) [N].
+        minimum: Lower bound of the tensions before the test [N], one number or (C,).
+        tests: Total number of loops, repetitions included.
+        displacement_std: Standard deviation of a reading along the weight [m].
+        steps: Number of steps from zero force to the largest.
+        progress: Show a bar on the standard error, if that is a terminal.
+
+    Raises:
+        InvalidInput: An argument is invalid, or ``model_of`` fails or does not take a parameter; no
+            candidate can be tested, or none determines any parameter.
+    """
+    angles, forces = number_array("postures", postures), number_array("weights", weights, "force")
+    if angles.ndim != 2 or not angles.size:
+        said = f"shape {angles.shape} given; (n, nv) joint angles [rad] are needed."
+        raise InvalidInput("postures", said)
+    if forces.ndim != 1 or not forces.size or forces.min() <= 0.0:
+        raise InvalidInput("weights", f"{weights!r} given; positive forces (n,) [N] are needed.")
+    bound, count = number_array("minimum", minimum), whole_number("steps", steps, 1, 100)
+    axes = np.atleast_2d(unit_directions("directions", directions)).tolist()
+    if len(forces) * len(angles) * len(axes) > _MOST:
+        raise InvalidInput("postures", f"more than {_MOST} candidates; give fewer.")
+    names = {axis: name for name, axis in AXES.items()}
+    way = (*range(count + 1), *range(count - 1, -1, -1))  # up and down
+    candidates = [
+        WeightLoop(
+            label=f"posture {i}, {names.get(tuple(u)) or coordinates(u, '.2g')}, {force:g} N",
+            angles=tuple(q),
+            direction=tuple(u),
+            forces=tuple(force * k / count for k in way),
+            minimum=bound.tolist(),
+            displacement_std=displacement_std,
+        )
+        for i, q in enumerate(angles.tolist(), 1)
+        for u in axes
+        for force in forces.tolist()
+    ]
+    return plan_tests(model_of, parameters, candidates, tests=tests, progress=progress)
+
+
+def plan_tests(
+    model_of: Callable[..., Manipulator],
+    parameters: Mapping[str, float],
+    candidates: Sequence[WeightLoop],
+    *,
+    tests: int,
+    progress: bool = True,
+) -> ExperimentPlan:
+    """Choose the tests that determine parameters best among the loops ``candidates``.
+
+    The labels of the loops must differ. :func:`plan_experiment` explains the criterion, the other
+    arguments and the errors.
+    """
+    if not isinstance(parameters, Mapping) or not parameters:
+        said = "give {name: expected value} for at least one."
+        raise InvalidInput("parameters", f"{parameters!r} given; {said}")
+    values = np.array([scalar(f"parameters[{name!r}]", x) for name, x in parameters.items()])
+    names, most = tuple(parameters), whole_number("tests", tests, 1, _MOST)
+    if not values.all():
+        said = "0 given; intervals are judged relative to the expected value. Give a small one."
+        raise InvalidInput(f"parameters[{names[int(abs(values).argmin())]!r}]", said)
+    bounds = {n: (min(0.0, 2.0 * v), max(0.0, 2.0 * v)) for n, v in zip(names, values, strict=True)}
+    usable, rows, failures = list[WeightLoop](), list[Array](), list[tuple[str, str]]()
+    for loop in track(candidates, "following the candidates", wanted=progress):
+        problem, middle = Problem(model_of, None, [loop], bounds), np.full(len(names), 0.5)
+        if isinstance(reason := problem.predict(middle), str):
+            failures.append((loop.label, reason))
+            continue
+        usable.append(loop)
+        rows.append(problem.jacobian(middle, central=True) / problem.slope(middle) * values)
+    if not usable:
+        said = f"none of {len(failures)} candidates can be tested. {': '.join(failures[0])} Choose "
+        raise InvalidInput("postures", f"{said}other postures, lighter weights, higher tensions.")
+    whole = Determination(names, np.vstack(rows), np.ones(len(names)))
+    if not whole.rank:
+        said = f"no candidate determines {', '.join(names)}. Add other postures, directions or "
+        raise InvalidInput("parameters", f"{said}weights.")
+    known = [J @ whole.coordinates for J in rows]
+    return ExperimentPlan(
+        names=names,
+        values=frozen(values),
+        candidates=tuple(usable),
+        counts=frozen(greedy(np.array([A.T @ A for A in known]), most)),
+        jacobians=tuple(frozen(J) for J in rows),
+        open_combinations=whole.open_combinations,
+        failures=tuple(failures),
+    )
+
+
+def greedy(information: Array, tests: int) -> NDArray[np.intp]:
+    """Choose ``tests`` of n candidates, repeated or not, one after the other; return counts (n,).
+
+    ``information`` (n, r, r) are the Fisher informations of the candidates for r parameters. Each
+    choice has the largest determinant of their sum, which starts from almost nothing.
+    """
+    total = 1e-9 * information.sum(axis=0)
+    counts = np.zeros(len(information), dtype=np.intp)
+    for _ in range(tests):
+        best = int(np.linalg.slogdet(total + information)[1].argmax())
+        total = total + information[best]
+        counts[best] += 1
+    return counts

@@ -1,20 +1,34 @@
-"""The measured stiffness of an arm, as input of an identification."""
+"""What is measured on a real arm: stiffnesses, and loops of weight tests."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, final
+from dataclasses import dataclass, field, replace
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.statics.equilibrium import equilibrium
+from cdsm.statics.load_cycle import load_cycle
+from cdsm.statics.weight_test import weight_test
+from cdsm.stiffness_matrix import stiffness
 from cdsm.support.directions import Axis, axis_vector, unit_direction
-from cdsm.support.validation import SMALLEST, number_array, scalar, vector, wrench_vector
+from cdsm.support.validation import (
+    SMALLEST,
+    instance,
+    number_array,
+    scalar,
+    vector,
+    whole_number,
+    wrench_vector,
+)
+from cdsm.support.values import Array
+from cdsm.tension import Tension, distribute_tension
 
-if TYPE_CHECKING:
-    from cdsm.identification.loop import WeightLoop
+_SUBSTEPS = 2  # of load_cycle; fixed, so that predictions are smooth functions of parameters
 
 
 @final
@@ -32,7 +46,7 @@ class Measurement:
         tension: Cable tensions (C,) [N]. Give either ``tension`` or ``minimum``.
         minimum: Lower bound of the tensions [N], one number or (C,).
             :func:`~cdsm.distribute_tension` then balances the model at these angles.
-        std: Standard deviation of the value [N/m]; it is required.
+        std: Standard deviation of the value [N/m], or a guess at it: the weight of the measurement.
         wrench: W (6,) at ``tool0`` without the measuring force, base axes: force [N], moment [N m].
         label: Name in reports and figures.
         force: Magnitude of the measuring force [N], added to ``wrench``. The value is then the
@@ -48,75 +62,210 @@ class Measurement:
     angles: tuple[float, ...]
     tension: tuple[float, ...] | None = None
     minimum: float | tuple[float, ...] | None = None
-    std: float = math.nan
+    std: float = field(kw_only=True)
     wrench: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     label: str = ""
     force: float = 0.0
 
     def __post_init__(self) -> None:
-        value = scalar("value", self.value)
-        if value <= 0.0:
-            raise InvalidInput("value", f"{value:g} N/m given; a stiffness measured is positive.")
-        if isinstance(self.std, float) and math.isnan(self.std):
-            raise InvalidInput(
-                "std",
-                "is missing; give the standard deviation of the value [N/m], a guess at it "
-                "if need be: it is the weight of the measurement.",
-            )
-        std = scalar("std", self.std)
-        if std < SMALLEST:
-            raise InvalidInput("std", f"{std:g} N/m given; it must be positive.")
+        value, std = _positive("value", self.value, "N/m"), _positive("std", self.std, "N/m")
         force = scalar("force", self.force)
         if force < 0.0:
-            raise InvalidInput(
-                "force",
-                f"{force:g} N given; it must be positive, or 0 for the tangent. Turn the direction "
-                "round instead.",
-            )
-        checked = checked_conditions(self) | {"value": value, "std": std, "force": force}
-        for name, entry in checked.items():
-            object.__setattr__(self, name, entry)
+            remedy = "it must be positive, or 0 for the tangent. Turn the direction round instead."
+            raise InvalidInput("force", f"{force:g} N given; {remedy}")
+        _keep(self, value=value, std=std, force=force)
+
+    @property
+    def _readings(self) -> Array:
+        return np.array([self.value])
+
+    def _predict(self, pose: Posture, tension: Tension | ArrayLike) -> Array:
+        """Compute the stiffness (1,) [N/m] that a model of the arm would show."""
+        K = stiffness(pose, tension, None if isinstance(tension, Tension) else self.wrench)
+        if not K.is_stable:
+            unit = pose.arm.stiffness_unit()
+            said = f"the arm buckles: the smallest stiffness is {K.margin:.3g} {unit}."
+            raise SingularStiffness(said, K.critical_direction)
+        value, u = K.along(self.direction), unit_direction("direction", self.direction)
+        if self.force:
+            value = weight_test(pose, K.tension, self.force * u, wrench=K.wrench).stiffness
+        if not value < 1.0 / SMALLEST:
+            said = "the tip cannot move in its direction, so the stiffness is infinite."
+            raise SingularStiffness(said, u)
+        return np.array([value])
+
+    def _errors(self, predicted: Array) -> tuple[Array, float]:
+        """Return predicted minus measured numbers, and their standard deviation."""
+        return predicted - self.value, self.std
 
 
-def checked_conditions(given: Measurement | WeightLoop) -> dict[str, object]:
-    """Check label, direction, wrench, angles and tensions of a measurement or a loop.
+@final
+@dataclass(frozen=True, kw_only=True)
+class WeightLoop:
+    """Loop of a weight test: forces applied and removed again, and readings of the tip.
 
-    Returns the last four by field name, as tuples of numbers; ``minimum`` may be one number. Raises
-    InvalidInput.
+    The arm is shaken at the posture, so that each cable has one tension along its length, and its
+    motors are locked. Then the forces act one after the other, as in :func:`~cdsm.load_cycle`. A
+    reading is the position of the tip along the direction, or in x, y and z, from an arbitrary
+    zero.
+
+    Attributes:
+        direction: Direction of the forces: an axis such as ``"-z"``, kept as its vector, or (3,) in
+            base axes, any length.
+        angles: Joint angles (nv,) [rad] before the first force.
+        forces: Forces along the direction (n,) [N], in their order; 0 where nothing hangs.
+        displacements: Readings (n,) along the direction or (n, 3) in base axes [m]; None if the
+            test is only planned.
+        displacement_std: Standard deviation of a reading [m].
+        tension: Cable tensions (C,) [N] before the first force. Give ``tension`` or ``minimum``.
+        minimum: Lower bound of the tensions [N], one number or (C,).
+            :func:`~cdsm.distribute_tension` then balances the model at these angles.
+        wrench: W (6,) at ``tool0`` without the forces, base axes: force [N], moment [N m].
+        label: Name in reports and figures.
+
+    Raises:
+        InvalidInput: A field is invalid, or all forces are the same. The error names the field and
+            the fault.
     """
-    if (given.tension is None) == (given.minimum is None):
-        raise InvalidInput(
-            "tension",
-            "give one of tension= (measured, of each cable) and minimum= (a bound to "
-            f"distribute from); {'neither' if given.tension is None else 'both'} given.",
-        )
+
+    direction: tuple[float, float, float] | Axis
+    angles: tuple[float, ...]
+    forces: tuple[float, ...]
+    displacements: tuple[float, ...] | tuple[tuple[float, float, float], ...] | None = None
+    displacement_std: float
+    tension: tuple[float, ...] | None = None
+    minimum: float | tuple[float, ...] | None = None
+    wrench: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        forces, read = number_array("forces", self.forces, "force"), None
+        if forces.ndim != 1 or forces.size < 2 or np.ptp(forces) == 0.0:
+            said = "a loop needs forces of at least two sizes, one after the other, as 0, 2, 4, 2, "
+            said += "0 N: only differences of readings are used."
+            raise InvalidInput("forces", f"{self.forces!r} given; {said}")
+        if self.displacements is not None:
+            array, n = number_array("displacements", self.displacements, "length"), forces.size
+            if array.shape not in ((n,), (n, 3)):
+                said = f"one reading [m] per force is needed, ({n},) along the direction or "
+                said += f"({n}, 3) in base axes."
+                raise InvalidInput("displacements", f"shape {array.shape} given; {said}")
+            read = tuple(array.tolist() if array.ndim == 1 else map(tuple, array.tolist()))
+        std = _positive("displacement_std", self.displacement_std, "m")
+        _keep(self, forces=tuple(forces.tolist()), displacements=read, displacement_std=std)
+
+    @property
+    def axes(self) -> Array:
+        """Unit vectors along which the tip is read: the direction (1, 3), or x, y and z (3, 3)."""
+        alone = self.displacements is None or np.ndim(self.displacements) == 1
+        return self._unit[None] if alone else np.eye(3)
+
+    @property
+    def applied(self) -> Array:
+        """Applied forces as vectors (n, 3) [N] in base axes."""
+        return np.outer(self.forces, self._unit)
+
+    @property
+    def _unit(self) -> Array:
+        return unit_direction("direction", self.direction)
+
+    @property
+    def _readings(self) -> Array:
+        if self.displacements is None:
+            return np.zeros(len(self.forces))  # of a planned test, any
+        return np.array(self.displacements).ravel()
+
+    def simulated(
+        self, arm: Manipulator, random: np.random.Generator | int | None = None
+    ) -> WeightLoop:
+        """Return the same loop with simulated readings (n,) [m] of an arm, along the direction.
+
+        Args:
+            arm: The arm, with friction in its holes.
+            random: Generator of the random errors of the readings, or its seed. None: without
+                errors.
+
+        Raises:
+            InvalidInput: ``random`` is neither of these, or ``arm`` is not an arm.
+            CdsmError: The arm has no equilibrium under the forces; see :func:`~cdsm.load_cycle`.
+        """
+        instance("arm", arm, Manipulator)
+        if not isinstance(random, np.random.Generator | None):
+            random = np.random.default_rng(whole_number("random", random, 0))
+        pose, alone = arm.at(self.angles), replace(self, displacements=None)
+        read = alone._predict(pose, tension_before(self, pose))
+        if random is not None:
+            read += self.displacement_std * random.normal(size=read.size)
+        return replace(self, displacements=tuple(read.tolist()))
+
+    def _predict(self, pose: Posture, tension: Tension | ArrayLike) -> Array:
+        """Compute how far the forces would move the tip of a model of the arm, (m,) [m]."""
+        F = tension.values if isinstance(tension, Tension) else tension
+        W = np.array(self.wrench) + np.pad(self.applied, ((0, 0), (0, 3)))
+        if pose.arm.has_friction:
+            moved = load_cycle(pose, F, W, substeps=_SUBSTEPS).displacement
+        else:  # the history has no influence, so each load is computed once
+            loads, which = np.unique(W, axis=0, return_inverse=True)
+            moved = np.array([equilibrium(pose, F, load).displacement for load in loads])[which]
+        return np.asarray(moved @ self.axes.T).ravel()
+
+    def _errors(self, predicted: Array) -> tuple[Array, float]:
+        """Return predicted minus measured numbers less their mean along each axis, and σ.
+
+        The zero of each axis is unknown; this estimate of it has the least χ².
+        """
+        off = (predicted - self._readings).reshape(len(self.forces), -1)
+        return (off - off.mean(axis=0)).ravel(), self.displacement_std
+
+
+def tension_before(test: Measurement | WeightLoop, pose: Posture) -> Tension | ArrayLike:
+    """Return the tensions of a test before its force acts: the given ones, or distributed ones."""
+    if test.tension is not None:
+        return test.tension
+    assert test.minimum is not None
+    return distribute_tension(pose, test.minimum, wrench=test.wrench)
+
+
+def name_of(i: int, test: Measurement | WeightLoop) -> str:
+    """Return the name of test number ``i``: its label, or "[i]" if it has none."""
+    return test.label or f"[{i}]"
+
+
+def _positive(name: str, value: object, unit: str) -> float:
+    number = scalar(name, value)
+    if number < SMALLEST:
+        raise InvalidInput(name, f"{number:g} {unit} given; it must be positive.")
+    return number
+
+
+def _keep(given: Measurement | WeightLoop, **own: object) -> None:
+    """Check label, direction, wrench, angles and tensions; keep them and ``own``, as numbers."""
+    tension, minimum = given.tension, given.minimum
+    if (tension is None) == (minimum is None):
+        said = "give one of tension= (measured, of each cable) and minimum= (a bound to distribute"
+        which = "neither" if tension is None else "both"
+        raise InvalidInput("tension", f"{said} from); {which} given.")
     if not isinstance(given.label, str):
         raise InvalidInput("label", f"{given.label!r} given; a text is needed.")
     direction: ArrayLike = given.direction
     if isinstance(direction, str):
         direction = axis_vector("direction", direction)
     unit_direction("direction", direction)
-    checked: dict[str, object] = {
-        "direction": tuple(vector("direction", direction, 3, "a direction in base axes").tolist()),
-        "wrench": tuple(wrench_vector("wrench", given.wrench).tolist()),
-        "angles": _numbers("angles", given.angles, "one angle [rad] per joint"),
-    }
-    if given.tension is not None:
-        checked["tension"] = _numbers("tension", given.tension, "one tension [N] per cable")
-    elif np.ndim(given.minimum) == 0:  # type: ignore[arg-type]
-        checked["minimum"] = scalar("minimum", given.minimum)
+    own["direction"] = tuple(vector("direction", direction, 3, "in base axes").tolist())
+    own["wrench"] = tuple(wrench_vector("wrench", given.wrench).tolist())
+    own["angles"] = _row("angles", given.angles, "one angle [rad] per joint")
+    if tension is not None:
+        own["tension"] = _row("tension", tension, "one tension [N] per cable")
+    elif np.ndim(minimum) == 0:  # type: ignore[arg-type]
+        own["minimum"] = scalar("minimum", minimum)
     else:
-        checked["minimum"] = _numbers("minimum", given.minimum, "one bound [N] per cable")
-    return checked
+        own["minimum"] = _row("minimum", minimum, "one bound [N] per cable")
+    for name, entry in own.items():
+        object.__setattr__(given, name, entry)
 
 
-def _numbers(name: str, value: object, meaning: str) -> tuple[float, ...]:
+def _row(name: str, value: object, meaning: str) -> tuple[float, ...]:
     array = number_array(name, value)  # type: ignore[arg-type]
     if array.ndim != 1 or not array.size:
         raise InvalidInput(name, f"shape {array.shape} given; give {meaning}.")
     return tuple(array.tolist())
-
-
-def label(i: int, measurement: Measurement | WeightLoop) -> str:
-    """Return the name of measurement number ``i``: its label, or "[i]" if it has none."""
-    return measurement.label or f"[{i}]"

@@ -1,234 +1,180 @@
-"""Predict measured stiffnesses and loops of weight tests from a model of the arm.
-
-The differences from the measurements are the residuals that :func:`identify` minimises.
-"""
+"""Least squares of all measurements, over parameters scaled to 0…1 between their bounds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
 
-from cdsm.errors import CdsmError, InvalidInput, SingularStiffness
-from cdsm.identification.least_squares import LeastSquares, NoModelError, no_model
-from cdsm.identification.loop import WeightLoop, measured, offset
-from cdsm.identification.measurement import Measurement, label
+from cdsm.errors import CdsmError, InvalidInput
+from cdsm.identification.measurement import Measurement, WeightLoop, name_of, tension_before
 from cdsm.manipulator import Manipulator
-from cdsm.statics.following import follow
-from cdsm.statics.loading_path import LoadingPath, same_segments
-from cdsm.statics.rest_search import equilibrium
-from cdsm.statics.weight_test import WeightTest, weight_test
-from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.directions import unit_direction
-from cdsm.support.validation import SMALLEST
-from cdsm.support.values import Array, frozen
-from cdsm.tension import Tension, distribute_tension
+from cdsm.support.validation import instance
+from cdsm.support.values import Array
+from cdsm.tension import Tension
 
-Parameters = dict[str, float]
+TensionOf = Callable[..., Tension | ArrayLike]
 
-_STORED = 8  # sets of parameters whose paths are stored
+_DECADES = 100.0  # bounds that are positive and this factor apart: the logarithm is searched
+_STEP, _STEP_OF_LOOPS = 1e-6, 1e-5  # of finite differences; loops are less exact, and have kinks
+_FINE, _OF_LOOPS = 1e-12, 1e-6  # relative fall of χ² at which a search ends
+_INSIDE = 1e-6  # nearest start to a bound: a search that starts on a bound may stay there
 
 
-class UserFaultError(Exception):
-    """A user-defined function has failed; its first argument is the :class:`InvalidInput` to raise.
+class Prediction(NamedTuple):
+    """What a model of the arm predicts."""
 
-    It is not a CdsmError. A search stops at it, while a CdsmError only means that the model does
-    not exist for these parameters.
+    arm: Manipulator
+    numbers: list[Array]  # of each measurement
+
+
+class Problem:
+    """Residuals r in standard deviations, as a function of scaled parameters x (P,).
+
+    Where the model does not exist, they are infinite, and scipy's search shortens its step.
     """
 
+    def __init__(
+        self,
+        model_of: Callable[..., Manipulator],
+        tension_of: TensionOf | None,
+        measurements: Sequence[Measurement | WeightLoop],
+        bounds: Mapping[str, tuple[float, float]],
+    ) -> None:
+        self.model_of, self.tension_of = model_of, tension_of
+        self.measurements, self.names = tuple(measurements), tuple(bounds)
+        self.low, self.high = np.array([*bounds.values()], dtype=np.float64).T
+        self._by_log = (self.low > 0.0) & (self.high >= _DECADES * self.low)
+        self._ends = self._scaled(self.low), self._scaled(self.high)
+        self._last: tuple[bytes, Prediction | str] = b"", ""
+        self.edge = ""  # where the model did not exist last, and why
+        self.has_loops = any(isinstance(each, WeightLoop) for each in self.measurements)
 
-@dataclass(frozen=True)
-class Model:
-    """Predictions and residuals of all measurements, as functions of the parameters of the arm."""
+    def _scaled(self, values: Array) -> Array:
+        return np.asarray(np.log(values, out=values.copy(), where=self._by_log))
 
-    model_of: Callable[..., Manipulator]  # function that builds the arm from the parameters
-    # function that gives the tensions, or None
-    tension_of: Callable[..., Tension | ArrayLike] | None
-    measurements: tuple[Measurement | WeightLoop, ...]
-    _last_rest: dict[Measurement, Array] = field(default_factory=dict)
-    _paths: dict[tuple[float, ...], list[LoadingPath | None]] = field(default_factory=dict)
+    def values(self, x: Array) -> Array:
+        """Compute the parameters (P,) at a point x (P,)."""
+        low, high = self._ends
+        mixed = (1.0 - x) * low + x * high
+        values = np.exp(mixed, out=mixed, where=self._by_log)
+        return np.where(x == 0.0, self.low, np.where(x == 1.0, self.high, values))  # exactly
 
-    @property
-    def count(self) -> int:
-        """Number n of residuals: one for each stiffness, and one for each reading of a loop."""
-        return sum(len(measured(each)) for each in self.measurements)
+    def point(self, values: Array) -> Array:
+        """Compute the point x (P,) of ``values`` (P,) of the parameters."""
+        low, high = self._ends
+        return np.asarray((self._scaled(values) - low) / (high - low))
 
-    @property
-    def loops(self) -> tuple[WeightLoop, ...]:
-        """The loops among the measurements."""
-        return tuple(each for each in self.measurements if isinstance(each, WeightLoop))
+    def slope(self, x: Array) -> Array:
+        """Compute the derivative of each parameter with respect to its x, (P,)."""
+        low, high = self._ends
+        return (high - low) * np.where(self._by_log, self.values(x), 1.0)
 
-    def residuals(self, parameters: Parameters) -> Array:
-        """Compute all residuals (n,) for these ``parameters``, in standard deviations."""
-        return self.weigh(self.predict(parameters)[1])
+    def describe(self, x: Array) -> str:
+        """Write the parameters at a point as text: "a = 1.2, b = 3"."""
+        return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, self.values(x), strict=True))
 
-    def residuals_beside(self, here: Parameters, moved: Parameters) -> Array:
-        """Compute the residuals (n,) for parameters ``moved`` near ``here``, to first order.
+    def predict(self, x: Array) -> Prediction | str:
+        """Predict all measurements at a point; return the reason as text if there is no model.
 
-        Equilibria of the loops are searched for only at the parameters ``here``; those for
-        ``moved`` are linearised about them. This is ten times as fast as :meth:`residuals`.
+        Raises InvalidInput if a function of the user fails.
         """
-        return self.weigh(self.predict(moved, here)[1])
+        if self._last[0] != x.tobytes():
+            self._last = x.tobytes(), self._predict(x)
+            if isinstance(reason := self._last[1], str):
+                self.edge = f"{self.describe(x)}: {reason}"
+        return self._last[1]
 
-    def predict(
-        self, parameters: Parameters, near: Parameters | None = None
-    ) -> tuple[Manipulator, list[Array]]:
-        """Build the arm of ``parameters``; predict each stiffness (1,) [N/m] or loop (m,) [m].
+    def _predict(self, x: Array) -> Prediction | str:
+        parameters = dict(zip(self.names, self.values(x).tolist(), strict=True))
+        where, numbers = "model_of: ", list[Array]()
+        try:
+            arm = self.model_of(**parameters)
+            where = ""
+            instance("model_of", arm, Manipulator)
+            for i, each in enumerate(self.measurements):
+                where = f"measurement {name_of(i, each)}: "
+                pose = arm.at(each.angles)
+                if self.tension_of is None:
+                    tension = tension_before(each, pose)
+                else:
+                    tension = self.tension_of(pose, each, **parameters)
+                numbers.append(each._predict(pose, tension))
+        except CdsmError as error:
+            return f"{where}{error}"
+        except Exception as error:
+            name = "tension_of" if self.tension_of and where.startswith("meas") else "model_of"
+            remedy = "Correct it, narrow the bounds, or let it raise a CdsmError where there is no"
+            said = f"fails at {self.describe(x)}: {error!r}. {remedy} such arm."
+            raise InvalidInput(name, said) from error
+        return Prediction(arm, numbers)
 
-        The predictions of a loop are displacements of the tip from its position without the forces.
-        If ``near`` is given, they are linearised about the equilibria at the parameters ``near``;
-        otherwise they are exact.
+    def weighed(self, numbers: Sequence[Array]) -> Array:
+        """Return the residuals r (n,) of predicted ``numbers``."""
+        pairs = zip(self.measurements, numbers, strict=True)
+        errors = (each._errors(found) for each, found in pairs)
+        return np.concatenate([off / std for off, std in errors])
+
+    def residuals(self, x: Array) -> Array:
+        """Compute r (n,) at a point; inf without a model."""
+        found = self.predict(x)
+        if isinstance(found, str):
+            return np.full(sum(each._readings.size for each in self.measurements), np.inf)
+        return self.weighed(found.numbers)
+
+    def cost(self, x: Array) -> float:
+        """Compute χ² = Σ r² at a point."""
+        r = self.residuals(x)
+        return float(r @ r)
+
+    def jacobian(self, x: Array, over: Any = None, *, central: bool = False) -> Array:
+        """Compute ∂r/∂x (n, P) by one-sided or central differences, or its columns ``over`` alone.
+
+        A side beyond a bound or without a model is left out. Raises InvalidInput if both are.
         """
-        arm = self.arm(parameters)
-        paths = self._paths_at(near) if near else self._paths_at(parameters, arm)
-        predicted = []
-        for i, (each, path) in enumerate(zip(self.measurements, paths, strict=True)):
-            with no_model(f"measurement {label(i, each)}: "):
-                if isinstance(each, Measurement):
-                    predicted.append(np.array([self._along(arm, each, parameters)]))
-                    continue
-                assert path is not None
-                tips, pose = path.tips, path.loading.reference
-                if near:
-                    K = self._stiffness(arm, each, parameters)
-                    pose = K.posture
-                    if not same_segments(pose, path.start.pose):
-                        raise NoModelError("the cables have other segments than beside there.")
-                    tips = path.beside(pose, K.tension, K.wrench)
-                predicted.append(((tips - pose.tip[:3, 3]) @ each.axes.T).ravel())
-        return arm, predicted
+        here, columns = self.residuals(x), []
+        step = _STEP_OF_LOOPS if self.has_loops else _STEP
+        for i in range(x.size) if over is None else over:
+            sides = list[tuple[float, Array]]()
+            for way in (step, -step):
+                y = x.copy()
+                y[i] += way
+                if 0.0 <= y[i] <= 1.0 and np.isfinite(r := self.residuals(y)).all():
+                    sides.append((way, r))
+                    if not central:
+                        break
+            if not sides:
+                said = "there is a prediction for all measurements, but none for a slightly smaller"
+                said = f"at {self.describe(x)} {said} or larger {self.names[i]}. Change the bounds."
+                raise InvalidInput("free", said)
+            (a, r_a), (b, r_b) = [*sides, (0.0, here)][:2]
+            columns.append((r_a - r_b) / (a - b))
+        return np.column_stack(columns)
 
-    def weigh(self, predicted: list[Array]) -> Array:
-        """Compute the residuals (n,) in standard deviations from a result of :meth:`predict`."""
-        rows = []
-        for each, found in zip(self.measurements, predicted, strict=True):
-            if isinstance(each, WeightLoop):
-                rows.append((found - offset(each, found) - measured(each)) / each.displacement_std)
-            else:
-                rows.append((found - each.value) / each.std)
-        return np.concatenate(rows)
+    def search(self, x: Array, over: Any = None, *, coarse: bool = False) -> Array:
+        """Search from a point x for the least χ²; only the parameters ``over`` move, or all."""
+        moving = np.arange(x.size) if over is None else np.asarray(over)
 
-    def with_offsets(self, predicted: list[Array]) -> Array:
-        """Convert predictions of :meth:`predict` to numbers (n,) [N/m, m] as they would be read.
+        def at(part: Array) -> Array:
+            point = x.copy()
+            point[moving] = part
+            return point
 
-        The predictions of a loop get the fitted offset of each axis.
-        """
-        return np.concatenate(
-            [
-                found - offset(each, found) if isinstance(each, WeightLoop) else found
-                for each, found in zip(self.measurements, predicted, strict=True)
-            ]
+        start = np.clip(x[moving], _INSIDE, 1.0 - _INSIDE)
+        if not np.isfinite(self.cost(at(start))):
+            return x  # the model ends here
+        found = least_squares(
+            lambda part: self.residuals(at(part)),
+            start,
+            lambda part: self.jacobian(at(part), moving),
+            bounds=(0.0, 1.0),
+            x_scale="jac",
+            ftol=_OF_LOOPS if coarse or self.has_loops else _FINE,
+            xtol=1e-8 if coarse or self.has_loops else _FINE,
+            gtol=_FINE,
+            max_nfev=200,
         )
-
-    def arm(self, parameters: Parameters) -> Manipulator:
-        """Build the arm of ``parameters``; raise NoModelError if there is none."""
-        with no_model("model_of: "):
-            arm = _call_model("model_of", self.model_of, parameters)
-        if not isinstance(arm, Manipulator):
-            raise InvalidInput("model_of", f"returns {arm!r}; a Manipulator is needed.")
-        return arm
-
-    def _paths_at(
-        self, parameters: Parameters, arm: Manipulator | None = None
-    ) -> list[LoadingPath | None]:
-        """Return the equilibria of each loop for ``parameters``; None for a measured stiffness.
-
-        The equilibria for the last 8 sets of parameters are stored. ``arm`` is the arm of
-        ``parameters``, if it is already built.
-        """
-        key = tuple(parameters.values())
-        if key not in self._paths:
-            arm = arm or self.arm(parameters)
-            near = next(reversed(self._paths.values()), [None] * len(self.measurements))
-            found = [self._path(i, arm, parameters, path) for i, path in enumerate(near)]
-            while len(self._paths) >= _STORED:
-                del self._paths[next(iter(self._paths))]
-            self._paths[key] = found
-        return self._paths[key]
-
-    def _path(
-        self, i: int, arm: Manipulator, parameters: Parameters, near: LoadingPath | None
-    ) -> LoadingPath | None:
-        loop = self.measurements[i]
-        if not isinstance(loop, WeightLoop):
-            return None
-        with no_model(f"measurement {label(i, loop)}: "):
-            K = self._stiffness(arm, loop, parameters)
-            return LoadingPath.of(K.posture, K.tension, K.wrench, loop.applied, near=near)
-
-    def _stiffness(
-        self, arm: Manipulator, measurement: Measurement | WeightLoop, parameters: Parameters
-    ) -> Stiffness:
-        """Compute the stiffness of the arm before the first force of a measurement."""
-        pose = arm.at(measurement.angles)
-        tension: Tension | ArrayLike
-        if self.tension_of is not None:
-            tension = _call_model("tension_of", self.tension_of, parameters, pose, measurement)
-        elif measurement.tension is not None:
-            tension = measurement.tension
-        else:
-            assert measurement.minimum is not None
-            tension = distribute_tension(pose, measurement.minimum, wrench=measurement.wrench)
-        wrench = None if isinstance(tension, Tension) else measurement.wrench
-        return stiffness(pose, tension, wrench)
-
-    def _along(self, arm: Manipulator, measurement: Measurement, parameters: Parameters) -> float:
-        K = self._stiffness(arm, measurement, parameters)
-        if not K.is_stable:
-            raise SingularStiffness(
-                f"the arm buckles: the smallest stiffness is {K.margin:.3g} "
-                f"{arm.stiffness_unit()}.",
-                K.critical_direction,
-            )
-        if measurement.force:
-            value = self._secant(measurement, K)
-        else:
-            value = K.along(measurement.direction)
-        if not value < 1.0 / SMALLEST:
-            raise SingularStiffness(
-                "the tip cannot move in its direction, so the stiffness is infinite.",
-                K.critical_direction,
-            )
-        return value
-
-    def _secant(self, measurement: Measurement, K: Stiffness) -> float:
-        # start at the equilibrium of the last parameters: a tenth of the time of weight_test
-        pose, last = K.posture, self._last_rest.get(measurement)
-        force = measurement.force * unit_direction("direction", measurement.direction)
-        test = None
-        if last is not None:
-            without = equilibrium(pose, K.tension, K.wrench)
-            loaded = follow(without, frozen(K.wrench + np.append(force, np.zeros(3))), last)
-            if loaded is not None:
-                test = WeightTest(force=force, without=without, loaded=(loaded,))
-        if test is None:
-            test = weight_test(pose, K.tension, force, wrench=K.wrench)
-        self._last_rest[measurement] = test.loaded[-1].pose.q
-        return test.stiffness
-
-
-def problem_of(model: Model, bounds: Mapping[str, tuple[float, float]]) -> LeastSquares:
-    """Return the least-squares problem of ``model`` within ``bounds`` (low, high) by name."""
-    beside = model.residuals_beside if model.loops else None
-    return LeastSquares(model.residuals, model.count, bounds, beside)
-
-
-def _call_model(
-    name: str, function: Callable[..., Any], parameters: Parameters, *args: object
-) -> Any:
-    try:
-        return function(*args, **parameters)
-    except CdsmError:
-        raise
-    except Exception as error:
-        where = ", ".join(f"{key}={value:g}" for key, value in parameters.items())
-        raise UserFaultError(
-            InvalidInput(
-                name,
-                f"fails at {where}: {error!r}. Correct it, narrow the bounds, or let it raise a "
-                "CdsmError where there is no such arm.",
-            )
-        ) from error
+        return at(found.x)

@@ -3,293 +3,250 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
+from numpy.typing import NDArray
+from scipy.special import chdtr, chdtrc, ndtri
 
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination
-from cdsm.identification.intervals import NEGLIGIBLE, Profile
-from cdsm.identification.loop import WeightLoop, measured
-from cdsm.identification.measurement import Measurement, label
+from cdsm.identification.intervals import interval
+from cdsm.identification.measurement import Measurement, WeightLoop, name_of
+from cdsm.identification.problem import Problem
 from cdsm.manipulator import Manipulator
-from cdsm.support.format import MODEL, plain
-from cdsm.support.validation import flag, scalar
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.format import MODEL, aligned
+from cdsm.support.progress import progress_allowed, track
+from cdsm.support.result import Result, quantity, unit
+from cdsm.support.validation import scalar
+from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-
-_LINEAR = 1.5  # an interval is printed as not linear if it is so many times wider or narrower
+_CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
+_UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
+_OWN, _MIXED = "own unit", "N/m or m"
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Identification(ReadOnlyState):
+class Identification(Result):
     """Parameters of an arm that explain its measurements best; made by :func:`identify`.
 
     There are P parameters and n measured numbers: one for each stiffness, and all readings of each
-    loop. Each parameter has the unit in which ``model_of`` takes it. All arrays are read-only.
+    loop. Each parameter has the unit in which ``model_of`` takes it, its own unit. All arrays are
+    read-only.
 
     Attributes:
         names: Names of the parameters, in the order of every (P,) array.
-        values: Values of the parameters (P,) [m, kg, N/m, …].
-        bounds: Bounds of the parameters (P, 2), low and high [m, kg, N/m, …].
+        values: Values of the parameters (P,).
+        bounds: Bounds of the parameters (P, 2), low and high.
         measurements: The measurements.
         predicted: Predicted numbers (n,): stiffnesses [N/m], and readings of loops [m] with fitted
             offsets.
-        residuals: Residuals r (n,) in standard deviations [-]. For a stiffness, r is (predicted −
-            measured)/σ; for a reading of a loop with the fitted
-            offset.
-        jacobian: J = ∂r/∂p (n, P) [1/m, m/N, …].
+        residuals: r = (predicted − measured)/σ (n,) [-].
+        jacobian: J = ∂r/∂p (n, P).
         arm: Arm with these values.
-        warnings: One sentence for each reason not to trust the result; empty if there is none.
-        profiles: One :class:`Profile` of χ² for each parameter; None if it is not determined, or if
-            :attr:`warnings` say why there are no intervals.
+        unfinished: Why the search ended before the optimum; empty if it did not.
     """
 
-    names: tuple[str, ...]
-    values: Array
-    bounds: Array
+    _headline, _rows = "chi_square", "parameter"
+
+    names: tuple[str, ...] = field(metadata=unit("1", "parameter"))
+    values: Array = field(metadata=unit(_OWN, "parameter"))
+    bounds: Array = field(metadata=unit(_OWN, "parameter", "bound"))
     measurements: tuple[Measurement | WeightLoop, ...]
-    predicted: Array
-    residuals: Array
+    predicted: Array = field(metadata=unit(_MIXED, "reading"))
+    residuals: Array = field(metadata=unit("1", "reading"))
     jacobian: Array
     arm: Manipulator
-    warnings: tuple[str, ...]
-    profiles: tuple[Profile | None, ...]
+    unfinished: str
+    _problem: Problem
 
     @property
     def parameters(self) -> dict[str, float]:
         """Values of the parameters by name, in the units of ``model_of``."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
-    @cached_property
+    @quantity(_MIXED, "reading")
     def measured(self) -> Array:
         """Measured numbers (n,): stiffnesses [N/m], and tip displacements of weight loops [m]."""
-        return frozen(np.concatenate([measured(each) for each in self.measurements]))
+        return frozen(np.concatenate([each._readings for each in self.measurements]))
 
-    @property
-    def chi_square(self) -> float:
-        """χ² = Σ r² [-]. It is about :attr:`freedom` if the model and all σ are right."""
-        return float(self.residuals @ self.residuals)
+    @cached_property
+    def measurement_of(self) -> NDArray[np.intp]:
+        """Index of the measurement to which each of the n measured numbers belongs (n,)."""
+        sizes = [each._readings.size for each in self.measurements]
+        return frozen(np.repeat(np.arange(len(sizes)), sizes))
 
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom of χ²: n − :attr:`rank`, less one offset per axis of each loop."""
-        loops = (each for each in self.measurements if isinstance(each, WeightLoop))
-        zeros = sum(len(loop.axes) for loop in loops)
-        return len(self.predicted) - zeros - self.rank
-
-    @property
-    def reduced_chi_square(self) -> float:
-        """χ² per degree of freedom [-]; inf without degrees of freedom."""
-        return self.chi_square / self.freedom if self.freedom else math.inf
-
-    @property
-    def rank(self) -> int:
-        """Number of combinations of parameters that the measurements determine, at most P."""
-        return self._determination.rank
+    @quantity(_OWN, "parameter")
+    def std(self) -> Array:
+        """Standard deviations of the parameters (P,); inf if undetermined."""
+        return frozen(np.sqrt(np.diag(self.covariance)))
 
     @property
     def covariance(self) -> Array:
-        """Covariance (JᵀJ)⁻¹ (P, P) [m², m kg, …] for the given σ, not scaled by χ².
+        """Covariance (JᵀJ)⁻¹ (P, P) for the given σ, not scaled by χ².
 
         If only the ratios of the σ are known, multiply it by :attr:`reduced_chi_square`. The bounds
         have no influence. An undetermined parameter has infinite variance.
         """
         return self._determination.covariance
 
-    @cached_property
-    def std(self) -> Array:
-        """Standard deviations of the parameters (P,) [m, kg, N/m, …]."""
-        return frozen(np.sqrt(np.diag(self.covariance)))
-
-    @property
+    @quantity("1", "parameter", "other_parameter")
     def correlation(self) -> Array:
         """Correlations (P, P) [-]; ±1 for two parameters with only one combination determined."""
         return self._determination.correlation
 
-    def confidence(
-        self, level: float = 0.95, *, scaled: bool = False
-    ) -> dict[str, tuple[float, float]]:
-        """Compute an interval (low, high) for each parameter, by name [m, kg, N/m, …].
+    @quantity("1")
+    def chi_square(self) -> float:
+        """χ² = Σ r² [-]. It is about :attr:`freedom` if the model and all σ are right."""
+        return float(self.residuals @ self.residuals)
 
-        It contains the true value with the probability ``level``.
+    @quantity("1")
+    def freedom(self) -> int:
+        """Degrees of freedom of χ²: n − :attr:`rank`, less one offset per axis of each loop."""
+        loops = (each for each in self.measurements if isinstance(each, WeightLoop))
+        return len(self.predicted) - sum(len(loop.axes) for loop in loops) - self.rank
+
+    @property
+    def reduced_chi_square(self) -> float:
+        """χ² per degree of freedom [-]; inf without degrees of freedom."""
+        return self.chi_square / self.freedom if self.freedom else math.inf
+
+    @quantity("1")
+    def rank(self) -> int:
+        """Number of combinations of parameters that the measurements determine, at most P."""
+        return self._determination.rank
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence for each reason not to trust the result; empty if there is none."""
+        said, r, std = list[str](), self.correlation, self.std
+        for combination in self._determination.open_combinations:
+            said.append(
+                f"not identifiable (rank {self.rank} of {len(self.names)}): no prediction changes "
+                f"with {combination}, so their values are one choice of many. Fix one, or measure "
+                "what separates them."
+            )
+        for j, i in zip(*np.triu_indices(len(self.names), 1), strict=True):
+            if abs(r[i, j]) > _CORRELATED and math.isfinite(std[i]):
+                said.append(
+                    f"{self.names[j]} and {self.names[i]} are correlated at {r[i, j]:+.4f}: mostly "
+                    "a combination of them is determined. Measure at other postures, directions or "
+                    "tensions."
+                )
+        for name, value, limits in zip(self.names, self.values, self.bounds, strict=True):
+            for side, limit in zip(("lower", "upper"), limits, strict=True):
+                if value == limit:
+                    said.append(
+                        f"{name} is at its {side} bound, {limit:g}: the optimum lies there or "
+                        "beyond. Widen the bounds, or doubt the model."
+                    )
+        if self.freedom and chdtrc(self.freedom, self.chi_square) < _UNLIKELY:
+            k = int(abs(self.residuals).argmax())
+            said.append(
+                f"the model does not explain the measurements within their σ: {self._verdict}, "
+                f"worst at {self.reading_names[k]} with {self.residuals[k]:+.3g} σ. Standard "
+                "deviations and intervals are valid for a right model only."
+            )
+        return (*said, *([self.unfinished] if self.unfinished else []))
+
+    def confidence(
+        self, level: float = 0.95, *, progress: bool = True
+    ) -> dict[str, tuple[float, float]]:
+        """Compute an interval (low, high) for each parameter, by name, in its own unit.
+
+        It contains the true value with the probability ``level``, between 0 and 1.
 
         The interval of p_i follows from profile likelihood: fix p_i, fit the other parameters
         within their bounds; the interval has all p_i where χ² rises by Δχ² ≤ q². q is the quantile
         of a normal variable. For a linear model the interval is value ± q·std. For other models it
         may be asymmetric. A limit is -inf or inf if Δχ² stays below q² up to the bound of the
-        parameter, or as far as the model exists. Then the measurements set no limit, and
-        :attr:`warnings` report it at 95 %.
+        parameter, or as far as the model exists: then the measurements set no limit.
 
-        No parameter has a limit if the fit is not an optimum; :attr:`warnings` say so. Another
-        minimum of χ² that fits as well stays unknown: try other starts of :func:`identify`.
-
-        Args:
-            level: The probability, between 0 and 1.
-            scaled: Whether the σ are known only up to a common factor, which χ² estimates. Then q
-                is the quantile of Student's t times √(reduced χ²).
+        This predicts all measurements some 30 P² times; ``progress`` shows a bar on the standard
+        error, if that is a terminal. If the σ are known only up to a common factor, widen them by
+        √(:attr:`reduced_chi_square`) and identify again. Another minimum of χ² that fits as well
+        stays unknown: try other starts of :func:`identify`.
 
         Raises:
-            InvalidInput: ``level`` is not between 0 and 1, or so near to 1 that the profiles do not
-                reach it; or ``scaled`` is not a bool.
+            InvalidInput: ``level`` is not between 0 and 1; or χ² is lower elsewhere, where the
+                error says.
         """
-        level = scalar("level", level)
-        if not 0.0 < level < 1.0:
+        if not 0.0 < (level := scalar("level", level)) < 1.0:
             raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
-        rise = self._rise(level, scaled=flag("scaled", scaled))
-        intervals = {}
-        for name, profile in zip(self.names, self.profiles, strict=True):
-            low: float | None = -math.inf
-            high: float | None = math.inf
-            if profile is not None and math.isfinite(rise):
-                low, high = profile.crossing(rise, -1), profile.crossing(rise, 1)
-            if low is None or high is None:
-                raise InvalidInput(
-                    "level",
-                    f"{level:.10g} given; the profile of {name} does not reach there. Give a level "
-                    "farther from 1.",
-                )
-            intervals[name] = (low, high)
-        return intervals
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the result as plain numbers for JSON; each parameter in its own unit."""
-        intervals = self.confidence()
-        return plain(
-            {
-                "parameters": {
-                    name: {"value": value, "std": std, "interval_95": intervals[name]}
-                    for name, value, std in zip(self.names, self.values, self.std, strict=True)
-                },
-                "correlation": self.correlation,
-                "chi_square": self.chi_square,
-                "degrees_of_freedom": self.freedom,
-                "rank": self.rank,
-            }
-        )
+        problem, rise = self._problem, float(ndtri((1.0 + level) / 2.0) ** 2)
+        best = problem.point(self.values)
+        best = np.where(self.values == problem.low, 0.0, best)
+        best = np.where(self.values == problem.high, 1.0, best)
+        jacobian, found = self.jacobian * problem.slope(best), dict[str, tuple[float, float]]()
+        with progress_allowed(progress):
+            for i in track(range(best.size), "finding the confidence of the parameters"):
+                known = math.isfinite(self.std[i])
+                limits = interval(problem, best, jacobian, i, rise) if known else None
+                found[self.names[i]] = limits or (-math.inf, math.inf)
+        return found
 
     def plot(self) -> Figure:
         """Plot predicted and measured stiffnesses [N/mm] and loops [mm], and residuals in σ."""
         from cdsm.plots.measured import plot_identification  # matplotlib imports slowly
 
-        return plot_identification(self, self._labels, self._verdict)
-
-    def __repr__(self) -> str:
-        values = ", ".join(f"{name}={value:.4g}" for name, value in self.parameters.items())
-        return f"<Identification {values}; {self._verdict}>"
+        return plot_identification(self, self.reading_names, self._verdict)
 
     def __str__(self) -> str:
-        columns = ("value", "std", "95 % from", "to", "low", "high")
-        intervals = list(self.confidence().values())
-        numbers = np.column_stack([self.values, self.std, intervals, self.bounds])
-        lines = [_row("parameter [own unit]", *columns), *map(_row, self.names, *numbers.T)]
-        lines += [*self._nonlinear_rows(), "", *self._stiffness_rows(), *self._loop_rows(), ""]
-        lines.append(self._verdict)
-        return "\n".join([*lines, *(f"warning: {sentence}" for sentence in self.warnings)])
-
-    def _nonlinear_rows(self) -> list[str]:
-        """Return the line that names parameters whose 95 % interval differs much from ±1.96 std.
-
-        The list is empty if there is no such parameter.
-        """
-        low, high = np.array(list(self.confidence().values())).T
-        ratio = (high - low) / (2.0 * math.sqrt(self._rise(0.95, scaled=False)) * self.std)
-        chosen = np.isfinite(ratio) & ((ratio > _LINEAR) | (ratio < 1.0 / _LINEAR))
-        names = ", ".join(name for name, bent in zip(self.names, chosen, strict=True) if bent)
-        return [f"(not linear: trust the interval, not the std, of {names})"] if names else []
-
-    def _stiffness_rows(self) -> list[str]:
-        chosen = [k for k, each in enumerate(self._rows) if isinstance(each, Measurement)]
-        if not chosen:
-            return []
-        names = [self._labels[k] for k in chosen]
-        numbers = self.measured[chosen] / 1e3, self.predicted[chosen] / 1e3
-        residuals = [f"{residual:.2f}" for residual in self.residuals[chosen]]
-        return [
-            _row("measurement", "measured", "predicted", "residual"),
-            _row("", "[N/mm]", "[N/mm]", "[σ]"),
-            *map(_row, names, *numbers, residuals),
-            f"({MODEL}; secant where a force is given)",
+        half = float(ndtri(0.975)) * self.std
+        numbers = np.column_stack([self.values, self.std, self.values - half, self.values + half])
+        rows = np.column_stack([numbers, self.bounds])
+        lines: list[Sequence[str]] = [
+            ("parameter [own unit]", "value", "std", "95 % from", "to", "low", "high")
         ]
-
-    def _loop_rows(self) -> list[str]:
-        rows = []
+        for name, row in zip(self.names, rows, strict=True):
+            lines.append((name, *(f"{x:.4g}" for x in row)))
+        tests: list[Sequence[str]] = [("measurement", "measured", "predicted", "worst residual")]
         for i, each in enumerate(self.measurements):
-            if isinstance(each, WeightLoop):
-                own = [k for k, row in enumerate(self._rows) if row is each]
-                off = 1e6 * (self.predicted - self.measured)[own]
-                spread = 1e6 * float(np.ptp(self.measured[own]))
-                worst = f"{max(self.residuals[own], key=abs):.2f}"
-                rms = float(np.sqrt(np.mean(off**2)))
-                rows.append(_row(label(i, each), len(own), spread, rms, worst))
-        if rows:
-            rows.insert(0, _row("loop", "readings", "range", "rms off", "worst"))
-            rows.insert(1, _row("", "", "[µm]", "[µm]", "[σ]"))
-        return rows
-
-    @cached_property
-    def _rows(self) -> list[Measurement | WeightLoop]:
-        """The measurement to which each of the n measured numbers belongs."""
-        return [each for each in self.measurements for _ in measured(each)]
-
-    @cached_property
-    def _determination(self) -> Determination:
-        return Determination(self.names, self.jacobian, np.ptp(self.bounds, axis=1))
+            own = self.measurement_of == i
+            off, worst = self.residuals[own], f"{max(self.residuals[own], key=abs):.2f} σ"
+            if isinstance(each, Measurement):
+                said = [f"{K[own][0] / 1e3:.4g} N/mm" for K in (self.measured, self.predicted)]
+            else:
+                rms = 1e6 * each.displacement_std * math.sqrt(np.mean(off**2))
+                said = [f"{off.size} readings", f"off by {rms:.3g} µm rms"]
+            tests.append((name_of(i, each), *said, worst))
+        note = "(95 % from the std of the linear model; confidence() profiles χ²)"
+        model = f"({MODEL}; secant where a force is given; loops with friction)"
+        shown = [*aligned(lines), note, "", *aligned(tests), model, "", self._verdict]
+        return "\n".join([*shown, *(f"warning: {sentence}" for sentence in self.warnings)])
 
     @property
-    def _labels(self) -> list[str]:
+    def reading_names(self) -> list[str]:
         """Name of each of the n measured numbers: the label, and for loops the force's number."""
         names = []
         for i, each in enumerate(self.measurements):
-            own = label(i, each)
+            own, numbers = name_of(i, each), each._readings.size
             if isinstance(each, WeightLoop):
-                numbers = np.repeat(np.arange(len(each.forces)) + 1, len(each.axes))
-                names += [f"{own} force {number}" for number in numbers]
+                names += [f"{own} force {k // len(each.axes) + 1}" for k in range(numbers)]
             else:
                 names.append(own)
         return names
 
     @property
     def _verdict(self) -> str:
-        return (
-            f"χ² = {self.chi_square:.4g} with {self.freedom} degrees of freedom, "
-            f"rank {self.rank} of {len(self.names)}"
-        )
-
-    def _rise(self, level: float, *, scaled: bool) -> float:
-        """Compute Δχ² [-], the rise of χ² at the limits of a confidence interval of this ``level``.
-
-        :meth:`confidence` explains ``scaled``.
-        """
-        half = (1.0 + level) / 2.0
-        if not scaled:
-            return float(ndtri(half) ** 2)
-        if not self.freedom:
-            return math.inf
-        return float(stdtrit(self.freedom, half) ** 2) * self.reduced_chi_square
-
-    @property
-    def _goals(self) -> tuple[list[float], float]:
-        """Values of Δχ² [-] that profiles reach: at the 95 % limits, ascending, and at the end.
-
-        The 95 % limits are those with and without ``scaled``; see :meth:`confidence`.
-        """
-        exact, far = [self._rise(0.95, scaled=False)], self._rise(0.999, scaled=False)
+        """χ² with its probability: of right models and σ, so many have a smaller one."""
+        said = f"χ² = {self.chi_square:.4g} with {self.freedom} degrees of freedom"
         if self.freedom:
-            exact.append(self._rise(0.95, scaled=True))
-            far = max(far, self._rise(0.99, scaled=True))
-        # without noise, χ² and all it scales are rounding
-        return sorted(rise for rise in exact if rise > NEGLIGIBLE), far
+            less = 100.0 * chdtr(self.freedom, self.chi_square)
+            said += f" (right models and σ: smaller in {less:.3g} % of all experiments)"
+        return f"{said}, rank {self.rank} of {len(self.names)}"
 
+    @cached_property
+    def _determination(self) -> Determination:
+        return Determination(self.names, self.jacobian, np.ptp(self.bounds, axis=1))
 
-def _row(name: str, *cells: object) -> str:
-    """Write one line of a table: ``name`` and ``cells``; floats have four digits."""
-    texts = (f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)
-    return f"{name:<22}" + "".join(f"{text:>12}" for text in texts)
+    def _labels(self) -> dict[str, Sequence[object]]:
+        names = {"parameter": self.names, "other_parameter": self.names, "bound": ("low", "high")}
+        return {**super()._labels(), **names}

@@ -9,9 +9,9 @@ from lxml import etree
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from cdsm.interchange.mjcf_motion import Carried
 from cdsm.manipulator import Manipulator
 from cdsm.posture import foot
-from cdsm.statics.natural_modes import Carried
 from cdsm.support.values import Array
 from cdsm.support.xml import parse_xml
 

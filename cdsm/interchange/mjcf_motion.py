@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
 from cdsm.manipulator import Manipulator
-from cdsm.statics.natural_modes import Carried, mass_matrix, motions
+from cdsm.posture import Posture
+from cdsm.statics.modes import vibrations
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import JointUnits
 from cdsm.support.values import Array
@@ -22,6 +24,15 @@ _DEFAULT_STEP = 2e-3  # MuJoCo's own time step [s]
 _PHASE = 0.2
 """Largest ω·dt [rad], with ω the highest natural frequency: frequencies are right within 0.2 %.
 MuJoCo integrates the springs explicitly, which diverges from ω·dt = 2 on."""
+
+
+class Carried(NamedTuple):
+    """Rigid body that a link carries; its centre and inertia are in the frame of the link."""
+
+    link: str
+    mass: float  # m [kg]
+    centre: Array  # centre of mass (3,) [m]
+    inertia: Array  # I about the centre of mass (3, 3) [kg m²]
 
 
 class Motion(NamedTuple):
@@ -51,7 +62,7 @@ def choose_motion(
     unit = JointUnits(arm.slides).joined("N m s/rad", "N s/m")
     damped = f"{joints:.4g} {unit} at every joint"
     if K is not None:
-        squares, shapes = motions(K, mass_matrix(K.posture, masses))
+        squares, shapes = vibrations(K, mass_matrix(K.posture, masses))
         fastest = math.sqrt(abs(squares).max())
         step, reason = _time_step(fastest), f"for frequencies up to {fastest / math.tau:.4g} Hz"
         swings = squares > 0.0
@@ -80,3 +91,20 @@ def _time_step(omega: float) -> float:
     power = math.floor(math.log10(_PHASE / omega))
     steps = [float(f"{digit}e{exponent}") for exponent in (power - 1, power) for digit in (1, 2, 5)]
     return max(step for step in steps if step * omega <= _PHASE)
+
+
+def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
+    """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies ``carried`` alone.
+
+    M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω). J_v and J_ω are the Jacobians of the velocity of the centre of
+    mass and of the angular velocity of a body.
+    """
+    body, M = pose.arm._body, np.zeros((pose.arm.nv, pose.arm.nv))
+    for link, mass, centre, inertia in carried:
+        place = pose.link_pose(link)
+        joints = np.array(body.joints_to(body.locate(link)[0]), dtype=np.intp) - 1
+        angular, R = pose._twist[3:, joints], place[:3, :3]
+        linear = pose._twist[:3, joints] + np.cross(angular.T, R @ centre + place[:3, 3]).T
+        turned = angular.T @ R
+        M[np.ix_(joints, joints)] += mass * linear.T @ linear + turned @ inertia @ turned.T
+    return M

@@ -3,40 +3,30 @@
 from collections.abc import Callable
 from typing import Final
 
-from cdsm.paper.claims import (
-    EXPLANATION,
-    HEADER,
-    SUMMARY,
-    Claim,
-    Figure,
-    to_dict,
-    to_markdown,
-    to_rows,
-    to_summary,
-)
-from cdsm.paper.curves import Curve, LeadFigure, StiffnessFigure
+from cdsm.paper.claims import HEADER, Claim, Figure, to_dict, to_markdown, to_rows
 from cdsm.paper.experiments import ExperimentFigure, Trace, figure_10, figure_12, figure_13
-from cdsm.paper.simulation import figure_3, figure_4, figure_6, figure_7, figure_8, figure_lead
+from cdsm.paper.simulation import (
+    Curve,
+    LeadFigure,
+    StiffnessFigure,
+    figure_3,
+    figure_4,
+    figure_6,
+    figure_7,
+    figure_8,
+    figure_lead,
+)
 from cdsm.paper.strand import StrandFigure, figure_5
 
+# fmt: off
 FIGURES: Final[dict[str, Callable[[], Figure]]] = {
-    "fig3": figure_3,
-    "fig4": figure_4,
-    "lead": figure_lead,
-    "fig5": figure_5,
-    "fig6": figure_6,
-    "fig7": figure_7,
-    "fig8": figure_8,
-    "fig10": figure_10,
-    "fig12": figure_12,
-    "fig13": figure_13,
+    "fig3": figure_3, "fig4": figure_4, "lead": figure_lead, "fig5": figure_5, "fig6": figure_6,
+    "fig7": figure_7, "fig8": figure_8, "fig10": figure_10, "fig12": figure_12, "fig13": figure_13,
 }
 """Function that computes each figure, by the name of the figure."""
 
-# fmt: off
 __all__ = [
-    "EXPLANATION", "FIGURES", "HEADER", "SUMMARY", "Claim", "Curve", "ExperimentFigure", "Figure",
-    "LeadFigure", "StiffnessFigure", "StrandFigure", "Trace", "to_dict", "to_markdown", "to_rows",
-    "to_summary",
+    "FIGURES", "HEADER", "Claim", "Curve", "ExperimentFigure", "Figure", "LeadFigure",
+    "StiffnessFigure", "StrandFigure", "Trace", "to_dict", "to_markdown", "to_rows",
 ]
 # fmt: on

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, final
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias, final
 
 import cdsm
+from cdsm.support.result import Result, unit
 
 if TYPE_CHECKING:
     from matplotlib import figure
@@ -30,8 +30,12 @@ EXPLANATION = (
 """Meaning of the columns, and the figures that are left out."""
 
 
+Said: TypeAlias = tuple[str, str, str, tuple[float, ...] | None]
+"""What the paper says: the first four fields of a :class:`Claim`."""
+
+
 @final
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Claim:
     """A number of the paper, or one for each of x, y and z, and the computed numbers.
 
@@ -53,11 +57,11 @@ class Claim:
     figure: str
     quantity: str
     unit: str
-    paper: tuple[float, ...] | None = None
+    paper: tuple[float, ...] | None
     computed: tuple[float, ...]
     original: tuple[float, ...] = ()
     along: tuple[float, ...] = ()
-    assumption: str
+    assumption: str = field(kw_only=True)
     searched: str = ""
     at_most: bool = False
 
@@ -68,9 +72,13 @@ class Claim:
             return None
         return tuple(ours - theirs for ours, theirs in zip(self.computed, self.paper, strict=True))
 
+    def to_dict(self) -> dict[str, object]:
+        """Return all fields and the difference, for JSON."""
+        return {**vars(self), "difference": self.difference}
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Figure(ABC):
+class Figure(Result):
     """One recomputed figure of the paper. Each subclass adds its curves.
 
     Attributes:
@@ -80,52 +88,17 @@ class Figure(ABC):
     """
 
     name: str
-    title: str
-    claims: tuple[Claim, ...]
+    title: str = field(metadata=unit("1"))
+    claims: tuple[Claim, ...] = field(metadata=unit("1"))
 
     def plot(self) -> figure.Figure:
         """Plot the curves, with the numbers that the paper prints."""
         return cdsm.plots.plot_paper(self)
 
-    @abstractmethod
-    def numbers(self) -> dict[str, object]:
-        """Return the curves as plain SI numbers, for JSON."""
-
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:
     """Convert values to a tuple of floats, as a :class:`Claim` stores them."""
     return tuple(float(value) for value in values)
-
-
-SUMMARY = ("number that deviates most", "compared", "deviation", "paper", "computed")
-"""Columns of :func:`to_summary`."""
-
-
-def to_summary(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
-    """Return a row per figure with its claim that deviates most from the paper.
-
-    :data:`SUMMARY` names the columns. A deviation is relative to the largest number of the paper in
-    the same claim.
-    """
-    rows: list[tuple[str, ...]] = []
-    for figure in figures:
-        compared = [claim for claim in figure.claims if claim.difference is not None]
-        count = f"{len(compared)} of {len(figure.claims)}"
-        if compared:
-            worst = max(compared, key=_deviation)
-            name = f"{worst.figure}: {worst.quantity} [{worst.unit}]"
-            numbers = _listed(worst.paper, ".4g"), _listed(worst.computed, ".3g")
-            rows.append((name, count, f"{100.0 * _deviation(worst):.2g} %", *numbers))
-        else:
-            rows.append((f"{figure.claims[0].figure}: no numbers in the paper", count, "", "", ""))
-    return rows
-
-
-def _deviation(claim: Claim) -> float:
-    """Return the largest difference of a claim, divided by the largest of the paper's numbers."""
-    assert claim.difference is not None
-    assert claim.paper is not None
-    return max(map(abs, claim.difference)) / max(map(abs, claim.paper))
 
 
 def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
@@ -134,11 +107,11 @@ def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
         (
             claim.figure,
             f"{claim.quantity} [{claim.unit}]",
-            ("≤ " if claim.at_most else "") + _listed(claim.paper, ".4g"),
-            _listed(claim.computed, ".3g"),
-            _listed(claim.difference, "+.2g"),
-            _listed(claim.original, ".3g"),
-            _listed(claim.along, ".3g"),
+            ("≤ " if claim.at_most else "") + _joined(claim.paper, ".4g"),
+            _joined(claim.computed, ".3g"),
+            _joined(claim.difference, "+.2g"),
+            _joined(claim.original, ".3g"),
+            _joined(claim.along, ".3g"),
             claim.assumption,
             claim.searched or "–",
         )
@@ -159,16 +132,9 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def to_dict(figures: Sequence[Figure]) -> dict[str, object]:
-    """Return all curves (plain SI numbers) and claims of ``figures``, ready for JSON."""
-    return {
-        figure.name: {
-            "title": figure.title,
-            **figure.numbers(),
-            "claims": [{**vars(claim), "difference": claim.difference} for claim in figure.claims],
-        }
-        for figure in figures
-    }
+    """Return all curves (in SI) and claims of ``figures`` by name, ready for JSON."""
+    return {figure.name: figure.to_dict() for figure in figures}
 
 
-def _listed(values: tuple[float, ...] | None, form: str) -> str:
+def _joined(values: tuple[float, ...] | None, form: str) -> str:
     return "–" if not values else ", ".join(format(value, form) for value in values)

@@ -8,8 +8,7 @@ Disagreement contradicts the model, an assumption or the other data.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, field
 from typing import Final, Literal, final
 
 import numpy as np
@@ -17,37 +16,64 @@ from numpy.typing import ArrayLike
 
 from cdsm import presets
 from cdsm.manipulator import Manipulator
-from cdsm.paper.claims import Claim, Figure, floats
-from cdsm.paper.section_v import (
-    CHECK,
-    DROPS,
-    HIGHEST_TENSION,
-    HYBRID,
-    HYBRID_TENSION,
-    MEASURED,
-    POSTURE,
-    RISES,
-    SECOND_POSTURE,
-    STIFFEST,
-    TABLE_II,
-    TABLE_II_SWAPPED,
-    TENSION_OFFSET,
-    TENSIONS,
-)
+from cdsm.paper.claims import Claim, Figure, Said, floats
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.directions import XYZ
+from cdsm.support.result import Result, unit
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
-_POINTS: Final = 40
-_POSTURES: Final = (POSTURE, SECOND_POSTURE)
+_X = [4.08, 4.86, 5.76, 8.21, 12.71]
+_Y = [2.23, 7.45, 7.24, 9.94, 10.29]
+_Z = [8.88, 10.31, 16.43, 27.54, 35.25]
+TABLE_II: Final = frozen(1e3 * np.column_stack([_X, _Y, _Z]))
+"""Measured stiffness in x, y, z (5, 3) [N/m], at tensions rising from 3 to 86 N (Table II)."""
 
-_claim = partial(Claim, searched="dimensions of the prototype, conditions of the tests")
+TABLE_II_SWAPPED: Final = frozen(np.vstack([TABLE_II[0], TABLE_II[1:4, [1, 0, 2]], TABLE_II[4]]))
+"""Table II with x and y exchanged in rows 2 to 4 (5, 3) [N/m].
+
+By the caption of Fig. 10 and Section V-C, y is the least of the three. The printed table
+contradicts this in exactly these rows: 7.45 > 4.86, 7.24 > 5.76, 9.94 > 8.21. In these rows y also
+falls, from 7.45 to 7.24. With the exchange, y is the least in every row and always rises. The
+increments from the first to the last row do not change.
+"""
+
+TENSIONS: Final = frozen(np.linspace(3.0, 86.0, 5))
+"""Tensions of the rows of Table II (5,) [N]: first and last are given, even spacing is assumed."""
+
+POSTURE: Final = frozen(np.deg2rad([-12.0, -18.0, -20.0]))
+"""Joint angles of Table II (3,) [rad] (Section V-C)."""
+
+DROPS, RISES = (0.17, 0.40), (7.93, 12.25)
+"""What stiffness in y falls by with tension (Fig. 12) and rises by with the springs (Fig. 13),
+(last − first)/first, in two configurations."""
+
+CHECK, MEASURED = 139.0, 131.0
+"""Calculated and measured stiffness in z [N/m] of the accuracy check (Section V-B)."""
+
+HYBRID: Final = 1890.0
+"""Stiffness of the hybrid cables (strand and spring together) of Fig. 12 [N/m]."""
+
+# Conditions that the paper does not state, fitted with presets.fitted_prototype to its 20 numbers
+
+TENSION_OFFSET: Final = 17.3
+"""Actual minus reported tension of the force-controlled cables [N]."""
+
+SECOND_POSTURE: Final = frozen(np.deg2rad([-30.0, -30.0, 7.28]))
+"""Joint angles of the second configuration of Figs. 12 and 13 (3,) [rad]; the first is POSTURE."""
+
+HIGHEST_TENSION, HYBRID_TENSION = 34.4, 3.0
+"""Highest tension in Fig. 12 [N], and the tension in Fig. 13 and the accuracy check [N]."""
+
+STIFFEST: Final = 8.04 * HYBRID
+"""Stiffness of the stiffest hybrid cables of Fig. 13 [N/m]; Fig. 11 gives no numbers."""
+
+_POINTS: Final = 40
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Trace:
+class Trace(Result):
     """One curve of a virtual experiment, with the paper's values beside it.
 
     Attributes:
@@ -59,11 +85,11 @@ class Trace:
             exchanged in rows 2 to 4 of Table II.
     """
 
-    label: str
-    swept: Array
-    computed: Array
-    paper_at: Array
-    paper: Array
+    label: str = field(metadata=unit("1"))
+    swept: Array = field(metadata=unit("N or N/m", "case"))
+    computed: Array = field(metadata=unit("N/m or 1", "case"))
+    paper_at: Array = field(metadata=unit("N or N/m", "case"))
+    paper: Array = field(metadata=unit("N/m or 1", "case"))
 
 
 @final
@@ -78,26 +104,9 @@ class ExperimentFigure(Figure):
         traces: Curves of the figure.
     """
 
-    swept: Literal["tension", "cable_stiffness"]
-    relative: bool
-    traces: tuple[Trace, ...]
-
-    def numbers(self) -> dict[str, object]:
-        """Return the curves as plain SI numbers, for JSON."""
-        swept = {"tension": "tension_N", "cable_stiffness": "cable_stiffness_N_per_m"}[self.swept]
-        computed = "stiffness_over_first" if self.relative else "stiffness_N_per_m"
-        return {
-            "curves": [
-                {
-                    "label": trace.label,
-                    swept: trace.swept.tolist(),
-                    computed: trace.computed.tolist(),
-                    f"paper_{swept}": trace.paper_at.tolist(),
-                    f"paper_{computed}": trace.paper.tolist(),
-                }
-                for trace in self.traces
-            ]
-        }
+    swept: Literal["tension", "cable_stiffness"] = field(metadata=unit("1"))
+    relative: bool = field(metadata=unit("1"))
+    traces: tuple[Trace, ...] = field(metadata=unit("1"))
 
 
 def measured(arm: Manipulator, q: ArrayLike, tensions: Sequence[float] | Array) -> Array:
@@ -114,64 +123,41 @@ def measured(arm: Manipulator, q: ArrayLike, tensions: Sequence[float] | Array) 
     return np.array(rows)
 
 
+def _claim(said: Said, computed: Sequence[float] | Array, assumption: str) -> Claim:
+    searched = "dimensions of the prototype, conditions of the tests"
+    return Claim(*said, floats(computed), assumption=assumption, searched=searched)
+
+
 def figure_10() -> ExperimentFigure:
     """Compute stiffness in x, y and z against tension with the 1×19 strand; compare with Table II.
 
     The curves stand beside Table II with x and y exchanged in rows 2 to 4 (evidence:
-    :data:`~cdsm.paper.section_v.TABLE_II_SWAPPED`). The claims compare the printed table too.
+    :data:`TABLE_II_SWAPPED`). The claims compare the printed table too.
     """
     arm = presets.fitted_prototype()
-    tensions = np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS)
+    tensions = frozen(np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS))
     curves, computed = measured(arm, POSTURE, tensions), measured(arm, POSTURE, TENSIONS)
     exchanged = "x and y exchanged in rows 2 to 4 of the table"
-    tables = ((exchanged, TABLE_II_SWAPPED), ("as printed", TABLE_II))
-    claims = [
-        _claim(
-            figure="Table II",
-            quantity=f"stiffness in {axis}",
-            unit="N/mm",
-            paper=floats(theirs / 1e3),
-            computed=floats(ours / 1e3),
-            assumption=f"tensions evenly spaced; {exchanged}",
-        )
-        for axis, theirs, ours in zip(XYZ, TABLE_II_SWAPPED.T, computed.T, strict=True)
-    ]
-    claims.append(
-        _claim(
-            figure="Fig. 10",
-            quantity="increment of stiffness, (last − first)/first",
-            unit="times",
-            paper=floats(TABLE_II[-1] / TABLE_II[0] - 1.0),
-            computed=floats(computed[-1] / computed[0] - 1.0),
-            assumption="tensions from 3 to 86 N",
-        )
-    )
-    claims += [
-        _claim(
-            figure="Table II",
-            quantity="typical misfit in x, y, z",
-            unit="%",
-            computed=floats(100.0 * np.sqrt(np.mean(np.log(computed / table) ** 2, axis=0))),
-            assumption=f"root mean square of ln(model/paper); {label}",
-        )
-        for label, table in tables
-    ]
+    claims, traces = [], []
+    for axis, paper, ours, curve in zip(XYZ, TABLE_II_SWAPPED.T, computed.T, curves.T, strict=True):
+        said = "Table II", f"stiffness in {axis}", "N/mm", floats(paper / 1e3)
+        claims.append(_claim(said, ours / 1e3, f"tensions evenly spaced; {exchanged}"))
+        beside = {"paper_at": TENSIONS, "paper": frozen(paper.copy())}
+        traces.append(Trace(label=axis, swept=tensions, computed=frozen(curve.copy()), **beside))
+    rise, paper = (floats(table[-1] / table[0] - 1.0) for table in (computed, TABLE_II))
+    said = "Fig. 10", "increment of stiffness, (last − first)/first", "times", paper
+    claims.append(_claim(said, rise, "tensions from 3 to 86 N"))
+    for label, table in ((exchanged, TABLE_II_SWAPPED), ("as printed", TABLE_II)):
+        misfit = 100.0 * np.sqrt(np.mean(np.log(computed / table) ** 2, axis=0))
+        assumed = f"root mean square of ln(model/paper); {label}"
+        claims.append(_claim(("Table II", "typical misfit in x, y, z", "%", None), misfit, assumed))
     return ExperimentFigure(
         name="fig10",
         title="Fig. 10: stiffness over tension, 1×19 strand, fitted prototype. "
         "Table II with x and y exchanged in rows 2 to 4",
         swept="tension",
         relative=False,
-        traces=tuple(
-            Trace(
-                label=axis,
-                swept=frozen(tensions),
-                computed=frozen(curve.copy()),
-                paper_at=TENSIONS,
-                paper=frozen(column.copy()),
-            )
-            for axis, curve, column in zip(XYZ, curves.T, TABLE_II_SWAPPED.T, strict=True)
-        ),
+        traces=tuple(traces),
         claims=tuple(claims),
     )
 
@@ -183,34 +169,26 @@ def figure_12() -> ExperimentFigure:
     """
     arm = presets.fitted_prototype(HYBRID)
     tensions = np.linspace(TENSIONS[0], HIGHEST_TENSION, _POINTS)
-    curves = [measured(arm, q, tensions)[:, 1] for q in _POSTURES]
-    check = measured(arm, POSTURE, [HYBRID_TENSION])[0, 2]
+    first, second = (measured(arm, q, tensions)[:, 1] for q in (POSTURE, SECOND_POSTURE))
+    traces = _relative(tensions, [first, second], 1.0 - np.array(DROPS))
+    falls = [100.0 * (1.0 - trace.computed[-1]) for trace in traces]
+    paper = floats(100.0 * drop for drop in DROPS)
+    said = "Fig. 12", "largest reduction of stiffness in y, two configurations", "%", paper
+    assumed = (
+        f"tension 3 to {HIGHEST_TENSION:g} N; the first configuration is the posture of Table II"
+    )
+    drops = _claim(said, falls, assumed)
+    stated = "calculated stiffness in z of the accuracy check", "N/mm", (CHECK / 1e3,)
+    assumed = f"posture of Table II, cables of 1.89 N/mm, {HYBRID_TENSION:g} N; "
+    assumed += f"the paper measured {MEASURED / 1e3:g} N/mm"
+    z = measured(arm, POSTURE, [HYBRID_TENSION])[0, 2]
     return ExperimentFigure(
         name="fig12",
         title="Fig. 12: stiffness in y over tension, cables of 1.89 N/mm, fitted prototype",
         swept="tension",
         relative=True,
-        traces=_configurations(tensions, curves, [1.0 - drop for drop in DROPS]),
-        claims=(
-            _claim(
-                figure="Fig. 12",
-                quantity="largest reduction of stiffness in y, two configurations",
-                unit="%",
-                paper=floats(100.0 * np.array(DROPS)),
-                computed=floats(100.0 * (1.0 - curve[-1] / curve[0]) for curve in curves),
-                assumption=f"tension 3 to {HIGHEST_TENSION:g} N; the first configuration is the "
-                "posture of Table II",
-            ),
-            _claim(
-                figure="Section V-B",
-                quantity="calculated stiffness in z of the accuracy check",
-                unit="N/mm",
-                paper=(CHECK / 1e3,),
-                computed=(float(check) / 1e3,),
-                assumption=f"posture of Table II, cables of 1.89 N/mm, {HYBRID_TENSION:g} N; the "
-                f"paper measured {MEASURED / 1e3:g} N/mm",
-            ),
-        ),
+        traces=traces,
+        claims=(drops, _claim(("Section V-B", *stated), [z / 1e3], assumed)),
     )
 
 
@@ -219,44 +197,30 @@ def figure_13() -> ExperimentFigure:
     springs = np.linspace(HYBRID, STIFFEST, _POINTS)
     arms = [presets.fitted_prototype(spring) for spring in springs.tolist()]
     curves = [
-        np.array([measured(arm, q, [HYBRID_TENSION])[0, 1] for arm in arms]) for q in _POSTURES
+        np.array([measured(arm, q, [HYBRID_TENSION])[0, 1] for arm in arms])
+        for q in (POSTURE, SECOND_POSTURE)
     ]
+    traces = _relative(springs, curves, 1.0 + np.array(RISES))
+    said = "Fig. 13", "increment of stiffness in y, two configurations", "times", RISES
+    assumed = f"stiffest spring {STIFFEST / HYBRID:.3g} times the softest; {HYBRID_TENSION:g} N"
     return ExperimentFigure(
         name="fig13",
         title="Fig. 13: stiffness in y over that of the cables, fitted prototype",
         swept="cable_stiffness",
         relative=True,
-        traces=_configurations(springs, curves, [1.0 + rise for rise in RISES]),
-        claims=(
-            _claim(
-                figure="Fig. 13",
-                quantity="increment of stiffness in y, two configurations",
-                unit="times",
-                paper=RISES,
-                computed=floats(curve[-1] / curve[0] - 1.0 for curve in curves),
-                assumption=f"stiffest spring {STIFFEST / HYBRID:.3g} times the softest; "
-                f"{HYBRID_TENSION:g} N",
-            ),
-        ),
+        traces=traces,
+        claims=(_claim(said, [trace.computed[-1] - 1.0 for trace in traces], assumed),),
     )
 
 
-def _configurations(
-    swept: Array, curves: Sequence[Array], paper: Sequence[float]
-) -> tuple[Trace, ...]:
-    """Build a trace for each configuration: its curve against ``swept`` (N,), over its first value.
-
-    ``paper`` has the paper's ratio of the last to the first value.
-    """
-    return tuple(
-        Trace(
-            label=f"{which}: {', '.join(f'{x:.0f}°' for x in np.rad2deg(q))}",
-            swept=frozen(swept),
-            computed=frozen(curve / curve[0]),
-            paper_at=frozen(swept[-1:].copy()),
-            paper=frozen(np.array([stated])),
-        )
-        for which, q, curve, stated in zip(
-            ("first", "second"), _POSTURES, curves, paper, strict=True
-        )
-    )
+def _relative(swept: Array, curves: Sequence[Array], paper: Array) -> tuple[Trace, ...]:
+    """Return each configuration's curve over its first value, beside the paper's last value."""
+    traces = []
+    for which, q, curve, stated in zip(
+        ("first", "second"), (POSTURE, SECOND_POSTURE), curves, paper.tolist(), strict=True
+    ):
+        label = f"{which}: {', '.join(f'{x:.0f}°' for x in np.rad2deg(q))}"
+        beside = {"paper_at": frozen(swept[-1:].copy()), "paper": frozen(np.array([stated]))}
+        computed = frozen(curve / curve[0])
+        traces.append(Trace(label=label, swept=frozen(swept), computed=computed, **beside))
+    return tuple(traces)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Final, final
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from cdsm import presets
-from cdsm.paper.claims import Claim, Figure
+from cdsm.paper.claims import Claim, Figure, floats
+from cdsm.support.result import unit
 from cdsm.support.values import Array, frozen
 
 GAUGE_LENGTH, JOIN = 0.5, 31.0  # [m], [N]
@@ -29,10 +30,7 @@ HALF_UNITS: Final = (
     frozen(np.array([5e-3, 5e-3, 5e-3, 5e-3, 5e-3, 5e-5, 5e-5])),
     frozen(np.array([5e-2, 5e-3, 5e-3, 5e-5, 5e-9, 5e-12, 5e-15])),
 )
-"""Half a unit of the last printed digit of each coefficient, lowest power first.
-
-The first array belongs to the lower branch of Eq. 19, the second to the upper branch.
-"""
+"""Half a unit of the last printed digit of each coefficient of :data:`EQ19_PRINTED`."""
 
 
 @final
@@ -50,24 +48,13 @@ class StrandFigure(Figure):
         join: Tension at which the two branches of Eq. 19 meet [N].
     """
 
-    tension: Array
-    displacement: Array
-    tangent: Array
-    secant: Array
-    printed: Array
-    gauge_length: float = GAUGE_LENGTH
+    tension: Array = field(metadata=unit("N", "point"))
+    displacement: Array = field(metadata=unit("m", "point"))
+    tangent: Array = field(metadata=unit("N", "point", name="tangent_rigidity"))
+    secant: Array = field(metadata=unit("N", "point", name="secant_rigidity"))
+    printed: Array = field(metadata=unit("N", "point", name="as_printed"))
+    gauge_length: float = field(default=GAUGE_LENGTH, metadata=unit("m"))
     join: float = JOIN
-
-    def numbers(self) -> dict[str, object]:
-        """Return the curves as plain SI numbers, for JSON."""
-        return {
-            "gauge_length_m": self.gauge_length,
-            "tension_N": self.tension.tolist(),
-            "displacement_m": self.displacement.tolist(),
-            "tangent_rigidity_N": self.tangent.tolist(),
-            "secant_rigidity_N": self.secant.tolist(),
-            "as_printed_N": self.printed.tolist(),
-        }
 
 
 def eq19_as_printed(tension: ArrayLike) -> Array:
@@ -90,9 +77,19 @@ def figure_5() -> StrandFigure:
     """Compute Fig. 5 for a 1×19 strand."""
     law = presets.STRAND_1X19
     tension = np.concatenate([np.linspace(2.25, JOIN, 80), np.linspace(31.01, law.high, 120)])
-    claim = partial(Claim, figure="Fig. 5")
     flat = law.rigidity(np.linspace(*LEVEL, 400))
-    low, high = left_open(LEVEL[1])
+    first = "first coefficient for which the branches meet at 31 N, times 1e4"
+    jump = "EA at 31 N from the lower over that from the upper polynomial, as printed"
+    end = "EA at 810 N, least and largest within the printed digits"
+    rise = "rise of EA from least to largest, 400 to 810 N (paper: near-constant)"
+    misprint = "misprint: −1e-3 for −1e-4; all other digits as printed"
+    level, steps = "Eq. 19 most level within its digits", eq19_as_printed([JOIN])
+    claims: list[tuple[str, str, tuple[float] | None, Iterable[float], str]] = [
+        (first, "N⁻⁵", (-10.0,), [1e4 * law.coefficients[0][-1]], misprint),
+        (jump, "-", (1.0,), steps / law.polynomial(JOIN), "none: a misprint"),
+        (end, "kN", None, (1e-3 * EA for EA in left_open(LEVEL[1])), "none"),
+        (rise, "%", None, [100.0 * (flat.max() / flat.min() - 1.0)], level),
+    ]
     return StrandFigure(
         name="fig5",
         title="Fig. 5: tensile test of the 1×19 strand, as Eq. 19 implies it",
@@ -101,33 +98,8 @@ def figure_5() -> StrandFigure:
         tangent=frozen(law.rigidity(tension)),
         secant=frozen(law.secant_rigidity(tension)),
         printed=frozen(eq19_as_printed(tension)),
-        claims=(
-            claim(
-                quantity="first coefficient for which the branches meet at 31 N, times 1e4",
-                unit="N⁻⁵",
-                paper=(-10.0,),
-                computed=(1e4 * law.coefficients[0][-1],),
-                assumption="misprint: −1e-3 for −1e-4; all other digits as printed",
-            ),
-            claim(
-                quantity="EA at 31 N from the lower over that from the upper polynomial, "
-                "as printed",
-                unit="-",
-                paper=(1.0,),
-                computed=(float(eq19_as_printed(JOIN)) / float(law.polynomial(JOIN)),),
-                assumption="none: a misprint",
-            ),
-            claim(
-                quantity="EA at 810 N, least and largest within the printed digits",
-                unit="kN",
-                computed=(1e-3 * low, 1e-3 * high),
-                assumption="none",
-            ),
-            claim(
-                quantity="rise of EA from least to largest, 400 to 810 N (paper: near-constant)",
-                unit="%",
-                computed=(100.0 * float(flat.max() / flat.min() - 1.0),),
-                assumption="Eq. 19 most level within its digits",
-            ),
+        claims=tuple(
+            Claim("Fig. 5", what, of, paper, floats(computed), assumption=assumed)
+            for what, of, paper, computed, assumed in claims
         ),
     )

@@ -1,29 +1,25 @@
-"""Exact derivatives of a :class:`Stiffness` with respect to the cable tensions.
-
-R (r, nv) are rows of the tip Jacobian, and X = (R K_θ⁻¹ Rᵀ)⁻¹ (r, r) is the tip stiffness. If K_θ
-changes by ∂K_θ, X changes by Mᵀ ∂K_θ M. M = K_θ⁻¹ Rᵀ X is the joint motion per unit motion of the
-tip. If a moment acts on the tip, K_θ is not symmetric, and the left factor is (K_θ⁻ᵀ Rᵀ Xᵀ)ᵀ.
-"""
+"""Exact derivatives of a :class:`Stiffness` with respect to the cable tensions."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import final
 
 import numpy as np
 
-from cdsm.planning.kernels import form_by_tension
+from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import aligned, without_rounding
+from cdsm.support.result import Result, unit
 from cdsm.support.validation import instance
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, frozen
 
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class StiffnessGradient(ReadOnlyState):
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class StiffnessGradient(Result):
     """Derivatives of a stiffness with respect to the cable tensions.
 
     Each has the name of the attribute or method of :class:`~cdsm.Stiffness` that it differentiates.
@@ -35,33 +31,20 @@ class StiffnessGradient(ReadOnlyState):
         cable_stiffness: dk_c/dF_c (C,) [1/m] of each cable; 0 under force control.
     """
 
+    _headline, _rows = "cable_stiffness", "cable"
+
     stiffness: Stiffness
-    cable_stiffness: Array
+    cable_stiffness: Array = field(metadata=unit("1/m", "cable"))
 
-    def __repr__(self) -> str:
-        return f"<StiffnessGradient of {self.stiffness.posture.arm.name}>"
-
-    def __str__(self) -> str:
-        arm = self.stiffness.posture.arm
-        columns = (without_rounding(each) for each in (self.cable_stiffness / 1e3, self.margin))
-        rows = [
-            [
-                "cable",
-                "cable stiffness [N/mm]",
-                f"smallest joint stiffness [{arm.stiffness_unit()}]",
-            ]
-        ]
-        rows += [
-            [name, *(f"{value:z.4g}" for value in values)]
-            for name, *values in zip(arm.cables.names, *columns, strict=True)
-        ]
-        return "\n".join(["change per 1 N of tension in one cable", *aligned(rows)])
+    @property
+    def _posture(self) -> Posture:
+        return self.stiffness.posture
 
     @cached_property
     def joint(self) -> Array:
         """∂K_θ/∂F (C, nv, nv) [m/rad²]: one symmetric matrix per cable."""
-        identity = np.eye(self.stiffness.posture.arm.nv)
-        return frozen(self._projected(identity, identity))
+        J, slope = self._posture.length_jacobian, self.cable_stiffness[:, None, None]
+        return frozen(self._posture.length_hessian + slope * J[:, :, None] * J[:, None])
 
     @cached_property
     def margin(self) -> Array:
@@ -72,16 +55,15 @@ class StiffnessGradient(ReadOnlyState):
         upper bound of the change of λ_min, to first order.
         """
         v = self.stiffness.critical_direction[:, None]
-        return frozen(self._projected(v, v)[:, 0, 0])
+        return frozen(form_by_tension(self._posture, self.cable_stiffness, v, v)[:, 0, 0])
 
     @cached_property
     def cartesian(self) -> Array:
         """∂(C_vv)⁻¹/∂F (C, 3, 3) [1/m], with the translational block C_vv of the compliance.
 
-        Raises:
-            SingularStiffness: K_θ is singular, or the tip hardly moves in some direction.
+        Raises SingularStiffness if K_θ is singular, or the tip hardly moves in some direction.
         """
-        return frozen(self._through(self.stiffness.posture.jacobian[:3], self.stiffness.cartesian))
+        return frozen(self._through(np.eye(3), self.stiffness.cartesian))
 
     def along(self, direction: Direction) -> Array:
         """Return ∂s/∂F (C,) [1/m] of the stiffness s = ``K.along(u)``, u being ``direction``.
@@ -92,25 +74,26 @@ class StiffnessGradient(ReadOnlyState):
         """
         u = unit_direction("direction", direction)
         self.stiffness._require_mobile(u)
-        rows = u[None] @ self.stiffness.posture.jacobian[:3]
-        return frozen(self._through(rows, np.array([[self.stiffness.along(u)]]))[:, 0, 0])
+        return frozen(self._through(u[None], np.array([[self.stiffness.along(u)]]))[:, 0, 0])
 
-    def _through(self, rows: Array, X: Array) -> Array:
-        """Return ∂X/∂F (C, r, r) of the tip stiffness X (r, r).
+    def _through(self, U: Array, X: Array) -> Array:
+        """Return Mᵀ ∂K_θ/∂F M (C, r, r), the derivative of X = (U C_vv Uᵀ)⁻¹ (r, r).
 
-        ``rows`` (r, nv) are the rows of the tip Jacobian that belong to X.
+        M = K_θ⁻¹ (U J_v)ᵀ X is the joint motion per motion of the tip. The left one is of
+        K_θᵀ, which differs if a moment acts on the tip.
         """
-        K = self.stiffness.joint
-        right = np.linalg.solve(K, rows.T) @ X
-        left = np.linalg.solve(K.T, rows.T) @ X.T  # differs from right only if a moment acts
-        return self._projected(left, right)
+        K, rows = self.stiffness.joint, U @ self._posture.jacobian[:3]
+        left, right = np.linalg.solve(K.T, rows.T) @ X.T, np.linalg.solve(K, rows.T) @ X
+        return form_by_tension(self._posture, self.cable_stiffness, left, right)
 
-    def _projected(self, left: Array, right: Array) -> Array:
-        """Return leftᵀ (∂K_θ/∂F_c) right (C, a, b) for left (nv, a) and right (nv, b)."""
-        pose = self.stiffness.posture
-        return form_by_tension(
-            pose.length_hessian, pose.length_jacobian, self.cable_stiffness, left, right
-        )
+    def __str__(self) -> str:
+        arm = self._posture.arm
+        smallest = f"smallest joint stiffness [{arm.stiffness_unit()}]"
+        columns = (without_rounding(each) for each in (self.cable_stiffness / 1e3, self.margin))
+        rows = [["cable", "cable stiffness [N/mm]", smallest]]
+        for name, *values in zip(arm.cables.names, *columns, strict=True):
+            rows.append([name, *(f"{value:z.4g}" for value in values)])
+        return "\n".join(["change per 1 N of tension in one cable", *aligned(rows)])
 
 
 def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
@@ -125,5 +108,17 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
         ElasticityRangeError: A tension is outside the domain of its elasticity.
     """
     K = instance("stiffness", stiffness, Stiffness).require_frictionless()
-    slope, _ = K.posture.arm._laws.slopes(K.tension, K.cable_stiffness)
+    slope = K.posture.arm._laws.stiffness_slope(K.tension, K.cable_stiffness)
     return StiffnessGradient(stiffness=K, cable_stiffness=slope)
+
+
+def form_by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> Array:
+    """Compute leftᵀ (∂K_θ/∂F_c) right (C, a, b) for ``left`` (nv, a) and ``right`` (nv, b).
+
+    ``slope`` (C,) [1/m] are the derivatives of the cable stiffnesses with respect to the tensions.
+    """
+    H, J = pose.length_hessian, pose.length_jacobian
+    pairs = (left[:, None, :, None] * right[:, None]).reshape(H[0].size, -1)
+    active = (H.reshape(len(H), -1) @ pairs).reshape(-1, left.shape[1], right.shape[1])
+    passive = slope[:, None, None] * (J @ left)[:, :, None] * (J @ right)[:, None]
+    return np.asarray(active + passive)

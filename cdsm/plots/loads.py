@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdsm.control.run import TrackingRun
-    from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
-    from cdsm.statics.load_history import LoadHistory
+    from cdsm.statics.buckling import CriticalLoad, CriticalTension
+    from cdsm.statics.load_cycle import LoadHistory
     from cdsm.statics.weight_test import WeightTest
 
 _ROOM = 0.08  # margin above and below all values, as a fraction of their range
@@ -29,17 +29,18 @@ def plot_weight_test(test: WeightTest) -> Figure:
     """Plot load against tip displacement, nonlinear and linear, and tensions against load."""
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
     loads = np.concatenate([[0.0], test.loads])
-    moved, linear = MM * np.vstack([np.zeros(3), test.displacements]), MM * test.linear.displacement
+    moved = MM * np.vstack([np.zeros(3), test.displacements])
+    linear = MM * test.tangent_displacement
     for i, (color, marker) in enumerate(zip(style.COLORS[:3], "os^", strict=True)):
         left.plot(moved[:, i], loads, f"{marker}-", color=color, label="xyz"[i])
         left.plot([0.0, linear[i]], [0.0, loads[-1]], "--", color=color, linewidth=0.9)
     left.set(xlabel="displacement of the tip [mm]", ylabel="load [N]")
     left.legend(title="direction; dashed: linear")
-    arm, tensions = test.without.pose.arm, np.vstack([test.without.tension, test.tensions])
+    arm, tensions = test.unloaded.pose.arm, np.vstack([test.unloaded.tension, test.tensions])
     style.cable_lines(right, loads, tensions, arm.cables.names)
     right.set(xlabel="load [N]", ylabel="tension at each motor [N]")
     right.set_ylim(bottom=0.0)
-    left_it = "; left its reference before the weight" if test.settled_first else ""
+    left_it = "; left its reference before the weight" if test.left_reference else ""
     style.heading(figure, f"{arm.name}: weight of {np.linalg.norm(test.force):.4g} N{left_it}")
     return figure
 
@@ -74,7 +75,7 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
         words = {"buckling": "buckles", "infeasible": "no balance", "elasticity": "end of a law"}
         said = f"{words[critical.limit]} at {critical.factor:.4g}"
         _mark(axes, critical.factor, critical.margins[-1], said, (-6, -12), "right")
-    load = style.direction_name(critical.wrench[:3])
+    load = style.direction_name(critical.load[:3])
     axes.set(xlabel="factor of the load", title=f"{critical.posture.arm.name}: load {load} N")
     return figure
 

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from cdsm.identification.experiment_plan import ExperimentPlan
     from cdsm.identification.result import Identification
     from cdsm.measures.polytope import ForcePolytope
-    from cdsm.uncertainties.budget import Uncertainty
-    from cdsm.uncertainties.monte_carlo import MonteCarlo
+    from cdsm.tolerancing.budget import Uncertainty
+    from cdsm.tolerancing.monte_carlo import MonteCarlo
     from cdsm.wires.elasticity import Elasticity
     from cdsm.wires.tensile_fit import TensileFit
 
@@ -85,14 +85,14 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
 
     ``labels`` has a text for each residual; more than 30 residuals are numbered instead.
     """
-    rows = fit._rows
+    rows = [fit.measurements[i] for i in fit.measurement_of]
     loops = [(i, one) for i, one in enumerate(fit.measurements) if hasattr(one, "forces")]
     stiff = [k for k, one in enumerate(rows) if not hasattr(one, "forces")]
     figure, (axes,) = style.panels(style.TWO_COLUMNS, 3.2, 1 + bool(stiff) + bool(loops))
     *left, right = axes
     if stiff:
         measured, predicted = N_PER_MM * fit.measured[stiff], N_PER_MM * fit.predicted[stiff]
-        sigma = [N_PER_MM * fit._rows[k].std for k in stiff]  # type: ignore[union-attr]
+        sigma = [N_PER_MM * rows[k].std for k in stiff]
         ends = [np.append(measured, predicted).min(), np.append(measured, predicted).max()]
         left[0].plot(ends, ends, color="0.6", linewidth=0.9)
         left[0].errorbar(measured, predicted, xerr=sigma, fmt="o", color=style.BLUE)
@@ -122,8 +122,8 @@ def _plot_loops(axes: Any, fit: Identification, loops: Sequence[tuple[int, Any]]
     All are along the force, less the first measured one.
     """
     looks = style.line_looks([loop.label or f"[{i}]" for i, loop in loops])
-    for look, (_, loop) in zip(looks, loops, strict=True):
-        rows = [k for k, each in enumerate(fit._rows) if each is loop]
+    for look, (i, loop) in zip(looks, loops, strict=True):
+        rows = np.flatnonzero(fit.measurement_of == i)
         along = loop.axes @ (np.array(loop.direction) / np.linalg.norm(loop.direction))
         read, model = (
             MM * x[rows].reshape(-1, along.size) @ along for x in (fit.measured, fit.predicted)
@@ -157,7 +157,7 @@ def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
 @style.styled
 def plot_uncertainty(budget: Uncertainty) -> Figure:
     """Plot the contribution of each source to the standard uncertainty, and the whole of it."""
-    unit, size = budget.question.unit
+    unit, size = budget.measurand.unit
     named = {source.replace("_", " "): u / size for source, u in budget.contributions.items() if u}
     bars = named | {"all together": budget.standard_uncertainty / size}
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 0.9 + 0.2 * len(bars))
@@ -168,7 +168,7 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
     axes.margins(x=0.18)
     axes.grid(visible=False, axis="y")
     axes.set(xlabel=f"standard uncertainty [{unit}]")
-    style.heading(figure, f"{budget.question.name}: {budget.value / size:.4g} {unit}")
+    style.heading(figure, f"{budget.name}: {budget.value / size:.4g} {unit}")
     return figure
 
 
@@ -178,7 +178,7 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
 
     The latter is drawn as a normal distribution. Dashed lines mark the 95 % intervals of both.
     """
-    (unit, size), first = run.budget.question.unit, run.budget
+    (unit, size), first = run.budget.measurand.unit, run.budget
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.8)
     values, u = run.values / size, first.standard_uncertainty / size
     low, high = np.quantile(values, [0.0005, 0.9995])
@@ -192,7 +192,7 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
     for interval, color in ((run.interval(), style.BLUE), (first.interval(), style.VERMILLION)):
         for end in interval:
             axes.axvline(end / size, color=color, linestyle="--", linewidth=1.0)
-    axes.set(xlabel=f"{first.question.name} [{unit}]", ylabel=f"probability density [1/({unit})]")
+    axes.set(xlabel=f"{first.name} [{unit}]", ylabel=f"probability density [1/({unit})]")
     axes.set_yticks([])
     style.legend_below(figure, axes, 2, title="dashed: 95 % intervals")
     return figure

@@ -22,7 +22,7 @@ from cdsm.support.values import Array
 if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
     from cdsm.posture import Posture
-    from cdsm.statics.natural_modes import Modes
+    from cdsm.statics.modes import Modes
 
 _GHOSTS = 5  # number of postures that are drawn over each other
 _FRAMES = 150  # largest number of frames of an animation; a longer path is thinned out

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
     from cdsm.planning.plan import StiffnessPlan
     from cdsm.planning.range import StiffnessRange
-    from cdsm.planning.saturation_curve import Saturation
+    from cdsm.planning.saturation import Saturation
     from cdsm.stiffness_matrix import Shares
     from cdsm.tension import Tension
 
@@ -84,28 +84,20 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 
 @style.styled
 def plot_saturation(found: Saturation) -> Figure:
-    """Plot stiffness, and its slope [N/mm per N], against the lower bound of all tensions."""
-    bound, along, slope = found.curve.T
-    figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 2.6, 2)
-    left.plot(bound, N_PER_MM * along)
-    left.set(ylabel=f"stiffness along {style.direction_name(found.direction)} [N/mm]")
-    left.set_ylim(bottom=0.0)
-    right.semilogy(bound, np.where(slope > 0.0, N_PER_MM * slope, np.nan))
-    right.set(ylabel="gain [N/mm per N]")
-    if found.steepest_slope > 0.0:
-        part = f"{100.0 * found.fraction:.3g} % of the largest gain"
-        level = N_PER_MM * found.fraction * found.steepest_slope
-        right.axhline(level, color="0.4", linestyle=":", label=part)
-    for axes in (left, right):
-        axes.set_xlabel("lower bound of tension [N]")
-        if np.isfinite(found.bound):
-            label = f"saturates above {found.bound:.4g} N"
-            axes.axvline(found.bound, color=style.VERMILLION, linestyle="--", label=label)
-        if bound[0] < found.stiffest < bound[-1]:
-            label = f"softer above {found.stiffest:.4g} N"
-            axes.axvline(found.stiffest, color=style.GREEN, linestyle="-.", label=label)
-    right.legend(loc="lower left")
-    style.heading(figure, found.tension.posture.arm.name)
+    """Plot the stiffness against the lower bound of all tensions."""
+    figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.6)
+    axes.plot(found.minimum, N_PER_MM * found.along, label="least tensions")
+    direction = style.direction_name(found.direction)
+    axes.set(xlabel="lower bound of tension [N]", ylabel=f"stiffness along {direction} [N/mm]")
+    axes.set_ylim(bottom=0.0)
+    if np.isfinite(found.bound):
+        label = f"saturates at {found.bound:.4g} N"
+        axes.axvline(found.bound, color=style.VERMILLION, linestyle="--", label=label)
+    if found.minimum[0] < found.stiffest < found.minimum[-1]:
+        label = f"softer above {found.stiffest:.4g} N"
+        axes.axvline(found.stiffest, color=style.GREEN, linestyle="-.", label=label)
+    axes.legend(loc="lower right")
+    style.heading(figure, found.posture.arm.name)
     return figure
 
 

@@ -1,1 +1,1 @@
-"""Statics of the loaded arm: equilibrium, hung weights, buckling and natural modes."""
+"""Statics of the loaded arm: equilibrium, weights, load cycles, buckling and natural modes."""

@@ -1,164 +1,299 @@
-"""Buckling: tension or load makes the joint stiffness of a fixed posture singular.
+"""Buckling: tension or load makes K_θ of a fixed posture singular, under the least tensions.
 
-The elasticity of the cables stiffens an arm. Their tension usually softens it (active part of
-Eq. 16). With stiff cables the elasticity always outweighs the tension. With soft springs or long
-leads (lead: the straight cable between its actuator and the base disk) there is a critical tension.
-Above it K_θ is not positive definite and the arm buckles under any load. This module keeps the
-posture fixed and takes the tensions of :func:`~cdsm.distribute_tension`.
-:func:`~cdsm.equilibrium` computes where an arm with locked motors moves when it buckles.
+The elasticity of the cables stiffens an arm; their tension usually softens it (active part of
+Eq. 16). With soft springs or long leads there is a critical tension: above it K_θ is not positive
+definite and the arm buckles. :func:`~cdsm.equilibrium` computes where it moves then.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cache
-from typing import Final
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import InvalidInput
+import cdsm
+from cdsm.batch.evaluation import evaluate
+from cdsm.errors import ElasticityRangeError, InfeasibleTension, InvalidInput, SolverError
 from cdsm.posture import Posture
-from cdsm.statics.bound_scan import (
-    SAMPLES,
-    failure_at,
-    last_true,
-    scan_end,
-    stable_ranges,
-    tension_domain,
-)
-from cdsm.statics.buckling_results import CriticalLoad, CriticalTension
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, bound, instance, wrench_vector
+from cdsm.support.validation import quantity as checked
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 
-_LARGEST_FACTOR: Final = 1e6
-"""The search for a critical load doubles the load factor while it is below this number.
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-If the arm is stable under all factors tried, the last of which is above half of it, the critical
-factor is infinite.
-"""
+SAMPLES = 200  # bounds or load factors of a scan: a stable range narrower than a step is not seen
+_PRECISION = 1e-12  # relative precision of a critical bound or load factor
+_ABOVE = 1.0 + 1e-9  # just above the low end of a law: rounding may put a tension below its bound
+_LOWEST, _LARGEST = 1e-3, 1e6  # lowest bound of a scan from zero [N]; end of doubled load factors
+_SHOWN = 10.0  # largest load factor of the curve if the critical one is infinite
 
-_SHOWN: Final = 10.0  # largest load factor of the curve if the critical factor is infinite
+
+Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
 
-def critical_tension(pose: Posture, wrench: ArrayLike = NO_WRENCH) -> CriticalTension:
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class _Critical(Result):
+    """Posture and load of a result, and K_θ where the arm buckles."""
+
+    posture: Posture
+    wrench: Array = field(metadata=unit("N and N m", "component"))
+    stiffness: Stiffness
+
+    @quantity("1", "joint")
+    def mode(self) -> Array:
+        """Unit joint motion (nv,) of buckling: eigenvector of the smallest eigenvalue of K_θ."""
+        mode = self.stiffness.critical_direction
+        return frozen(mode * np.sign(mode[abs(mode).argmax()]))
+
+    @quantity("N", "cable")
+    def tension(self) -> Array:
+        """F (C,) [N] where the arm buckles."""
+        return self.stiffness.tension
+
+    def _softest(self) -> str:
+        order, names = np.argsort(-abs(self.mode))[:4], self.posture.arm.joint_names
+        shares = ", ".join(f"{names[i]} {self.mode[i]:+.2f}" for i in order)
+        return f"softest joint motion: {shares}" + ", …" * (self.mode.size > order.size)
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class CriticalTension(_Critical):
+    """Tension at which an arm buckles at one posture; made by :func:`critical_tension`.
+
+    Attributes:
+        posture: The fixed posture.
+        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        minimum: Lower bound of tension [N] at which the arm buckles: the end of the first range in
+            ``stable``; inf if that is the end of ``examined``, its low end if no range is stable.
+        stiffness: K_θ at ``minimum``; if the arm does not buckle, at the bound with the smallest of
+            ``margins``. ``mode`` and ``tension`` belong to it.
+        stable: Ranges (low, high) [N] of the lower bound in which the arm is stable.
+        examined: Range [N] of the lower bound that was scanned.
+        bounds: Lower bounds (n,) [N] that were evaluated.
+        margins: Smallest eigenvalue of K_θ at each of these bounds (n,) [N m/rad].
+    """
+
+    _headline, _rows = "minimum", "bounds"
+
+    minimum: float = field(metadata=unit("N"))
+    stable: tuple[tuple[float, float], ...] = field(metadata=unit("N", "range", "end"))
+    examined: tuple[float, float] = field(metadata=unit("N", "end"))
+    bounds: Array = field(metadata=unit("N", "bounds"))
+    margins: Array = field(metadata=unit("joint stiffness", "bounds"))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence if the arm is UNSTABLE at every lower bound; otherwise empty."""
+        span = "from {:.4g} N to {:.4g} N".format(*self.examined)
+        return () if self.stable else (f"UNSTABLE at every lower bound {span}",)
+
+    def plot(self) -> Figure:
+        """Plot the smallest eigenvalue of K_θ [N m/rad] against the lower bound of tension [N]."""
+        return cdsm.plots.plot_critical_tension(self)
+
+    def __str__(self) -> str:
+        verdict = f"buckles at a lower bound of {self.minimum:.4g} N"
+        if math.isinf(self.minimum):
+            verdict = f"does not buckle at any lower bound up to {self.examined[1]:.4g} N"
+        spans = ", ".join(f"{a:.4g} to {b:.4g} N" for a, b in self.stable if a < b)
+        stable = f"stable from {spans}\n" if spans else ""
+        return f"{(self.warnings or (verdict,))[0]}\n{stable}{self._softest()}"
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class CriticalLoad(_Critical):
+    """Multiple of a load at which an arm fails at one posture; made by :func:`critical_load`.
+
+    Attributes:
+        posture: The fixed posture.
+        wrench: Constant wrench (6,) that acts in addition: force [N], then moment [N m].
+        load: The wrench (6,) that is multiplied by the factor.
+        factor: Largest factor [-] up to which the arm is balanced and stable; inf: half a million.
+        limit: What ends it: ``"buckling"``, ``"infeasible"``, ``"elasticity"`` or ``"none"``.
+        stiffness: K_θ at ``factor``, or at half a million. ``mode`` and ``tension`` belong to it.
+        factors: Factors (n,) [-] under which the arm is stable, up to ``factor``, or to ten.
+        margins: Smallest eigenvalue of K_θ at each of these factors (n,) [N m/rad].
+    """
+
+    _headline, _rows = "factor", "factors"
+
+    load: Array = field(metadata=unit("N and N m", "component"))
+    factor: float = field(metadata=unit("1"))
+    limit: Limit = field(metadata=unit("1"))
+    factors: Array = field(metadata=unit("1", "factors"))
+    margins: Array = field(metadata=unit("joint stiffness", "factors"))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence if the arm is UNSTABLE even without the load; otherwise empty."""
+        return () if self.factor else (f"UNSTABLE without the load: {str(self).splitlines()[0]}",)
+
+    def plot(self) -> Figure:
+        """Plot the smallest eigenvalue of K_θ [N m/rad] against the factor of the load."""
+        return cdsm.plots.plot_critical_load(self)
+
+    def __str__(self) -> str:
+        none = self.factor == 0.0
+        reason = {
+            "buckling": "it buckles without the load already" if none else "there it buckles",
+            "infeasible": "beyond, no tensions balance it",
+            "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
+            "none": "nothing happens that far",
+        }[self.limit]
+        part = "no part of it" if none else f"the load up to a factor of {self.factor:.4g}"
+        return f"holds {part}; {reason}\n{self._softest()}"
+
+
+def critical_tension(
+    pose: Posture, wrench: ArrayLike = NO_WRENCH, *, up_to: float = 1e6
+) -> CriticalTension:
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
-    F_min is the lower bound of all cables. :func:`~cdsm.distribute_tension` computes the tensions,
-    and :func:`~cdsm.stiffness` computes K_θ, of which the symmetric part is examined.
+    The symmetric part of K_θ under the least tensions is examined at 200 bounds, even on a log
+    scale, up to ``up_to``, or to where no tensions within their laws and maxima balance the arm.
 
     Args:
         pose: The posture, which stays fixed.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
+        up_to: Largest lower bound [N] of the scan.
 
     Raises:
-        InvalidInput: ``wrench`` has the wrong shape or is not finite.
+        InvalidInput: ``wrench`` or ``up_to`` is invalid.
         InfeasibleTension: No tensions balance the arm.
         ElasticityRangeError: Even the least tensions are outside the domains of the elasticities.
     """
-    arm = instance("pose", pose, Posture).arm
-    W = wrench_vector("wrench", wrench)
+    from scipy.optimize import brentq  # slow to import
 
+    arm, W = instance("pose", pose, Posture).arm, wrench_vector("wrench", wrench)
+
+    @cache
     def at(minimum: float) -> Stiffness:
         return stiffness(pose, distribute_tension(pose, minimum, wrench=W))
 
-    low, highest = tension_domain(arm)
+    laws = [each.elasticity for each in arm.cables if each.control == "position"]
+    low = max((law.low for law in laws), default=0.0) * _ABOVE
+    ends = [*(law.high for law in laws), *(each.maximum for each in arm.cables)]
+    high, first = max(min([*ends, checked("up_to", up_to, "tension")]), low), max(low, _LOWEST)
     at(low)  # raises the reason if no tensions balance the arm
-    high = scan_end(at, low, highest)
-    places, margins, stable = stable_ranges(at, low, high)
-    buckles = [b for _, b in stable if b < high]
-    if buckles:
-        minimum = where = buckles[0]
-    elif stable:
-        minimum, where = math.inf, float(places[int(np.argmin(margins))])
-    else:
-        minimum = where = low
-    K = at(where)
+    bounds = np.unique([low, *np.geomspace(first, max(high, first), SAMPLES - 1)])
+    margins = _margins(pose, bounds[:, None], math.inf, W)
+    n = int(np.append(np.isfinite(margins), False).argmin())  # bounds that balance the arm
+    if n < bounds.size:
+        balances = ("none", "buckling")
+        high = _bisect(lambda b: _failure(at, b) in balances, *bounds[n - 1 : n + 1])[0]
+        bounds, margins = np.append(bounds[:n], high), np.append(margins[:n], at(high).margin)
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], margins > 0.0, [False]])))
+    edges = [
+        brentq(lambda b: at(b).margin, *bounds[i - 1 : i + 1], xtol=1e-300, rtol=_PRECISION)
+        if 0 < i < bounds.size
+        else float(bounds[min(i, bounds.size - 1)])
+        for i in changes.tolist()
+    ]
+    ranges = tuple(zip(edges[::2], edges[1::2], strict=True))
+    minimum = next((end for _, end in ranges if end < high), math.inf if ranges else low)
+    where = minimum if math.isfinite(minimum) else float(bounds[margins.argmin()])
     return CriticalTension(
         posture=pose,
         wrench=W,
         minimum=minimum,
-        mode=_mode(K),
-        tension=K.tension,
-        stable=stable,
-        examined=(low, high),
-        bounds=frozen(places),
+        stiffness=at(where),
+        stable=ranges,
+        examined=(low, float(high)),
+        bounds=frozen(bounds),
         margins=frozen(margins),
     )
 
 
 def critical_load(
     pose: Posture,
-    wrench: ArrayLike,
+    load: ArrayLike,
     minimum: ArrayLike = 0.0,
     maximum: ArrayLike = math.inf,
     *,
-    carried: ArrayLike = NO_WRENCH,
+    wrench: ArrayLike = NO_WRENCH,
 ) -> CriticalLoad:
-    """Compute the factor λ up to which an arm at a fixed posture is stable under λ W + carried.
+    """Compute the factor λ up to which an arm at a fixed posture is stable under λ load + wrench.
 
     Args:
         pose: The posture, which stays fixed. Tensions are distributed again for every load.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]; not zero.
+        load: Wrench (6,) at ``tool0`` in base axes: force [N], then moment [N m]; not zero.
         minimum: Lower bound of the tensions [N], for all cables or (C,).
         maximum: Upper bound of the tensions [N], for all cables or (C,).
-        carried: Constant wrench (6,) at ``tool0`` that always acts, such as the weight of a tool.
+        wrench: Constant wrench (6,) at ``tool0`` that always acts, such as the weight of a tool.
 
     Raises:
-        InvalidInput: ``wrench`` is zero; or ``wrench``, ``carried`` or a bound is invalid.
-        InfeasibleTension: No tensions balance the arm under its own weight and ``carried``.
+        InvalidInput: ``load`` is zero; or ``load``, ``wrench`` or a bound is invalid.
+        InfeasibleTension: No tensions balance the arm under its own weight and ``wrench``.
         ElasticityRangeError: A tension without the load is outside the domain of its elasticity.
     """
     count = len(instance("pose", pose, Posture).arm.cables)
-    W = wrench_vector("wrench", wrench)
-    always = wrench_vector("carried", carried)
+    multiplied, always = wrench_vector("load", load), wrench_vector("wrench", wrench)
     low, high = bound("minimum", minimum, count), bound("maximum", maximum, count)
-    if not W.any():
-        raise InvalidInput("wrench", "is zero, and so is any multiple of it; give a load.")
+    if not multiplied.any():
+        raise InvalidInput("load", "is zero, and so is any multiple of it; give a load.")
 
     @cache
     def at(factor: float) -> Stiffness:
-        return stiffness(pose, distribute_tension(pose, low, high, always + factor * W))
+        return stiffness(pose, distribute_tension(pose, low, high, always + factor * multiplied))
 
-    factor, limit = 0.0, failure_at(at, 0.0)
-    at(factor)  # raises the reason if no tensions balance the arm
-    stable = [0.0]
+    at(0.0)  # raises the reason if no tensions balance the arm
+    end, factor, limit = 1e-3, 0.0, _failure(at, 0.0)
+    factors, margins = np.zeros(1), np.array([at(0.0).margin])
     if limit == "none":
-        end = 1e-3
-        while end < _LARGEST_FACTOR and failure_at(at, end) == "none":
-            stable.append(end)
+        while end < _LARGEST and _failure(at, end) == "none":
             end *= 2.0
-        if end < _LARGEST_FACTOR:
-            # the doubling may have stepped over the first failure
-            places = np.linspace(0.0, end, SAMPLES).tolist()
-            first = next(i for i, place in enumerate(places) if failure_at(at, place) != "none")
-            ends = places[first - 1], places[first]
-            factor, beyond = last_true(lambda x: failure_at(at, x) == "none", *ends)
-            stable = [*places[:first], factor]
-            limit = failure_at(at, beyond)
-        else:
-            factor = math.inf
-    K = at(min(factor, _LARGEST_FACTOR / 2.0))
-    factors = [each for each in stable if each < _SHOWN or math.isfinite(factor)]
+        factor, last = math.inf, end if end < _LARGEST else _SHOWN
+        factors = np.linspace(0.0, last, SAMPLES)
+        margins = _margins(pose, low, high, always + factors[:, None] * multiplied)
+    if limit == "none" and end < _LARGEST:  # the doubling may have stepped over the first failure
+        n = int(np.append(margins[:-1] > 0.0, False).argmin())
+        factor, beyond = _bisect(lambda x: _failure(at, x) == "none", *factors[n - 1 : n + 1])
+        limit = _failure(at, beyond)
+        factors, margins = np.append(factors[:n], factor), np.append(margins[:n], at(factor).margin)
     return CriticalLoad(
         posture=pose,
-        wrench=W,
-        carried=always,
+        wrench=always,
+        stiffness=at(min(factor, _LARGEST / 2.0)),
+        load=multiplied,
         factor=factor,
         limit=limit,
-        mode=_mode(K),
-        tension=K.tension,
-        factors=frozen(np.array(factors)),
-        margins=frozen(np.array([at(each).margin for each in factors])),
+        factors=frozen(factors),
+        margins=frozen(margins),
     )
 
 
-def _mode(K: Stiffness) -> Array:
-    """Return the buckling mode (nv,): the unit eigenvector of the smallest eigenvalue of K_θ.
+def _margins(pose: Posture, minimum: Array, maximum: ArrayLike, wrenches: Array) -> Array:
+    """Compute margins or NaN (n,) for lower bounds (C,) or (n, 1) and wrenches (6,) or (n, 6)."""
+    q = np.tile(pose.q, (max(len(np.atleast_2d(each)) for each in (minimum, wrenches)), 1))
+    bounds = np.broadcast_to(minimum, (len(q), len(pose.arm.cables))), maximum
+    case: Any = {"minimum": bounds[0], "maximum": bounds[1], "check_limits": False}
+    return np.asarray(evaluate(pose.arm, q, None, wrenches, ("margin",), **case)["margin"])
 
-    The sign makes its largest entry positive.
-    """
-    mode = K.critical_direction
-    return frozen(mode * np.sign(mode[abs(mode).argmax()]))
+
+def _failure(at: Callable[[float], Stiffness], place: float) -> Limit:
+    """Return why the arm fails at a lower bound [N] or load factor."""
+    try:
+        return "none" if at(float(place)).is_stable else "buckling"
+    except (InfeasibleTension, SolverError, InvalidInput):  # on the very edge, or below 1e-9 N
+        return "infeasible"
+    except ElasticityRangeError:
+        return "elasticity"
+
+
+def _bisect(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:
+    """Return two numbers, equal to 1e-12, between which ``true`` changes from True to False."""
+    while b - a > max(_PRECISION * b, _PRECISION**2):
+        middle = float(a + b) / 2.0
+        a, b = (middle, b) if true(middle) else (a, middle)
+    return float(a), float(b)

@@ -3,225 +3,217 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.errors import InvalidInput
-from cdsm.friction.breakaway import breakaway
+from cdsm.errors import EquilibriumError, InvalidInput
+from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium
-from cdsm.statics.following import follow_load
-from cdsm.statics.load_cycle import load_cycle
-from cdsm.statics.rest_search import equilibrium
-from cdsm.statics.weight_friction import WeightFriction
+from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium
+from cdsm.statics.load_cycle import LoadHistory, load_cycle
+from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.solve import Balance, continued, stable_between
 from cdsm.support.directions import unit_direction
-from cdsm.support.format import MODEL, coordinates, plain, without_rounding
-from cdsm.support.tidy import data_frame
+from cdsm.support.format import MODEL, coordinates, plural, without_rounding
+from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import vector, whole_number
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
-    import pandas
     from matplotlib.figure import Figure
 
-MOST_STEPS = 1000
-"""Largest number of steps. A curve with more points is not smoother, but takes long."""
+SLIDING = 1.25  # an arm slides if its tangent is at most so many times the frictionless one
 
-_MEASURED = 1e-12
-"""Smallest tip displacement, divided by the arm's length, with about three correct digits."""
-
-_DISPLACED = 1e-9
-"""Smallest tip displacement, divided by the arm's length, above the rounding of equilibrium."""
+_MEASURED = 1e-12  # least displacement, over the arm's length, with about three correct digits
+_DISPLACED = 1e-9  # least displacement, over the arm's length, above the rounding of equilibrium
+_FINEST = 2.0**-12  # relative precision of a buckling load; absolute below 1e-9 of the load
 
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class LinearPrediction(ReadOnlyState):
-    """Linear prediction of a weight test from the compliance of the arm without the weight.
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class WeightTest(Result):
+    """States of an arm while a weight at its tip is increased in n equal steps.
 
-    Joints at stops are fixed. ΔF (3,) [N] is the force of the :class:`WeightTest`, u = ΔF/|ΔF|.
-
-    Attributes:
-        displacement: Displacement of the tip C_vv ΔF (3,) [m], with C of
-            :attr:`~cdsm.Equilibrium.compliance`.
-        stiffness: 1/(uᵀ C_vv u) along the force [N/m].
-    """
-
-    displacement: Array
-    stiffness: float
-
-
-@final
-@dataclass(frozen=True, eq=False, kw_only=True)
-class WeightTest(ReadOnlyState):
-    """States of an arm while a weight at its tip is increased in equal steps.
-
-    If the arm has friction in its holes, tips, displacements and stiffness are computed with it.
+    If the arm has friction in its holes, tips, displacements, tensions and stiffness are computed
+    with it; ``unloaded``, ``states`` and ``tangent`` are frictionless.
 
     Attributes:
         force: ΔF (3,) [N], the dead force at the full load, base axes.
-        without: Frictionless equilibrium without the weight, under the wrench that also acts then.
-        loaded: Frictionless equilibrium at each step; the last one is under the full load.
-        friction: Loads and stiffnesses with friction; None for an arm without friction.
+        unloaded: Equilibrium without the weight, under the wrench that also acts then.
+        states: Equilibrium at each step; the last one is under the full load.
+        breakaway: Load in the direction of the weight below which no cable slides, and the hole
+            that slides first; None for an arm without friction.
+        history: States with friction; entry 0 is the arm without the weight. None without friction.
     """
 
-    force: Array
-    without: Equilibrium
-    loaded: tuple[Equilibrium, ...]
-    friction: WeightFriction | None = None
+    _headline, _rows = "stiffness", "loads"
 
-    @cached_property
+    force: Array = field(metadata=unit("N", "axis"))
+    unloaded: Equilibrium
+    states: tuple[Equilibrium, ...]
+    breakaway: Breakaway | None = None
+    history: LoadHistory | None = None
+
+    @property
+    def _posture(self) -> Posture:
+        return self.states[-1].pose
+
+    @quantity("N", "loads")
+    def loads(self) -> Array:
+        """Magnitude of the force at each step (n,) [N]."""
+        count = len(self.states)
+        return frozen(np.linalg.norm(self.force) * np.arange(1, count + 1) / count)
+
+    @quantity("m", "loads", "axis")
+    def displacements(self) -> Array:
+        """Tip position at each step minus tip position without the weight (n, 3) [m]."""
+        if self.history is not None:
+            return frozen(self.history.tip[1:] - self.history.tip[0])
+        start = self.unloaded.pose.tip[:3, 3]
+        return frozen(np.array([each.pose.tip[:3, 3] for each in self.states]) - start)
+
+    @quantity("N", "loads", "cable")
+    def tensions(self) -> Array:
+        """Cable tensions at each step (n, C) [N]; with friction, those at the motors."""
+        if self.history is not None:
+            return frozen(np.array([T[1:, 0] for T in self.history.tensions]).T)
+        return frozen(np.array([each.tension for each in self.states]))
+
+    @property
     def displacement(self) -> Array:
         """ΔX (3,) [m]: tip position with the full weight minus tip position without the weight."""
         return frozen(self.displacements[-1].copy())
 
-    @cached_property
+    @quantity("N/m")
     def stiffness(self) -> float:
         """Secant |ΔF|/(u·ΔX) [N/m], u = ΔF/|ΔF| (1/C of Eq. 20); inf without motion along u."""
-        return (
-            float(np.linalg.norm(self.force)) / self._tip_motion if self._tip_motion else math.inf
-        )
+        return self._secant(self.displacement)
 
-    @property
-    def _tip_motion(self) -> float:
-        """Displacement of the tip along the force [m]; zero if it is rounding."""
-        moved = float(self.displacement @ unit_direction("force", self.force))
-        return moved if abs(moved) > _MEASURED * self.without.pose.arm.length else 0.0
+    @quantity("N/m")
+    def frictionless(self) -> float:
+        """The same secant [N/m] without friction."""
+        return self._secant(self.states[-1].pose.tip[:3, 3] - self.unloaded.pose.tip[:3, 3])
 
-    @cached_property
-    def linear(self) -> LinearPrediction:
-        """Linear prediction of the test from the compliance without the weight.
+    @quantity("N/m")
+    def tangent(self) -> float:
+        """Stiffness 1/(uᵀ C_vv u) [N/m] along the force, without the weight and without friction.
 
-        Raises:
-            SingularStiffness: The arm without the weight is about to buckle.
+        C is :attr:`Equilibrium.compliance` of ``unloaded``: joints at stops are fixed. Raises
+        SingularStiffness if the arm without the weight is about to buckle.
         """
-        C = self.without.compliance[:3, :3]
-        stiff = self.without.along(self.force)
-        return LinearPrediction(displacement=frozen(C @ self.force), stiffness=stiff)
+        return self.unloaded.along(self.force)
+
+    @quantity("m", "axis")
+    def tangent_displacement(self) -> Array:
+        """Displacement C_vv ΔF (3,) [m] that the compliance without the weight predicts."""
+        return frozen(self.unloaded.compliance[:3, :3] @ self.force)
+
+    @quantity("N/m")
+    def stuck(self) -> float | None:
+        """Stiffness [N/m] along the weight while it is so small that all cables stick, or None."""
+        first = self.breakaway
+        return first.stiffness.along(first.direction) if first else None
+
+    @quantity("N")
+    def breakaway_load(self) -> float | None:
+        """Weight [N] below which no cable slides, to first order; None without friction."""
+        return self.breakaway.load if self.breakaway else None
+
+    @quantity("N")
+    def sliding_load(self) -> float | None:
+        """The first of ``loads`` from which on the arm slides [N]; None without friction.
+
+        There, and at all larger ones, the tangent with friction is at most 1.25 times the
+        frictionless one under the same load. It is inf if the arm does not slide at the last load,
+        0 if no cable can stick. More steps give it more precisely.
+        """
+        if self.history is None or self.breakaway_load == 0.0:
+            return self.breakaway_load
+        slides = [
+            self.history.stiffness(k).along(self.force) <= SLIDING * state.along(self.force)
+            for k, state in enumerate(self.states, 1)
+        ]
+        first = len(slides) - int(np.argmin([*slides[::-1], False]))
+        return float(np.append(self.loads, math.inf)[first])
 
     @property
-    def settled_first(self) -> bool:
+    def left_reference(self) -> bool:
         """Whether the given tensions did not balance the arm, so that it moved before the test."""
-        moved = float(np.linalg.norm(self.without.displacement))
-        return moved > _DISPLACED * self.without.pose.arm.length
+        return self.unloaded.moved > _DISPLACED * self._posture.arm.length
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences if, without the weight, the arm leaves its reference, or is not stable."""
-        said = []
-        if self.settled_first:
-            moved = coordinates(1000.0 * self.without.displacement)
-            left = (
-                "before the weight the arm did not stay there; the tip moved "
-                f"by {moved} mm, from where all this is measured"
-            )
-            if self.friction is not None:
-                start = self.friction.history.tip[0] - self.without.reference.tip[:3, 3]
-                left = (
-                    f"without friction the arm does not stay there before the weight; its tip "
-                    f"moves by {moved} mm, from where all that is linear or frictionless is "
-                    f"measured. With friction it moves by {coordinates(1000.0 * start)} mm"
-                )
-            said.append(f"LEFT ITS REFERENCE: {left}")
-        if not self.without.stable:
+        moved, said = f"by {coordinates(1e3 * self.unloaded.displacement)} mm", list[str]()
+        if self.left_reference and self.history is None:
+            said += [
+                "LEFT ITS REFERENCE: before the weight the arm did not stay there; the tip moved "
+                f"{moved}, from where all this is measured"
+            ]
+        elif self.left_reference and self.history is not None:
+            said += [
+                "LEFT ITS REFERENCE: without friction the arm does not stay there before the "
+                f"weight; its tip moves {moved}, from where all that is linear or frictionless is "
+                "measured. With friction it moves by "
+                f"{coordinates(1e3 * self.history.displacement[0])} mm"
+            ]
+        if not self.unloaded.stable:
             said.append("NEUTRAL: before the weight, not every joint is brought back")
-        return tuple(said)
-
-    @cached_property
-    def loads(self) -> Array:
-        """Magnitude of the force at each step (n,) [N]."""
-        count = len(self.loaded)
-        return frozen(np.linalg.norm(self.force) * np.arange(1, count + 1) / count)
-
-    @cached_property
-    def tips(self) -> Array:
-        """Tip position at each step (n, 3) [m]."""
-        if self.friction is not None:
-            return frozen(self.friction.history.tip[1:].copy())
-        return frozen(np.array([each.pose.tip[:3, 3] for each in self.loaded]))
-
-    @cached_property
-    def displacements(self) -> Array:
-        """Tip position at each step minus tip position without the weight (n, 3) [m]."""
-        if self.friction is not None:
-            return frozen(self.tips - self.friction.history.tip[0])
-        return frozen(self.tips - self.without.pose.tip[:3, 3])
-
-    @cached_property
-    def tensions(self) -> Array:
-        """Cable tensions at each step (n, C) [N]; with friction, those at the motors."""
-        if self.friction is not None:
-            return frozen(np.array([T[1:, 0] for T in self.friction.history.tensions]).T)
-        return frozen(np.array([each.tension for each in self.loaded]))
+        return (*said, *(self.history.warnings if self.history else ()))
 
     def plot(self) -> Figure:
         """Plot load [N] against tip displacement [mm], and the tension of each cable [N]."""
         return cdsm.plots.plot_weight_test(self)
 
-    def to_dict(self) -> dict[str, object]:
-        """Return loads, displacements and tensions in SI for JSON, with units in the keys."""
-        last, before = self.loaded[-1], self.without
-        numbers = {
-            "before": {
-                "tip_displacement_m": before.displacement,
-                "at_limit": before.at_limit,
-                "slack": before.slack,
-                "stable": before.stable,
-            },
-            "force_N": self.force,
-            "loads_N": self.loads,
-            "tip_displacements_m": self.displacements,
-            "linear_displacement_m": self.linear.displacement,
-            "stiffness_N_per_m": self.stiffness,
-            "linear_stiffness_N_per_m": self.linear.stiffness,
-            "cables": last.pose.arm.cables.names,
-            "tensions_N": self.tensions,
-            **last.pose._coordinates,
-            "slack": last.slack,
-            "at_limit": last.at_limit,
-            "stable": last.stable,
-        }
-        if self.friction is not None:
-            numbers["friction"] = self.friction.to_dict()
-        return plain(numbers)
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return displacement [m] and tensions [N] at each load; needs pandas (MissingExtra)."""
-        names = [f"{name} tension [N]" for name in self.without.pose.arm.cables.names]
-        moved = zip(("x [m]", "y [m]", "z [m]"), self.displacements.T, strict=True)
-        columns = {**dict(moved), **dict(zip(names, self.tensions.T, strict=True))}
-        return data_frame(columns, "load [N]", self.loads)
-
-    def __repr__(self) -> str:
-        return (
-            f"<WeightTest with {np.linalg.norm(self.force):.4g} N on "
-            f"{self.without.pose.arm.name}: {self.stiffness / 1000.0:.4g} N/mm>"
-        )
-
     def __str__(self) -> str:
         rows = [f"{'load [N]':>10}{'x [mm]':>12}{'y [mm]':>12}{'z [mm]':>12}"]
-        for load, moved in zip(self.loads, without_rounding(self.displacements), strict=True):
-            rows.append(f"{load:>10.4g}" + "".join(f"{1000.0 * x:>12.4g}" for x in moved))
-        predicted = "".join(
-            f"{1000.0 * x:>12.4g}" for x in without_rounding(self.linear.displacement)
-        )
+        names = [*(f"{load:.4g}" for load in self.loads), "linear"]
+        moves = without_rounding(np.vstack([self.displacements, self.tangent_displacement]))
+        for name, moved in zip(names, moves, strict=True):
+            rows.append(f"{name:>10}" + "".join(f"{1e3 * x:>12.4g}" for x in moved))
         rows += [
-            f"{'linear':>10}{predicted}",
-            f"stiffness along the force: measured {self.stiffness / 1000.0:.4g} N/mm, "
-            f"linear {self.linear.stiffness / 1000.0:.4g} N/mm",
+            f"stiffness along the force: measured {self.stiffness / 1e3:.4g} N/mm, "
+            f"linear {self.tangent / 1e3:.4g} N/mm",
             f"(linear is {MODEL}; measured the secant over this weight)",
+            *self._about_friction(),
         ]
-        if self.friction is not None:
-            rows.append(str(self.friction))
-        if self.without.at_limit:
-            rows.append(f"before the weight at a stop: {', '.join(self.without.at_limit)}")
+        if self.unloaded.at_limit:
+            rows.append(f"before the weight at a stop: {', '.join(self.unloaded.at_limit)}")
         return "\n".join([*self.warnings, *rows])
+
+    def _secant(self, displacement: Array) -> float:
+        moved = float(displacement @ unit_direction("force", self.force))
+        measured = abs(moved) > _MEASURED * self._posture.arm.length
+        return float(np.linalg.norm(self.force)) / moved if measured else math.inf
+
+    def _about_friction(self) -> list[str]:
+        """Say which weights measure which stiffness."""
+        if self.history is None or self.stuck is None:
+            return []
+        if self.breakaway_load == 0.0:
+            return ["friction holds no cable here: the cables go straight through all holes"]
+        slides = (
+            f"at {self.sliding_load:.4g} N they slide: from this step on the tangent is at most "
+            f"{100.0 * (SLIDING - 1.0):.0f} % above that of the same load without friction"
+        )
+        if self.sliding_load == math.inf:
+            slides = "under this weight the arm does not slide yet: hang more"
+        sliding = np.count_nonzero(self.history.sliding[-1]), len(self.history.holes)
+        return [
+            f"below {self.breakaway_load:.4g} N (first order) all cables stick: a weight measures "
+            f"{self.stuck / 1e3:.4g} N/mm",
+            slides,
+            f"this weight, {self.loads[-1]:.4g} N, measures {self.stiffness / 1e3:.4g} N/mm; "
+            f"{sliding[0]} of {plural(sliding[1], 'hole')} slide",
+            "so take the difference of two weights with which they slide, and compare it with "
+            "theirs without friction; this weight alone would measure "
+            f"{self.frictionless / 1e3:.4g} N/mm without friction",
+        ]
 
 
 def weight_test(
@@ -236,9 +228,8 @@ def weight_test(
 
     The test is nonlinear: the tensions follow the elongations, and the posture changes. For a small
     force the result is :meth:`~cdsm.Stiffness.along`. With friction in the holes it depends on the
-    weight: under a small one all cables stick; ``friction.sliding_load`` of the result is the
-    weight [N] from which they slide. The weight is hung once and slowly, as in
-    :func:`~cdsm.load_cycle`.
+    weight: under a small one all cables stick; :attr:`WeightTest.sliding_load` is the weight from
+    which they slide. The weight is hung once and slowly, as in :func:`~cdsm.load_cycle`.
 
     Args:
         pose: The reference posture, at which the motors are locked.
@@ -260,32 +251,50 @@ def weight_test(
     force = vector("force", force, 3, "a force in base axes [N]", "force")
     if not force.any():
         raise InvalidInput("force", "is zero; nothing moves, and there is nothing to measure.")
-    steps = whole_number("steps", steps, 1, MOST_STEPS)
-    without = equilibrium(pose, tension, wrench)
-    added = np.append(force, np.zeros(3))
-    loaded, part = [without], 0.0
-    for step in range(1, steps + 1):
-        loaded.append(follow_load(loaded[-1], without.wrench, added, part, step / steps))
-        part = step / steps
-    test = WeightTest(force=force, without=without, loaded=tuple(loaded[1:]))
-    if not test._tip_motion and math.isfinite(test.linear.stiffness):
+    steps = whole_number("steps", steps, 1, 1000)
+    unloaded = equilibrium(pose, tension, wrench)
+    states, added, W = [unloaded], np.append(force, np.zeros(3)), unloaded.wrench
+    for step in range(steps):
+        states.append(_follow(states[-1], W, added, step / steps, (step + 1) / steps))
+    test = WeightTest(force=force, unloaded=unloaded, states=tuple(states[1:]))
+    if math.isinf(test.frictionless) and math.isfinite(test.tangent):
         raise InvalidInput(
             "force",
             f"{np.abs(force).max():.3g} N moves the tip by rounding only, and measures nothing; "
-            f"hang at least {_MEASURED * pose.arm.length * test.linear.stiffness:.1g} N.",
+            f"hang at least {_MEASURED * pose.arm.length * test.tangent:.1g} N.",
         )
-    return _with_friction(test, tension) if pose.arm.has_friction else test
-
-
-def _with_friction(test: WeightTest, tension: Tension | ArrayLike) -> WeightTest:
-    """Return ``test`` with its field ``friction`` computed, under the same load steps."""
-    before, parts = test.without, test.loads / np.linalg.norm(test.force)
-    added = np.append(test.force, np.zeros(3))
-    path = before.wrench + np.append(0.0, parts)[:, None] * added
-    friction = WeightFriction(
-        breakaway=breakaway(before.reference, before.reference_tension, test.force, before.wrench),
-        frictionless=test.linear.stiffness,
-        frictionless_secant=test.stiffness,
-        history=load_cycle(before.reference, tension, path),
+    if not pose.arm.has_friction:
+        return test
+    return WeightTest(
+        force=force,
+        unloaded=unloaded,
+        states=test.states,
+        breakaway=breakaway(pose, unloaded.reference_tension, force, W),
+        history=load_cycle(pose, tension, W + np.arange(steps + 1)[:, None] / steps * added),
     )
-    return replace(test, friction=friction)
+
+
+def _follow(
+    before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
+) -> Equilibrium:
+    """Follow the stable equilibrium ``before`` while the load wrench + λ · added grows.
+
+    λ grows from ``reached`` to ``goal``. Raises EquilibriumError if the arm buckles.
+    """
+    step = goal - reached
+    while reached < goal:
+        part, q = min(goal, reached + step), before.pose.q
+        W = frozen(wrench + part * added)
+        arm = LockedArm(before.reference, before.reference_tension, W)
+        f = Balance(arm.at, arm.reference, arm.at_pose(before.pose))
+        found = continued(f, (q / f.unit - before.stop_torque * f.unit / f.k,), q)
+        if found is not None and stable_between(arm.at, q, found.state.pose.q):
+            before, reached, step = as_equilibrium(arm, found), part, 2.0 * step
+        elif step > _FINEST * max(reached, 1e-9):
+            step /= 2.0
+        else:
+            worst = int(abs(before.stiffness.critical_direction).argmax())
+            joint, load = before.pose.arm.joint_names[worst], reached * np.linalg.norm(added)
+            problem = f"the arm buckles at {100.0 * reached:.4g} % of the load, under {load:.4g} N"
+            raise EquilibriumError(f"{problem}: {joint} buckles", before.residual, reached, joint)
+    return before

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,14 +33,12 @@ XYZ: Final = ("x", "y", "z")
 
 def unit_direction(name: str, value: Direction) -> Array:
     """Return the read-only unit vector (3,) along an axis or a vector that is not zero."""
-    if isinstance(value, str):
-        return frozen(np.array(axis_vector(name, value)))
-    array = vector(name, value, 3, "a direction in base axes")
-    largest = max(map(abs, array.tolist()))
-    if largest == 0.0:
+    given = axis_vector(name, value) if isinstance(value, str) else value
+    array = vector(name, given, 3, "a direction in base axes")
+    length = float(np.linalg.norm(array))
+    if length == 0.0:
         raise InvalidInput(name, "is the zero vector; give a direction, such as (0, 0, 1).")
-    scaled = array / largest  # so that the norm neither overflows nor underflows
-    return frozen(scaled / math.sqrt(np.vdot(scaled, scaled)))
+    return frozen(array / length)
 
 
 def axis_vector(name: str, axis: str) -> tuple[float, float, float]:
@@ -53,20 +50,19 @@ def axis_vector(name: str, axis: str) -> tuple[float, float, float]:
 
 def gravity_vector(name: str, value: Direction) -> Array:
     """Return gravity (3,) [m/s²], read-only, from a vector or an axis (9.81 m/s² along it)."""
-    if isinstance(value, str):
-        return frozen(9.81 * np.array(axis_vector(name, value)))
-    return vector(name, value, 3, "gravity in base axes [m/s²]", "gravity")
+    given = 9.81 * np.array(axis_vector(name, value)) if isinstance(value, str) else value
+    return vector(name, given, 3, "gravity in base axes [m/s²]", "gravity")
 
 
 def unit_directions(name: str, value: Direction | Iterable[Direction]) -> Array:
     """Return the read-only unit vector (3,) of one direction, or (n, 3) of n directions."""
-    if isinstance(value, str):
-        return unit_direction(name, value)
-    if isinstance(value, (list, tuple)) and any(isinstance(each, str) for each in value):
-        return frozen(np.array([unit_direction(f"{name}[{i}]", u) for i, u in enumerate(value)]))
-    given = number_array(name, value)  # type: ignore[arg-type]
-    if given.ndim < 2:
-        return unit_direction(name, given)
-    if given.ndim > 2 or given.shape[1] != 3 or not len(given):
-        raise InvalidInput(name, f"shape {given.shape} given, (3,) or (n, 3) needed.")
-    return frozen(np.array([unit_direction(f"{name}[{i}]", u) for i, u in enumerate(given)]))
+    rows: Any = value
+    if isinstance(rows, str):
+        return unit_direction(name, rows)
+    if not (isinstance(rows, (list, tuple)) and any(isinstance(each, str) for each in rows)):
+        rows = number_array(name, rows)
+        if rows.ndim < 2:
+            return unit_direction(name, rows)
+        if rows.ndim > 2 or rows.shape[1] != 3 or not len(rows):
+            raise InvalidInput(name, f"shape {rows.shape} given, (3,) or (n, 3) needed.")
+    return frozen(np.array([unit_direction(f"{name}[{i}]", each) for i, each in enumerate(rows)]))

@@ -32,6 +32,14 @@ def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
+    """Return ``value ± uncertainty`` [SI] as text in a unit of this ``size``: two digits of it."""
+    u, places = uncertainty / size, 4
+    if 0.0 < u < math.inf:
+        places = min(max(1 - math.floor(math.log10(u)), 0), 12)
+    return f"{value / size:.{places}f} ± {u:.{places}f}"
+
+
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return the rows as aligned lines: the first column to the left, the others to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -51,13 +59,15 @@ def without_rounding(values: Array) -> Array:
 
 
 def plain(numbers: Mapping[str, Any]) -> dict[str, object]:
-    """Prepare values for JSON: arrays and tuples become lists, infinite numbers and NaN None."""
+    """Prepare values for JSON: arrays become lists, results dictionaries, inf and NaN None."""
     return {name: _plain(each) for name, each in numbers.items()}
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return plain(value)
+    if hasattr(value, "to_dict"):
+        return _plain(value.to_dict())
     if isinstance(value, (np.ndarray, np.generic)):
         return _plain(value.tolist())
     if isinstance(value, (list, tuple)):
@@ -103,18 +113,11 @@ class JointUnits(NamedTuple):
         return tuple(("mm", 1e-3) if slides else ("deg", math.pi / 180.0) for slides in self.slides)
 
     def torque(self, joint: int | None = None) -> str:
-        """Return the unit of torque of one joint, or of all joints if ``joint`` is None.
-
-        It is "N m" for revolute joints, "N" for prismatic ones, "N m or N" for joints of both.
-        """
+        """Return the unit of torque of one joint, or of all: "N m", "N", or "N m or N" if mixed."""
         return self.joined("N m", "N", joint)
 
     def stiffness(self) -> str:
-        """Return the unit of the eigenvalues of K_θ, the joint stiffness.
-
-        It is "N m/rad" if all joints are revolute, "N/m" if all are prismatic, else
-        "N m/rad or N/m".
-        """
+        """Return the unit of the eigenvalues of K_θ: "N m/rad", "N/m", or both if mixed."""
         return self.joined("N m/rad", "N/m")
 
     def levers(self, length: float) -> Array:
@@ -122,24 +125,14 @@ class JointUnits(NamedTuple):
         return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
-        """Return joint coordinates q (..., nv) for JSON, by joint name.
-
-        Angles are under the key ``angles_rad``, displacements of prismatic joints under ``ways_m``.
-        """
-        found: dict[str, object] = {}
-        for key_of, chosen in (("angles_rad", ~self.slides), ("ways_m", self.slides)):
-            if chosen.any() or key_of == "angles_rad":
-                columns = np.flatnonzero(chosen).tolist()
-                found[key_of] = {names[i]: q[..., i].tolist() for i in columns}
+        """Return joint coordinates q (..., nv) for JSON by joint name: angles_rad and ways_m."""
+        found: dict[str, object] = {"angles_rad": {}}
+        for i, (name, slides) in enumerate(zip(names, self.slides, strict=True)):
+            column = found.setdefault("ways_m" if slides else "angles_rad", {})
+            column[name] = q[..., i].tolist()  # type: ignore[index]
         return found
 
     def joined(self, turning: str, sliding: str, joint: int | None = None) -> str:
-        """Return the text for a joint: ``sliding`` if it is prismatic, else ``turning``.
-
-        If ``joint`` is None, the text is for all joints: both texts, joined by "or", if
-        the arm has both types.
-        """
+        """Return the text of a joint, or of all: ``turning``, ``sliding``, or both with "or"."""
         slides = self.slides if joint is None else self.slides[joint : joint + 1]
-        if slides.all():
-            return sliding
-        return f"{turning} or {sliding}" if slides.any() else turning
+        return " or ".join([turning] * (not slides.all()) + [sliding] * bool(slides.any()))

@@ -12,8 +12,7 @@ if TYPE_CHECKING:
 OPTIMAL, INFEASIBLE, UNBOUNDED = 0, 2, 3
 """Status numbers of scipy that decide a program; all others leave it undecided."""
 
-_TIGHT: Final = 1e-10
-"""Allowed violation of a constraint of order one; the default of HiGHS is 1e-7."""
+_TIGHT: Final = 1e-10  # allowed violation of a constraint of order one; HiGHS's default is 1e-7
 
 
 def least(cost: Array, **constraints: Any) -> OptimizeResult:

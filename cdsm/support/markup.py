@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable
 
 
 class Markup(str):
@@ -23,8 +22,3 @@ def element(name: str, *contents: str, **attributes: str) -> Markup:
     )
     inner = "".join(each if isinstance(each, Markup) else html.escape(each) for each in contents)
     return Markup(f"<{name}{given}>{inner}</{name}>")
-
-
-def row(tag: str, cells: Iterable[str]) -> Markup:
-    """Build a row of a table; ``tag`` is the element of each cell, ``th`` or ``td``."""
-    return element("tr", *(element(tag, cell) for cell in cells))

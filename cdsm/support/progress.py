@@ -5,32 +5,24 @@ Nothing is shown where there is no terminal: in a pipe, a notebook, a log file.
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterable, Iterator, Sized
+import sys
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from time import monotonic
+from typing import TypeVar
 
 from cdsm.support.validation import flag
 
-if TYPE_CHECKING:
-    from rich.progress import Progress, ProgressColumn, Task
-    from rich.text import Text
-
-_Item = TypeVar("_Item", covariant=True)
+_Item = TypeVar("_Item")
 
 DELAY = 1.0
 """Time [s] before a bar is shown: shorter work shows nothing."""
 
-_outermost: ContextVar[bool] = ContextVar("_outermost", default=True)
-"""Whether no other bar is open: a bar inside another one would overwrite it."""
+_allowed: ContextVar[bool] = ContextVar("_allowed", default=True)
 
 
-class _Items(Sized, Iterable[_Item], Protocol[_Item]):
-    """Type of the items of :func:`track`: an iterable with a length."""
-
-
-def track(items: _Items[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:
+def track(items: Collection[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:
     """Yield the items; if ``wanted``, show a bar called ``what`` with the number of items."""
     with progress_bar(what, len(items), wanted=wanted) as advance:
         for item in items:
@@ -48,14 +40,35 @@ def progress_bar(
     bar also shows how many items are finished per second. A bar that is opened while another one
     is open is never shown, even if the outer one is not ``wanted``.
     """
-    outermost = _outermost.get()
-    token = _outermost.set(False)
-    bar = _Bar(what, total, done, rate, shown=wanted and outermost)
+    if not (wanted and _allowed.get() and sys.stderr.isatty()):
+        with progress_allowed(False):
+            yield lambda count: None
+        return
+    from rich import progress  # slow to import
+    from rich.console import Console
+
+    class Rate(progress.ProgressColumn):
+        def render(self, task: progress.Task) -> str:
+            return f"{task.speed:,.0f}/s" if rate and task.speed else ""
+
+    bar = progress.Progress(
+        *(what, progress.BarColumn(), progress.MofNCompleteColumn()),
+        *(Rate(), progress.TimeRemainingColumn()),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    task, begun = bar.add_task(what, total=total, completed=done), monotonic()
+
+    def advance(count: int) -> None:
+        if monotonic() - begun >= DELAY:
+            bar.start()
+        bar.advance(task, count)
+
     try:
-        yield bar.advance
+        with progress_allowed(False):
+            yield advance
     finally:
-        bar.close()
-        _outermost.reset(token)
+        bar.stop()
 
 
 @contextmanager
@@ -64,74 +77,8 @@ def progress_allowed(progress: bool) -> Iterator[None]:
 
     Raises InvalidInput if ``progress`` is not a bool.
     """
-    token = _outermost.set(flag("progress", progress) and _outermost.get())
+    token = _allowed.set(flag("progress", progress) and _allowed.get())
     try:
         yield
     finally:
-        _outermost.reset(token)
-
-
-class _Bar:
-    """Progress bar that appears after :data:`DELAY` seconds."""
-
-    def __init__(self, what: str, total: int | None, done: int, rate: bool, *, shown: bool) -> None:
-        self._what, self._total, self._done, self._rate = what, total, done, rate
-        self._progress: Progress | None = None
-        self._lock = threading.Lock()
-        self._timer = threading.Timer(DELAY, self._show)
-        self._timer.daemon = True
-        self._open = shown
-        if shown and DELAY:
-            self._timer.start()
-        elif shown:
-            self._show()
-
-    def advance(self, count: int) -> None:
-        with self._lock:
-            self._done += count
-            if self._progress is not None:
-                self._progress.advance(self._progress.task_ids[0], count)
-
-    def close(self) -> None:
-        self._timer.cancel()
-        with self._lock:
-            self._open = False
-            if self._progress is not None:
-                self._progress.stop()
-
-    def _show(self) -> None:
-        from rich.console import Console  # slow to import
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-            TimeElapsedColumn,
-            TimeRemainingColumn,
-        )
-
-        console = Console(stderr=True)
-        with self._lock:
-            if not (self._open and console.is_terminal):
-                return
-            columns: list[ProgressColumn] = [TextColumn(self._what), BarColumn()]
-            if self._total is None:
-                columns.append(TimeElapsedColumn())
-            else:
-                columns += [MofNCompleteColumn(), *([_rate()] if self._rate else [])]
-                columns.append(TimeRemainingColumn())
-            self._progress = Progress(*columns, console=console, transient=True)
-            self._progress.add_task("", total=self._total, completed=self._done)
-            self._progress.start()
-
-
-def _rate() -> ProgressColumn:
-    """Return a column of a bar with the items per second in the last half minute."""
-    from rich.progress import ProgressColumn
-    from rich.text import Text
-
-    class Rate(ProgressColumn):
-        def render(self, task: Task) -> Text:
-            return Text("" if task.speed is None else f"{task.speed:,.0f}/s")
-
-    return Rate()
+        _allowed.reset(token)

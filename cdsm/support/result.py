@@ -90,8 +90,8 @@ class Result(ReadOnlyState):
         """Return all numbers as a labelled Dataset in SI; needs xarray (MissingExtra)."""
         variables, words = {}, {}
         for name, value, of, dims in self._quantities():
-            array = np.asarray(value)
-            if array.dtype.kind in "USO":
+            array = _array(value)
+            if array.dtype.kind in "USO" or array.ndim != len(dims):
                 words[name] = str(value)
             else:
                 variables[name] = (dims, array, of)
@@ -99,28 +99,22 @@ class Result(ReadOnlyState):
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with a unit in the name of each column; needs pandas (MissingExtra)."""
-        labels, index = self._labels(), None
+        labels: dict[str, Any] = self._labels()
         columns: dict[str, Any] = {}
         for name, value, of, dims in self._quantities():
             suffix = "" if of == "1" else f" [{of}]"
-            if not self._rows:
-                if not dims:
-                    columns[name + suffix] = [value]
-            elif dims == (self._rows,) and name == self._rows:
-                index = np.asarray(value)
-            elif dims[:1] == (self._rows,):
-                array = np.asarray(value)
+            if not self._rows and not dims:
+                columns[name + suffix] = [value]
+            elif dims == (name,) == (self._rows,):
+                labels |= {name: np.asarray(value)}
+            elif self._rows and dims[:1] == (self._rows,):
+                array = _array(value)
                 for place in np.ndindex(array.shape[1:]):
-                    parts = [
-                        str(labels[d][i] if d in labels else i + 1)
-                        for d, i in zip(dims[1:], place, strict=True)
-                    ]
+                    pairs = zip(dims[1:], place, strict=True)
+                    parts = [str(labels[d][i] if d in labels else i + 1) for d, i in pairs]
                     columns[" ".join([name, *parts]) + suffix] = array[(slice(None), *place)]
-        if self._rows in labels:
-            index = np.asarray(labels[self._rows])
-        if index is None:  # rows without names
-            index = np.arange(len(next(iter(columns.values()), (None,))))
-        return data_frame(columns, self._rows or "result", index)
+        numbers = np.arange(len(next(iter(columns.values()), ())))  # of rows without names
+        return data_frame(columns, self._rows or "result", labels.get(self._rows, numbers))
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write :meth:`to_pandas` (``.csv``) or :meth:`to_xarray` (``.nc``); return the path.
@@ -133,14 +127,12 @@ class Result(ReadOnlyState):
         return write_labelled(path, self.to_pandas, self.to_xarray)
 
     def __repr__(self) -> str:
-        shown = ""
+        shown = "" if getattr(self, "is_stable", True) else ", UNSTABLE"
         for name, value, of, _ in self._quantities():
             if name == self._headline:
-                numbers = np.atleast_1d(value)
-                shown = f" {name} {span(numbers) if numbers.size else 'none'}"
-                shown += "" if of == "1" else f" {of}"
-        state = "" if getattr(self, "is_stable", True) else ", UNSTABLE"
-        return f"<{type(self).__name__}{shown}{state}>"
+                numbers = span(np.atleast_1d(value)) if np.size(value) else "none"
+                shown = f" {name} {numbers} {'' if of == '1' else of}".rstrip() + shown
+        return f"<{type(self).__name__}{shown}>"
 
     def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
         """Yield name, value, unit and dimensions of each number: fields first, then properties."""
@@ -175,6 +167,11 @@ class Result(ReadOnlyState):
             labels |= {"joint": joints, "joint_column": joints, "cable": cables.names}
             labels["held_cable"] = [each.name for each in cables if each.control == "position"]
         return labels
+
+
+def _array(value: Any) -> Any:
+    """Return a value as an array; of a mapping, its values."""
+    return np.asarray([*value.values()] if isinstance(value, Mapping) else value)
 
 
 def _by_name(value: Any, dims: Sequence[str], labels: Mapping[str, Sequence[object]]) -> Any:

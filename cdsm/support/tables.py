@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import io
 import math
 import os
-import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple, NoReturn
 
@@ -14,17 +14,10 @@ import numpy as np
 
 from cdsm.errors import FileError, listed
 from cdsm.support.files import read_text
-from cdsm.support.records import misspelt
 from cdsm.support.values import Array
-
-_LONGEST_CELL = 1000  # maximum number of characters of a cell; numbers and names are shorter
 
 ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
-
-_ALIKE = 0.8  # similarity of names that differ in one letter of five or more
-_NUMBERED = re.compile(r"[^\d]+(?=\d)")  # what is before the number of a name
-_TRIED = 500  # lines that tell the delimiter; titles are fewer
 
 
 def csv_text(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
@@ -54,14 +47,13 @@ class Table(NamedTuple):
         numbers = []
         for line, cells in self.rows[first:]:
             cell = cells[at] if at < len(cells) else ""
-            value = self.number(cell)
-            if not math.isfinite(value):
+            numbers.append(self.number(cell))
+            if not math.isfinite(numbers[-1]):
                 refuse(f"line {line}: {cell!r} is not a finite number")
-            numbers.append(value)
         return np.array(numbers)
 
     def number(self, cell: str) -> float:
-        """Return the number in a cell; NaN if the cell has no number."""
+        """Return the number in a cell, or NaN; commas are decimal marks if none is a delimiter."""
         try:
             return float(cell if self.delimiter == "," else cell.replace(",", "."))
         except ValueError:
@@ -77,27 +69,31 @@ def read_table(
     more numbers. ``any_encoding`` is an argument of :func:`read_text`. FileError names a line that
     cannot be split into cells.
     """
-    text = read_text(path, any_encoding=any_encoding)
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip()]
-    comments = [line for _, line in lines if line.lstrip().startswith("#")]
-    lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
-    delimiter = max(delimiters, key=lambda each: _rows_of_numbers(lines[:_TRIED], each))
-    rows = [(k, _cells(path, k, line, delimiter)) for k, line in lines]
-    return Table(rows, comments, delimiter)
+    lines = enumerate(read_text(path, any_encoding=any_encoding).splitlines(), start=1)
+    filled = [(number, line) for number, line in lines if line.strip()]
+    comments = [line for _, line in filled if line.lstrip().startswith("#")]
+    kept = [(number, line) for number, line in filled if not line.lstrip().startswith("#")]
+    tables = []
+    for delimiter in delimiters:
+        split = csv.reader([line for _, line in kept], delimiter=delimiter)
+        try:
+            rows = [(number, [cell.strip() for cell in next(split)]) for number, _ in kept]
+        except (csv.Error, StopIteration) as error:
+            at, why = kept[split.line_num - 1][0], f"{error}" or "a quote is not closed before it"
+            raise FileError(path, f"line {at} is no line of a table: {why}.") from None
+        tables.append(Table(rows, comments, delimiter))
+    return max(tables, key=_rows_of_numbers)
 
 
-def _rows_of_numbers(lines: list[tuple[int, str]], delimiter: str) -> int:
-    """Count the lines that have two or more numbers if ``delimiter`` splits them."""
-    table = Table([], [], delimiter)
-    cells = ([cell.strip(' "') for cell in line.split(delimiter)] for _, line in lines)
-    return sum(sum(not math.isnan(table.number(cell)) for cell in row) > 1 for row in cells)
+def _rows_of_numbers(table: Table) -> int:
+    rows = (cells for _, cells in table.rows)
+    return sum(sum(not math.isnan(table.number(cell)) for cell in row) > 1 for row in rows)
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:
     """Split a header cell such as ``joint1 [deg]``; without brackets the unit is empty."""
-    found = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL)
-    assert found is not None
-    return found[1], found[2] or ""
+    name, _, unit = cell.partition("[")
+    return name.strip(), unit.strip().removesuffix("]")
 
 
 def named_columns(
@@ -105,31 +101,26 @@ def named_columns(
 ) -> dict[str, tuple[int, str]]:
     """Return index and unit of each column of a table, by the name of the column.
 
-    Columns with other names than the ``known`` ones are allowed. ``refuse`` is called, which raises
-    an error, if a name is given twice, looks like a misspelt known name, or has the letters of a
-    known name before its number (a joint that the arm does not have). It is also called if
-    semicolons separate the columns, or a row has more cells than the header.
+    Columns with other names than the ``known`` ones are allowed, unless they are almost a known
+    name. ``refuse`` is called, which raises an error, for those, for a name that is given twice,
+    for semicolons between the columns, and for a row with more cells than the header.
     """
-    if len(table.header) == 1 and ";" in table.header[0]:
-        refuse("has its columns separated by semicolons; separate them by commas")
     width = len(table.header)
+    if width == 1 and ";" in table.header[0]:
+        refuse("has its columns separated by semicolons; separate them by commas")
     for line, cells in table.rows[1:]:
         if any(cells[width:]):
-            refuse(
-                f"line {line}: has {len(cells)} cells, but the header {width}; write decimals with "
-                "a point"
-            )
+            more = f"{len(cells)} cells, but the header {width}; write decimals with a point"
+            refuse(f"line {line}: has {more}")
     found: dict[str, tuple[int, str]] = {}
-    kinds = {begin[0] for each in known if (begin := _NUMBERED.match(each))}
-    for at, cell in enumerate(table.header):
-        name, unit = name_and_unit(cell)
+    for at, (name, unit) in enumerate(map(name_and_unit, table.header)):
+        as_long = [each for each in known if abs(len(each) - len(name)) < 2]
+        near = difflib.get_close_matches(name, as_long, 1, 0.8)
         if name in found:
             refuse(f"has two columns called {name}; give each once")
-        if meant := misspelt(name, known, _ALIKE):
-            refuse(f"has a column {name}, which is not known{meant} Rename it")
-        begin = _NUMBERED.match(name)
-        if name not in known and begin and begin[0] in kinds:
-            refuse(f"has a column {name}, which is not known; there are {listed(known)}")
+        if near and name not in known:
+            there = f"did you mean {near[0]}? There are {listed(known)}"
+            refuse(f"has a column {name}, which is not known; {there}")
         found[name] = at, unit
     return found
 
@@ -151,17 +142,3 @@ def column_in(
         names = " or ".join(f"{name} [{unit}]" for unit in known)
         refuse(f"{fault if at >= 0 else f'has no column {name}'}; call it {names}")
     return at, known[unit]
-
-
-def _cells(path: str | os.PathLike[str], number: int, line: str, delimiter: str) -> list[str]:
-    try:
-        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
-    except csv.Error as error:
-        raise FileError(path, f"line {number} is no line of a table: {error}.") from None
-    longest = max(map(len, cells), default=0)
-    if longest > _LONGEST_CELL:
-        raise FileError(
-            path,
-            f"line {number} has a cell of {longest} characters; {_LONGEST_CELL} are read at most.",
-        )
-    return cells

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,8 +62,7 @@ def write_labelled(
     labelled: Callable[[], xarray.Dataset],
 ) -> Path:
     """Write ``table()`` to a ``.csv`` or ``labelled()`` to a ``.nc``; only this one is called."""
-    suffix = checked_suffix(path)
-    if suffix == ".csv":
+    if checked_suffix(path) == ".csv":
         return write_file(path, table().to_csv)
     data = labelled()
     return write_file(path, lambda aside: write_netcdf(data, aside))
@@ -95,23 +94,15 @@ def check_sweep(dataset: object) -> None:
 
     if not isinstance(dataset, xarray.Dataset):
         raise InvalidInput("dataset", f"{dataset!r} given; the Dataset of a sweep is needed.")
-    if "flag_meanings" not in dataset.get("status", xarray.DataArray()).attrs:
+    if not {"flag_values", "flag_meanings"} <= set(dataset.get("status", xarray.DataArray()).attrs):
         raise InvalidInput("dataset", "has no status; the Dataset of a sweep is needed.")
 
 
 def status_names(dataset: xarray.Dataset) -> dict[int, str]:
-    """Return the name of each status of a sweep by its number, read from the attributes.
-
-    Raises InvalidInput if names or numbers are missing.
-    """
+    """Return the name of each status of a sweep by its number, read from the attributes."""
     flags = dataset["status"].attrs
-    try:
-        values = np.atleast_1d(flags["flag_values"]).tolist()
-        return dict(zip(values, flags["flag_meanings"].split(), strict=True))
-    except (KeyError, AttributeError, TypeError, ValueError):
-        raise InvalidInput(
-            "dataset", "its status has no word for each number; the Dataset of a sweep is needed."
-        ) from None
+    values = np.atleast_1d(flags["flag_values"]).tolist()
+    return dict(zip(values, flags["flag_meanings"].split(), strict=False))
 
 
 def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
@@ -130,31 +121,12 @@ def tidy(dataset: xarray.Dataset) -> pandas.DataFrame:
         if name == "status" or (variable.dims == (name,) and name not in status.dims):
             continue  # coordinates of components appear in the names of the columns
         units = f" [{variable.units}]" if variable.attrs.get("units", "1") != "1" else ""
-        for suffix, component in _components(variable, status):
-            columns[f"{name}{suffix}{units}"] = component
-    words = status_names(dataset)
-    unknown = ~np.isin(status.values, list(words))
-    if unknown.any():
-        raise InvalidInput(
-            "dataset",
-            f"its status holds {status.values[unknown][0].item()!r}, which is none of {words}; the "
-            "file it was read from may be damaged.",
-        )
-    columns["status"] = np.array([words[int(value)] for value in status.values.ravel()])
-    return pandas.DataFrame(columns)
-
-
-def _components(
-    variable: xarray.DataArray, status: xarray.DataArray
-) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield each component of a variable: the suffix of its name, such as ``_x``, and its values.
-
-    There is a value for each entry of ``status``.
-    """
-    inner = [dim for dim in variable.dims if dim not in status.dims]
-    names = [map(str, variable[dim].values.tolist()) for dim in inner]
-    for places in itertools.product(*(enumerate(each) for each in names)):
-        one = variable.isel({dim: i for dim, (i, _) in zip(inner, places, strict=True)})
+        inner = [dim for dim in variable.dims if dim not in status.dims]
         # along dimensions that the variable lacks, its values are repeated
-        full = one.broadcast_like(status).transpose(*status.dims)
-        yield "".join(f"_{name}" for _, name in places), full.values.ravel()
+        full = variable.broadcast_like(status).transpose(*status.dims, *inner).values
+        labels = itertools.product(*(variable[dim].values.tolist() for dim in inner))
+        for label, column in zip(labels, full.reshape(status.size, -1).T, strict=True):
+            columns["_".join(map(str, (name, *label))) + units] = column
+    words = status_names(dataset)
+    columns["status"] = np.array([words.get(k, str(k)) for k in status.values.ravel().tolist()])
+    return pandas.DataFrame(columns)

@@ -1,13 +1,8 @@
-"""Check all inputs: native float64, right shape, finite, of a plausible size.
-
-A quantity outside its range in :data:`RANGES` raises an error here, so other code need not guard
-against overflow or denormal numbers.
-"""
+"""Check all inputs: native float64, right shape, finite, of a plausible size."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple, TypeVar
 
@@ -19,11 +14,8 @@ from cdsm.support.values import Array, frozen
 
 _Kind = TypeVar("_Kind")
 
-LARGEST = 1e15
-"""Largest magnitude of a number whose quantity is not in :data:`RANGES`."""
-
-SMALLEST = 1e-12
-"""Smallest positive number whose quantity is not in :data:`RANGES`."""
+LARGEST, SMALLEST = 1e15, 1e-12
+"""Ends of the magnitudes of a number whose quantity is not in :data:`RANGES`."""
 
 
 class Range(NamedTuple):
@@ -55,9 +47,7 @@ half a metre thick: such a diameter was meant in millimetres.
 """
 
 WRENCH: Final = "force [N], then moment [N m], base axes"
-
 NO_WRENCH: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_ZERO: Final = frozen(np.zeros(6))
 
 
 def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = False) -> str:
@@ -70,28 +60,20 @@ def within(quantity: str, value: float, *, zero: bool = False, infinite: bool = 
         return ""
     if quantity == "tension" and value < 0.0:
         return f"{value:g} N given; cables only pull"
-    words = [*(["0"] if zero else []), f"{low:g} to {high:g} {unit}".rstrip()]
-    words += ["inf"] if infinite else []
+    words = [*["0"] * zero, f"{low:g} to {high:g} {unit}".rstrip(), *["inf"] * infinite]
     return f"{f'{value:g} {unit}'.rstrip()} given; {', or '.join(words)} is needed"
 
 
 def quantity(
     name: str, value: object, kind: str, *, zero: bool = False, infinite: bool = False
 ) -> float:
-    """Check a positive number against the range ``kind`` of :data:`RANGES`; return a float.
-
-    ``zero`` and ``infinite`` also allow 0 and inf. Other values raise :class:`InvalidInput`.
-    """
+    """Return a number of the range ``kind``, or InvalidInput; options as :func:`within`."""
     if infinite and isinstance(value, float) and value == math.inf:
         return value
     number = scalar(name, value)
-    problem = within(kind, number, zero=zero, infinite=infinite)
-    if problem:
+    if problem := within(kind, number, zero=zero, infinite=infinite):
         raise InvalidInput(name, f"{problem}.")
     return number
-
-
-_MANY = 5000  # numbers from which BLAS may use threads of its own, which compete with ours
 
 
 def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
@@ -102,50 +84,38 @@ def number_array(name: str, value: ArrayLike, kind: str | None = None) -> Array:
     """
     array = _native(name, value)
     unit, _, largest = ("", 0.0, LARGEST) if kind is None else RANGES[kind]
-    if array.size < _MANY:
-        # if the sum of squares is small enough, all entries are; twice as fast as two extremes
-        small = np.vdot(array, array) <= largest
-    else:
-        small = -largest <= array.min() and array.max() <= largest
-    if small:  # false also for NaN
-        return array
-    usable = abs(array) <= largest
-    if np.count_nonzero(usable) < array.size:
+    if not (array.min(initial=0.0) >= -largest and array.max(initial=0.0) <= largest):
+        unusable = ~(abs(array) <= largest)
         allowed = f"finite numbers up to {f'{largest:g} {unit}'.rstrip()} are allowed"
-        raise InvalidInput(name, f"{_first_of(array, ~usable)}; {allowed}.")
+        raise InvalidInput(name, f"{_first_of(array, unusable)}; {allowed}.")
     return array
 
 
 def _first_of(array: Array, chosen: NDArray[np.bool_]) -> str:
     """Return index and value of the first entry where ``chosen`` is True: ``entry [0, 2] is 5``."""
-    at = np.argwhere(chosen)[0]
-    where = f"entry [{', '.join(map(str, at))}] is " if array.ndim else ""
-    return f"{where}{array[tuple(at)]:g}"
+    at = tuple(np.argwhere(chosen)[0].tolist())
+    where = f"entry [{', '.join(map(str, at))}] is " if at else ""
+    return f"{where}{array[at]:g}"
 
 
 def instance(name: str, value: _Kind, kind: type[_Kind]) -> _Kind:
     """Return the value if it is an instance of ``kind``, else raise :class:`InvalidInput`."""
     if not isinstance(value, kind):
-        # a named tuple may hold what is needed
-        parts: dict[str, object] = getattr(value, "_asdict", dict)()
-        its = "".join(f": its .{key}" for key, part in parts.items() if isinstance(part, kind))
-        raise InvalidInput(name, f"{value!r} given; a {kind.__name__} is needed{its}.")
+        raise InvalidInput(name, f"{value!r} given; a {kind.__name__} is needed.")
     return value
 
 
 def sequence_of(name: str, value: Iterable[_Kind], kind: type[_Kind]) -> tuple[_Kind, ...]:
     """Return a list or tuple of ``kind`` as a tuple; else raise :class:`InvalidInput`."""
-    entries = tuple(value) if isinstance(value, (list, tuple)) else None
-    if entries is None or not all(isinstance(entry, kind) for entry in entries):
+    if not isinstance(value, (list, tuple)) or not all(isinstance(each, kind) for each in value):
         raise InvalidInput(name, f"{value!r} given; a list or tuple of {kind.__name__} is needed.")
-    return entries
+    return tuple(value)
 
 
 def vector(name: str, value: ArrayLike, size: int, meaning: str, kind: str | None = None) -> Array:
     """Return a new, read-only, finite vector (size,), or raise :class:`InvalidInput`.
 
-    ``meaning`` says in the message what the vector is. ``kind`` is the key of :data:`RANGES` that
-    gives the range of the entries.
+    ``meaning`` says in the message what the vector is; ``kind`` is as for :func:`number_array`.
     """
     array = number_array(name, value, kind)
     if array.shape != (size,):
@@ -159,22 +129,17 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
     ±inf is allowed. If ``rows`` is given, an array (rows, size) is also allowed and keeps its
     shape. Raises InvalidInput.
     """
-    _, least, most = RANGES["tension"]
-    # one float for all cables is the usual case and must be fast
-    number = value if isinstance(value, float) else math.nan
-    if least <= number <= most or number in (0.0, math.inf):
-        return frozen(np.zeros(size) + number)
-    array = _native(name, value)
+    array, (_, least, most) = _native(name, value), RANGES["tension"]
     if array.ndim == 0:
         array = array.repeat(size)
-    if array.shape != (size,) and (rows is None or array.shape != (rows, size)):
+    if array.shape not in ((size,), (rows, size)):
         wanted = f"({size},)" if rows is None else f"({size},) or ({rows}, {size})"
         raise InvalidInput(
             name, f"shape {array.shape} given; give one number, or {wanted}: one per cable [N]."
         )
-    size_of = abs(array)
-    usable = ((size_of <= most) & (size_of >= least)) | (size_of == 0.0) | np.isinf(size_of)
-    if np.count_nonzero(usable) < array.size:
+    big = abs(array)
+    usable = ((big <= most) & (big >= least)) | (big == 0.0) | np.isinf(big)
+    if not usable.all():
         wanted = f"newtons from {least:g} to {most:g}, 0 or inf"
         raise InvalidInput(name, f"{_first_of(array, ~usable)}; give {wanted}.")
     return frozen(array)
@@ -182,7 +147,7 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
 
 def wrench_vector(name: str, value: ArrayLike) -> Array:
     """Check a wrench: force [N], then moment [N m]. Return it as a read-only vector (6,)."""
-    return _ZERO if value is NO_WRENCH else vector(name, value, 6, WRENCH, "wrench")
+    return vector(name, value, 6, WRENCH, "wrench")
 
 
 def scalar(name: str, value: object) -> float:
@@ -191,6 +156,14 @@ def scalar(name: str, value: object) -> float:
     if array.ndim != 0:
         raise InvalidInput(name, f"shape {array.shape} given; one number is needed.")
     return float(array)
+
+
+def fraction(name: str, value: object) -> float:
+    """Return a number between 0 and 1, the ends excluded; raise InvalidInput for any other."""
+    number = scalar(name, value)
+    if not 0.0 < number < 1.0:
+        raise InvalidInput(name, f"{number:g} given; a number between 0 and 1 is needed.")
+    return number
 
 
 def flag(name: str, value: object) -> bool:
@@ -202,29 +175,20 @@ def flag(name: str, value: object) -> bool:
 
 def whole_number(name: str, value: object, least: int, most: int | None = None) -> int:
     """Return a whole number from ``least`` to ``most``, or raise :class:`InvalidInput`."""
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, (int, np.integer))
-        or value < least
-        or (most is not None and value > most)
-    ):
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
         to = "on" if most is None else f"to {most}"
         raise InvalidInput(name, f"{value!r} given; a whole number from {least} {to} is needed.")
-    return int(value)
-
-
-_NO_LETTER = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\uffff]")
-"""Control characters, line breaks, lone surrogates and other codes that XML cannot hold."""
+    return int(value)  # type: ignore[call-overload, no-any-return]
 
 
 def text(name: str, value: object) -> str:
     """Return ``value`` if it is a printable, not blank text; else raise :class:`InvalidInput`."""
     if not isinstance(value, str) or not value.strip():
         raise InvalidInput(name, f"{value!r} given; a name is needed, a text that is not blank.")
-    wrong = _NO_LETTER.search(value)
-    if wrong is not None:
-        at = wrong.start() + 1
-        raise InvalidInput(name, f"{value!r} given; character {at} cannot be printed.")
+    for at, letter in enumerate(value, start=1):
+        if not letter.isprintable():
+            raise InvalidInput(name, f"{value!r} given; character {at} cannot be printed.")
     return value
 
 
@@ -238,25 +202,15 @@ def one_of(kind: str, name: object, known: Iterable[str], remedy: str = "") -> s
 
 def _native(name: str, value: ArrayLike) -> Array:
     """Copy ``value`` to a new array of native float64, or raise :class:`InvalidInput`."""
-    if type(value) is np.ndarray and value.dtype == np.float64:  # usual case, must be fast
-        copy: Array = value.copy()
-        return copy
-    if isinstance(value, np.ma.MaskedArray) or (
-        isinstance(value, (list, tuple)) and any(entry is np.ma.masked for entry in value)
-    ):
-        raise InvalidInput(name, "is a masked array; fill or drop the masked entries first.")
-    try:
-        array = np.asarray(value)
-    except Exception as error:  # a user-defined __array__ may raise anything
-        raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
     if isinstance(value, Mapping):
         raise InvalidInput(
             name, f"a {type(value).__name__} given; give its numbers alone, in order, as an array."
         )
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError) as error:  # rows of different lengths
+        raise InvalidInput(name, f"is not an array of numbers ({error}).") from None
     if array.dtype.kind not in "iuf":
         such = "".join(f", such as {each!r:.60}" for each in array.ravel()[:1].tolist())
         raise InvalidInput(name, f"holds {array.dtype} entries{such}; real numbers are needed.")
-    if array.dtype == np.float64:
-        return np.array(array, order="C")
-    with np.errstate(over="ignore"):  # numbers beyond float64 become inf, which is refused later
-        return array.astype(np.float64, order="C")
+    return np.array(array, dtype=np.float64, order="C")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, Protocol, TypeVar
@@ -9,11 +10,11 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.support.markup import element
-
 Array = NDArray[np.float64]
 
 _AnyArray = TypeVar("_AnyArray", bound=NDArray[Any])
+_Given = TypeVar("_Given", contravariant=True)
+_Kept = TypeVar("_Kept", covariant=True)
 
 
 def frozen(array: _AnyArray) -> _AnyArray:
@@ -22,17 +23,8 @@ def frozen(array: _AnyArray) -> _AnyArray:
     return array
 
 
-_Given = TypeVar("_Given", contravariant=True)
-_Kept = TypeVar("_Kept", covariant=True)
-
-
 class Given(Protocol[_Given, _Kept]):
-    """Type of a dataclass field whose constructor accepts another type than the attribute has.
-
-    For example, a field accepts a list and stores an array. Type checkers read the accepted type
-    from ``__set__`` and the stored type from ``__get__``; at run time nothing calls these methods.
-    mypy reads them only if the field has a default.
-    """
+    """Type of a dataclass field that accepts another type than it keeps; only type checkers ask."""
 
     def __get__(self, owner: Any, kind: type) -> _Kept: ...
 
@@ -43,7 +35,7 @@ class Printed:
     """Base class for values that print as a table; a notebook shows the printed text."""
 
     def _repr_html_(self) -> str:
-        return str(element("pre", str(self)))
+        return f"<pre>{html.escape(str(self))}</pre>"
 
 
 class Named:

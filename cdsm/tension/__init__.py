@@ -4,6 +4,8 @@ from cdsm.tension.distribution import bounds_at as bounds_at
 from cdsm.tension.distribution import checked_bounds as checked_bounds
 from cdsm.tension.distribution import distribute_tension as distribute_tension
 from cdsm.tension.distribution import grip as grip
+from cdsm.tension.infeasibility import advice as advice
+from cdsm.tension.infeasibility import too_few_cables as too_few_cables
 from cdsm.tension.solvers import DEFAULT_SOLVER as DEFAULT_SOLVER
 from cdsm.tension.solvers import installed_solvers as installed_solvers
 from cdsm.tension.value import Tension as Tension

@@ -1,4 +1,4 @@
-"""Find why no tensions balance an arm: the missing torque, and how far bounds must widen."""
+"""Find why no tensions balance an arm: the missing torque, and which bounds must widen how far."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import InfeasibleTension, SolverError
+from cdsm.errors import InfeasibleTension, SolverError, listed
+from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.support.format import plural
 from cdsm.support.linear_program import OPTIMAL, least
-from cdsm.support.values import frozen
+from cdsm.support.values import Array, frozen
 from cdsm.tension.solvers import HINT, OPTIMALITY, Problem
 
 
@@ -54,7 +56,45 @@ def explain(
         binding=[names[c] for c in np.flatnonzero(tight)],
         fixed=[names[c] for c in np.flatnonzero(~free)] if blocked else (),
         units=(pose.arm.torque_unit(), pose.arm.torque_unit(worst)),
+        hint=too_few_cables(pose.arm)
+        if math.isinf(widening)
+        else advice(pose.arm, force * F, force * low, force * high, free),
     )
+
+
+def advice(
+    arm: Manipulator, F: Array, low: Array, high: Array, among: NDArray[np.bool_] | None = None
+) -> str:
+    """Say which bounds to widen: of each cable at a bound, the argument, its own, or its law's.
+
+    Tensions and bounds are (C,) [N]; ``among`` (C,) are the cables that count, default all. The
+    text is such as "lower minimum=, raise the maximum of cable1_1 itself", or empty.
+    """
+    near = OPTIMALITY * max(float(F.max()), 1.0)
+    found: dict[str, list[str]] = {}
+    for c, cable in enumerate(arm.cables):
+        law = cable.elasticity if cable.control == "position" else None
+        for tight, value, verb, side, end in (
+            (0.0 < F[c] <= low[c] + near, low[c], "lower", "minimum", law and law.low),
+            (F[c] >= high[c] - near, high[c], "raise", "maximum", law and law.high),
+        ):
+            if tight and (among is None or among[c]):
+                rule = f"{verb} {side}="
+                if value == getattr(cable, side):
+                    rule = f"{verb} the {side} of % itself"
+                elif value == end:
+                    rule = f"take another law than one that ends at {value:.4g} N for %"
+                found.setdefault(rule, []).append(cable.name)
+    return ", ".join(rule.replace("%", listed(names)) for rule, names in found.items())
+
+
+def too_few_cables(arm: Manipulator) -> str:
+    """Return a sentence if the arm has too few cables to hold its joints, else nothing."""
+    count, joints = len(arm.cables), arm.nv
+    if count > joints:
+        return ""
+    needed = f"cables only pull, so at least {joints + 1} are needed"
+    return f"{plural(count, 'cable')} alone cannot hold {plural(joints, 'joint')}: {needed}. "
 
 
 def _widening(problem: Problem, free: NDArray[np.bool_]) -> float:

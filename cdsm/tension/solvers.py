@@ -27,7 +27,7 @@ _ROUNDING: Final = 1e-12  # a solution with a larger violation is corrected
 _CURVATURE: Final = 1e-8  # ε that makes a linear program a quadratic one
 _FARTHEST: Final = 1e4  # variables of a linear program beyond this may be unbounded
 _FEASIBLE: Final = 1e-8  # largest accepted violation of A x = b by a linear program
-_NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are rounding
+NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are rounding
 
 # DAQP is three times as fast with 60 cables if it eliminates the balance first; OSQP misses bounds
 # by newtons with its defaults, and its polishing can spoil a solution
@@ -53,7 +53,7 @@ def nondimensional(J: Array, torque: Array, low: Array, high: Array, length: flo
     """Scale the balance ``J``ᵀ F = ``torque`` of an arm, without rounding; J_L is (C, nv)."""
     arm = 2.0 ** math.frexp(abs(J).max())[1]
     A, b = J.T / arm, torque / arm
-    A[abs(A) < _NO_ARM * length / arm] = 0.0
+    A[abs(A) < NO_ARM * length / arm] = 0.0
     force = 2.0 ** math.frexp(max(abs(b).max(), low.max()))[1]
     return Problem(A, b / force, low / force, high / force, arm, force)
 

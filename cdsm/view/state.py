@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import cdsm
 from cdsm.errors import CdsmError
+from cdsm.friction.stick import can_stick
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
@@ -26,7 +27,6 @@ Color = tuple[int, int, int]
 GREY: Final = (150, 150, 150)
 """Colour of cables with unknown tension."""
 
-_BENT = 1e-9  # least product of friction and wrap angle of a hole in which a cable can stick
 _BEAD = 0.013  # half the length of the mark of a hole, as a fraction of the arm's length
 
 
@@ -123,7 +123,7 @@ class Shown:
         pose = self.posture
         if pose is None or self.tensions is None or not pose.arm.has_friction:
             return np.empty((0, 2, 3)), np.empty((0, 2, 3))
-        chains, sticks = pose.segments.chains, pose.segments.grip > _BENT
+        chains, sticks = pose.segments.chains, can_stick(pose)
         slides = np.zeros_like(sticks) if self.sliding is None else self.sliding
         where = zip(chains.cable[chains.hole], chains.site, strict=True)
         spans = np.array([pose.cable_paths[c][i : i + 2] for c, i in where])
@@ -172,13 +172,10 @@ def _rest(
     if not pose.arm.has_friction:
         return cdsm.equilibrium(pose, tension, wrench), None
     history = cdsm.load_cycle(pose, tension, wrench[None])
-    K, stops = history.stiffness(-1), frozen(history.reaction[-1].copy())
     rest = Equilibrium(
         reference=pose,
         reference_tension=tension.values,
-        wrench=K.wrench,
-        stiffness=K,
-        reaction=stops,
-        residual=frozen(K.residual - stops),
+        stiffness=history.stiffness(-1),
+        stop_torque=frozen(history.stop_torque[-1].copy()),
     )
     return rest, history.sliding[-1] != 0

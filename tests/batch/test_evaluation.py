@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import evaluation, solution
+from cdsm.batch import choice, evaluation, solution
 from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.quantities import OF_POSTURE
 from cdsm.presets import STRAND_1X19
@@ -311,6 +311,21 @@ def test_foreign_memory_layouts_give_the_same() -> None:
         assert pulled.ok.all(), name
 
 
+def test_each_kernel_is_compiled_for_one_signature(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise it is compiled again at work, for seconds, though it was compiled ahead."""
+    kernels: Any = choice.compiled()
+    monkeypatch.setattr(solution, "kernels_for", lambda *_: kernels)
+    arm = random_arm(1, 3)
+    q, tension, wrench = problem(arm, 70)
+    for u in ("z", DIRECTIONS):
+        cdsm.evaluate(arm, q, tension, wrench, ("along",), direction=u)
+        cdsm.evaluate(arm, q, outputs=OUTPUTS, direction=u, minimum=5.0)
+    pull = cdsm.distribute_tension(arm.at(q[0]), 5.0)
+    cdsm.uncertainty(pull.posture, pull, cdsm.Tolerances(hole_radius=1e-4), direction="z")
+    for kernel in (kernels.pose, kernels.guess, kernels.stiffness, kernels.along):
+        assert len(kernel.signatures) == 1, kernel
+
+
 @pytest.mark.usefixtures("kernels")
 def test_memory_beyond_the_outputs_is_bounded() -> None:
     """Whatever comes and goes, per thread a chunk of a few megabytes."""
@@ -587,7 +602,6 @@ BAD: dict[str, tuple[Callable[[], object], tuple[str, ...]]] = {
     ),
     "q infinite": (lambda: cdsm.evaluate(ARM, changed(Q, 2, 0, math.inf), F), ("[2, 0] is inf",)),
     "q ragged": (lambda: cdsm.evaluate(ARM, [[0.0], [0.0, 1.0]], F), ("q: is not an array",)),
-    "q masked": (lambda: cdsm.evaluate(ARM, np.ma.masked_array(Q, Q > 0), F), ("q: is a masked",)),
     "q complex": (lambda: cdsm.evaluate(ARM, Q + 0j, F), ("q: holds complex128",)),
     "q None": (lambda: cdsm.evaluate(ARM, ANY, F), ("q: holds object entries, such as None;",)),
     "tension short": (

@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cdsm._former.compiling import at_once
 from cdsm.batch.choice import compiled
 
 
@@ -53,9 +52,7 @@ class Clock:
         Raises:
             AssertionError: The ratio is below ``least`` or above ``most``.
         """
-        compiled()
-        with at_once():  # warm up: compile, fill caches
-            slow(), fast()
+        compiled(), slow(), fast()  # warm up: compile, fill caches
         best_slow = best_fast = math.inf
         ratio = math.nan
         for round_ in range(4 * rounds):

@@ -35,12 +35,12 @@ def test_cycle_writes_and_draws_the_loop_of_the_api(arm: Path, tmp_path: Path) -
     )
     pull = cdsm.distribute_tension(pose, 60.0)
     history = cdsm.load_cycle(pose, pull, wrenches)
-    np.testing.assert_array_equal(numbers["tip_displacements_m"], history.displacement)
+    np.testing.assert_array_equal(numbers["displacement_m"], history.displacement)
     assert numbers["lost_in_last_cycle_J"] == pytest.approx(history.dissipated.sum())
     assert numbers["computed_with"]["friction"] == "included"
     lines = csv.read_text(encoding="utf-8").splitlines()
     assert len(lines) == 13
-    assert lines[0].startswith("load,force x [N]")
+    assert lines[0].startswith("load,wrenches fx [N and N m]")
     assert png.read_bytes().startswith(b"\x89PNG")
     text = call(*asked).output
     assert "friction 0.15" in text
@@ -55,7 +55,7 @@ def test_cycle_writes_netcdf(arm: Path, tmp_path: Path) -> None:
     )
     assert result.exit_code == 0, result.output
     with xarray.open_dataset(path) as data:
-        np.testing.assert_allclose(data["wrench"].sel(component="fz"), [2.0, 4.0, 2.0, 0.0] * 2)
+        np.testing.assert_allclose(data["wrenches"].sel(component="fz"), [2.0, 4.0, 2.0, 0.0] * 2)
 
 
 def test_weigh_says_which_weights_measure_what(arm: Path) -> None:
@@ -64,10 +64,9 @@ def test_weigh_says_which_weights_measure_what(arm: Path) -> None:
     assert "all cables stick: a weight measures" in result.output
     assert "take the difference of two weights" in result.output
     numbers = json.loads(call("weigh", arm, *OPTIONS, "--force", "0,0,3", "--json").stdout)
-    friction = numbers["friction"]
-    assert 0.0 < friction["stuck_below_N"] < friction["sliding_from_N"] < 3.0
-    assert friction["stuck_stiffness_N_per_m"] > friction["secant_stiffness_N_per_m"]
-    assert friction["secant_stiffness_N_per_m"] == numbers["stiffness_N_per_m"]
+    assert 0.0 < numbers["breakaway_load_N"] < numbers["sliding_load_N"] <= 3.0
+    assert numbers["stuck_N_per_m"] > numbers["stiffness_N_per_m"]
+    assert numbers["stiffness_N_per_m"] > numbers["frictionless_N_per_m"]
 
 
 def test_friction_beyond_reason_is_refused(arm: Path) -> None:

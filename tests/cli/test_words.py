@@ -31,7 +31,9 @@ def test_stiffness_with_tolerances_says_how_sure_it_is(geometry: Path, tmp_path:
     budget = cdsm.uncertainty(
         pose, cdsm.distribute_tension(pose, 10.0), cdsm.Tolerances.read(file), direction="z"
     )
-    assert numbers["z"]["standard_uncertainty"] == pytest.approx(budget.standard_uncertainty)
+    assert numbers["z"]["standard_uncertainty_N_per_m"] == pytest.approx(
+        budget.standard_uncertainty
+    )
     shown = call(*asked).stdout
     assert budget.shown in shown
     assert "of it joint angle" in shown
@@ -61,7 +63,7 @@ def test_stiffness_in_one_more_direction(geometry: Path, tmp_path: Path) -> None
     told = json.loads(call(*asked, "--json").stdout)
     assert told["along_direction_N_per_m"] == pytest.approx(along)
     assert told["sticking"]["1,0,-2"]["breakaway_N"] == pytest.approx(first.load)
-    assert told["uncertainty"]["1,0,-2"]["value"] == pytest.approx(along)
+    assert told["uncertainty"]["1,0,-2"]["value_N_per_m"] == pytest.approx(along)
     text = call(*asked).stdout
     assert f"along 1,0,-2: {along / 1e3:.4g} N/mm\n" in text
     stuck = first.stiffness.along(u) / 1e3

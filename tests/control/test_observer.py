@@ -71,7 +71,7 @@ def test_model_of_the_wire_in_the_holes_finds_angles_and_force_under_friction() 
         assert 1.0 / estimate.softness == pytest.approx(0.9, abs=2e-3)
     state, estimate = pairs[-1]
     cable = state.pose.segments.chains.cable
-    inner = state.state.settled.chain.tension
+    inner = state.state.arm_state.chain.tension
     found = estimate.shares * state.true_values.tension[cable]
     even = state.true_values.tension[cable]
     # half of what friction changes is found, and more

@@ -32,7 +32,9 @@ def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
     state = plant.step_to(before, command, wrench)
     pose = plan.arm.at(plan.angles[0])
     taken_in = paid_out(plan)[0] - command.paid_out
-    history = cdsm.load_cycle(pose, plan.tensions[0], [wrench], motors=[taken_in], accuracy=0.1)
+    history = cdsm.load_cycle(
+        pose, plan.tensions[0], [wrench], motors=[taken_in], substeps=plant.substeps
+    )
     np.testing.assert_allclose(state.pose.q, history.angles[0], atol=1e-12)
     np.testing.assert_allclose(state.true_values.paid_out, command.paid_out, rtol=1e-14)
     first = [T[0, 0] for T in history.tensions]
@@ -62,6 +64,8 @@ def test_stretched_lengths_are_refused() -> None:
 def test_plant_of_something_else_than_an_arm_is_refused() -> None:
     with pytest.raises(cdsm.InvalidInput, match="arm: None given; a Manipulator is needed"):
         cdsm.QuasiStaticPlant(None)  # type: ignore[arg-type]
+    with pytest.raises(cdsm.InvalidInput, match="substeps: 0 given"):
+        cdsm.QuasiStaticPlant(small_path().arm, substeps=0)
 
 
 def test_plant_with_other_cables_is_refused() -> None:

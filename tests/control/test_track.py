@@ -177,7 +177,7 @@ def tabulated_path(friction: float) -> cdsm.PathPlan:
     angles = small_path().angles
     K = cdsm.stiffness(arm.at(angles[0]), cdsm.distribute_tension(arm.at(angles[0]), 10.0))
     target = 1.05 * K.along("z")
-    return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles, progress=False)
+    return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles)
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
@@ -239,9 +239,7 @@ def test_wrong_arguments_are_refused(wrong: dict[str, object], said: str) -> Non
 
 def test_plan_with_gaps_is_refused() -> None:
     plan = small_path()
-    broken = cdsm.plan_path(
-        plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2], progress=False
-    )
+    broken = cdsm.plan_path(plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2])
     with pytest.raises(cdsm.InvalidInput, match=r"1 of 2 samples are not planned.*sample 1"):
         cdsm.track(broken)
 

@@ -313,10 +313,8 @@ def test_all_faults_are_listed_at_once() -> None:
 
 
 def test_values_without_keywords_are_told_to_have_them() -> None:
-    raises(
-        "write joints=8, cables_per_joint=3, link_length=0.06", cdsm.Geometry.universal, 8, 3, 0.06
-    )
-    raises("write joint=8, angle=3, lead=0.06", cdsm.CableRoute, 8, 3, 0.06)
+    raises("8 is given without its name; give it as a keyword", cdsm.Geometry.universal, 8, 3, 0.06)
+    raises("0.06 is given without its name", cdsm.CableRoute, 8, 3, 0.06)
 
 
 # what is replaced in a TOML text, and what the message must say

@@ -122,10 +122,7 @@ def test_replace_checks_what_it_changes() -> None:
         geometry.replace(hole_radus=0.025)
     with pytest.raises(cdsm.GeometryError, match="hole_radius: -1 m given"):
         geometry.replace(hole_radius=-1.0)
-    with pytest.raises(
-        cdsm.GeometryError,
-        match=r"lead: is not a key that is known here; it belongs in each of \[\[cables",
-    ):
+    with pytest.raises(cdsm.GeometryError, match="lead: is not a key that is known here"):
         geometry.replace(lead=0.1)
 
 

@@ -156,7 +156,7 @@ def test_an_arm_of_two_coordinates_prints_and_has_a_cartesian_stiffness_where_it
 
 U = (0.0, 0.3, 1.0)
 PLAN = cdsm.plan_path(
-    POSE.arm, U, [K.along(U), 1e9], 10.0, 200.0, angles=[POSE.q, POSE.q], rate=50.0
+    POSE.arm, U, [K.along(U), 1e9], 10.0, 200.0, angles=[POSE.q, POSE.q], max_change_per_sample=50.0
 )
 RESULTS: dict[str, Any] = {
     "Posture": POSE,
@@ -199,7 +199,7 @@ def test_results_become_strict_json_with_units_in_the_keys(name: str) -> None:
         ("MomentArms", 9),
         ("WeightTest", 2),
         ("PathPlan", 2),
-        ("Saturation", len(RESULTS["Saturation"].curve)),
+        ("Saturation", len(RESULTS["Saturation"].along)),
     ],
 )
 def test_tables_have_a_row_for_each_and_units_in_the_columns(name: str, rows: int) -> None:
@@ -212,10 +212,10 @@ def test_tables_hold_the_numbers_of_their_results() -> None:
     assert PULL.to_pandas()["tension [N]"].to_dict() == dict(PULL)
     table = PLAN.to_pandas()
     assert table["status"].to_list() == ["planned", "stiffness"]
-    assert table["stiffness [N/m]"].iloc[0] == PLAN.achieved[0]
-    assert np.isnan(table["stiffness [N/m]"].iloc[1])
+    assert table["achieved [N/m]"].iloc[0] == PLAN.achieved[0]
+    assert np.isnan(table["achieved [N/m]"].iloc[1])
     assert table["target [N/m]"].to_list() == PLAN.target.tolist()
-    tip = table[["tip x [m]", "tip y [m]", "tip z [m]"]].iloc[0].to_numpy(dtype=float)
+    tip = table[["tips x [m]", "tips y [m]", "tips z [m]"]].iloc[0].to_numpy(dtype=float)
     np.testing.assert_array_equal(tip, POSE.tip[:3, 3])
 
 
@@ -266,7 +266,5 @@ def test_elasticities_are_read_and_written_by_methods(tmp_path: Path) -> None:
     law = cdsm.presets.STRAND_1X19
     assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
     header = PLAN.write(tmp_path / "new.csv").read_text().splitlines()[0].split(",")
-    assert header[-6:] == [
-        *("tip x [m]", "tip y [m]", "tip z [m]"),
-        *("stiffness [N/m]", "target [N/m]", "reason"),
-    ]
+    assert header[:2] == ["sample", "status"]
+    assert header[-5:] == ["tips x [m]", "tips y [m]", "tips z [m]", "target [N/m]", "reason"]

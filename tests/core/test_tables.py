@@ -6,7 +6,6 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-import cdsm
 from cdsm.support.tables import name_and_unit, read_table
 
 
@@ -43,13 +42,6 @@ def test_a_cell_that_is_no_number_is_refused_with_its_line(
     path.write_text(f"a\n\n{cell}\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"line 3: '.*' is not a finite number"):
         read_table(path).column(at, refuse)
-
-
-def test_a_long_cell_is_refused_with_its_line(tmp_path: Path) -> None:
-    path = tmp_path / "table.csv"
-    path.write_text("a\n" + "1" * 2000, encoding="utf-8")
-    with pytest.raises(cdsm.FileError, match="line 2 has a cell of 2000 characters"):
-        read_table(path)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import pytest
 from lxml import etree
 
 import cdsm
-from cdsm.support.xml import DEEPEST
 from cdsm.urdf_reader import read_urdf
 
 DATA = Path(__file__).parents[1] / "data"
@@ -226,8 +225,7 @@ def test_generated_arms_pass() -> None:
         ("<mujoco></mujoco>", "It is a MuJoCo model (MJCF)"),
         ('<!DOCTYPE robot [<!ENTITY x "y">]>' + robot(*chain()), "DOCTYPE"),
         ('<!DOCTYPE robot SYSTEM "file:///etc/passwd">' + robot(*chain()), "DOCTYPE"),
-        (robot(*chain(), "<x>" * DEEPEST + "</x>" * DEEPEST), "deeper than"),
-        (robot(*chain(), f'<link name="{"n" * 20_000}"/>'), "20000 characters"),
+        (robot(*chain(), "<x>" * 300 + "</x>" * 300), "Excessive depth in document"),
     ],
 )
 def test_faults_are_named(text: str, said: str) -> None:

@@ -53,8 +53,8 @@ def test_a_step_that_does_not_hold_the_arm_is_shortened() -> None:
         loads=(0.0, 0.0, -0.5, 0.0, 0.0, 0.0),
     )
     refined = cdsm.refine_design(task, [0.02, 0.2, 120.0])
-    # the first steps lead to tensions outside the law of the strand
-    assert (refined.evaluated["held"][:5] < 1.0).any()
+    # some steps lead to tensions outside the law of the strand
+    assert (refined.evaluated["held"] < 1.0).any()
     assert refined.values(0)["stiffness (0, 0, 1)"] == pytest.approx(500.0, rel=1e-5)
     assert refined.values(0)["motor_force"] < 10.0
     bare = cdsm.refine_design(replace(task, constraints=()), [0.02, 0.2, 120.0])

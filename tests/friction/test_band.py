@@ -131,12 +131,13 @@ def test_print_names_first_order_and_the_breakaway_load() -> None:
     pose, F = prototype(0.1)
     band = cdsm.rest_band(pose, F, "-z")
     assert band.breakaway == cdsm.breakaway(pose, F, "-z").load
-    assert str(band) == (
-        f"first-order band: the tip rests within ±{1e3 * band.high:.4g} mm along (0, 0, -1), "
-        f"whatever loads came before; breakaway load {band.breakaway:.4g} N"
-    )
+    told = str(band)
+    assert told.startswith(f"first-order band: the tip rests within ±{1e3 * band.high:.4g} mm")
+    assert f"breakaway load {band.breakaway:.4g} N" in told
+    assert "few loads pass it, by less than 2 %" in told
+    assert "near buckling it is far too wide" in told
     assert repr(band) == f"<RestBand half_width {band.high:.4g} m>"
-    assert str(cdsm.rest_band(*prototype(0.2), "z")).endswith("pass the band by about 10 %)")
+    assert "by about 10 %" in str(cdsm.rest_band(*prototype(0.2), "z"))
     numbers = band.to_dict()
     assert numbers["high_m"] == numbers["half_width_m"] == -numbers["low_m"] == band.high  # type: ignore[operator]
 

@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_matrix
 
 import cdsm
-from cdsm._former.chain_problem import Wire, solve_chains
-from cdsm.friction.chain_problem import ChainProblem
+from cdsm.friction.capstan import ChainProblem
+from cdsm.friction.capstan_kernels import Wire, solve_chains
 from cdsm.support.values import Array
 
 ROUNDING = 8.0 * np.finfo(float).eps
@@ -29,14 +29,14 @@ class Chains(NamedTuple):
     near: Array
 
     def solve(self) -> tuple[Array, Array, NDArray[np.bool_]]:
-        return solve_chains(self.start, self.forced, *self.wire, self.near)
+        return solve_chains(self.start, self.forced, self.wire, self.near)
 
     def lengths_left(self, T: Array) -> tuple[Array, Array]:
         """D' = a − A(T) [m] and its derivative by T [m/N]."""
         w = self.wire
         stretch = w.base + w.softness * T
-        natural = (w.length - w.spring * (T - w.rest)) / stretch
-        return w.natural - natural, (w.spring + natural * w.softness) / stretch
+        natural = (w.length - w.spring * (T - w.unloaded)) / stretch
+        return w.rest_length - natural, (w.spring + natural * w.softness) / stretch
 
 
 def random_chains(seed: int, count: int, most: int = 16) -> Chains:
@@ -82,7 +82,7 @@ def check_optimality(chains: Chains) -> tuple[int, int]:
             assert not slip[a:b].any()
             if np.isnan(forced):
                 slack += 1
-                assert left[a:b].sum() >= -ROUNDING * abs(chains.wire.natural[a:b]).sum()
+                assert left[a:b].sum() >= -ROUNDING * abs(chains.wire.rest_length[a:b]).sum()
             continue
         assert (T[a:b] > 0.0).all()
         step, grip = np.diff(np.log(T[a:b])), np.log(chains.wire.ratio[a : b - 1])
@@ -100,7 +100,7 @@ def check_optimality(chains: Chains) -> tuple[int, int]:
                 lacking[0] = 0.0  # the motor supplies the wire of its segment
             share = T[a + i : a + k] / T[a + i : a + k].max()
             compliance = (share * rise[a + i : a + k]).sum()
-            noise = abs(chains.wire.natural[a + i : a + k]).sum() * ROUNDING
+            noise = abs(chains.wire.rest_length[a + i : a + k]).sum() * ROUNDING
             error = abs(lacking[i:k].sum()) - noise
             assert error <= 1e-9 * compliance * T[a + i : a + k].max()
     return slack, int(slides.sum())
@@ -221,7 +221,7 @@ def test_laws_keep_their_tension_where_nothing_moves(
 ) -> None:
     problem, lengths, F = one_cable(law, unstrained)
     T = np.full(6, F)
-    natural, ratio = problem.natural(lengths, T), np.full(6, 1.05)
+    natural, ratio = problem.rest_lengths(lengths, T), np.full(6, 1.05)
     chain = problem.settle(lengths, natural, ratio, np.array([np.nan]), np.full(6, 3.0))
     np.testing.assert_allclose(chain.tension, F, rtol=1e-9)
     if not unstrained:
@@ -238,7 +238,7 @@ def test_steep_table_leads_newtons_method_out_of_its_cycle(shorter: float) -> No
     cable = cdsm.Cable("cable", (site, replace(site, position=(0.03, 0.0, 0.0))), law)
     F, length, one = np.array([277.0]), np.array([0.0307]), np.ones(1)
     problem = ChainProblem((cable,), np.array([0, 1]), F, True)
-    natural = problem.natural(length, F)
+    natural = problem.rest_lengths(length, F)
     found = problem.settle(shorter * length, natural, one, np.array([np.nan]), F).tension
     stretch = 0.0307 * shorter / natural[0] - 1.0
     expected = brentq(lambda T: float(law.strain(T)) - stretch, 0.0, 345.0, xtol=1e-12)
@@ -247,12 +247,12 @@ def test_steep_table_leads_newtons_method_out_of_its_cycle(shorter: float) -> No
 
 def test_slack_cable_forgets_and_is_tightened_again() -> None:
     problem, lengths, F = one_cable(LAWS[0], True, math.inf)
-    natural, held = problem.natural(lengths, np.full(6, F)), np.array([np.nan])
+    natural, held = problem.rest_lengths(lengths, np.full(6, F)), np.array([np.nan])
     ratio = np.full(6, 1.05)
     slack = problem.settle(lengths * 0.99, natural, ratio, held, np.full(6, F))
     assert not slack.tension.any()
-    assert slack.natural.sum() == pytest.approx(natural.sum(), rel=1e-15)
-    back = problem.settle(lengths, slack.natural, ratio, held, slack.tension)
+    assert slack.rest_length.sum() == pytest.approx(natural.sum(), rel=1e-15)
+    back = problem.settle(lengths, slack.rest_length, ratio, held, slack.tension)
     np.testing.assert_allclose(back.tension, F, rtol=1e-9)
 
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 import cdsm
 from cdsm import presets
-from cdsm.friction.stuck import assemble_segments
+from cdsm.friction.stick import assemble_segments
 from cdsm.support.values import Array
 from tests.campaigns import order
 from tests.support import arms

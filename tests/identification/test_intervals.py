@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binom, norm, t
+from scipy.stats import binom, norm
 
 import cdsm
-from cdsm.identification import Measurement, Profile, identify
+from cdsm.identification import Measurement, identify
 from cdsm.support.values import Array
 from tests.support.arms import readme_geometry
 
@@ -68,21 +68,16 @@ BOUNDS = {"softness": (1e-4, 1e-1), "gravity": (-500.0, 500.0)}
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.3])
-@pytest.mark.parametrize("scaled", [False, True])
 @pytest.mark.parametrize("level", [0.95, 0.68, 0.99])
 def test_interval_of_a_reciprocal_is_the_reciprocal_of_the_interval(
-    noise: float, scaled: bool, level: float
+    noise: float, level: float
 ) -> None:
     measured = readings(noise)
     (rigidity, gravity), covariance, chi_square = line(measured)
     found = identify(hinge, measured, BOUNDS)
     assert found.chi_square == pytest.approx(chi_square, rel=1e-8)
-    half = (1.0 + level) / 2.0
-    z = t.ppf(half, 6) * math.sqrt(chi_square / 6) if scaled else norm.ppf(half)
-    width = z * np.sqrt(np.diag(covariance))
-    intervals = found.confidence(level, scaled=scaled)
-    # a cubic between the places looked at, which at 95 % are near
-    near = 2e-3 if level == 0.95 else 2e-2
+    width = norm.ppf((1.0 + level) / 2.0) * np.sqrt(np.diag(covariance))
+    intervals, near = found.confidence(level), 1e-5
     assert intervals["gravity"] == pytest.approx(
         (gravity - width[1], gravity + width[1]), abs=near * width[1]
     )
@@ -93,23 +88,7 @@ def test_interval_of_a_reciprocal_is_the_reciprocal_of_the_interval(
     assert found.std[0] == pytest.approx(math.sqrt(covariance[0, 0]) / rigidity**2, rel=1e-4)
 
 
-def test_profile_is_the_least_of_chi_square_with_the_parameter_held() -> None:
-    measured = readings(0.3)
-    (rigidity, _), covariance, _ = line(measured)
-    found = identify(hinge, measured, BOUNDS)
-    profile = found.profiles[0]
-    assert isinstance(profile, Profile)
-    assert profile.values[profile.best] == found.values[0]
-    assert (np.diff(profile.values) > 0.0).all()
-    away = 1.0 / profile.values - rigidity
-    np.testing.assert_allclose(profile.rise, away**2 / covariance[0, 0], rtol=1e-4, atol=1e-6)
-    slope = -2.0 * away / covariance[0, 0] / profile.values**2
-    np.testing.assert_allclose(profile.slope, slope, rtol=1e-3, atol=1e-5 * abs(slope).max())
-    for array in (profile.values, profile.rise, profile.slope):
-        assert not array.flags.writeable
-
-
-def test_interval_that_the_measurements_do_not_end_is_open_and_said() -> None:
+def test_interval_that_the_measurements_do_not_end_is_open() -> None:
     measured = readings(0.3)
     (rigidity, _), covariance, _ = line(measured)
     least = rigidity - norm.ppf(0.975) * math.sqrt(covariance[0, 0])
@@ -117,19 +96,14 @@ def test_interval_that_the_measurements_do_not_end_is_open_and_said() -> None:
     low, high = found.confidence()["softness"]
     assert high == math.inf
     assert 0.0 < low < found.values[0]
-    (said,) = (each for each in found.warnings if each.startswith("softness"))
-    assert "softness has no upper limit at 95 %" in said
-    assert f"its bound, {0.9 / least:g}" in said
-    assert "inf" in str(found)
     # with less asked the end is within the bounds
     assert math.isfinite(found.confidence(0.6)["softness"][1])
     # and both ends can be missing
     narrow = identify(hinge, measured, {"softness": (1.0 / rigidity, 1.01 / rigidity)})
     assert narrow.confidence()["softness"] == (-math.inf, math.inf)
-    assert any("softness may be anything within its bounds" in each for each in narrow.warnings)
 
 
-def test_interval_that_the_model_ends_is_open_and_says_why() -> None:
+def test_interval_that_the_model_ends_is_open() -> None:
     def model_of(softness: float) -> cdsm.Manipulator:
         if softness > 2.05e-3:
             raise cdsm.InvalidInput("softness", "no such wire is sold.")
@@ -139,20 +113,6 @@ def test_interval_that_the_model_ends_is_open_and_says_why() -> None:
         model_of, readings(0.3), {"softness": (1e-4, 1e-1)}, start={"softness": 1.9e-3}
     )
     assert found.confidence()["softness"][1] == math.inf
-    (said,) = (each for each in found.warnings if "no upper limit" in each)
-    assert "where the model ends" in said
-    assert "no such wire is sold" in said
-
-
-def test_interval_that_is_not_that_of_the_std_is_said_once() -> None:
-    # the interval of the reciprocal is asymmetric: 1/(ρ − 1.96σ) − 1/(ρ + 1.96σ) is 3 times wider
-    measured = readings(0.3)
-    (rigidity, _), covariance, _ = line(measured)
-    spread = 0.8 * rigidity / norm.ppf(0.975) / math.sqrt(covariance[0, 0])
-    noisy = [replace(each, std=spread * each.std) for each in measured]
-    said = "(not linear: trust the interval, not the std, of softness)"
-    assert str(identify(hinge, noisy, BOUNDS)).count(said) == 1
-    assert "not linear" not in str(identify(hinge, readings(0.05), BOUNDS))
 
 
 def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
@@ -166,8 +126,6 @@ def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
     low, high = found.confidence()["softness"]
     assert found.values[0] == beyond
     assert low == -math.inf
-    profile = found.profiles[0]
-    assert profile is not None
     # Δχ² from the bound on, where it already rises
     passive, sigma = stiffnesses(hinge(2e-3, 0.0)) / 500.0, [each.std for each in measured]
     weight = stiffnesses(hinge()) - 500.0 * passive
@@ -178,38 +136,9 @@ def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
 
     assert chi_square(high) - chi_square(beyond) == pytest.approx(norm.ppf(0.975) ** 2, rel=5e-3)
     assert any(each.startswith("softness is at its lower bound") for each in found.warnings)
-    assert not any("no lower limit" in each for each in found.warnings)
 
 
-def test_a_start_in_the_higher_valley_is_said() -> None:
-    measured = readings(0.1)
-    best, covariance, chi_square = line(measured)
-    root = np.linalg.cholesky(covariance)
-
-    def valleys(x: float) -> cdsm.Manipulator:
-        """Δχ²: valleys of 0 at −1.6 and of 0.9 near 4.5, a ridge of 2.8 between."""
-        away = 0.8 + 0.8 * np.sin(x), 0.15 * (x + np.pi / 2.0)
-        rigidity, gravity = best + root @ away
-        return hinge(1.0 / rigidity, gravity)
-
-    found = identify(valleys, measured, {"x": (-6.0, 8.0)}, start={"x": 4.6})
-    assert found.confidence()["x"] == (-math.inf, math.inf)
-    (said,) = (each for each in found.warnings if "not the best fit" in each)
-    lower = float(said.split("x = ")[1].split(". Give")[0])
-    again = identify(valleys, measured, {"x": (-6.0, 8.0)}, start={"x": lower})
-    assert again.parameters["x"] == pytest.approx(-np.pi / 2.0, abs=1e-3)
-    assert again.chi_square == pytest.approx(chi_square, rel=1e-6)
-
-
-def test_level_beyond_the_profiles_is_refused() -> None:
-    found = identify(hinge, readings(0.05), BOUNDS)
-    with pytest.raises(
-        cdsm.InvalidInput, match=r"level: 0\.9999999 given; the profile of softness"
-    ):
-        found.confidence(0.9999999)
-
-
-def test_profiles_cost_about_as_many_predictions_as_stated() -> None:
+def test_fit_and_profiles_cost_about_as_many_predictions_as_stated() -> None:
     calls = 0
 
     def counted(softness: float, gravity: float) -> cdsm.Manipulator:
@@ -217,9 +146,11 @@ def test_profiles_cost_about_as_many_predictions_as_stated() -> None:
         calls += 1
         return hinge(softness, gravity)
 
-    start = {"softness": 2e-3, "gravity": 9.81}
-    identify(counted, readings(0.1), BOUNDS, start=start)
-    assert calls < 50 + 20 * 2**2
+    found = identify(counted, readings(0.1), BOUNDS, start={"softness": 3e-3, "gravity": 5.0})
+    assert calls < 10 * 2 + 10
+    calls = 0
+    found.confidence()
+    assert calls < 30 * 2**2
 
 
 # --- how often they hold --------------------------------------------------------------------
@@ -233,9 +164,9 @@ def strand_arm(hole_radius: float, drive: float, lead: float) -> cdsm.Manipulato
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("noise", "stated"), [(0.02, 1.0), (0.1, 1.0), (0.02, 1.0 / 3.3)])
+@pytest.mark.parametrize("noise", [0.02, 0.1])
 def test_intervals_of_correlated_parameters_hold_as_often_as_they_say(
-    noise: float, stated: float
+    noise: float,
 ) -> None:
     true = {"hole_radius": 0.025, "drive": 4e4, "lead": 0.3}
     free = {"hole_radius": (0.01, 0.06), "drive": (1e3, 1e6), "lead": (0.0, 3.0)}
@@ -248,12 +179,9 @@ def test_intervals_of_correlated_parameters_hold_as_often_as_they_say(
     seeds, counts = 120, np.zeros(3, dtype=int)
     for seed in range(seeds):
         z = np.random.default_rng([seed, 7]).normal(size=14)
-        noisy = [
-            replace(m, value=m.value + m.std * e, std=stated * m.std)
-            for m, e in zip(exact, z, strict=True)
-        ]
+        noisy = [replace(m, value=m.value + m.std * e) for m, e in zip(exact, z, strict=True)]
         found = identify(strand_arm, noisy, free, start=true)
-        intervals = found.confidence(scaled=stated != 1.0)
+        intervals = found.confidence()
         counts += [low <= true[name] <= high for name, (low, high) in intervals.items()]
     # of the intervals value ± q·std some 80 to 90 % hold
     fewest, most = binom.interval(0.998, seeds, 0.95)

@@ -2,7 +2,6 @@
 
 import math
 import pickle
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +11,7 @@ from scipy.stats import binom
 
 import cdsm
 from cdsm.identification import Measurement, WeightLoop, identify
-from cdsm.identification.problem import Model, problem_of
+from cdsm.identification.problem import Problem
 from tests.support.coverage import Experiment
 
 TRUE = {"friction": 0.1, "rigidity": 48e3}
@@ -81,9 +80,8 @@ def test_loops_of_a_load_cycle_give_the_arm_that_made_them() -> None:
     for loop in PLANNED:
         pose = hinge().at(loop.angles)
         wrenches = np.c_[loop.applied, np.zeros((len(FORCES), 3))]
-        tip = cdsm.load_cycle(
-            pose, cdsm.distribute_tension(pose, 200.0), wrenches, accuracy=1e-5
-        ).tip
+        pull = cdsm.distribute_tension(pose, 200.0)
+        tip = cdsm.load_cycle(pose, pull, wrenches, substeps=64).tip
         read = tuple(map(tuple, (tip + np.array([0.3, -2.0, 5.0])).tolist()))
         loops.append(replace(loop, displacements=read))
     found = identify(hinge, loops, FREE, start={"friction": 0.2, "rigidity": 6e4})
@@ -115,40 +113,26 @@ def test_loops_and_stiffnesses_determine_together_what_neither_does_alone() -> N
     assert both.std[1] < alone.std[1]
 
 
-def residuals_of(values: Mapping[str, float], model: Model) -> Any:
-    return model.residuals(dict(values))
-
-
 def test_jacobian_is_the_derivative_of_the_residuals() -> None:
-    model = Model(hinge, None, tuple(measured(1)))
-    problem = problem_of(model, FREE)
-    point = problem.box.point(np.array(list(TRUE.values())))
-    jacobian = problem.jacobian(point, central=True) / problem.box.derivative(point)
-    for i, (name, value) in enumerate(TRUE.items()):
-        h = 1e-5 * value
-        up, down = (residuals_of({**TRUE, name: value + s * h}, model) for s in (1.0, -1.0))
-        expected = (up - down) / (2.0 * h)
-        np.testing.assert_allclose(jacobian[:, i], expected, atol=1e-5 * abs(expected).max())
+    problem = Problem(hinge, None, measured(1), FREE)
+    true = np.array(list(TRUE.values()))
+    jacobian = problem.jacobian(problem.point(true), central=True) / problem.slope(true)
+    for i, value in enumerate(true):
+        h = np.zeros(2)
+        h[i] = 1e-4 * value
+        up, down = (problem.residuals(problem.point(true + s * h)) for s in (1.0, -1.0))
+        expected = (up - down) / (2.0 * h[i])
+        np.testing.assert_allclose(jacobian[:, i], expected, atol=1e-4 * abs(expected).max())
 
 
 def experiment() -> Experiment:
     return Experiment(hinge, PLANNED, TRUE, FREE)
 
 
-@pytest.mark.slow
-def test_the_short_way_to_coverage_is_that_of_the_intervals() -> None:
-    for seed in (0, 11):
-        found = FOUND if seed == 0 else identify(hinge, measured(seed), FREE, start=TRUE)
-        intervals = found.confidence()
-        assert experiment().held(np.random.default_rng([seed, 20])) == {
-            name: low <= TRUE[name] <= high for name, (low, high) in intervals.items()
-        }
-
-
-@pytest.mark.slow
-def test_most_intervals_hold_the_truth() -> None:
-    # tests/campaigns/identified.py resolves 2 %, for dimensions and springs too
-    seeds, planned = 20, experiment()
+@pytest.mark.long
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    # tests/campaigns/identified.py does the same for dimensions and springs
+    seeds, planned = 240, experiment()
     held = [planned.held(np.random.default_rng([seed, 20])) for seed in range(seeds)]
     counts = np.sum([list(each.values()) for each in held], axis=0)
     fewest, most = binom.interval(0.998, seeds, 0.95)
@@ -193,16 +177,11 @@ def test_a_loop_is_a_plain_value() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"forces": ()}, ("forces", "at least two sizes")),
-        ({"forces": (5.0,)}, ("forces", "at least two sizes")),
         ({"forces": (5.0, 5.0, 5.0)}, ("forces", "at least two sizes")),
         ({"forces": (0.0, math.nan)}, ("forces", "nan")),
         ({"displacement_std": -5e-6}, ("displacement_std", "-5e-06", "positive")),
-        ({"displacement_std": 0.0}, ("displacement_std", "positive")),
         ({"displacements": (1e-3, 2e-3)}, ("displacements", "(2,)", "(7,)", "(7, 3)")),
         ({"minimum": None}, ("tension", "neither")),
-        ({"direction": "down"}, ("direction", "down")),
-        ({"angles": ()}, ("angles",)),
     ],
 )
 def test_bad_loops_name_the_offender_and_the_remedy(
@@ -234,7 +213,7 @@ def test_bad_experiments_name_the_offender_and_the_remedy() -> None:
         cdsm.InvalidInput, match="1 independent reading given for 2 parameters, friction"
     ):
         identify(hinge, [one], FREE)
-    with pytest.raises(cdsm.UnknownName, match="viscosity"):
+    with pytest.raises(cdsm.InvalidInput, match="viscosity"):
         identify(hinge, measured(0), {"viscosity": (0.0, 1.0)})
     other = replace(measured(0)[0], angles=(0.1, 0.1))
     with pytest.raises(cdsm.InvalidInput, match="2"):

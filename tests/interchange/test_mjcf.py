@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 
 import cdsm
 from cdsm.interchange.mjcf_bodies import add_bodies
-from cdsm.statics.natural_modes import mass_matrix
+from cdsm.interchange.mjcf_motion import mass_matrix
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture, random_wrench, readme_geometry
 from tests.support.foreign import POSTURE, TENSION, crab
@@ -154,7 +154,7 @@ def test_simulation_under_a_weight_settles_where_the_weight_test_says() -> None:
     data.xfrc_applied[model.body("tool0").id, :3] = force
     mujoco.mj_step(model, data, round(8.0 / model.opt.timestep))
     assert abs(data.qvel).max() < 1e-9
-    np.testing.assert_allclose(data.body("tool0").xpos, test.loaded[-1].pose.tip[:3, 3], atol=1e-8)
+    np.testing.assert_allclose(data.body("tool0").xpos, test.states[-1].pose.tip[:3, 3], atol=1e-8)
 
 
 # --- time step ------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm.paper.section_v import CHECK, MEASURED, TABLE_II, TABLE_II_SWAPPED
+from cdsm.paper.experiments import CHECK, MEASURED, TABLE_II, TABLE_II_SWAPPED
 from cdsm.paper.strand import EQ19_PRINTED, HALF_UNITS, JOIN, LEVEL, eq19_as_printed, left_open
 from cdsm.support.values import Array
 from tests.core.test_urdf import eq1, eq2, eq3, table1

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cdsm
-from cdsm._former.tension import OPTIMALITY
 from cdsm.stiffness_matrix.value import UNMOVED
 from cdsm.support.values import Array
+from cdsm.tension.solvers import OPTIMALITY
 from tests.support import arms
 
 # the same examples every time, and no files; numba compiles during the first one

@@ -5,9 +5,8 @@ import pytest
 
 import cdsm
 from cdsm import paper, presets
-from cdsm.paper import section_v
-from cdsm.paper.experiments import measured
-from cdsm.paper.section_v import HYBRID, POSTURE, TENSION_OFFSET
+from cdsm.paper import experiments
+from cdsm.paper.experiments import HYBRID, POSTURE, TENSION_OFFSET, measured
 from cdsm.support.values import Array
 from tests.conftest import Results
 
@@ -19,9 +18,9 @@ def experiment(results: Results, name: str) -> paper.ExperimentFigure:
 
 
 def test_table_2_is_the_papers() -> None:
-    increments = section_v.TABLE_II[-1] / section_v.TABLE_II[0] - 1.0
+    increments = experiments.TABLE_II[-1] / experiments.TABLE_II[0] - 1.0
     np.testing.assert_allclose(increments, (2.11, 3.6, 2.97), atol=0.015)  # as it prints them
-    assert section_v.TENSIONS[[0, -1]].tolist() == [3.0, 86.0]
+    assert experiments.TENSIONS[[0, -1]].tolist() == [3.0, 86.0]
 
 
 def test_prototype_has_what_the_paper_does_say() -> None:
@@ -81,7 +80,7 @@ def test_fig10_rises_and_passes_through_what_is_compared(results: Results) -> No
     figure = experiment(results, "fig10")
     for i, trace in enumerate(figure.traces):
         assert np.all(np.diff(trace.computed) > 0.0)
-        np.testing.assert_array_equal(trace.paper, section_v.TABLE_II_SWAPPED[:, i])
+        np.testing.assert_array_equal(trace.paper, experiments.TABLE_II_SWAPPED[:, i])
         ends = 1e3 * np.array(figure.claims[i].computed)[[0, -1]]
         np.testing.assert_allclose(trace.computed[[0, -1]], ends, rtol=1e-9)
 

@@ -1,17 +1,15 @@
 """Derivatives of stiffness by the tensions, against central differences."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 import cdsm
-from cdsm.cable_laws import CableLaws
 from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order, central_difference
-from tests.support.locked import ARMS, STRAND, TABLE, balanced, original_lengths, some_arm
+from tests.support.locked import ARMS, STRAND, TABLE, balanced, original_lengths
 
 U = np.array([0.3, -0.5, 0.8])
 
@@ -32,12 +30,6 @@ def test_slope_of_rigidity_is_its_derivative(name: str) -> None:
     slope = law.rigidity_slope(F)
     size = float(law.rigidity(F).max())
     assert_second_order(law.rigidity, np.diag(slope), F, step=2.0**-3, size=size, tolerance=1e-8)
-
-
-@pytest.mark.parametrize("law", [STRAND, TABLE])
-def test_slope_outside_the_domain_is_refused(law: cdsm.Elasticity) -> None:
-    with pytest.raises(cdsm.ElasticityRangeError, match="outside the domain"):
-        law.rigidity_slope([20.0, 950.0])
 
 
 # --- stiffness ------------------------------------------------------------------------------
@@ -139,36 +131,6 @@ def test_multiple_eigenvalue_has_bounds_for_gradients() -> None:
     assert max(fell) > 1e-3 * K.margin
 
 
-def test_second_slope_of_cable_stiffness_is_the_derivative_of_the_first() -> None:
-    arm = some_arm("universal-3-8-all")
-    cables = list(arm.cables)
-    laws, lengths = CableLaws(tuple(cables), "unstrained"), np.linspace(0.2, 0.5, len(cables))
-    assert {cable.control for cable in cables} == {"position", "force"}
-    assert {cable.series_stiffness for cable in cables} > {math.inf}
-
-    def slopes(F: Array) -> tuple[Array, Array]:
-        return laws.slopes(F, laws.stiffness(lengths, F))
-
-    # away from 31 and 250 N, where Eq. 19 and the table bend
-    F = np.random.default_rng(3).uniform(60.0, 200.0, len(cables))
-    first, second = slopes(F)
-    # Eq. 19 is curved above 31 N, and a spring bends the stiffness of any law
-    assert np.count_nonzero(second) > len(cables) / 2
-    step = 2.0**-2
-    np.testing.assert_allclose(
-        central_difference(lambda x: slopes(x)[0], F, step),
-        np.diag(second),
-        rtol=1e-4,
-        atol=1e-4 * abs(second).max(),
-    )
-    np.testing.assert_allclose(
-        central_difference(lambda x: laws.stiffness(lengths, x), F, step),
-        np.diag(first),
-        rtol=1e-5,
-        atol=1e-5 * abs(first).max(),
-    )
-
-
 def test_where_the_tip_cannot_move_there_is_no_gradient() -> None:
     geometry = cdsm.presets.experimental_prototype_geometry()
     pose = cdsm.Manipulator(geometry, arms.STEEL).at(np.zeros(3))
@@ -181,19 +143,3 @@ def test_where_the_tip_cannot_move_there_is_no_gradient() -> None:
         gradient.along([0.0, 0.0, 0.0])
     with pytest.raises(cdsm.InvalidInput, match="Stiffness"):
         cdsm.stiffness_gradient("K")  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("place", [31.0, 810.0], ids=["join", "end"])
-def test_second_slope_is_taken_on_the_side_that_belongs_to_the_place(
-    place: float,
-) -> None:
-    """Below a kink and the end of the domain, where there is no tension beyond."""
-    arm = cdsm.Manipulator(arms.random_arm(1, 2).geometry, STRAND)
-    lengths = arm.at(np.zeros(arm.nv)).cable_lengths
-
-    def slopes(F: float) -> tuple[Array, Array]:
-        tension = np.full(lengths.size, F)
-        return arm._laws.slopes(tension, arm._laws.stiffness(lengths, tension))
-
-    for there, below in zip(slopes(place), slopes(place * (1.0 - 1e-4)), strict=True):
-        np.testing.assert_allclose(there, below, rtol=1e-2)

@@ -10,17 +10,13 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm import presets
-from cdsm.planning.range import MARGIN
 from cdsm.support.values import Array
-from tests.support import arms, foreign
+from tests.support import arms
 from tests.support.locked import (
     BUCKLING,
     EA,
     LENGTH,
-    RISING,
     STRAND,
-    H,
-    R,
     hinge,
     soft,
     soft_hinge,
@@ -108,42 +104,6 @@ def test_brute_force_beats_neither_end_and_comes_near_both(case: str, moment: bo
         np.testing.assert_array_equal(pull.wrench, wrench)
 
 
-def test_where_tension_buckles_the_arm_brute_force_along_rays_beats_neither_end() -> None:
-    """The softest tensions lie where λ_min is just what the margin asks for."""
-    arm = arms.random_arm(0, 3, "hinged", cdsm.LinearElasticity(5e3))
-    pose = arms.random_posture(arm, 0, reach=0.4)
-    low, high = 20.0, 300.0
-    u = np.random.default_rng(0).normal(size=3)
-    found = cdsm.stiffness_range(pose, u, low, high, margin=0.01)
-    assert cdsm.stiffness(pose, found.low_tension).margin == pytest.approx(found.floor, rel=1e-9)
-    ends = corners(pose, low, high, np.zeros(6))
-    start = cdsm.distribute_tension(pose, low).values
-    K = cdsm.stiffness(pose, start)
-    assert found.floor == pytest.approx(0.01 * np.linalg.norm(K.joint, 2), rel=1e-12)
-    # K_θ is affine in F, so a ray leaves the stable tensions once: where λ_min is the floor
-    values, softest = [K.along(u)], start
-
-    def judge(end: Array) -> None:
-        nonlocal softest
-        rate = cdsm.stiffness(pose, end).joint - K.joint
-        way = np.where(end == start, 1e-300, end - start)
-        a, b = 0.0, float(np.where(way > 0.0, (high - start) / way, (low - start) / way).min())
-        for _ in range(40):
-            middle = (a + b) / 2.0
-            stable = np.linalg.eigvalsh(K.joint + middle * rate)[0] >= found.floor
-            a, b = (middle, b) if stable else (a, middle)
-        values.append(cdsm.stiffness(pose, start + a * (end - start)).along(u))
-        softest = end if values[-1] == min(values) else softest
-
-    rng = np.random.default_rng(2)
-    for reach in (1.0, 0.3, 0.1, 0.03, 0.01, 0.003):
-        centre = softest
-        for end in rng.dirichlet(np.full(len(ends), 0.3), 100) @ ends:
-            judge(centre + reach * (end - centre))
-    assert found.low * (1.0 - 1e-9) <= min(values) <= 1.01 * found.low
-    assert found.high * 0.99 <= max(values) <= found.high * (1.0 + 1e-9)
-
-
 # --- one hinge: the null space is a line ----------------------------------------------------
 
 
@@ -162,21 +122,12 @@ def test_hinge_has_its_closed_form_at_both_ends() -> None:
     assert straight(71.0) not in found
 
 
-def test_hinge_without_a_lead_has_its_ends_the_other_way_round() -> None:
-    """K = 2 k R² − F h, with k = (EA + F)/2h: R²/h is more than h, so that tension stiffens."""
-    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, 70.0)
-    ends = [(2.0 * (EA + F) / (2.0 * H) * R**2 - F * H) / LENGTH**2 for F in (10.0, 70.0)]
-    np.testing.assert_allclose([found.low, found.high], ends, rtol=1e-12)
-    np.testing.assert_allclose(found.low_tension.values, 10.0, rtol=1e-12)
-    np.testing.assert_allclose(found.high_tension.values, 70.0, rtol=1e-12)
-
-
 def test_without_a_maximum_buckling_ends_the_range() -> None:
     """K falls with F until it is the margin's part of what it is under the least tensions."""
-    found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0, margin=0.02)
+    found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0)
     assert found.high == pytest.approx(straight(10.0), rel=1e-12)
-    assert found.low == pytest.approx(0.02 * straight(10.0), rel=1e-9)
-    expected = BUCKLING - 0.02 * (BUCKLING - 10.0)
+    assert found.low == pytest.approx(0.01 * straight(10.0), rel=1e-9)
+    expected = BUCKLING - 0.01 * (BUCKLING - 10.0)
     np.testing.assert_allclose(found.low_tension.values, expected, rtol=1e-9)
 
 
@@ -209,27 +160,6 @@ def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
         cdsm.plan_stiffness(pose, DOWN, 0.9 * found.low, 10.0)
 
 
-def test_end_of_the_elasticity_bounds_the_tensions() -> None:
-    arm = presets.virtual_prototype(RISING)
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    found = cdsm.stiffness_range(pose, DOWN, 50.0)
-    assert found.high_tension.values.max() == pytest.approx(810.0, rel=1e-12)
-
-
-def test_strand_whose_rigidity_levels_off_is_stiffest_before_its_end() -> None:
-    """EA of Eq. 19, filled in, has its largest value between 400 N and 810 N."""
-    places = np.linspace(400.0, 810.0, 500)
-    assert 401.0 < places[STRAND.rigidity(places).argmax()] < 809.0
-    arm = presets.virtual_prototype(STRAND)
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    found = cdsm.stiffness_range(pose, DOWN, 50.0)
-    assert found.high_tension.values.max() < 809.0
-    for bound in np.linspace(50.0, 700.0, 60):
-        pull = cdsm.distribute_tension(pose, bound)
-        if pull.values.max() <= 810.0:
-            assert cdsm.stiffness(pose, pull).along(DOWN) < found.high
-
-
 def test_range_of_an_arm_without_redundancy_is_a_point() -> None:
     """Bounds that pin one cable of each pair leave nothing to choose."""
     arm = arms.random_arm(2, 3, "hinged", STRAND)
@@ -259,25 +189,15 @@ def test_domain_of_a_force_controlled_cable_bounds_nothing() -> None:
 
 
 BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
-    ({"direction": (0.0, 0.0, 0.0)}, cdsm.InvalidInput, "direction: is the zero vector"),
     ({"direction": (0.0, 1.0)}, cdsm.InvalidInput, "direction"),
     ({"minimum": 80.0, "maximum": 70.0}, cdsm.InvalidInput, "maximum: 70 N"),
     ({"minimum": -1.0}, cdsm.InvalidInput, "minimum"),
-    ({"minimum": math.nan}, cdsm.InvalidInput, "minimum"),
     ({"wrench": (1.0, 2.0)}, cdsm.InvalidInput, "wrench"),
     ({"wrench": (0.0, 0.0, 1e5, 0.0, 0.0, 0.0)}, cdsm.InfeasibleTension, "balances the arm"),
     ({"minimum": 50.0, "maximum": 50.1}, cdsm.InfeasibleTension, "balances the arm"),
-    (
-        {"minimum": 1000.0, "maximum": 2e3},
-        cdsm.ElasticityRangeError,
-        "between minimum= and maximum=",
-    ),
+    ({"minimum": 1000.0, "maximum": 2e3}, cdsm.ElasticityRangeError, "lower minimum="),
     ({"maximum": 2.0}, cdsm.CdsmError, "minimum|balances"),
-    ({"margin": 0.0}, cdsm.InvalidInput, "margin"),
-    ({"margin": 1.0}, cdsm.InvalidInput, "margin"),
     ({"starts": 0}, cdsm.InvalidInput, "starts"),
-    ({"starts": 2.5}, cdsm.InvalidInput, "starts"),
-    ({"seed": -1}, cdsm.InvalidInput, "seed"),
     ({"pose": "here"}, cdsm.InvalidInput, "pose"),
 ]
 
@@ -316,18 +236,9 @@ def bump(F: Array) -> Array:
 BUMP = cdsm.Elasticity.from_rigidity(bump, 0.0, 500.0)
 
 
-def measured_bump() -> cdsm.TabulatedElasticity:
-    """The same as a table of the library."""
-    F = np.array([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0, 220.0, 300.0, 400.0, 500.0])
-    EA = bump(F)
-    strain = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(F) / (EA[1:] + EA[:-1]))])
-    return cdsm.TabulatedElasticity(tuple(F), tuple(strain))
-
-
-@pytest.mark.parametrize("law", [BUMP, measured_bump()], ids=["own", "table"])
-def test_no_sample_is_stiffer_where_the_rigidity_falls_again(law: cdsm.Elasticity) -> None:
+def test_no_sample_is_stiffer_where_the_rigidity_falls_again() -> None:
     """The stiffest tensions lie inside, and many searches stop at others."""
-    pose = arms.random_posture(arms.random_arm(19, 3, "hinged", law), 19, 0.4)
+    pose = arms.random_posture(arms.random_arm(19, 3, "hinged", BUMP), 19, 0.4)
     u = np.array([1.0, -0.5, 0.3])
     found = cdsm.stiffness_range(pose, u, 10.0, 400.0)
     values = []
@@ -348,7 +259,7 @@ def test_no_sample_is_stiffer_where_the_rigidity_falls_again(law: cdsm.Elasticit
 
 
 def test_corners_beside_the_softest_one_are_searched() -> None:
-    """Random starts alone ended at 334, 473, 310 and 334 N/m."""
+    """Tension can buckle this arm, so that it is softest at the limit of stability."""
     geometry = cdsm.Geometry.hinged(
         joints=5,
         twist=0.6,
@@ -362,64 +273,11 @@ def test_corners_beside_the_softest_one_are_searched() -> None:
     )
     arm = cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
     pose = arm.at([0.03, 0.13, 0.06, 0.0, -0.13])
-    found = [
-        cdsm.stiffness_range(pose, (-1.1, 1.5, -0.1), 10.0, 600.0, seed=seed).low
-        for seed in range(4)
-    ]
-    # next to buckling K_θ⁻¹ amplifies the last digits of the tensions
-    np.testing.assert_allclose(found, 310.19, rtol=5e-4)
-    np.testing.assert_allclose(found, found[0], rtol=1e-7)
-
-
-@pytest.mark.parametrize("seed", [12, 27])
-def test_more_starts_are_never_worse(seed: int) -> None:
-    kind = "hinged" if seed % 2 else "universal"
-    pose = arms.random_posture(arms.random_arm(seed, 2, kind, BUMP), seed, 0.4)
-    found = [
-        cdsm.stiffness_range(pose, (1.0, -0.5, 0.3), 10.0, 400.0, starts=starts)
-        for starts in (1, 2, 5, 11, 24)
-    ]
-    for fewer, more in itertools.pairwise(found):
-        # the ends of searches that meet differ by their rounding
-        assert more.high >= fewer.high * (1.0 - 1e-9)
-        assert more.low <= fewer.low * (1.0 + 1e-9)
-
-
-def test_a_prismatic_joint_counts_in_lengths_of_the_arm() -> None:
-    """The slide of a finger has 10^5 N/m, which must not count as 10^5 N m/rad beside its hinge."""
-    urdf = "\n".join(
-        [
-            '<robot name="finger">',
-            foreign.link_element("palm", 0.1),
-            foreign.link_element("bone", 0.02),
-            foreign.link_element("nail", 0.01),
-            foreign.joint_element("a", "revolute", "palm", "bone", "0 0 0", "0 0 0", "0 1 0"),
-            foreign.joint_element("b", "prismatic", "bone", "nail", "0.05 0 0", "0 0 0", "1 0 0"),
-            "</robot>",
-        ]
-    )
-    law = cdsm.LinearElasticity(4e3)
-    sides = [(0.003, 0.003), (-0.003, -0.004), (0.003, -0.004), (-0.004, 0.003)]
-    back = [(0.045, 0.004), (0.045, -0.004)]
-    cables = [
-        cdsm.Cable(
-            f"pull{i}", (cdsm.Site("palm", (-0.01, 0, z)), cdsm.Site("nail", (0, 0, w))), law
-        )
-        for i, (z, w) in enumerate(sides)
-    ] + [
-        cdsm.Cable(f"push{i}", (cdsm.Site("bone", (0.08, 0, z)), cdsm.Site("nail", (x, 0, z))), law)
-        for i, (x, z) in enumerate((-0.05 + x, z) for x, z in back)
-    ]
-    arm = cdsm.Manipulator.from_urdf(urdf, cables, tip="nail")
-    pose = arm.at([0.05, 0.002])
-    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 5.0, 60.0))
-    assert K.is_stable
-    least, most = np.linalg.eigvalsh(K.joint)
-    assert least < MARGIN * most  # N m/rad beside N/m
-    found = cdsm.stiffness_range(pose, "z", 5.0, 60.0, progress=False)
-    bare = cdsm.stiffness_range(pose, "z", 5.0, 60.0, margin=1e-9, progress=False)
-    assert found.low == pytest.approx(bare.low, rel=1e-9)
-    assert found.high == pytest.approx(bare.high, rel=1e-9)
-    target = (found.low + found.high) / 2.0
-    plan = cdsm.plan_stiffness(pose, "z", target, 5.0, 60.0, progress=False)
-    assert plan.stiffness.along("z") == pytest.approx(target, rel=1e-6)
+    found = cdsm.stiffness_range(pose, (-1.1, 1.5, -0.1), 10.0, 600.0)
+    assert found.low == pytest.approx(713.84, rel=5e-4)  # of 200 searches, one came as low
+    assert found.limited_by_stability == (True, False)
+    assert "limited by stability" in str(found)
+    K = cdsm.stiffness(pose, found.low_tension)
+    assert K.margin == pytest.approx(found.floor, rel=1e-6)
+    least = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0, 600.0))
+    assert found.floor == pytest.approx(0.01 * least.margin, rel=1e-12)

@@ -41,34 +41,16 @@ def except_at(size: int, index: int, value: object, fill: float = 0.0) -> list[A
 # what is not a vector of six finite real numbers, and what the message says of it
 NOT_SIX_NUMBERS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "too short": ([0.0] * 5, ("shape (5,) given", "(6,) needed")),
-    "too long": ([0.0] * 7, ("shape (7,) given", "(6,) needed")),
-    "empty": ([], ("shape (0,) given", "(6,) needed")),
     "scalar": (0.0, ("shape () given", "(6,) needed")),
     "row": (np.zeros((1, 6)), ("shape (1, 6) given", "(6,) needed")),
-    "column": (np.zeros((6, 1)), ("shape (6, 1) given", "(6,) needed")),
     "NaN": (except_at(6, 2, NAN), ("entry [2] is nan", "finite numbers")),
-    "infinite": (except_at(6, 4, INF), ("entry [4] is inf", "finite numbers")),
     "minus infinite": (except_at(6, 4, -INF), ("entry [4] is -inf", "finite numbers")),
-    "longdouble beyond float": (
-        np.full(6, np.finfo(np.longdouble).max),
-        ("entry [0] is inf", "finite numbers"),
-    ),
-    "masked": (np.ma.masked_array(np.zeros(6), except_at(6, 1, 1)), ("masked", "fill or drop")),
-    "masked entry in a list": (except_at(6, 1, np.ma.masked), ()),
     "strings": (["0.1"] * 6, ("<U3", "real numbers")),
-    "string": ("joint", ("<U5", "real numbers")),
-    "bytes": ([b"1"] * 6, ("S1", "real numbers")),
     "complex": (np.zeros(6, complex), ("complex128", "real numbers")),
-    "object": (np.zeros(6, object), ("object", "real numbers")),
     "None": (None, ("object", "real numbers")),
-    "None inside": (except_at(6, 0, None), ("object", "real numbers")),
     "bool": ([True] * 6, ("bool", "real numbers")),
-    "dates": (np.zeros(6, "M8[s]"), ("datetime64", "real numbers")),
-    "record": (np.zeros(6, [("a", float)]), ("'a'", "real numbers")),
     "ragged": ([[0.0], [0.0, 1.0]], ("not an array of numbers",)),
-    "huge integers": ([10**400] * 6, ("object", "real numbers")),
     "dictionary": ({"joint1_1": 0.1}, ("a dict given", "its numbers alone")),
-    "generator": ((x for x in range(6)), ("object", "real numbers")),
 }
 
 CASES: dict[str, Case] = {}
@@ -123,11 +105,6 @@ CASES |= {
         cdsm.InvalidInput,
         ("elasticity", f"1 for each of {C}"),
     ),
-    "elasticities that are none": (
-        lambda: cdsm.Manipulator(GEOMETRY, [1.0] * C),  # type: ignore[list-item]
-        cdsm.CableError,
-        ("cable1_1", "elasticity: 1.0", "Elasticity is needed"),
-    ),
     "gravity of two": (
         lambda: cdsm.Manipulator(GEOMETRY, STEEL, gravity=(0.0, -9.81)),
         cdsm.InvalidInput,
@@ -138,20 +115,10 @@ CASES |= {
         cdsm.InvalidInput,
         ("gravity: entry [2] is nan",),
     ),
-    "gravity a number": (
-        lambda: cdsm.Manipulator(GEOMETRY, STEEL, gravity=-9.81),
-        cdsm.InvalidInput,
-        ("gravity: shape ()",),
-    ),
     "no cables": (
         lambda: cdsm.Manipulator(GEOMETRY, cables=()),
         cdsm.InvalidInput,
         ("cables: none given", "at least one"),
-    ),
-    "cables that are none": (
-        lambda: cdsm.Manipulator(GEOMETRY, cables=(1,)),  # type: ignore[arg-type]
-        cdsm.InvalidInput,
-        ("cables: ", "Cable is needed"),
     ),
     "cables a number": (
         lambda: cdsm.Manipulator(GEOMETRY, cables=3),  # type: ignore[arg-type]
@@ -162,11 +129,6 @@ CASES |= {
         lambda: ARM.with_cables(""),
         cdsm.FileError,
         ("'': is an empty path", "give a file or folder"),
-    ),
-    "no text of a URDF": (
-        lambda: cdsm.Manipulator.from_urdf("", ARM.cables, tip="tool0"),
-        cdsm.InvalidInput,
-        ("urdf: '' given", "the path of a URDF or its text needed"),
     ),
     "a URDF of bytes": (
         lambda: cdsm.Manipulator.from_urdf(ARM.urdf.encode(), ARM.cables, tip="tool0"),  # type: ignore[arg-type]
@@ -185,14 +147,6 @@ CASES |= {
         ),
         cdsm.CableError,
         ("cable 'a'", "'lnk1'", "did you mean 'link1'", "Known: base_link, base_disk"),
-    ),
-    "joint instead of a link": (
-        lambda: cdsm.Manipulator(
-            GEOMETRY,
-            cables=[cdsm.Cable("a", (BASE, cdsm.Site("joint1_1", (0.0, 0.0, 0.0))), STEEL)],
-        ),
-        cdsm.CableError,
-        ("cable 'a'", "'joint1_1'", "Known: base_link"),
     ),
     "coincident sites on one link": (
         lambda: cdsm.Manipulator(GEOMETRY, cables=[cdsm.Cable("a", (BASE, BASE, END), STEEL)]),
@@ -215,14 +169,8 @@ CASES |= {
         cdsm.InvalidInput,
         ("position: entry [1] is nan",),
     ),
-    "site text": (lambda: cdsm.Site("link1", "xyz"), cdsm.InvalidInput, ("position",)),  # type: ignore[arg-type]
     "cable without a name": (
         lambda: cdsm.Cable("", (BASE, END), STEEL),
-        cdsm.CableError,
-        ("name: ", "a name is needed"),
-    ),
-    "cable name a number": (
-        lambda: cdsm.Cable(3, (BASE, END), STEEL),  # type: ignore[arg-type]
         cdsm.CableError,
         ("name: ", "a name is needed"),
     ),
@@ -230,21 +178,6 @@ CASES |= {
         lambda: cdsm.Cable("a", (BASE,), STEEL),
         cdsm.CableError,
         ("cable 'a'", "sites: 1 given", "two or more"),
-    ),
-    "cable of numbers": (
-        lambda: cdsm.Cable("a", (1, 2), STEEL),  # type: ignore[arg-type]
-        cdsm.CableError,
-        ("cable 'a'", "sites", "Site"),
-    ),
-    "cable sites a number": (
-        lambda: cdsm.Cable("a", 3, STEEL),  # type: ignore[arg-type]
-        cdsm.CableError,
-        ("cable 'a'", "sites", "Site"),
-    ),
-    "cable sites one site": (
-        lambda: cdsm.Cable("a", BASE, STEEL),  # type: ignore[arg-type]
-        cdsm.CableError,
-        ("cable 'a'", "sites", "Site"),
     ),
     "cable elasticity a number": (
         lambda: cdsm.Cable("a", (BASE, END), 2e5),  # type: ignore[arg-type]
@@ -266,49 +199,19 @@ CASES |= {
         cdsm.CableError,
         ("cable 'a'", "series_stiffness: -inf"),
     ),
-    "series stiffness NaN": (
-        lambda: cdsm.Cable("a", (BASE, END), STEEL, series_stiffness=NAN),
-        cdsm.CableError,
-        ("cable 'a'", "series_stiffness: nan"),
-    ),
-    "series stiffness of two": (
-        lambda: cdsm.Cable("a", (BASE, END), STEEL, series_stiffness=[1.0, 2.0]),  # type: ignore[arg-type]
-        cdsm.CableError,
-        ("cable 'a'", "series_stiffness", "one number"),
-    ),
     **{
         f"lead {value!r}": (
             lambda v=value: cdsm.Cable("a", (BASE, END), STEEL, lead=v),  # type: ignore[misc]
             cdsm.CableError,
             ("cable 'a'", "lead"),
         )
-        for value in (-1.0, NAN, INF, [1.0], [1.0, 2.0], "x", None, 1j, True)
+        for value in (-1.0, NAN, [1.0, 2.0], "x", None)
     },
     # --- serpentine_cables
-    "cables of a number": (
-        lambda: cdsm.serpentine_cables(3, STEEL),  # type: ignore[arg-type]
-        cdsm.InvalidInput,
-        ("geometry", "3"),
-    ),
-    "cables of no elasticity": (
-        lambda: cdsm.serpentine_cables(GEOMETRY, None),  # type: ignore[arg-type]
-        cdsm.InvalidInput,
-        ("elasticity: None", "an Elasticity is needed"),
-    ),
     "cables of too few elasticities": (
         lambda: cdsm.serpentine_cables(GEOMETRY, [STEEL] * (C - 1)),
         cdsm.InvalidInput,
         ("elasticity", f"1 for each of {C}"),
-    ),
-    "cables of unknown control": (
-        lambda: cdsm.serpentine_cables(GEOMETRY, STEEL, control="forces"),  # type: ignore[arg-type]
-        cdsm.CableError,
-        ("cable1_1", "'forces'", "did you mean 'force'?"),
-    ),
-    "cables of negative series stiffness": (
-        lambda: cdsm.serpentine_cables(GEOMETRY, STEEL, series_stiffness=-1.0),
-        cdsm.CableError,
-        ("cable1_1", "series_stiffness: -1 N/m"),
     ),
     # --- Posture
     "pose of an unknown link": (
@@ -316,20 +219,12 @@ CASES |= {
         cdsm.UnknownName,
         ("no link", "'tol0'", "did you mean 'tool0'?", "Known: base_link"),
     ),
-    "pose of a joint": (lambda: POSE.link_pose("joint1_1"), cdsm.UnknownName, ("'joint1_1'",)),
-    "pose of the universe": (lambda: POSE.link_pose("universe"), cdsm.UnknownName, ("universe",)),
     "pose of a number": (lambda: POSE.link_pose(3), cdsm.UnknownName, ("no link", "3")),  # type: ignore[arg-type]
-    "pose of None": (lambda: POSE.link_pose(ANY), cdsm.UnknownName, ("no link", "None")),
     # --- distribute_tension
     "distribute at a number": (
         lambda: cdsm.distribute_tension(3),  # type: ignore[arg-type]
         cdsm.InvalidInput,
         ("pose: 3", "Posture is needed"),
-    ),
-    "distribute at an arm": (
-        lambda: cdsm.distribute_tension(ARM),  # type: ignore[arg-type]
-        cdsm.InvalidInput,
-        ("pose", "Posture is needed"),
     ),
     "minimum negative": (
         lambda: cdsm.distribute_tension(POSE, minimum=except_at(C, 3, -1.0)),
@@ -341,11 +236,6 @@ CASES |= {
         cdsm.InvalidInput,
         ("minimum: inf N", "finite"),
     ),
-    "minimum minus infinite": (
-        lambda: cdsm.distribute_tension(POSE, minimum=-INF),
-        cdsm.InvalidInput,
-        ("minimum: -inf N", "not negative"),
-    ),
     "minimum NaN": (
         lambda: cdsm.distribute_tension(POSE, minimum=NAN),
         cdsm.InvalidInput,
@@ -355,11 +245,6 @@ CASES |= {
         lambda: cdsm.distribute_tension(POSE, maximum=except_at(C, 0, NAN, 5.0)),
         cdsm.InvalidInput,
         ("maximum", "entry [0] is nan", "or inf"),
-    ),
-    "maximum minus infinite": (
-        lambda: cdsm.distribute_tension(POSE, maximum=-INF),
-        cdsm.InvalidInput,
-        ("maximum: -inf N", "below 0 N (minimum)"),
     ),
     "maximum below minimum": (
         lambda: cdsm.distribute_tension(POSE, minimum=5.0, maximum=except_at(C, 2, 3.0, 9.0)),
@@ -386,9 +271,6 @@ CASES |= {
         for value, part in (
             ("5", "real numbers"),
             (None, "real numbers"),
-            (1j, "real numbers"),
-            (True, "real numbers"),
-            (np.ma.zeros(C), "masked"),
         )
     },
     "unknown solver": (
@@ -396,28 +278,12 @@ CASES |= {
         cdsm.UnknownName,
         ("solver", "'dapq'", "did you mean 'daqp'?", "Known: "),
     ),
-    "solver None": (
-        lambda: cdsm.distribute_tension(POSE, solver=ANY),
-        cdsm.UnknownName,
-        ("solver", "None", "Known: "),
-    ),
-    "solver a list": (
-        lambda: cdsm.distribute_tension(POSE, solver=["daqp"]),  # type: ignore[arg-type]
-        cdsm.UnknownName,
-        ("solver", "['daqp']", "Known: "),
-    ),
     # --- stiffness
     "stiffness at None": (
         lambda: cdsm.stiffness(ANY, PULL),
         cdsm.InvalidInput,
         ("pose: None", "Posture is needed"),
     ),
-    "stiffness at an arm": (
-        lambda: cdsm.stiffness(ARM, PULL),  # type: ignore[arg-type]
-        cdsm.InvalidInput,
-        ("pose", "Posture is needed"),
-    ),
-    "tension None": (lambda: cdsm.stiffness(POSE, ANY), cdsm.InvalidInput, ("tension: ",)),
     "tension scalar": (
         lambda: cdsm.stiffness(POSE, 5.0),
         cdsm.InvalidInput,
@@ -433,20 +299,10 @@ CASES |= {
         cdsm.InvalidInput,
         ("tension: entry [3] is nan",),
     ),
-    "tension infinite": (
-        lambda: cdsm.stiffness(POSE, except_at(C, 3, INF)),
-        cdsm.InvalidInput,
-        ("tension: entry [3] is inf",),
-    ),
     "tension negative": (
         lambda: cdsm.stiffness(POSE, except_at(C, 5, -2.5, 1.0)),
         cdsm.InvalidInput,
         ("tension: -2.5 N", ARM.cables[5].name, "only pull"),
-    ),
-    "tension a little negative": (
-        lambda: cdsm.stiffness(POSE, except_at(C, 2, -1e-3, 1.0)),
-        cdsm.InvalidInput,
-        ("tension: -0.001 N", ARM.cables[2].name, "only pull"),
     ),
     "tension of another posture": (
         lambda: cdsm.stiffness(ARM.at(0.5 * POSE.q), PULL),
@@ -492,9 +348,7 @@ CASES |= {
             ((0.0, 0.0, 0.0), "zero vector"),
             ((1.0, 0.0), "shape (2,)"),
             ((NAN, 0.0, 1.0), "entry [0] is nan"),
-            ((0.0, INF, 1.0), "entry [1] is inf"),
             (None, "real numbers"),
-            (0, "shape ()"),
         )
     },
     "unknown term": (
@@ -502,8 +356,6 @@ CASES |= {
         cdsm.UnknownName,
         ("stiffness term", "'activ'", "did you mean 'active'?", "passive, gravity, load, joint"),
     ),
-    "term None": (lambda: K.pseudoinverse(ANY), cdsm.UnknownName, ("None", "Known: active")),
-    "private term": (lambda: K.pseudoinverse("_solve"), cdsm.UnknownName, ("'_solve'",)),  # type: ignore[arg-type]
 }
 
 
@@ -523,14 +375,9 @@ EIGHTHS = np.array([1.0, -2.0, 3.0, 0.0, -1.0, 2.0]) / 8.0
 DRESSES: dict[str, Callable[[Array], Any]] = {
     "big-endian": lambda q: q.astype(">f8"),
     "float32": lambda q: q.astype(np.float32),
-    "float16": lambda q: q.astype(np.float16),
-    "longdouble": lambda q: q.astype(np.longdouble),
     "strided": lambda q: np.repeat(q, 2)[::2],
-    "reversed": lambda q: q[::-1].copy()[::-1],
-    "column of a matrix": lambda q: np.stack([q, q + 1.0], axis=1)[:, 0],
     "list": lambda q: q.tolist(),
     "tuple of numpy numbers": tuple,
-    "memory": lambda q: memoryview(q),  # type: ignore[arg-type]
 }
 
 
@@ -550,7 +397,7 @@ def test_angles_in_any_dress_give_the_native_answer(dress: str) -> None:
     assert pose.q.dtype.isnative
 
 
-@pytest.mark.parametrize("kind", [np.int8, np.uint16, np.int64, ">i4", int])
+@pytest.mark.parametrize("kind", [np.int8, np.int64, int])
 def test_integer_angles_give_the_native_answer(kind: Any) -> None:
     ones = np.ones(6)
     np.testing.assert_array_equal(
@@ -598,7 +445,6 @@ OUT_OF_RANGE: dict[str, tuple[Callable[[], object], str]] = {
         lambda: cdsm.distribute_tension(POSE, minimum=1e10),
         r"minimum: .* is 1e\+10; give newtons from 1e-09 to 1e\+09, 0 or inf",
     ),
-    "tiny minimum": (lambda: cdsm.distribute_tension(POSE, minimum=5e-324), "is 4.94066e-324"),
     "fixed": (
         lambda: cdsm.distribute_tension(POSE, fixed={"cable1_1": 1e10}),
         r"fixed\['cable1_1'\]: 1e\+10 N given; 0, or 1e-09 to 1e\+09 N",

@@ -1,145 +1,52 @@
-"""Files that were cut, shuffled and poisoned: an error of ours, or numbers, and nothing else.
+"""URDFs that could crash Pinocchio or fill the memory, and files that cannot be read."""
 
-Here are a few of each kind, always the same; ``python -m tests.campaigns.mutated`` reads
-a hundred thousand and counts what became of them. All attacks by name, the largest included::
-
-    pytest -m long -s tests/robust/test_hostile_files.py
-"""
-
-import json
 import os
-import shutil
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import pytest
 
 import cdsm
-from tests.campaigns.hostile import MUTATIONS, READERS, SECONDS, TEXTS, outcome, whole_files
-from tests.campaigns.mutated import read, spoilt
+from tests.support.foreign import TREE, crab
 from tests.support.patience import HANGS
 
-SHORT = 25
-"""Files of each kind and mutation; a store takes far longer to read than a text."""
+
+@pytest.mark.parametrize(
+    "entities",
+    [
+        '<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;"><!ENTITY c "&b;&b;&b;&b;">',
+        '<!ENTITY c SYSTEM "file:///etc/passwd">',
+    ],
+)
+def test_entities_are_not_expanded(entities: str, tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    start = TREE.index("<robot")
+    text = TREE[start:].replace("</robot>", "&c;</robot>")
+    path.write_text(f"<!DOCTYPE robot [{entities}]>{text}", encoding="utf-8")
+    with pytest.raises(cdsm.UrdfError, match="DOCTYPE"):
+        cdsm.Manipulator.from_urdf(path, crab().cables, tip="tip")
 
 
-@pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return whole_files(tmp_path_factory.mktemp("whole"))
-
-
-@pytest.fixture
-def folder(files: Path, tmp_path: Path) -> Path:
-    """A folder of whole files, to be spoilt."""
-    return Path(shutil.copytree(files, tmp_path / "spoilt"))
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_mutated_files_are_refused_or_read(name: str, folder: Path) -> None:
-    assert_some_are_read(Counter(spoilt(name, folder, SHORT * len(MUTATIONS), seed=1)))
-
-
-@pytest.mark.parametrize("name", ["store", "store of an array"])
-def test_mutated_stores_are_refused_or_read(name: str, folder: Path) -> None:
-    assert_some_are_read(Counter(spoilt(name, folder, SHORT // 2, seed=1)))
-
-
-@pytest.mark.slow
-def test_mutated_netcdf_is_refused_or_read_and_crashes_nothing() -> None:
-    # a process of its own reads it: netCDF's library is C
-    assert_some_are_read(read("netcdf", 1, SHORT))
-
-
-def assert_some_are_read(counts: Counter[str]) -> None:
-    assert [what for what in counts if what.startswith("FAULT")] == []
-    # the changes do spoil something, and not everything
-    assert counts.total() > counts["read"] > 0
-
-
-# --- attacks by name ------------------------------------------------------------------------
-
-
-def attacked(folder: Path, largest: int, *names: str) -> list[dict[str, str]]:
-    """What became of each attack, read one after the other by a process with 1 GB to spare."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.campaigns.hostile", str(folder), str(largest), *names],
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        timeout=HANGS,
-        check=False,
-    )
-    lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
-    last = lines[-1] if lines else "nothing"
-    assert done.returncode == 0, f"ended with {done.returncode} after {last}: {done.stderr[-2000:]}"
-    return lines
-
-
-def assert_refused_or_read(results: list[dict[str, str]]) -> None:
-    for each in results:
-        assert not each["result"].startswith("FAULT"), each
-        assert float(each["seconds"]) < SECONDS, each
-
-
-@pytest.mark.slow
-def test_billion_laughs_entities_and_deep_nesting_are_refused(folder: Path) -> None:
-    results = attacked(folder, 1_500_000, "linear wire", "urdf")
-    assert_refused_or_read(results)
-    found = {each["attack"]: each["result"] for each in results if each["reader"] == "urdf"}
-    refused = [
-        *("billion laughs", "quadratic blow-up", "a file as entity", "a page as entity", "a DTD"),
-        *("a parameter entity", "recursive entities", "a public DTD", "nested elements", "empty"),
-        *("nested and open", "utf-32", "noise"),
-    ]
-    assert {name: found[name] for name in refused if found[name] == "read"} == {}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", READERS)
-def test_every_reader_stands_every_attack(name: str, folder: Path) -> None:
-    results = attacked(folder, 50_000_000, name)
-    assert_refused_or_read(results)
-    slowest = max(results, key=lambda each: float(each["seconds"]))
-    counts = Counter(each["result"] for each in results)
-    print(f"\n{name}: {len(results)} attacks, {dict(counts)}, slowest {slowest}")
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_what_is_no_file_is_refused_and_not_waited_for(name: str, folder: Path) -> None:
-    path = folder / READERS[name].file
-
-    def refused() -> None:
-        assert outcome(READERS[name], path) == "FileError"
-
-    path.unlink()
-    os.mkfifo(path)
-    refused()  # nobody writes to the pipe
-    path.unlink()
-    for target in (path, Path("/dev/zero"), Path("/dev/full"), folder, Path("/no/such/file")):
-        path.symlink_to(target)  # the first is a link to itself
-        refused()
-        path.unlink()
-
-
-def test_a_sweep_is_no_pipe_and_no_device(tmp_path: Path) -> None:
-    pipe = tmp_path / "sweep.nc"
-    os.mkfifo(pipe)
-    for path in (pipe, Path("/dev/zero"), Path("/dev/null")):
-        with pytest.raises(cdsm.FileError):
-            cdsm.read_sweep(path)
+def test_a_folder_a_missing_file_and_bytes_are_named(tmp_path: Path) -> None:
+    (tmp_path / "binary.toml").write_bytes(b"\x00\x01\x02")
+    for name, said in (("", "regular file"), ("no.toml", "not exist"), ("binary.toml", "binary")):
+        with pytest.raises(cdsm.FileError, match=said):
+            cdsm.Geometry.read(tmp_path / name)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is unreadable to root")
-def test_a_file_that_may_not_be_read_is_named(folder: Path) -> None:
-    for name in TEXTS:
-        path = folder / READERS[name].file
-        path.chmod(0)
-        assert outcome(READERS[name], path) == "FileError"
+def test_a_file_or_folder_without_permission_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text("", encoding="utf-8")
+    path.chmod(0)
+    with pytest.raises(cdsm.FileError, match="Permission denied"):
+        cdsm.Geometry.read(path)
+    tmp_path.chmod(0o500)
+    with pytest.raises(cdsm.FileError, match="Permission denied"):
+        cdsm.presets.virtual_prototype_geometry().write(tmp_path / "other.toml")
+    tmp_path.chmod(0o700)
 
-
-# --- what could crash Pinocchio -------------------------------------------------------------
 
 _CRASH = """
 import sys, resource, warnings

@@ -9,10 +9,8 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from cdsm.statics.slow_loading import SlowLoading
 from cdsm.support.values import Array
 from tests.support.arms import random_arm, random_posture, random_tension
-from tests.support.rough import rough
 
 WIRE = cdsm.LinearElasticity(48e3)
 
@@ -98,7 +96,7 @@ def test_without_friction_every_load_gives_the_equilibrium(
         np.testing.assert_allclose(history.tip[k], rest.pose.tip[:3, 3], atol=1e-8 * scale + 1e-13)
         for T, expected in zip(history.tensions, rest.tension, strict=True):
             np.testing.assert_allclose(T[k], expected, rtol=1e-9, atol=1e-7)
-        np.testing.assert_allclose(history.reaction[k], rest.reaction, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(history.stop_torque[k], rest.stop_torque, rtol=1e-6, atol=1e-9)
     assert not history.sliding.any()
     assert not history.dissipated.any()
 
@@ -106,25 +104,47 @@ def test_without_friction_every_load_gives_the_equilibrium(
 # --- energies -------------------------------------------------------------------------------
 
 
+def loop(history: cdsm.LoadHistory, since: int) -> tuple[float, float]:
+    """Work of the force along z, by trapezoids, and dissipated work [J] of the loads since one."""
+    z, f = history.tip[since - 1 :, 2], history.wrenches[since - 1 :, 2]
+    return float(np.diff(z) @ (f[1:] + f[:-1]) / 2.0), float(history.dissipated[since:].sum())
+
+
 def test_closed_loop_loses_its_work_in_the_holes() -> None:
     # one hinge: one hole per cable, so the second cycle ends where it began
     pose, pull = planar(0.3, joints=1)
-    history = cdsm.load_cycle(pose, pull, along_z(*[9.0, -9.0] * 3), accuracy=1e-10)
-    last = slice(-2, None)
-    lost = history.dissipated[last].sum()
-    assert lost > 1e-5
-    np.testing.assert_allclose(history.tip[-1], history.tip[-3], atol=1e-14)
-    assert history.load_work[last].sum() == pytest.approx(lost, rel=1e-8)
+    off = []
+    for n in (10, 40):
+        up = np.linspace(-9.0, 9.0, n + 1)
+        path = along_z(*np.concatenate([up, *2 * [up[-2::-1], up[1:]]]))
+        history = cdsm.load_cycle(pose, pull, path)
+        np.testing.assert_allclose(history.tip[-1], history.tip[n], atol=1e-13)
+        work, lost = loop(history, 3 * n + 1)
+        assert lost > 1e-5
+        off.append(abs(work / lost - 1.0))
+    # of first order in the steps, since holes begin and stop to slide within one
+    assert off[0] < 0.01
+    assert off[1] < 0.3 * off[0]
 
 
 @pytest.mark.slow
 def test_loops_of_several_holes_close_slowly_and_lose_their_work_too() -> None:
     pose, pull = planar(0.1)
-    history = cdsm.load_cycle(pose, pull, along_z(*[6.0, -6.0] * 3), accuracy=1e-10)
-    last = slice(-2, None)
-    lost = history.dissipated[last].sum()
-    # wire still creeps from segment to segment
-    assert history.load_work[last].sum() == pytest.approx(lost, rel=1e-5)
+    up = np.linspace(-6.0, 6.0, 41)
+    path = along_z(*np.concatenate([up, *2 * [up[-2::-1], up[1:]]]))
+    work, lost = loop(cdsm.load_cycle(pose, pull, path), 121)
+    assert work == pytest.approx(lost, rel=5e-3)  # wire still creeps from segment to segment
+
+
+def test_dissipation_converges_with_the_sub_steps() -> None:
+    pose, pull = prototype(0.1)
+    lost = [
+        cdsm.load_cycle(pose, pull, along_z(6.0, -6.0, 6.0), substeps=n).dissipated.sum()
+        for n in (2, 4, 8, 64)
+    ]
+    errors = abs(np.array(lost[:-1]) / lost[-1] - 1.0)
+    assert errors[1] < 0.02
+    assert (np.diff(errors) < 0.0).all()
 
 
 @pytest.mark.parametrize("law", [WIRE, cdsm.StrandElasticity.eq19_repaired()])
@@ -160,8 +180,7 @@ def test_tension_falls_from_a_motor_that_pulls(control: cdsm.cable.Control) -> N
     # pulls, and lets go again
     first = [2e-4, 0.0] if control == "position" else [1.3 * F[0], F[0]]
     motors = np.array([[each, 0.0, 0.0, 0.0] for each in first])
-    history = cdsm.load_cycle(pose, F, np.zeros((2, 6)), motors=motors, accuracy=1e-7)
-    assert abs(history.load_work).max() < 1e-15  # rounding of the balance at the reference
+    history = cdsm.load_cycle(pose, F, np.zeros((2, 6)), motors=motors)
     assert history.dissipated.min() > 0.0
     T = history.tensions[0]
     holes = arm.at(pose.q).segments
@@ -173,26 +192,6 @@ def test_tension_falls_from_a_motor_that_pulls(control: cdsm.cable.Control) -> N
     np.testing.assert_array_less(T[0, 1:], T[0, :-1])
     assert T[0, 0] / T[0, 1] == pytest.approx(grip, rel=0.02)
     np.testing.assert_array_less(T[1, :-1], T[1, 1:])
-
-
-@pytest.mark.parametrize(("seed", "law"), [(0, WIRE), (20, presets.STRAND_1X19.slack_below())])
-def test_rounding_of_the_energy_divides_no_steps(
-    seed: int, law: cdsm.Elasticity, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Tensions that balance the arm to 1e-7 do almost no work on the way to the same wrench."""
-    pose = rough(random_arm(seed, 2, "universal", law), 0.1).at(np.array([0.05, -0.1, 0.1, 0.02]))
-    pull = cdsm.distribute_tension(pose, 50.0).values
-    rests, rest = [], SlowLoading.rest
-
-    def counted(self: SlowLoading, *arguments: Any) -> Any:
-        rests.append(arguments)
-        return rest(self, *arguments)
-
-    monkeypatch.setattr(SlowLoading, "rest", counted)
-    for off in (0.0, 1e-9, 1e-7, 1e-5):
-        F = pull * (1.0 + off * np.random.default_rng(seed).normal(size=pull.size))
-        cdsm.load_cycle(pose, F, np.zeros((1, 6)))
-    assert len(rests) < 40
 
 
 # --- breakaway, tangents ----------------------------------------------------------------------
@@ -212,25 +211,16 @@ def test_first_hole_slips_at_the_breakaway_load(mu: float) -> None:
     assert np.flatnonzero(slip).tolist() == [expected.hole_loads.argmin()]
 
 
-@pytest.mark.parametrize("load", [0.5, 4.0, 15.0])
+@pytest.mark.parametrize("load", [0.5, 5.2, 15.0])
 def test_tangent_is_the_derivative_of_the_history(load: float) -> None:
     pose, pull = prototype(0.1)
     step = 1e-3
     path = along_z(load - step, load, load + step)
-    history = cdsm.load_cycle(pose, pull, path, accuracy=1e-6)
+    history = cdsm.load_cycle(pose, pull, path)
     if (history.sliding[0] != history.sliding[2]).any():
         pytest.fail("a hole begins to slide at this load; choose another one")
     numerical = 2.0 * step / (history.tip[2] - history.tip[0])[2]
     assert history.stiffness(1).along("z") == pytest.approx(numerical, rel=1e-5)
-
-
-def test_holes_that_hold_give_the_stuck_stiffness() -> None:
-    pose, pull = prototype(0.2)
-    history = cdsm.load_cycle(pose, pull, along_z(1e-3))
-    assert not history.sliding.any()
-    stuck = cdsm.stuck_stiffness(pose, pull).along("z")
-    assert 1e-3 / history.displacement[0, 2] == pytest.approx(stuck, rel=1e-5)
-    assert history.stiffness(0).along("z") == pytest.approx(stuck, rel=1e-5)
 
 
 # --- numbers of an independent computation ----------------------------------------------------
@@ -335,8 +325,8 @@ def test_history_is_labelled_and_drawn() -> None:
     assert dict(data.sizes)["load"] == 30
     assert data.sizes["hole"] == len(history.holes) == len(pose.segments.wrap)
     assert data["dissipated"].attrs["units"] == "J"
-    own = data["segment_tension"].where(data["segment_cable"] == "cable2_1", drop=True)
-    assert own.sizes["segment"] == history.tensions[2].shape[1]
+    own = [name for name in data["segment"].values if name.startswith("cable2_1 ")]
+    np.testing.assert_array_equal(data["segment_tensions"].sel(segment=own), history.tensions[2])
     assert history.holes[0] == "cable1_1 site 1"
     figure = history.plot()
     assert figure.axes[0].get_xlabel() == "displacement along the force [mm]"
@@ -356,8 +346,8 @@ def test_bad_arguments_are_named() -> None:
         cdsm.load_cycle(pose, pull, along_z(1.0), motors=np.zeros((2, 4)))
     with pytest.raises(cdsm.InvalidInput, match=r"motors: 0\.5 m of wire taken in for cable1_1"):
         cdsm.load_cycle(pose, pull, along_z(1.0), motors=[[0.5, 0.0, 0.0, 0.0]])
-    with pytest.raises(cdsm.InvalidInput, match="accuracy"):
-        cdsm.load_cycle(pose, pull, along_z(1.0), accuracy=0.5)
+    with pytest.raises(cdsm.InvalidInput, match="substeps"):
+        cdsm.load_cycle(pose, pull, along_z(1.0), substeps=0)
     with pytest.raises(cdsm.InvalidInput, match="wrenches"):
         cdsm.load_cycle(pose, pull, along_z(math.nan))
 

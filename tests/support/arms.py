@@ -35,18 +35,20 @@ def random_arm(
     return cdsm.Manipulator(geometry, elasticity, gravity=rng.normal(0.0, 6.0, 3))
 
 
+README_SIZES = {
+    "link_length": 0.06,
+    "base_length": 0.03,
+    "disk_offset": 0.012,
+    "hole_radius": 0.025,
+    "link_mass": 0.12,
+    "lead": 0.3,
+}
+"""Lengths [m] and mass [kg] of README's arm."""
+
+
 def readme_geometry(**changes: Any) -> cdsm.Geometry:
     """The geometry of README, with some of its sizes changed."""
-    sizes = {
-        "joints": 4,
-        "cables_per_joint": 3,
-        "link_length": 0.06,
-        "base_length": 0.03,
-        "disk_offset": 0.012,
-        "hole_radius": 0.025,
-        "link_mass": 0.12,
-        "lead": 0.3,
-    }
+    sizes: dict[str, Any] = {"joints": 4, "cables_per_joint": 3, **README_SIZES}
     return cdsm.Geometry.universal(**(sizes | changes))
 
 

@@ -30,7 +30,7 @@ def assert_holds(plan: cdsm.PathPlan, low: float, high: float) -> None:
         assert (high >= F).all()
         assert again.is_stable
     changes = abs(np.diff(plan.tensions, axis=0)) / np.diff(plan.planned)[:, None]
-    assert (changes <= plan.rate * (1.0 + 1e-12)).all()
+    assert (changes <= plan.max_change_per_sample * (1.0 + 1e-12)).all()
     np.testing.assert_array_equal(plan.steps, [0.0, *changes.max(axis=1)])
     named = [*plan.planned, *(each.index for each in plan.infeasible)]
     assert sorted(named) == list(range(len(plan.target)))

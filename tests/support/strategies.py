@@ -533,12 +533,10 @@ def broken_vectors(draw: st.DrawFn, size: int, huge: bool = True) -> Broken:
         "complex": lambda: whole.astype(complex),
         "of objects": lambda: whole.astype(object),
         "of truths": lambda: [True] * size,
-        "masked": lambda: np.ma.masked_array(whole, np.arange(size) == at),
         "ragged": lambda: [[0.0], [0.0, 1.0]],
         "nothing": lambda: None,
         "a text": lambda: draw(st.text(max_size=8)),
         "a dictionary": lambda: {"joint1_1": 0.1},
-        "of longdoubles beyond float64": lambda: spoilt(0.0) + np.finfo(np.longdouble).max,
         "of dates": lambda: np.zeros(size, "M8[s]"),
     }
     if huge:

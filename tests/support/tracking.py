@@ -35,7 +35,7 @@ def small_path(
     )
     arm = cdsm.Manipulator(geometry, presets.STRAND_1X19).with_friction(friction)
     angles = np.deg2rad([[6.0, -4.0, 5.0, 3.0], [7.0, -3.0, 6.0, 3.0], [8.0, -2.0, 7.0, 3.0]])
-    return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles, progress=False)
+    return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles)
 
 
 @cache
@@ -56,4 +56,4 @@ def circle(friction: float, samples: int = 13) -> cdsm.PathPlan:
     turn = np.linspace(0.0, 2.0 * np.pi, samples)
     way = np.array([0.0 * turn, np.cos(turn), np.sin(turn)]).T
     tips = arm.at(bent).tip[:3, 3] + [-0.006, -0.015, 0.02] + 0.015 * way
-    return cdsm.plan_path(arm, "z", WANTED, 10.0, 250.0, tips=tips, guess=bent, progress=False)
+    return cdsm.plan_path(arm, "z", WANTED, 10.0, 250.0, tips=tips, guess=bent)

@@ -113,20 +113,6 @@ def test_what_is_no_sweep_is_named(tmp_path: Path, everything: xr.Dataset) -> No
         cdsm.read_sweep(tmp_path / "other.nc")
 
 
-@pytest.mark.slow
-def test_a_status_without_a_meaning_is_named(tmp_path: Path, everything: xr.Dataset) -> None:
-    damaged = everything.copy(deep=True)
-    damaged["status"].values.flat[3] = 64
-    path = tmp_path / "s.csv"
-    with pytest.raises(cdsm.InvalidInput, match="its status holds 64, which is none of"):
-        cdsm.write_sweep(damaged, path)
-    for meanings in ("ok", 3):
-        damaged["status"].attrs["flag_meanings"] = meanings
-        with pytest.raises(cdsm.InvalidInput, match="has no word for each number"):
-            cdsm.write_sweep(damaged, path)
-    assert not path.exists()
-
-
 def test_a_failure_leaves_the_old_file(
     tmp_path: Path, everything: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -77,12 +77,12 @@ def test_a_load_test_that_ended_at_the_low_end_runs_on() -> None:
         cdsm.weight_test(pose, pull, force, steps=20)
     pose, pull = pulled(STRAND.slack_below(), 3.0)
     test = cdsm.weight_test(pose, pull, force, steps=20)
-    least = np.array([each.tension.min() for each in test.loaded])
+    least = np.array([each.tension.min() for each in test.states])
     assert least[0] > 2.2 > least[-1] > 0.0
     assert abs(np.diff(least)).max() < 0.3  # no jump where the law begins
-    assert all(each.stable for each in test.loaded)
-    assert "on the slack branch of its wire" in str(test.loaded[-1])
-    assert "on the slack branch" not in str(test.loaded[0])
+    assert all(each.stable for each in test.states)
+    assert "on the slack branch of its wire" in str(test.states[-1])
+    assert "on the slack branch" not in str(test.states[0])
 
 
 def test_slack_branch_of_a_constant_rigidity_is_the_linear_law() -> None:

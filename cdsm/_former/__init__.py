@@ -1,1 +1,0 @@
-"""Compiled kernels of forward kinematics, gravity, cable lengths, stiffness and tensions."""

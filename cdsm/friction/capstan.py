@@ -1,0 +1,181 @@
+"""Tensions, slips and tangent of cables at a posture; each cable is a chain of segments."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.cable import Cable
+from cdsm.routing import Indices
+from cdsm.support.values import Array
+from cdsm.wires.elasticity import Elasticity
+
+_STEPS = 60  # most Newton steps: linear laws need one, strands 3 to 6
+_UNDAMPED = 20  # full Newton steps; later ones are shortened, since full ones may cycle at a kink
+_SLACK = 1e-6  # tension [N] that stands for zero in a shortened step
+_CONVERGED = 1e-9  # relative change that ends the iteration; the error is about its square
+
+
+class ChainState(NamedTuple):
+    """State of all cables at a posture, after wire has slipped through holes: (S,) each."""
+
+    tension: Array  # T [N]
+    rest_length: Array  # a: length of the wire in the segment without strain [m]
+    slip: Array  # rest length [m] that moved to the next segment
+    slides: NDArray[np.bool_]  # whether the cable slides in the hole to the next segment
+    stretch: Array  # 1 + ε [-]
+    compliance: Array  # −∂a/∂T at constant length [m/N]
+
+
+class ChainProblem:
+    """Model of all cables as chains of segments: their laws, series springs and motors.
+
+    It computes the tensions of the segments from their lengths, with friction in the holes between
+    them. A force-controlled motor keeps the tension of the first segment; a position-controlled one
+    keeps the wire. The series spring belongs to the first segment. Outside the domain of its law a
+    segment has the rigidity at the nearest end. A cable without tension is slack.
+
+    Args:
+        cables: Cables of the arm.
+        start: First segment of each cable; the last entry is the number of segments (C+1,).
+        tension: F (C,) [N]; needed only if ``unstrained`` is False.
+        unstrained: Whether ε is the strain of the law. If not, ε is this strain minus the strain at
+            ``tension``. A rest length is the length at ε = 0.
+
+    Attributes:
+        laws: Each law with the indices of its cables.
+    """
+
+    def __init__(
+        self, cables: tuple[Cable, ...], start: Indices, tension: Array, unstrained: bool
+    ) -> None:
+        self._start, self._cable = start, np.repeat(np.arange(len(cables)), np.diff(start))
+        size, first = self._cable.size, start[:-1]
+        self._spring, self._unloaded = np.zeros(size), np.zeros(size)
+        self._spring[first] = [1.0 / cable.series_stiffness for cable in cables]
+        self._unloaded[first] = [cable.elasticity.rest for cable in cables]
+        self._base, self._softness = np.ones(size), np.zeros(size)
+        self._curved: list[tuple[Elasticity, Indices]] = []
+        by_law: dict[Elasticity, list[int]] = {}
+        for c, cable in enumerate(cables):
+            by_law.setdefault(cable.elasticity, []).append(c)
+        self.laws = list(by_law.items())
+        for law, of in self.laws:
+            segments = np.flatnonzero(np.isin(self._cable, of))
+            if law._constant is None:
+                self._curved.append((law, segments))
+            else:
+                self._softness[segments] = 1.0 / law._constant
+        if not unstrained:
+            F = tension[self._cable]
+            base, softness = self._strain(F)
+            self._base = self._base - (base + softness * F - 1.0)
+
+    def settle(
+        self, length: Array, rest_length: Array, ratio: Array, forced: Array, near: Array
+    ) -> ChainState:
+        """Compute the tensions and slips of all segments when their lengths become ``length``.
+
+        ``length`` (S,) [m] are the new lengths, ``rest_length`` (S,) [m] those before wire slips.
+        ``ratio`` (S,) is exp(μ φ) of the hole to the next segment. ``forced`` (C,) [N] is the
+        tension of force-controlled motors, NaN for others. The search starts at ``near`` (S,) [N].
+        """
+        from cdsm.friction.capstan_kernels import Wire, solve_chains  # imports numba
+
+        T = near
+        for step in range(_STEPS):
+            base, softness = self._strain(T)
+            parts = length, rest_length, base, softness, self._spring, self._unloaded, ratio
+            new, slip, slides = solve_chains(self._start, forced, Wire(*parts), T)
+            if not self._curved or (abs(new - T) <= _CONVERGED * np.maximum(new, 1.0)).all():
+                break
+            T = new if step < _UNDAMPED else self._shortened(T, new, length, rest_length)
+        stretch = base + softness * new
+        wire = (length - self._spring * (new - self._unloaded)) / stretch
+        after = rest_length - slip
+        after[1:] += slip[:-1]
+        first, supplied = self._start[:-1], ~np.isnan(forced)
+        after[first[supplied]] = wire[first[supplied]]
+        slack = (new == 0.0) & ~supplied[self._cable]
+        if slack.any():  # the wire of a slack cable moves freely: it spreads evenly over segments
+            surplus = np.add.reduceat(after, first) / np.add.reduceat(wire, first)
+            after = np.where(slack, wire * surplus[self._cable], after)
+        compliance = (self._spring + wire * softness) / stretch
+        return ChainState(new, after, slip, slides, stretch, compliance)
+
+    def rest_lengths(self, length: Array, tension: Array) -> Array:
+        """Compute the rest lengths (S,) [m] from lengths (S,) [m] and tensions (S,) [N]."""
+        base, softness = self._strain(tension)
+        wire = length - self._spring * (tension - self._unloaded)
+        return np.asarray(wire / (base + softness * tension))
+
+    def potential(self, tension: Array) -> Array:
+        """Compute P = T (1 + ε) − ∫ T dε (S,) [N] at ``tension`` T; P is T but for the strain.
+
+        Wire that slips to the next segment dissipates the difference of P, per rest length.
+        """
+        base, softness = self._strain(tension)
+        energy = self._softness * tension**2 / 2.0
+        for law, of in self._curved:
+            T, inside = tension[of], np.clip(tension[of], law.low, law.high)
+            energy[of] = law.energy(inside) + softness[of] * (T**2 - inside**2) / 2.0
+        return np.asarray(tension * (base + softness * tension) - energy)
+
+    def _shortened(self, T: Array, new: Array, length: Array, rest_length: Array) -> Array:
+        """Return the tensions (S,) between ``T`` and ``new``, by ln T, of the least Σ D_j."""
+        T = np.maximum(T, _SLACK)
+        step = np.log(np.maximum(new, _SLACK) / T)
+        low, high = 0.0, 1.0
+        for _ in range(5):
+            middle = (low + high) / 2.0
+            there = T * np.exp(middle * step)
+            rise = (rest_length - self.rest_lengths(length, there)) @ step
+            low, high = (middle, high) if rise < 0.0 else (low, middle)
+        return np.asarray(T * np.exp(high * step))
+
+    def _strain(self, tension: Array) -> tuple[Array, Array]:
+        """Linearise 1 + ε ≈ base + softness · T at ``tension`` (S,): base, softness [1/N]."""
+        if not self._curved:
+            return self._base, self._softness
+        base, softness = self._base.copy(), self._softness.copy()
+        for law, of in self._curved:
+            inside = np.clip(tension[of], law.low, law.high)
+            strain, rigidity = law._evaluate(inside)
+            softness[of] = 1.0 / rigidity
+            base[of] += strain - inside / rigidity
+        return base, softness
+
+
+def chain_tangent(
+    start: Indices, forced: NDArray[np.bool_], chain: ChainState, gradient: Array, turning: Array
+) -> Array:
+    """Compute ∂T/∂θ (S, nv) [N/rad] of the segments in a state.
+
+    A block is a run of segments joined by holes in which the cable slides; a is its first segment.
+    Within it, T_j = T_a exp(Σ ± μ φ) over the holes between, with + where T rises, and wire is
+    conserved. With g = ∂l/∂θ, ψ_j = Σ ± μ ∂φ/∂θ and the compliance κ = −∂a/∂T,
+
+        ∂ln T_a/∂θ = Σ_j (g_j/(1 + ε_j) − κ_j T_j ψ_j)/Σ_j κ_j T_j,
+        ∂T_j/∂θ = T_j (∂ln T_a/∂θ + ψ_j).
+
+    A ``forced`` motor (C,) keeps T_a of the first block. Slack cables stay slack. ``start`` (C+1,)
+    is as in :class:`ChainProblem`, ``gradient`` is g (S, nv), ``turning`` (S, nv) is μ ∂φ/∂θ of the
+    hole to the next segment.
+    """
+    T = chain.tension
+    begins = np.append(True, ~chain.slides[:-1])
+    begins[start[:-1]] = True
+    block, first = np.cumsum(begins) - 1, np.flatnonzero(begins)
+    up = np.where(begins[1:], 0.0, np.sign(np.diff(T)))
+    psi = np.zeros_like(gradient)
+    np.cumsum(up[:, None] * turning[:-1], axis=0, out=psi[1:])
+    psi -= psi[first][block]
+    weight = chain.compliance * T
+    pull = np.add.reduceat(gradient / chain.stretch[:, None] - weight[:, None] * psi, first)
+    total = np.add.reduceat(weight, first)
+    free = total > 0.0
+    free[block[start[:-1][forced]]] = False
+    common = np.where(free, 1.0 / np.where(free, total, 1.0), 0.0)[:, None] * pull
+    return np.asarray(T[:, None] * (common[block] + psi))

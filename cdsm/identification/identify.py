@@ -1,0 +1,183 @@
+"""Identify parameters of an arm from measured stiffnesses and load loops, by least squares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from cdsm.errors import InvalidInput
+from cdsm.identification.measurement import Measurement, WeightLoop
+from cdsm.identification.problem import Problem, TensionOf
+from cdsm.identification.result import Identification
+from cdsm.manipulator import Manipulator
+from cdsm.support.format import plural
+from cdsm.support.progress import progress_allowed, progress_bar
+from cdsm.support.validation import scalar, vector
+from cdsm.support.values import Array, frozen
+
+_NEAR = 1e-3  # an optimum this near to a bound is tried on it: the search only approaches bounds
+
+
+def identify(
+    model_of: Callable[..., Manipulator],
+    measurements: Sequence[Measurement | WeightLoop],
+    free: Mapping[str, tuple[float, float]],
+    *,
+    start: Mapping[str, float] | None = None,
+    tension_of: TensionOf | None = None,
+    progress: bool = True,
+) -> Identification:
+    """Identify P parameters p of an arm within bounds: min Σ ((K_i(p) − K_i)/σ_i)².
+
+    With ``arm = model_of(**p)``, the prediction K_i(p) is ``stiffness(arm.at(angles), tension,
+    wrench).along(direction)``. For a measurement with a ``force`` it is ``weight_test(
+    arm.at(angles), tension, force, wrench=wrench).stiffness``. The search shortens a step that
+    leads to an unstable arm, to one that buckles under the force, or to a tension outside the
+    domain of a law.
+
+    A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
+    its width determines the friction.
+
+    The search (``least_squares`` of scipy) predicts all measurements about 10 P times. A
+    measurement with a force takes ten times as long as one without; a loop with friction takes tens
+    of milliseconds.
+
+    Args:
+        model_of: Function that builds the arm from the free parameters (dimensions, masses,
+            springs, leads, …), given by keyword; or :class:`~cdsm.ArmParameters`.
+        measurements: Stiffnesses and loops. They have at least as many numbers as there are
+            parameters; a loop of n forces has n − 1 per axis, since its offset is unknown.
+        free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
+            they are positive and a factor of 100 or more apart, the search is logarithmic.
+        start: First value of each parameter; by default the middle of its bounds. The search ends
+            in the nearest minimum: give a start near the values that you expect.
+        tension_of: Function ``tension_of(posture, measurement, **p)`` that returns the tensions
+            (C,) [N] or a :class:`~cdsm.Tension`, for example with the offset of a load cell as a
+            parameter. Both ``tension_of`` and ``model_of`` get all free parameters. The default is
+            the tensions of the measurement.
+        progress: Show a bar on the standard error, if that is a terminal.
+
+    Raises:
+        InvalidInput: There are no measurements or fewer than parameters; bounds or start are
+            invalid; ``model_of`` or ``tension_of`` fails or does not take a parameter; or the start
+            does not give every measurement a stable stiffness.
+    """
+    _check_measurements(measurements)
+    bounds = _checked_bounds(free)
+    informative = sum(each._readings.size for each in measurements)
+    informative -= sum(len(each.axes) for each in measurements if isinstance(each, WeightLoop))
+    if informative < len(bounds):
+        said = f"{plural(informative, 'independent reading')} given for "
+        said += f"{plural(len(bounds), 'parameter')}, {', '.join(bounds)}; give at least as many, "
+        said += "or free fewer parameters. A stiffness counts as one, a loop as its readings minus "
+        raise InvalidInput("measurements", f"{said}one, since its offset is unknown.")
+    problem = Problem(model_of, tension_of, measurements, bounds)
+    first = _start(problem, start)
+    with progress_allowed(progress), progress_bar("identifying parameters"):
+        best = _optimum(problem, first)
+        found, jacobian = problem.predict(best), problem.jacobian(best, central=True)
+    assert not isinstance(found, str)
+    r = problem.weighed(found.numbers)
+    measured = np.concatenate([each._readings for each in measurements])
+    pairs = zip(measurements, found.numbers, strict=True)
+    errors = np.concatenate([each._errors(numbers)[0] for each, numbers in pairs])
+    return Identification(
+        names=problem.names,
+        values=frozen(problem.values(best)),
+        bounds=frozen(np.column_stack([problem.low, problem.high])),
+        measurements=problem.measurements,
+        predicted=frozen(measured + errors),
+        residuals=frozen(r),
+        jacobian=frozen(jacobian / problem.slope(best)),
+        arm=found.arm,
+        unfinished=_unfinished(problem, best, jacobian),
+        _problem=problem,
+    )
+
+
+def _check_measurements(measurements: object) -> None:
+    kinds = Measurement | WeightLoop
+    if not isinstance(measurements, list | tuple) or not all(
+        isinstance(each, kinds) for each in measurements
+    ):
+        said = "a list or tuple of Measurement and WeightLoop is needed."
+        raise InvalidInput("measurements", f"{measurements!r} given; {said}")
+    for i, each in enumerate(measurements):
+        if isinstance(each, WeightLoop) and each.displacements is None:
+            said = f"{each.label or 'the loop'} has no readings yet; give its displacements [m], "
+            said += "as with dataclasses.replace(loop, displacements=…)."
+            raise InvalidInput(f"measurements[{i}]", said)
+
+
+def _checked_bounds(free: object) -> dict[str, tuple[float, float]]:
+    if not isinstance(free, Mapping) or not free:
+        said = "give {name: (low, high)} for at least one parameter."
+        raise InvalidInput("free", f"{free!r} given; {said}")
+    bounds = {}
+    for name, limits in free.items():
+        if not isinstance(name, str):
+            raise InvalidInput("free", f"{name!r} is no name of a parameter.")
+        low, high = vector(f"free[{name!r}]", limits, 2, "the bounds (low, high)").tolist()
+        # within closer bounds, rounding would hide the finite differences
+        if not high - low > 1e-9 * max(abs(low), abs(high)):
+            said = f"low = {low:g}, high = {high:g} given; low must be below high. A parameter "
+            raise InvalidInput(f"free[{name!r}]", f"{said}whose value is known is not free.")
+        bounds[name] = (low, high)
+    return bounds
+
+
+def _start(problem: Problem, start: Mapping[str, float] | None) -> Array:
+    """Return ``start``, or the middle of the bounds, as a point (P,) that has a prediction."""
+    point, name = np.full(len(problem.names), 0.5), "the middle of the bounds"
+    if start is not None:
+        if not isinstance(start, Mapping) or set(start) != set(problem.names):
+            needed = f"one value for each of {', '.join(problem.names)} is needed."
+            raise InvalidInput("start", f"{start!r} given; {needed}")
+        values = np.array([scalar(f"start[{name!r}]", start[name]) for name in problem.names])
+        rows = zip(problem.names, values, problem.low, problem.high, strict=True)
+        for each, value, low, high in rows:
+            if not low <= value <= high:
+                said = f"{value:g} is outside the bounds {low:g} to {high:g}."
+                raise InvalidInput(f"start[{each!r}]", said)
+        point, name = np.clip(problem.point(values), 0.0, 1.0), "it"
+    reason = problem.predict(point)
+    if isinstance(reason, str):
+        said = f"{name} does not give every measurement a stable prediction. At "
+        said += f"{problem.describe(point)}, {reason} Correct that, or give another start."
+        raise InvalidInput("start", said)
+    return point
+
+
+def _optimum(problem: Problem, start: Array) -> Array:
+    """Search from ``start`` (P,) for the least χ²; the search alone only approaches bounds."""
+    best = problem.search(start)
+    free = np.ones(best.size, dtype=bool)
+    for i in np.flatnonzero(np.minimum(best, 1.0 - best) < _NEAR):
+        free[i], trial = False, best.copy()
+        trial[i] = round(best[i])
+        if free.any() and math.isfinite(problem.cost(trial)):
+            trial = problem.search(trial, np.flatnonzero(free))
+        if problem.cost(trial) <= problem.cost(best):
+            best = trial
+        else:
+            free[i] = True
+    return best
+
+
+def _unfinished(problem: Problem, best: Array, jacobian: Array) -> str:
+    """Return a warning if a search ended before a minimum of χ², else an empty text.
+
+    The search can end early because the model does not exist beyond ``best`` (P,).
+    """
+    r = problem.residuals(best)
+    gradient = r @ jacobian
+    free = ~(((best == 0.0) & (gradient >= 0.0)) | ((best == 1.0) & (gradient <= 0.0)))
+    step = np.linalg.lstsq(jacobian[:, free], -r, rcond=1e-6)[0] if free.any() else np.zeros(0)
+    fall = float(np.sum((jacobian[:, free] @ step) ** 2))
+    if fall < (1e-2 if problem.has_loops else 1e-3):  # of χ²; a standard deviation is 1
+        return ""
+    edge = f"The model ended last at {problem.edge}" if problem.edge else "Give another start."
+    said = f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
+    return f"{said}{problem.describe(best)}. {edge}"

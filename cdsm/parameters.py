@@ -1,0 +1,200 @@
+"""Named numbers of an arm: their units, their values, and the arm that has other values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, NamedTuple, final
+
+import numpy as np
+
+from cdsm.cable import Cable
+from cdsm.errors import InvalidInput
+from cdsm.geometry import Geometry
+from cdsm.geometry.cables import require_own_cables, serpentine_cables
+from cdsm.manipulator import Manipulator
+from cdsm.support.validation import instance, one_of, scalar, text
+from cdsm.wires.elasticity import Elasticity
+
+
+class Parameter(NamedTuple):
+    """A number of an arm, of each joint or of each cable."""
+
+    unit: str  # unit shown to people
+    size: float  # size of ``unit`` in SI
+    part: Literal["joints", "links", "routes", "cables"]  # of the geometry, or a Cable of the arm
+    attribute: str = ""  # its name there; empty: a change of the arm, see ``neutral``
+    neutral: float = math.nan  # value of a change that leaves the arm as it is
+
+
+PARAMETERS: Final = {
+    "hole_radius": Parameter("mm", 1e-3, "joints", "hole_radius"),
+    "disk_offset": Parameter("mm", 1e-3, "joints", "disk_offset"),
+    "link_length": Parameter("mm", 1e-3, "links", "length"),
+    "link_mass": Parameter("g", 1e-3, "links", "mass"),
+    "lead": Parameter("mm", 1e-3, "routes", "lead"),
+    "hole_angle": Parameter("deg", math.pi / 180.0, "routes", "angle"),
+    "phase": Parameter("deg", math.pi / 180.0, "routes", neutral=0.0),
+    "friction": Parameter("", 1.0, "cables", "friction"),
+    "spring": Parameter("N/mm", 1e3, "cables", "series_stiffness"),
+    "rigidity": Parameter("", 1.0, "cables", neutral=1.0),
+}
+"""All parameters by name; :class:`ArmParameters` explains them."""
+
+
+@final
+@dataclass(frozen=True)
+class ArmParameters:
+    """Arm as a function of some of its parameters; use it as ``model_of`` of :func:`identify`.
+
+    - ``hole_radius``, ``disk_offset`` [m] of a joint; ``link_length`` [m], ``link_mass`` [kg] of
+      the link after it.
+    - Of a cable: ``lead`` [m], ``hole_angle`` [rad], ``friction`` μ [-] in its holes, ``spring``
+      [N/m] in series, ``rigidity`` [-], a factor on the EA of its law, and ``phase`` [rad], which
+      is added to its hole angle.
+
+    ``"hole_radius"`` is that of all joints, ``"hole_radius@2"`` of the second one from the base.
+    ``"lead"`` is that of all cables, ``"lead@2"`` of the cables that end at joint 2,
+    ``"lead@cable2_1"`` of one cable. A call passes names with @ in a dict:
+    ``parameters(**{"hole_radius@2": 0.025})``.
+
+    Attributes:
+        arm: The arm; parameters that are not named keep their values.
+        names: Names of the parameters, in any order.
+
+    Raises:
+        UnknownName: There is no such parameter or cable.
+        InvalidInput: The arm has no such joint, no geometry, or other cables, leads or holes than
+            its geometry; or two names change the same number.
+    """
+
+    arm: Manipulator
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        instance("arm", self.arm, Manipulator)
+        object.__setattr__(self, "names", tuple(text("names", name) for name in self.names))
+        require_own_cables(self._geometry, self.arm.cables)
+        taken = set[tuple[str, int]]()
+        for name in self.names:
+            kind, where = self._place(name)
+            numbers = {(PARAMETERS[kind].attribute or kind, i) for i in where}
+            if taken & numbers:
+                raise InvalidInput(name, f"frees {kind} of a joint twice.")
+            taken |= numbers
+
+    @property
+    def _geometry(self) -> Geometry:
+        return self.arm.geometry
+
+    def unit(self, name: str) -> tuple[str, float]:
+        """Return the unit in which the parameter ``name`` is printed, and its size in SI."""
+        kind = PARAMETERS[self._place(name)[0]]
+        return kind.unit, kind.size
+
+    @property
+    def present(self) -> dict[str, float]:
+        """Value of each parameter in :attr:`arm`, in SI; the median if its joints differ.
+
+        A ``rigidity`` is 1 and a ``phase`` 0.
+        """
+        return {name: float(np.median(self._values(name))) for name in self.names}
+
+    def __call__(self, **values: float) -> Manipulator:
+        """Build the arm with these values of parameters, in SI.
+
+        Raises:
+            GeometryError: No valid arm has these values.
+            UnknownName: A parameter is not among :attr:`names`.
+            InvalidInput: A rigidity is not positive, or a value is not a number.
+            CableError: A spring is not positive.
+        """
+        geometry = self._geometry
+        parts: dict[str, list[Any]] = {
+            "joints": [*geometry.joints],
+            "links": [*geometry.links],
+            "routes": [*geometry.cables],
+        }
+        common, changes = geometry.hole_radius, [dict[str, float]() for _ in geometry.cables]
+        for name, number in values.items():
+            one_of("parameter", name, self.names)
+            value, (kind, where) = scalar(name, number), self._place(name)
+            own: float | None = value
+            if name == "hole_radius":
+                common, own = value, None  # of all joints: they have none of their own
+            _, _, part, attribute, _ = PARAMETERS[kind]
+            for i in where:
+                if part == "cables":
+                    changes[i][kind] = value
+                elif kind == "phase":
+                    parts[part][i] = replace(parts[part][i], angle=parts[part][i].angle + value)
+                else:
+                    parts[part][i] = replace(parts[part][i], **{attribute: own})
+        if any(PARAMETERS[self._place(name)[0]].part != "cables" for name in values):
+            geometry = geometry.replace(
+                joints=tuple(parts["joints"]),
+                links=tuple(parts["links"]),
+                cables=tuple(parts["routes"]),
+                hole_radius=common,
+            )
+        laws = dict[tuple[Elasticity, float], Elasticity]()
+        routed = serpentine_cables(geometry, self.arm.cables[0].elasticity)
+        rows = zip(self.arm.cables, routed, changes, strict=True)
+        return Manipulator(
+            geometry,
+            cables=[_changed(old, new, own, laws) for old, new, own in rows],
+            gravity=self.arm.gravity,
+            original_length=self.arm.original_length,
+        ).with_tolerances(self.arm.tolerances)
+
+    def _place(self, name: str) -> tuple[str, list[int]]:
+        """Split a name such as ``hole_radius@2`` into its kind, and the indices in its part."""
+        kind, at, place = name.partition("@")
+        one_of("parameter of an arm", kind, PARAMETERS)
+        geometry, count = self._geometry, len(self._geometry.joints)
+        of_cable = PARAMETERS[kind].part in ("routes", "cables")
+        joints = [c.joint for c in geometry.cables] if of_cable else [*range(1, count + 1)]
+        if of_cable and place.startswith("cable"):
+            one_of("cable", place, geometry.cable_names)
+            return kind, [geometry.cable_names.index(place)]
+        if at and not (place.isdecimal() and 1 <= int(place) <= count):
+            raise InvalidInput(name, f"the arm has the joints 1 to {count}.")
+        return kind, [i for i, k in enumerate(joints) if not at or k == int(place)]
+
+    def _values(self, name: str) -> list[float]:
+        """Return the values in SI that the parameter ``name`` has now."""
+        kind, where = self._place(name)
+        _, _, part, attribute, neutral = PARAMETERS[kind]
+        if not attribute:
+            return [neutral]
+        if kind == "hole_radius":
+            return [self._geometry.hole_radii[i] for i in where]
+        if kind == "friction":
+            return [max(site.friction for site in self.arm.cables[i].sites) for i in where]
+        owners: Any = self._geometry.cables if part == "routes" else self.arm.cables
+        owners = getattr(self._geometry, part) if part in ("joints", "links") else owners
+        return [getattr(owners[i], attribute) for i in where]
+
+
+def _changed(
+    old: Cable,
+    routed: Cable,
+    changes: dict[str, float],
+    laws: dict[tuple[Elasticity, float], Elasticity],
+) -> Cable:
+    """Return the cable ``old`` on the sites and with the lead of ``routed``, and with ``changes``.
+
+    ``laws`` has the scaled laws so far: cables that share one are computed together.
+    """
+    pairs = zip(old.sites, routed.sites, strict=True)
+    sites = tuple(replace(site, position=moved.position) for site, moved in pairs)
+    cable = replace(old, sites=sites, lead=routed.lead)
+    if "friction" in changes:
+        cable = cable.with_friction(changes["friction"])
+    if "spring" in changes:
+        cable = replace(cable, series_stiffness=changes["spring"])
+    if "rigidity" in changes:
+        law, factor = old.elasticity, changes["rigidity"]
+        shared = laws.setdefault((law, factor), law.scaled(factor))
+        cable = replace(cable, elasticity=shared)
+    return cable

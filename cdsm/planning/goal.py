@@ -1,0 +1,138 @@
+"""Search for the least tensions, or those nearest to others, that give a wanted stiffness."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cdsm.errors import UnreachableStiffness
+from cdsm.planning.range import AT_END, End, ends
+from cdsm.planning.tension_space import Bounds, TensionSpace
+from cdsm.support.values import Array
+from cdsm.tension import advice
+
+REACHED: Final = 1e-6
+"""Largest relative miss with which a target counts as hit; most searches come much nearer."""
+
+_CORNERS = 12  # number of random directions in which corners are sought
+_STARTS, _SEARCHES = 5, 3  # number of starts if the first one fails, and of searches from each
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Wanted stiffness along each direction of a space: the targets, or at least these."""
+
+    space: TensionSpace
+    targets: Array  # (n,) [N/m]
+    at_least: bool = False
+
+    def misses(self, F: Array) -> tuple[Array, Array]:
+        """Return along/target − 1 (n,) [-] under F (C,) [N], and its gradient (n, C) [1/N]."""
+        s, slopes = self.space.at(F).along
+        return s / self.targets - 1.0, slopes / self.targets[:, None]
+
+    def misfit(self, F: Array) -> float:
+        """Return the norm of the misses [-] under F (C,) [N]; with ``at_least``, of what lacks."""
+        values = self.misses(F)[0]
+        return float(np.linalg.norm(np.minimum(values, 0.0) if self.at_least else values))
+
+    def met(self, F: Array | None) -> bool:
+        """Return whether the arm is stable under F (C,) [N], and as stiff as wanted."""
+        return F is not None and self.space.reserve(F) > -REACHED and self.misfit(F) <= REACHED
+
+    def search(
+        self, start: Array, bounds: Bounds | None = None, centre: Array | float = 0.0
+    ) -> Array | None:
+        """Search from ``start`` for the tensions nearest to ``centre`` that meet the goal, locally.
+
+        All are (C,) [N]; ``centre`` 0 gives the least ones. The search is repeated from its end
+        while that is missed, or still comes nearer. Return None if it misses at last.
+        """
+        unit = max(self.space.unit, float(start.max()))
+
+        def effort(F: Array) -> tuple[float, Array]:
+            way = (F - centre) / unit
+            return float(way @ way) / 2.0, way / unit
+
+        rule = "ineq" if self.at_least else "eq", self.misses
+        best, known = None, math.inf
+        for _ in range(_SEARCHES):
+            F = self.space.search(start, effort, rule, bounds=bounds)
+            if F is None or (self.met(F) and effort(F)[0] > (1.0 - REACHED) * known):
+                break
+            start = F
+            if self.met(F):
+                best, known = F, effort(F)[0]
+        return best
+
+    def least(self) -> Array:
+        """Search for the least tensions (C,) [N] that meet the goal, from the anchor at first.
+
+        If that fails, searches begin where lines from the anchor to corners hit the target, or
+        lines from an end of the range. Several directions that no search hits together have the
+        tensions with the least sum of squared misses that was found; a single one raises
+        UnreachableStiffness. SingularStiffness is raised if the arm is stable nowhere.
+        """
+        space = self.space
+        if (found := self.search(space.anchor)) is not None:
+            return found
+        corners = space.corners(_CORNERS)
+        if self.targets.size > 1:
+            starts = [space.anchor, *sorted(corners, key=self.misfit)[:_STARTS]]
+            near = [F for F in map(self.nearest, starts) if F is not None]
+            best = min([*starts, *near], key=self.misfit)
+            found = self.search(best) if self.met(best) else None
+            return best if found is None else found
+        found = self._best(self._crossings(space.anchor, corners))
+        if found is None:
+            low, high = ends(space)
+            if not (1.0 - REACHED) * low.value <= self.targets[0] <= (1.0 + REACHED) * high.value:
+                raise self._unreachable(low, high)
+            both = [low.F, high.F]
+            lines = [*self._crossings(low.F, corners), *self._crossings(space.anchor, both)]
+            found = self._best([*both, *lines])
+        if found is None:
+            raise self._unreachable(low, high)
+        return found
+
+    def _unreachable(self, low: End, high: End) -> UnreachableStiffness:
+        space, target = self.space, float(self.targets[0])
+        end = low if target < low.value else high
+        hint = advice(space.pose.arm, end.F, *space.bounds)
+        if space.reserve(end.F) < AT_END:
+            hint = "take stiffer cables, since the arm is about to buckle there"
+        first, last, u = low.value, high.value, space.directions[0]
+        nearest = [first, last] if first <= target <= last else [end.value]
+        return UnreachableStiffness(u, target, first, last, nearest, hint)
+
+    def nearest(self, start: Array, bounds: Bounds | None = None) -> Array | None:
+        """Search once for the tensions (C,) [N] with the least sum of squared misses, if any."""
+
+        def miss(F: Array) -> tuple[float, Array]:
+            values, slopes = self.misses(F)
+            values = np.minimum(values, 0.0) if self.at_least else values
+            return float(values @ values) / 2.0, values @ slopes
+
+        F = self.space.search(start, miss, bounds=bounds)
+        return None if F is None else self.space.pulled_back(F)
+
+    def _best(self, starts: list[Array]) -> Array | None:
+        starts = starts[:_STARTS]
+        found = [F for F in (*map(self.search, starts), *starts) if F is not None and self.met(F)]
+        return min(found, key=lambda F: float(F @ F), default=None)
+
+    def _crossings(self, hub: Array, points: list[Array]) -> list[Array]:
+        """Return where the lines from ``hub`` to ``points`` hit the only target, least first."""
+        found = []
+
+        def miss(part: float, way: Array) -> float:
+            return float(self.misses(hub + part * way)[0][0])
+
+        for way in points - hub:
+            if miss(0.0, way) * miss(1.0, way) < 0.0:
+                found.append(hub + brentq(miss, 0.0, 1.0, args=(way,), xtol=1e-12) * way)
+        return sorted(found, key=lambda F: float(F @ F))

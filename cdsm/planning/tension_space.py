@@ -1,0 +1,278 @@
+"""K_θ at one posture as a function of the cable tensions F, and searches among admissible F.
+
+    K_θ(F) = Σ_c F_c H_c + J_Lᵀ diag(k(F)) J_L + const,      ∂K_θ/∂F_c = H_c + k′_c J_c J_cᵀ.
+
+J_c is the gradient and H_c the Hessian of the length of cable c, k_c its stiffness, k′_c = dk_c/dF.
+F is admissible if it balances the arm, J_Lᵀ F = J_Xᵀ W − g (Eq. 13), within the bounds and the
+domains of the elasticities, and the arm is stable. Searches are scipy's SLSQP (Kraft, ACM TOMS 20,
+1994) with exact gradients; its exit code is ignored, results are checked.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq, minimize
+
+from cdsm.errors import ElasticityRangeError, InfeasibleTension, SingularStiffness
+from cdsm.planning.gradient import form_by_tension
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.stiffness_matrix.instability import verdict
+from cdsm.support.validation import SMALLEST, instance
+from cdsm.support.values import Array, frozen
+from cdsm.tension import Tension, advice, distribute_tension, too_few_cables
+from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve
+
+MARGIN: Final = 1e-2
+"""An arm counts as stable down to this part of the smallest eigenvalue under the least tensions."""
+
+FAR: Final = 1e3
+"""Largest tension of a search without an upper bound, over the largest of the least tensions."""
+
+_REGULAR = 1e-3  # this eigenvalue counts as at least such a part of the smallest diagonal entry
+_FLAT = 1e-10  # singular values of J_Lᵀ below this part of the largest count as zero
+_DIGITS = 6  # decimal places of tensions, over the largest of the least, in which corners differ
+
+Function = Callable[[Array], tuple[Any, Array]]
+"""Function of F (C,) that returns its value, () or (n,), and its gradient, (C,) or (n, C)."""
+
+Bounds = tuple[Array, Array]
+"""Lower and upper bounds of the tensions, (C,) [N] each."""
+
+
+class Point(NamedTuple):
+    """What follows from K_θ under given tensions F."""
+
+    along: tuple[Array, Array]  # s = 1/(uᵀ C_vv u) (n,) [N/m] along n directions u, ∂s/∂F (n, C)
+    smallest: tuple[float, Array]  # smallest eigenvalue λ of the symmetric part, ∂λ/∂F (C,)
+
+
+class TensionSpace:
+    """The admissible tensions at a posture, and what follows from K_θ under them.
+
+    Attributes:
+        pose: The posture.
+        directions: n unit directions u (n, 3), base axes; the tip can move along each of them.
+        least: The least tensions in balance (Eq. 17), within bounds and domains.
+        bounds: Lower and upper bounds (C,) [N], within the domains; inf if there is none.
+        capped: The same with finite upper bounds, for searches of the largest tensions.
+        unit: Largest of the least tensions [N]; 1 N if all are zero.
+        floor: Smallest eigenvalue of K_θ with which the arm counts as stable [N m/rad].
+    """
+
+    def __init__(
+        self,
+        pose: Posture,
+        directions: Array,
+        minimum: ArrayLike,
+        maximum: ArrayLike,
+        wrench: ArrayLike,
+    ) -> None:
+        self.pose, self.directions = instance("pose", pose, Posture), directions.reshape(-1, 3)
+        self.least, (low, high) = _least_tensions(pose, minimum, maximum, wrench)
+        self.unit = float(self.least.values.max()) or 1.0
+        self.bounds = low, high
+        self.capped = low, np.minimum(high, FAR * max(self.unit, float(low.max())))
+        K, J = stiffness(pose, self.least), pose.length_jacobian
+        for u in self.directions:
+            K._require_mobile(u)
+        parts = sum(abs(each.diagonal()) for each in (K.active, K.passive, K.gravity, K.load))
+        self.floor = MARGIN * max(K.margin, _REGULAR * float(np.min(parts)), SMALLEST)
+        self._constant = K.gravity + K.load
+        torque = pose.jacobian.T @ self.least.wrench - pose.gravity_torque
+        self._balance = nondimensional(J, torque, low, high, pose.arm.length)
+        _, sizes, basis = np.linalg.svd(J.T)
+        rank = int((sizes > _FLAT * sizes.max(initial=0.0)).sum())
+        self._rows, self._free = basis[:rank], basis[rank:]
+        self._last: tuple[Array, Point] | None = None
+
+    def at(self, F: Array) -> Point:
+        """Evaluate K_θ under F (C,) [N], which rounding may have moved over the bounds."""
+        F = np.clip(F, *self.bounds)
+        if self._last and np.array_equal(F, self._last[0]):  # SLSQP asks for value, then gradient
+            return self._last[1]
+        pose, laws = self.pose, self.pose.arm._laws
+        k, J = laws.stiffness(pose.cable_lengths, F), pose.length_jacobian
+        slope = laws.stiffness_slope(F, k)
+        K = self._constant + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J
+        values, vectors = np.linalg.eigh((K + K.T) / 2.0)
+        softest = form_by_tension(pose, slope, vectors[:, :1], vectors[:, :1])[:, 0, 0]
+        rows = self.directions @ pose.jacobian[:3]
+        K = K + 1e-16 * self.floor * np.eye(len(K))  # which cannot be singular
+        right, left = (np.asarray(np.linalg.solve(A, rows.T), np.float64) for A in (K, K.T))
+        s = 1.0 / np.einsum("ni,in->n", rows, right)
+        slopes = s**2 * form_by_tension(pose, slope, left, right).diagonal(0, 1, 2)
+        self._last = F, Point((s, np.asarray(slopes.T)), (float(values[0]), softest))
+        return self._last[1]
+
+    def reserve(self, F: Array) -> float:
+        """Return λ/floor − 1 [-] of the smallest eigenvalue λ under F (C,); stable: 0 or more."""
+        return self.at(F).smallest[0] / self.floor - 1.0
+
+    def nearest(self, F: Array, bounds: Bounds | None = None) -> Array | None:
+        """Return the balanced tensions (C,) [N] nearest to F within the bounds, if any."""
+        A, b, *_, arm, force = self._balance
+        low, high = bounds or self.bounds
+        sides = b - A @ (F / force), (low - F) / force, (high - F) / force
+        found = solve(Problem(A, *sides, arm, force), DEFAULT_SOLVER)
+        return None if isinstance(found, str) else np.clip(F + force * found, low, high)
+
+    def tension(self, F: Array) -> Tension:
+        """Return F (C,) [N] as a :class:`Tension`."""
+        return replace(self.least, values=frozen(F.copy()), least=False)
+
+    def within(self, F: Array, change: Array) -> Bounds:
+        """Return the bounds of tensions that differ from F by ``change`` at most, (C,) [N] each."""
+        return np.maximum(self.bounds[0], F - change), np.minimum(self.bounds[1], F + change)
+
+    def search(
+        self,
+        start: Array,
+        objective: Function,
+        *rules: tuple[str, Function],
+        bounds: Bounds | None = None,
+        stable: bool = True,
+        precision: float = 1e-12,
+        iterations: int = 100,
+    ) -> Array | None:
+        """Minimise ``objective`` from ``start`` (C,) [N] among the admissible tensions, locally.
+
+        ``rules`` are more constraints: each "eq" or "ineq" (not negative), and a function. Return
+        tensions (C,) [N] in balance within ``bounds``, or None if there are none. They may miss
+        stability and ``rules``.
+        """
+        unit, limits = self.unit, bounds or self.bounds
+        if (limits[0] > limits[1]).any():
+            return None
+
+        def scaled(kind: str, of: Function) -> dict[str, Any]:
+            value, slope = (lambda x: of(unit * x)[0]), (lambda x: unit * of(unit * x)[1])
+            return {"type": kind, "fun": value, "jac": slope}
+
+        def balance(F: Array) -> tuple[Array, Array]:
+            return self._rows @ (F - self.least.values) / unit, self._rows / unit
+
+        reserve = affine(lambda F: self.at(F).smallest, MARGIN / self.floor, -MARGIN)
+        every = [*rules, *[("ineq", reserve)] * stable, *[("eq", balance)] * (len(self._rows) > 0)]
+        goal = scaled("", objective)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of iterates beyond the bounds
+            found = minimize(
+                goal["fun"],
+                np.clip(start, *limits) / unit,
+                jac=goal["jac"],
+                method="SLSQP",
+                bounds=np.transpose(limits) / unit,
+                constraints=[scaled(*each) for each in every],
+                options={"ftol": precision, "maxiter": iterations},
+            )
+        return self.nearest(np.clip(unit * found.x, *limits), limits)
+
+    @cached_property
+    def anchor(self) -> Array:
+        """Tensions (C,) [N] under which the arm is stable: the least ones, if they are.
+
+        Raises SingularStiffness if none are found.
+        """
+        best = self.least.values
+        if self.reserve(best) < 0.0:
+            goal = affine(lambda F: self.at(F).smallest, -MARGIN / self.floor)
+            points = [best, *self._corners(0)]
+            starts = max(points, key=self.reserve), np.mean(points, axis=0)
+            found = [self.search(F, goal, bounds=self.capped, stable=False) for F in starts]
+            best = max([*points, *(F for F in found if F is not None)], key=self.reserve)
+        if self.reserve(best) < 0.0:
+            K = stiffness(self.pose, best, self.least.wrench)
+            raise unstable(K, "admissible tensions", self.bounds)
+        return best
+
+    def corner(self, way: Array) -> Array | None:
+        """Return the balanced tensions (C,) [N] farthest in the direction ``way`` (C,), if any."""
+        step = (self._free @ way) @ self._free
+        far = FAR * self.capped[1].max() / max(float(np.linalg.norm(step)), SMALLEST) * step
+        return self.nearest(self.least.values + far, self.capped)
+
+    def corners(self, random: int) -> list[Array]:
+        """Return stable tensions (C,) [N] far apart: towards bounds, and in random directions."""
+        return [self.pulled_back(F, 1e-3) for F in self._corners(random)]
+
+    def _corners(self, random: int) -> Array:
+        axes = np.eye(self.least.values.size)
+        others = np.random.default_rng(0).normal(size=(random, len(axes)))
+        ways = (*axes, *-axes, *others)
+        found = np.array(
+            [F for F in map(self.corner, ways) if F is not None] or [self.least.values]
+        )
+        _, different = np.unique(np.round(found / self.unit, _DIGITS), axis=0, return_index=True)
+        return found[np.sort(different)]
+
+    def pulled_back(self, F: Array, precision: float = 1e-14) -> Array:
+        """Return the stable tensions nearest to F (C,) [N] on the line from F to the anchor."""
+
+        def moved(part: float) -> Array:
+            return np.asarray(F + part * (self.anchor - F))
+
+        if self.reserve(F) >= 0.0:
+            return F
+        part = brentq(lambda part: self.reserve(moved(part)), 0.0, 1.0, xtol=precision)
+        while self.reserve(moved(part)) < 0.0:  # the root may lie on the other side
+            part += precision
+        return moved(part)
+
+
+def affine(of: Function, factor: float, constant: float = 0.0) -> Function:
+    """Return the function ``factor`` · ``of`` + ``constant``."""
+
+    def value(F: Array) -> tuple[Any, Array]:
+        found, gradient = of(F)
+        return factor * found + constant, factor * gradient
+
+    return value
+
+
+def unstable(K: Stiffness, tried: str, bounds: Bounds | None = None) -> SingularStiffness:
+    """Return the error that none of the tensions ``tried`` make the arm stable; K is the best."""
+    arm = K.posture.arm
+    said = f"no {tried} make the arm stable. At best: {verdict(K)}. {too_few_cables(arm)}"
+    if all(cable.control == "force" for cable in arm.cables):
+        said += "All motors control force, so that no cable resists by its elasticity: have some "
+        said += 'hold their length (control="position").'
+    else:
+        wider = advice(arm, K.tension, *bounds) if bounds else ""
+        said += f"Change the posture or the load, take stiffer cables{wider and f', {wider}'}."
+    return SingularStiffness(said, K.critical_direction)
+
+
+def _least_tensions(
+    pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike
+) -> tuple[Tension, Bounds]:
+    """Distribute the least tensions within bounds and domains; return these bounds, too."""
+    least, cables = distribute_tension(pose, minimum, maximum, wrench), pose.arm.cables
+    F, held = least.values, cables.position_controlled  # the others do not use their elasticity
+    first = np.where(held, [cable.elasticity.low for cable in cables], 0.0)
+    last = np.where(held, [cable.elasticity.high for cable in cables], np.inf)
+    low, high = np.maximum(least.minimum, first), np.minimum(least.maximum, last)
+    outside = (low > F) | (high < F)
+    if not outside.any():
+        return least, (low, high)
+    if (low <= high).all():
+        try:
+            inside = distribute_tension(pose, low, high, wrench)
+            return replace(inside, minimum=least.minimum, maximum=least.maximum), (low, high)
+        except InfeasibleTension:
+            pass
+    wider = advice(pose.arm, F, least.minimum, least.maximum, outside)
+    places = np.flatnonzero(outside).tolist()
+    said = f"outside the domain {cables[places[0]].elasticity._span} of the elasticity, and no "
+    said += (
+        "tensions within it and the bounds balance the arm. Take another elasticity, change the "
+    )
+    said += f"posture or the load{wider and f', {wider}'}."
+    raise ElasticityRangeError(said, F[outside].tolist(), places, [cables[c].name for c in places])

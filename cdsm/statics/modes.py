@@ -1,0 +1,151 @@
+"""Small vibrations of an arm about a posture: K_θ φ = ω² M φ.
+
+M is the joint-space mass matrix of the links; cables have no mass. If K_θ is not positive definite,
+some motions grow exponentially, with a growth rate instead of a frequency.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+import cdsm
+from cdsm.errors import InvalidInput, SingularMass
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.support.format import aligned
+from cdsm.support.result import Result, unit
+from cdsm.support.validation import instance
+from cdsm.support.values import Array, frozen
+from cdsm.urdf import CROSS_INERTIA
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_LIGHT = (
+    50.0  # a link with less than so many times the placeholders of its cross counts as massless
+)
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Modes(Result):
+    """Natural modes of an arm and the stiffness from which they follow; made by :func:`modes`.
+
+    S of the nv modes vibrate. The other modes grow; a stable arm has none of them. Shapes are
+    columns of joint angles, mass-normalised and orthogonal in M and K_θ: φᵀMφ = 1 and φᵀK_θφ = ω².
+    A shape has the unit rad/(√kg m); its largest entry is positive.
+
+    Attributes:
+        stiffness: K_θ with its posture, tensions and wrench.
+        mass: M (nv, nv) [kg m²].
+        frequencies: ω/2π (S,) [Hz], ascending.
+        shapes: φ of the modes that vibrate (nv, S) [rad/(√kg m)].
+        growth_rates: √(−ω²) of the modes that grow (n,) [1/s], the fastest first. A deflection
+            grows by a factor e in the time 1/rate.
+        growth_shapes: φ of the modes that grow (nv, n) [rad/(√kg m)].
+    """
+
+    _headline = "frequencies"
+
+    stiffness: Stiffness
+    mass: Array = field(metadata=unit("kg m²", "joint", "joint_column"))
+    frequencies: Array = field(metadata=unit("Hz", "mode"))
+    shapes: Array = field(metadata=unit("1", "joint", "mode"))
+    growth_rates: Array = field(metadata=unit("1/s", "growth"))
+    growth_shapes: Array = field(metadata=unit("1", "joint", "growth"))
+
+    @property
+    def _posture(self) -> Posture:
+        return self.stiffness.posture
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all modes vibrate."""
+        return not self.growth_rates.size
+
+    def plot(self) -> Figure:
+        """Plot the arm in mm, deflected by a few modes: growing modes first, then the lowest."""
+        return cdsm.plots.plot_modes(self)
+
+    def __str__(self) -> str:
+        names = np.array(self.stiffness.posture.arm.joint_names)
+        leading = [names[abs(each).argmax(axis=0)] for each in (self.shapes, self.growth_shapes)]
+        rows = [("mode", "frequency [Hz]", "moves most")]
+        for k, frequency in enumerate(self.frequencies):
+            rows.append((str(k + 1), f"{frequency:.4g}", leading[0][k]))
+        lines = aligned(rows)
+        for rate, joint in zip(self.growth_rates.tolist(), leading[1], strict=True):
+            grows = f"grows by e in {1.0 / rate:.4g} s" if rate else "meets no resistance"
+            lines.append(f"UNSTABLE: a deflection, most of it at {joint}, {grows}")
+        return "\n".join(lines)
+
+
+def modes(pose: Posture, stiffness: Stiffness) -> Modes:
+    """Compute natural frequencies and mode shapes at a posture: K_θ φ = ω² M φ.
+
+    The symmetric part of K_θ is used. A skew part, which a moment at the tip or sliding cables add,
+    is left out. The modes describe a small vibration about the posture, without losses by friction
+    or damping. They are valid only if the tensions balance the arm there, see
+    :attr:`Stiffness.residual <cdsm.Stiffness.residual>`. If the arm buckles, ``is_stable`` is
+    false; this is not an error.
+
+    Args:
+        pose: The posture.
+        stiffness: K_θ, the result of :func:`~cdsm.stiffness` at this posture.
+
+    Raises:
+        InvalidInput: ``stiffness`` belongs to another posture or arm.
+        SingularMass: A joint moves no mass, or hardly more than the placeholder in the cross of its
+            universal joint.
+    """
+    arm = instance("pose", pose, Posture).arm
+    if not instance("stiffness", stiffness, Stiffness).posture._equals(pose):
+        raise InvalidInput("stiffness", "belongs to another posture or arm; compute it for this.")
+    M = arm._body.mass_matrix(pose.q)
+    if arm.is_serpentine:
+        least = int(M.diagonal().argmin())  # crosses and massless links have placeholders
+        crossed = any(len(joint.axes) == 2 for joint in arm.geometry.joints)
+        light = crossed and M[least, least] < _LIGHT * CROSS_INERTIA
+        if light or arm.geometry.links[-1].mass == 0.0:
+            raise SingularMass(
+                f"{arm.joint_names[least]} moves links of no mass, or of hardly any: its frequency "
+                "would be that of placeholders. Give the links their link_mass.",
+                frozen(np.eye(arm.nv)[least]),
+            )
+    squares, shapes = vibrations(stiffness, M)
+    shapes *= np.sign(shapes[abs(shapes).argmax(axis=0), np.arange(arm.nv)])
+    vibrates = squares > 0.0
+    return Modes(
+        stiffness=stiffness,
+        mass=frozen(M),
+        frequencies=frozen(np.sqrt(squares[vibrates]) / (2.0 * math.pi)),
+        shapes=frozen(shapes[:, vibrates]),
+        growth_rates=frozen(np.sqrt(-squares[~vibrates])),
+        growth_shapes=frozen(shapes[:, ~vibrates]),
+    )
+
+
+def vibrations(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
+    """Solve K_θ φ = ω² M φ: return ω² (nv,) [1/s²], ascending, and the shapes φ (nv, nv).
+
+    The shapes are columns with φᵀMφ = 1. M is (nv, nv). Raises SingularMass if it is not positive
+    definite.
+    """
+    from scipy.linalg import eigh  # slow to import
+
+    # scaled by joint: the mass of the last link may be rounding beside that of the arm
+    scale = 1.0 / np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
+    K, scaled = (matrix * scale * scale[:, None] for matrix in (stiffness.joint, M))
+    try:
+        squares, shapes = eigh((K + K.T) / 2.0, scaled)
+    except np.linalg.LinAlgError:  # M is not positive definite
+        motion = np.linalg.eigh(M)[1][:, 0]
+        joint = stiffness.posture.arm.joint_names[int(abs(motion).argmax())]
+        said = f"a motion of {joint} moves no link of any mass. "
+        said += "Give the links a mass and moments of inertia."
+        raise SingularMass(said, frozen(motion)) from None
+    return squares, scale[:, None] * shapes

@@ -1,0 +1,161 @@
+"""Arm with friction in its holes that is loaded slowly, from equilibrium to equilibrium.
+
+    r(q) = Σ_j T_j g_j + g − J_Xᵀ W,    ∂r/∂q = Σ_j (T_j H_j + g_jᵀ ∂T_j/∂q) + ∂g/∂q − ∂(J_Xᵀ W)/∂q
+
+T_j is the tension of segment j, g_j and H_j are gradient and Hessian of its length. The rest
+lengths of the segments carry the history: from those at one equilibrium, :mod:`cdsm.friction`
+computes the tensions at any posture nearby. ∂r/∂q is not symmetric where cables slide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
+from cdsm.posture import Posture
+from cdsm.statics.locked_arm import LockedArm, require_domain
+from cdsm.statics.solve import ArmState, Balance, Point, continued, equilibrium_error, settle
+from cdsm.support.values import Array, frozen
+
+_SHORTEST = 2.0**-8  # shortest sub-step, as a part of the step between two loads
+
+
+class Load(NamedTuple):
+    """Load and motor commands that act on an arm."""
+
+    wrench: Array  # W (6,): force [N], then moment [N m]
+    holding: Array  # torque that holds an unbalanced arm at its reference (nv,) [N m]
+    motors: Array  # per cable (C,): rest length taken in [m]; or tension [N] of a force motor
+
+    def interpolate(self, other: Load, part: float) -> Load:
+        """Return the load at the part ``part`` (0 to 1) of the straight way to ``other``."""
+        return Load(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
+
+
+@dataclass(frozen=True)
+class ChainArmState(ArmState):
+    """State of an arm at one posture, in balance or not, after the cables have slipped."""
+
+    chain: ChainState
+    slope: Array  # ∂T/∂q (S, nv) [N/rad]
+
+
+class QuasiStaticState(NamedTuple):
+    """Equilibrium of an arm under a load."""
+
+    load: Load
+    arm_state: ChainArmState
+    x: Array  # solution of the normal map (nv,)
+    stop_torque: Array  # torque of the stops (nv,) [N m]
+
+
+class Step(NamedTuple):
+    """What happened in a step from one load to another."""
+
+    slip: Array  # rest length that moved from each segment to the next (S,) [m]
+    dissipated: float  # work lost to friction in the holes [J]
+    snapped: bool  # whether the arm jumped
+
+
+class QuasiStaticArm:
+    """Arm with friction whose motors are locked at ``reference``, with tensions F (C,) [N].
+
+    Raises JointLimitError if the posture is beyond a joint limit, and ElasticityRangeError if a
+    series spring leaves no wire.
+    """
+
+    def __init__(self, reference: Posture, tension: Array) -> None:
+        arm = reference.arm
+        arm._angles(reference.q, True)  # within the joint limits
+        LockedArm(reference, tension, np.zeros(6))  # refuses a spring that leaves no wire
+        self.reference, self._tension = reference, tension
+        self.start = reference.segments.chains.start
+        self.forced = ~arm.cables.position_controlled
+        unstrained = arm.original_length == "unstrained"
+        self._problem = ChainProblem(arm.cables, self.start, tension, unstrained)
+
+    def initial(self, wrench: Array) -> QuasiStaticState:
+        """Return the state at the reference under ``wrench`` (6,), with even tensions."""
+        pose, motors = self.reference, np.where(self.forced, self._tension, 0.0)
+        T, none = self._tension[pose.segments.chains.cable], np.zeros(pose.q.size)
+        rest_length = self._problem.rest_lengths(pose.segments.lengths, T)
+        state = self._state(pose, rest_length, Load(wrench, none, motors), T)
+        x = pose.q / Balance(lambda q: state, pose, state).unit
+        return QuasiStaticState(Load(wrench, state.residual, motors), state, x, frozen(none))
+
+    def step_to(
+        self, before: QuasiStaticState, load: Load, substeps: int, what: str
+    ) -> tuple[QuasiStaticState, Step]:
+        """Change the load of an equilibrium to ``load`` in equal sub-steps.
+
+        A sub-step is halved where no stable equilibrium is found near the last one. If it cannot be
+        halved further, the arm jumps to the next stable one. Raises EquilibriumError if there is
+        none, and ElasticityRangeError if a tension of the new state is outside its law. The error
+        texts call the step ``what``.
+        """
+        state, motion = before, np.zeros_like(before.x)
+        done, part, dissipated, snapped = 0.0, 1.0 / substeps, 0.0, False
+        slip = last = np.zeros_like(before.arm_state.chain.slip)
+        while done < 1.0:
+            goal = done + part if done + 1.5 * part < 1.0 else 1.0
+            target, old = before.load.interpolate(load, goal), state.arm_state
+            f = self._balance(state, target)
+            found: Point | None = continued(f, (state.x + motion, state.x), old.pose.q)
+            if found is None and goal - done > _SHORTEST:
+                part, motion = (goal - done) / 2.0, 0.0 * motion
+                continue
+            if found is None:
+                found, snapped = settle(f, old.pose.q)
+                if not snapped:
+                    raise equilibrium_error(self.reference, found, done, what)
+            new = found.state
+            assert isinstance(new, ChainArmState)
+            start, end, now = self._jumps(old), self._jumps(new), new.chain.slip
+            again = now * last > 0.0  # these holes slid the same way before
+            dissipated += float(np.where(again, (start + end) / 2.0, end) @ now)
+            motion = found.x - state.x
+            state = QuasiStaticState(target, new, found.x, found.stop_torque)
+            slip, last, done, part = slip + now, now, goal, min(2.0 * part, 1.0 / substeps)
+        self._require_domains(state.arm_state.tension, what)
+        return state, Step(slip, dissipated, snapped)
+
+    def _balance(self, before: QuasiStaticState, load: Load) -> Balance:
+        """Return the normal map of the states that follow ``before`` under a load."""
+        old, rest_length = before.arm_state, before.arm_state.chain.rest_length.copy()
+        rest_length[self.start[:-1]] -= ~self.forced * (load.motors - before.load.motors)
+
+        def at(q: Array) -> ChainArmState:
+            pose = self.reference.arm.at(q, check_limits=False)
+            near = np.maximum(old.tension + old.slope @ (q - old.pose.q), 0.0)
+            return self._state(pose, rest_length, load, near)
+
+        return Balance(at, self.reference, old, load.holding)
+
+    def _state(self, pose: Posture, rest_length: Array, load: Load, near: Array) -> ChainArmState:
+        """Compute the state at a posture; the search for tensions starts at ``near`` (S,) [N]."""
+        segments, W, g = pose.segments, load.wrench, pose.gravity_torque
+        chains, J = segments.chains, segments.length_jacobian
+        forced = np.where(self.forced, load.motors, np.nan)
+        chain = self._problem.settle(segments.lengths, rest_length, segments.ratio, forced, near)
+        turning, T = np.zeros_like(J), chain.tension
+        turning[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian
+        slope = chain_tangent(self.start, self.forced, chain, J, turning)
+        K = segments.active(T) + J.T @ slope + pose.gravity_stiffness + pose._load(W)
+        scale = T @ abs(J) + abs(g) + abs(W) @ abs(pose.jacobian)
+        return ChainArmState(pose, T, T @ J + g - W @ pose.jacobian, K, scale, chain, slope)
+
+    def _jumps(self, state: ChainArmState) -> Array:
+        """Return the work per slip (S,) [N] that the hole after each segment dissipates."""
+        return np.append(np.diff(self._problem.potential(state.tension)), 0.0)
+
+    def _require_domains(self, tension: Array, what: str) -> None:
+        cables = self.reference.arm.cables
+        for law, of in self._problem.laws:
+            # a motor that holds the tension of a cable without friction needs no law
+            known = np.array([c for c in of if not self.forced[c] or any(cables[c].friction)], int)
+            for extreme in (np.minimum, np.maximum):
+                F = extreme.reduceat(tension, self.start[:-1])[known]
+                require_domain(self.reference.arm, law, known, F, f"after {what}, ")

@@ -1,0 +1,270 @@
+"""Solve the balance r(q) = 0 of an arm between its stops, for any model of its torques.
+
+r is the residual torque, K = ∂r/∂q. A stop pushes, but does not pull. With the projection P onto
+the angles between the stops, all of this is one equation without inequalities, Robinson's normal
+map (Math. Oper. Res. 17, 1992):
+
+    f(x) = r(P(x)) + k (x − P(x)) = 0.
+
+The angles are q = P(x), and a joint at its stop is pushed by the torque k (P(x) − x). r need not be
+the gradient of a potential: a moment at the tip and sliding cables have none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import count
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdsm.errors import CdsmError, EquilibriumError
+from cdsm.posture import Posture
+from cdsm.support.values import Array, frozen
+
+BALANCED = 1e-9  # largest |r| of an equilibrium, over the sum of the magnitudes of its terms
+FLAT = 1e-10  # an eigenvalue of K whose size is below this part of the largest is rounding
+FAR = 0.1  # largest motion of a joint [rad] from one equilibrium to the next while loads change
+
+_LONGEST = 0.2  # longest step of a joint [rad]
+_DENSE = 0.02  # distance [rad] of the postures at which the way to an equilibrium is checked
+_STEPS = 300  # most steps of the search for an equilibrium
+_KICK = 0.01  # step off a saddle [rad]
+_NOISE = 1e-13  # |r| that is rounding, over the sum of magnitudes
+_APART = 1e-6  # a joint stops this far [rad] before its disks touch: cables have no direction there
+_CLOSE = 1e-3  # sites meet if their distance is below this part of that at the reference
+
+
+@dataclass(frozen=True)
+class ArmState:
+    """State of a loaded arm at one posture, in balance or not."""
+
+    pose: Posture
+    tension: Array  # of each cable (C,), or of each segment (S,) [N]
+    residual: Array  # r (nv,) [N m]
+    stiffness: Array  # ∂r/∂q (nv, nv) [N m/rad]
+    scale: Array  # sum of the magnitudes of the terms of r (nv,) [N m]
+
+
+class Point(NamedTuple):
+    """Normal map at x, in scaled coordinates: a sliding joint counts in lengths of the arm."""
+
+    x: Array
+    state: ArmState
+    value: Array  # f (nv,) [N m]
+    slope: Array  # ∂f/∂x (nv, nv)
+    out: NDArray[np.bool_]  # which joints are beyond a stop (nv,)
+    off: float  # largest |f| over the scale of r
+    stop_torque: Array  # torque of the stops (nv,) [N m]; 0 where it is rounding
+
+
+class Balance:
+    """Normal map f(x) of the model ``at(q)``, with the torque ``holding`` subtracted from r.
+
+    The stops are those of an arm that was locked at ``reference``; ``near`` is a state close by.
+    """
+
+    def __init__(
+        self,
+        at: Callable[[Array], ArmState],
+        reference: Posture,
+        near: ArmState,
+        holding: Array | float = 0.0,
+    ) -> None:
+        arm = reference.arm
+        self._at, self._holding = at, holding
+        self.unit = np.where(arm.slides, arm.length, 1.0)
+        touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
+        if arm.is_serpentine:
+            joints = arm.geometry.joints
+            touching[:] = [joint.limit is None for joint in joints for _ in joint.axes]
+        apart = np.where(touching, _APART, 0.0)
+        # the reference may be nearer to the stop
+        self._lower = np.minimum(arm.lower + apart, reference.q) / self.unit
+        self._upper = np.maximum(arm.upper - apart, reference.q) / self.unit
+        self.k = float(abs(near.stiffness.diagonal() * self.unit**2).max()) or 1.0
+
+    def __call__(self, x: Array) -> Point:
+        """Return f, its derivative and the state at x (nv,)."""
+        inside = self.inside(x)
+        state, out, beyond = self._at(inside * self.unit), x != inside, self.k * (x - inside)
+        residual = state.residual - self._holding
+        value = residual * self.unit + beyond
+        slope = np.where(out, 0.0, state.stiffness * self.unit * self.unit[:, None])
+        slope += np.diag(self.k * out)
+        # the torques of a pendulum vanish where it hangs: 1e-3 rad are a part of the scale
+        size = float((state.scale * self.unit).max()) + 1e-3 * self.k
+        pushed = np.where(abs(beyond) > _NOISE * size, residual, 0.0)
+        return Point(x, state, value, slope, out, float(abs(value).max()) / size, frozen(pushed))
+
+    def inside(self, x: Array) -> Array:
+        """Return P(x): the scaled angles between the stops."""
+        return np.minimum(np.maximum(x, self._lower), self._upper)
+
+    def attempt(self, x: Array) -> Point | None:
+        """Return f(x); None where the model does not exist, as where two sites coincide."""
+        try:
+            return self(x)
+        except CdsmError:
+            return None
+
+    def limited(self, x: Array, step: Array) -> Array:
+        """Return ``step``, shortened so that no joint moves by more than 0.2 rad."""
+        beyond = x - self.inside(x)
+        room = np.where(beyond == 0.0, 0.0, np.where(beyond * step < 0.0, abs(beyond), math.inf))
+        return step / max(1.0, float((abs(step) / (_LONGEST + room)).max()))
+
+
+def settle(f: Balance, q: Array) -> tuple[Point, bool]:
+    """Find the stable equilibrium to which the arm descends from the angles q (nv,).
+
+    Returns the last point, and whether it is an equilibrium.
+    """
+    here, found = _descend(f, f(q / f.unit), 1e-3 * f.k)
+    if not found:  # rarely: follow the overdamped motion instead
+        there = f.attempt(_flow(f, q / f.unit))
+        here, found = _descend(f, there, 1e-3 * f.k) if there else (here, False)
+    return here, found
+
+
+def continued(f: Balance, guesses: Iterable[Array], before: Array) -> Point | None:
+    """Find the stable equilibrium near the angles ``before`` (nv,), as a load changes a little.
+
+    The searches begin at the points ``guesses``: Newton's method, then scipy's hybrid method.
+    Returns None if none finds one to which no joint moves by more than 0.1 rad.
+    """
+    for search in (_descend, _hybrid):
+        for x in guesses:
+            try:
+                here, found = search(f, f(x), 0.0, before / f.unit)
+            except (CdsmError, np.linalg.LinAlgError, ValueError):
+                continue
+            if found:
+                return here
+    return None
+
+
+def stable_between(at: Callable[[Array], ArmState], before: Array, after: Array) -> bool:
+    """Return whether K is positive definite along the straight way between two equilibria.
+
+    If it is not, the arm snaps through, though the search has stepped over the unstable postures.
+    """
+    free, length = before != after, float(abs(after - before).max())
+    for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
+        K = at(before + part * (after - before)).stiffness[np.ix_(free, free)]
+        if np.linalg.eigvalsh(K + K.T)[0] <= 0.0:
+            return False
+    return True
+
+
+def _descend(
+    f: Balance, here: Point, shift: float, home: Array | None = None
+) -> tuple[Point, bool]:
+    """Newton's method on K + ``shift``, which is raised to be positive definite.
+
+    A step counts if the work ∫f·dx along it is negative. It ends at a stable equilibrium, not at a
+    saddle, unless the stops bar both ways down; and if a joint is more than 0.1 rad from ``home``.
+    """
+    kicks, identity = 0, np.eye(here.x.size)
+    for _ in range(_STEPS):
+        if home is not None and abs(f.inside(here.x) - home).max() > FAR:
+            break
+        lowest, mode = _softest(f, here)
+        saddle = here.off <= BALANCED
+        if saddle and (lowest >= 0.0 or kicks == 2):
+            return _polished(f, here), True
+        if saddle:  # leave it to where f pushes; if it is where the last kick began, the other way
+            side = -1.0 if here.value @ mode > _NOISE * f.k else 1.0
+            step, kicks = side * (-1.0) ** kicks * _KICK * mode, kicks + 1
+        else:
+            K = here.slope + max(shift, -1.5 * lowest) * identity
+            step = f.limited(here.x, -np.asarray(np.linalg.lstsq(K, here.value, rcond=None)[0]))
+            kicks *= bool(abs(step).max() < _KICK)
+        there, gain = f.attempt(here.x + step), float(here.value @ step)
+        if there and (saddle or 0.0 > 0.5 * gain > (here.value + there.value) @ step):
+            here, shift = there, shift / 4.0
+        else:
+            shift = 4.0 * max(shift, -lowest, 1e-4 * f.k)
+    return here, False
+
+
+def _polished(f: Balance, here: Point) -> Point:
+    """Return the point after Newton's steps, down to rounding."""
+    for _ in range(4):
+        there = None
+        if here.off > 10.0 * _NOISE:
+            step = np.linalg.lstsq(here.slope, here.value, rcond=None)[0]
+            there = f.attempt(here.x - step)
+        if there is None or there.off >= here.off:
+            break
+        here = there
+    return here
+
+
+def _softest(f: Balance, point: Point) -> tuple[float, Array]:
+    """Return the smallest eigenvalue of K of the joints off their stops, and its motion (nv,).
+
+    An eigenvalue that is rounding is returned as 0.
+    """
+    K = np.where(point.out | point.out[:, None], 0.0, (point.slope + point.slope.T) / 2.0)
+    values, vectors = np.linalg.eigh(K + np.diag(f.k * point.out))
+    mode, rounding = vectors[:, 0], abs(values[0]) <= FLAT * abs(values).max()
+    return 0.0 if rounding else float(values[0]), mode * np.sign(mode[abs(mode).argmax()])
+
+
+def _flow(f: Balance, x: Array) -> Array:
+    """Return where the overdamped motion x′ = −f(x)/k from x ends, or is after 3000 postures."""
+    from scipy.integrate import solve_ivp  # slow to import, and rarely needed
+
+    calls = count()
+
+    def speed(_: float, x: Array) -> Array:
+        next(calls)
+        return -f(x).value / f.k
+
+    def moving(_: float, x: Array) -> float:
+        return -1.0 if next(calls) > 3000 else float(abs(f(x).value).max()) / f.k - 1e-6
+
+    moving.terminal, moving.direction = True, -1.0  # type: ignore[attr-defined]
+    options = {"events": moving, "rtol": 1e-3, "atol": 1e-5, "first_step": 1e-2}
+    try:
+        jac = {"jac": lambda _, x: -f(x).slope / f.k}
+        return np.asarray(solve_ivp(speed, (0.0, 1e6), x, "BDF", **jac, **options).y[:, -1])
+    except (CdsmError, np.linalg.LinAlgError, ValueError):
+        return x
+
+
+def _hybrid(f: Balance, here: Point, shift: float, home: Array) -> tuple[Point, bool]:
+    """Hybrid method of scipy, which stops at a step length, not at a residual."""
+    from scipy.optimize import root  # slow to import, and rarely needed
+
+    options = {"xtol": 1e-11, "factor": 0.1}
+    found = root(lambda x: f(x)[2:4], here.x, jac=True, method="hybr", options=options)
+    return _descend(f, f(found.x), shift, home)
+
+
+def equilibrium_error(
+    reference: Posture, point: Point, reached: float, load: str = "the load"
+) -> EquilibriumError:
+    """Return the error of a search that ended at ``point``, beyond the part ``reached`` of a load.
+
+    It names the joint with the largest residual torque, and a cable of which two sites meet there.
+    """
+    pose, residual = point.state.pose, frozen(np.where(point.out, 0.0, point.state.residual))
+    worst, remedy = int(abs(residual).argmax()), ""
+    arm = pose.arm
+    problem = (
+        f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of {load}; at the "
+        f"last iterate {abs(residual[worst]):.4g} {arm.torque_unit(worst)} are out of balance at "
+        f"{arm.joint_names[worst]}"
+    )
+    for cable, *paths in zip(arm.cables, reference.cable_paths, pose.cable_paths, strict=True):
+        apart, left = (np.linalg.norm(np.diff(path, axis=0), axis=1) for path in paths)
+        if (left < _CLOSE * apart).any():
+            problem += f", where two sites of {cable.name} meet: disks touch there"
+            remedy = "Set joint_limit to where disks touch, or leave it out, for a stop there."
+            break
+    return EquilibriumError(problem, residual, reached, arm.joint_names[worst], remedy)

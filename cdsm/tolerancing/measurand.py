@@ -1,0 +1,150 @@
+"""Measurands: numbers of an arm that have an uncertainty, such as its stiffness along a direction.
+
+Arms with errors are rows of a batch (:mod:`cdsm.batch.solution`), each with its own dimensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.batch.quantities import Codes
+from cdsm.batch.solution import Rows
+from cdsm.errors import InvalidInput
+from cdsm.posture import Posture
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.directions import Direction, unit_direction
+from cdsm.support.format import coordinates
+from cdsm.support.status import Status
+from cdsm.support.validation import flag, one_of
+from cdsm.support.values import Array, ReadOnlyState
+from cdsm.tension import Tension
+from cdsm.tolerancing.inputs import Errors, Inputs, inputs_of
+
+MeasurandName = Literal["along", "margin", "tip", "tension"]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurand(ReadOnlyState):
+    """Number of an arm whose uncertainty is asked for.
+
+    Attributes:
+        of: Its kind; :func:`~cdsm.uncertainty` explains the names.
+        stiffness: The stiffness of the arm without errors.
+        direction: Unit direction (3,) of ``along`` and ``tip``; else None.
+        cable: Index of the cable whose ``tension`` it is; None for all cables.
+        redistribute: Whether each arm has its own least tensions; if not, they are measured.
+    """
+
+    of: MeasurandName
+    stiffness: Stiffness
+    direction: Array | None = None
+    cable: int | None = None
+    redistribute: bool = False
+
+    @property
+    def inputs(self) -> Inputs:
+        """Inputs of the arm."""
+        return inputs_of(self.stiffness.posture.arm)
+
+    @property
+    def unit(self) -> tuple[str, float]:
+        """Unit in which people read the value, and its size in SI."""
+        return {"along": ("N/mm", 1e3), "tip": ("mm", 1e-3)}.get(self.of, (self.si_unit, 1.0))
+
+    @property
+    def si_unit(self) -> str:
+        """SI unit of the value."""
+        units = {"along": "N/m", "tip": "m", "tension": "N"}
+        return units.get(self.of) or self.stiffness.posture.arm.stiffness_unit()
+
+    @property
+    def name(self) -> str:
+        """Name as text, with the direction or the cable."""
+        if self.direction is not None:
+            what = "stiffness" if self.of == "along" else "tip"
+            return f"{what} along {coordinates(self.direction)}"
+        if self.cable is not None:
+            return f"tension of {self.stiffness.posture.arm.cables[self.cable].name}"
+        return "smallest joint stiffness"
+
+    def value(self) -> Array:
+        """Return the value of the arm without errors (1,), or of each cable (C,), in SI."""
+        K, u = self.stiffness, self.direction
+        if self.of == "tension":
+            return K.tension if self.cable is None else K.tension[[self.cable]]
+        if u is None:
+            return np.array([K.margin])
+        return np.array([K.along(u) if self.of == "along" else u @ K.posture.tip[:3, 3]])
+
+    def of_arms(self, errors: Errors, threads: int = 1) -> tuple[Array, Codes]:
+        """Compute the values (N, 1 or C) of N arms with ``errors``, and the status (N,) of each."""
+        K, arm = self.stiffness, self.stiffness.posture.arm
+        count, bounds = len(next(iter(errors.values()))), None
+        status, none = np.zeros(count, dtype=np.uint8), np.zeros((count, 1))
+        F = K.tension + errors.get("tension", none)
+        if self.redistribute:
+            assert K.distribution is not None
+            bounds = K.distribution.minimum[None], K.distribution.maximum[None]
+        elif self.of != "tip":  # cables only pull
+            status[F.min(axis=1) < 0.0] = Status.OUTSIDE_ELASTICITY
+        u = np.zeros((0, 3)) if self.direction is None else self.direction[None]
+        found = Rows(
+            arm=arm,
+            q=K.posture.q + errors.get("joint_angle", none),
+            wrench=K.wrench[None],
+            names=(self.of,),
+            tension=None if self.redistribute else F,
+            bounds=bounds,
+            directions=u,
+            body=self.inputs.bodies(errors, count),
+            springs=lambda L, F, part: self._springs(errors, L, F, part),
+            check_limits=False,
+        ).solve(status, threads)[self.of]
+        if self.of == "tension":
+            return found if self.cable is None else found[:, [self.cable]], status
+        found = found[:, :3, 3] @ u.T if self.of == "tip" else found.reshape(count, 1)
+        status[~np.isfinite(found[:, 0]) & (status == Status.OK)] = Status.SINGULAR
+        return found, status
+
+    def _springs(self, errors: Errors, L: Array, F: Array, part: slice) -> Array:
+        """Return the stiffness of cables whose rigidities EA and springs have errors.
+
+        The strain ε falls as EA rises, so EA (1 + ε) rises by the error of EA alone.
+        """
+        laws = self.stiffness.posture.arm._laws
+        change = errors["rigidity"][part] if "rigidity" in errors else 0.0
+        stretched, EA, series = laws.rigidities(F), np.zeros_like(F), laws.series + 0.0 * F
+        if "spring" in errors:
+            series[:, laws.series > 0.0] /= 1.0 + errors["spring"][part]
+        for law, of in laws.held:
+            EA[:, of] = law.rigidity(np.clip(F[:, of], law.low, law.high))
+        stretched = stretched + np.where(stretched > 0.0, change * EA, 0.0)
+        return laws.stiffness_of(L, F, stretched, series)
+
+
+def measurand_of(
+    pose: Posture,
+    tension: Tension | ArrayLike,
+    direction: Direction | None,
+    of: MeasurandName,
+    cable: str | None,
+    wrench: ArrayLike | None,
+    redistribute: bool,
+) -> Measurand:
+    """Check the arguments of :func:`~cdsm.uncertainty`; return the measurand they describe."""
+    one_of("measurand", of, get_args(MeasurandName))
+    K, names = stiffness(pose, tension, wrench), pose.arm.cables.names
+    given = {"direction": (direction, of in ("along", "tip")), "cable": (cable, of == "tension")}
+    for name, (value, wanted) in given.items():
+        if (value is not None) != wanted:
+            raise InvalidInput(name, f"{'is needed' if wanted else 'has no meaning'} for {of}.")
+    again = flag("redistribute", redistribute) or of == "tension"
+    if again and not (isinstance(tension, Tension) and tension.least):
+        raise InvalidInput("tension", "is distributed again: give a least Tension.")
+    u = None if direction is None else unit_direction("direction", direction)
+    index = None if cable is None else names.index(one_of("cable", cable, names))
+    return Measurand(of, K, u, index, again)

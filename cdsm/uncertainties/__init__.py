@@ -1,5 +1,0 @@
-"""Uncertainty of stiffnesses and other readings of an arm that follows from its tolerances.
-
-Uncertainty budgets follow the *Guide to the expression of uncertainty in measurement*
-(JCGM 100:2008), Monte Carlo runs its Supplement 1 (JCGM 101:2008).
-"""

@@ -1,0 +1,151 @@
+"""Ranges and plans of arms that slide, hang slack, hold forces, have own laws or few cables."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm import presets
+from tests.planning.test_range import BUMP
+from tests.support import arms, foreign
+from tests.support.locked import BUCKLING, STRAND, soft_hinge, some_arm
+from tests.support.paths import DOWN
+
+
+def finger() -> cdsm.Posture:
+    """A hinge and a slide; the slide has 10^5 N/m, which must not count as 10^5 N m/rad."""
+    urdf = "\n".join(
+        [
+            '<robot name="finger">',
+            foreign.link_element("palm", 0.1),
+            foreign.link_element("bone", 0.02),
+            foreign.link_element("nail", 0.01),
+            foreign.joint_element("a", "revolute", "palm", "bone", "0 0 0", "0 0 0", "0 1 0"),
+            foreign.joint_element("b", "prismatic", "bone", "nail", "0.05 0 0", "0 0 0", "1 0 0"),
+            "</robot>",
+        ]
+    )
+    law = cdsm.LinearElasticity(4e3)
+    sides = [(0.003, 0.003), (-0.003, -0.004), (0.003, -0.004), (-0.004, 0.003)]
+    ends = [(("palm", (-0.01, 0.0, z)), ("nail", (0.0, 0.0, w))) for z, w in sides] + [
+        (("bone", (0.08, 0.0, z)), ("nail", (-0.005, 0.0, z))) for z in (0.004, -0.004)
+    ]
+    cables = [
+        cdsm.Cable(f"c{i}", (cdsm.Site(*a), cdsm.Site(*b)), law) for i, (a, b) in enumerate(ends)
+    ]
+    return cdsm.Manipulator.from_urdf(urdf, cables, tip="nail").at([0.05, 0.002])
+
+
+def of_law(law: cdsm.Elasticity) -> cdsm.Posture:
+    return arms.random_posture(arms.random_arm(2, 3, "hinged", law), 2, 0.4)
+
+
+def own_law(F: Any) -> Any:
+    return 2e3 + 40.0 * F
+
+
+ARMS: dict[str, Callable[[], cdsm.Posture]] = {
+    "slide": finger,
+    "own law": lambda: of_law(cdsm.Elasticity.from_rigidity(own_law, 1.0, 500.0)),
+    "law that falls": lambda: of_law(BUMP),
+    "slack branch": lambda: of_law(STRAND.slack_below()),
+    "forces": lambda: arms.random_posture(some_arm("mixed-3-0-all"), 11, 0.25),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_targets_within_the_range_are_hit(name: str) -> None:
+    """From 0.5 N, below the low end of a strand, where its slack branch holds."""
+    pose = ARMS[name]()
+    low = 0.5 if name == "slack branch" else 40.0 if name == "forces" else 5.0
+    high = 300.0 if name == "forces" else 60.0
+    found = cdsm.stiffness_range(pose, "z", low, high, starts=6)
+    assert found.high > 1.001 * found.low
+    least = cdsm.distribute_tension(pose, low, high)
+    for part in (0.02, 0.5, 0.98):
+        target = found.low + part * (found.high - found.low)
+        plan = cdsm.plan_stiffness(pose, "z", target, low, high)
+        F = plan.tension.values
+        assert cdsm.stiffness(pose, F).along("z") == pytest.approx(target, rel=1e-6)
+        assert (low <= F).all()
+        assert F.max() <= high
+        assert abs(plan.tension.residual).max() < 1e-10
+        assert np.linalg.norm(F) >= np.linalg.norm(least.values) * (1.0 - 1e-12)
+
+
+def test_at_least_as_stiff_costs_no_more_than_exactly_as_stiff() -> None:
+    pose = arms.random_posture(arms.random_arm(3, 3, "universal", STRAND), 3, 0.4)
+    found = cdsm.stiffness_range(pose, DOWN, 40.0, 300.0)
+    least = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 40.0, 300.0))
+    for target in (0.5 * (found.low + found.high), found.low):
+        plan = cdsm.plan_stiffness(pose, DOWN, target, 40.0, 300.0, at_least=True)
+        exact = cdsm.plan_stiffness(pose, DOWN, target, 40.0, 300.0)
+        assert plan.reached
+        assert plan.achieved >= target * (1.0 - 1e-6)
+        assert np.linalg.norm(plan.tension) <= np.linalg.norm(exact.tension) * (1.0 + 1e-6)
+        if target < least.along(DOWN):  # the least tensions will do
+            np.testing.assert_allclose(plan.tension, least.tension, rtol=1e-6)
+    with pytest.raises(cdsm.UnreachableStiffness):
+        cdsm.plan_stiffness(pose, DOWN, 1.01 * found.high, 40.0, 300.0, at_least=True)
+
+
+def test_unstable_least_tensions_do_not_hide_stable_ones() -> None:
+    """Eq. 19 starts soft: an arm that stands on its joints needs tension to stand."""
+    geometry = presets.experimental_prototype_geometry(link_mass=0.6, lead=2.0)
+    arm = cdsm.Manipulator(geometry, STRAND, gravity=(-9.81, 0.0, 0.0))
+    pose = arm.at([0.05, -0.1, 0.05])
+    assert not cdsm.stiffness(pose, cdsm.distribute_tension(pose, 3.0)).is_stable
+    found = cdsm.stiffness_range(pose, DOWN, 3.0)
+    for pull in (found.low_tension, found.high_tension):
+        assert cdsm.stiffness(pose, pull).margin >= found.floor * (1.0 - 1e-9)
+    assert found.low < 0.01 * found.high
+
+
+@pytest.mark.parametrize("above", [-1e-3, 1e-3])
+def test_arm_is_held_exactly_as_long_as_some_tension_holds_it(above: float) -> None:
+    """From the critical tension on no tensions do: all are larger."""
+    pose, minimum = soft_hinge().at([0.0]), BUCKLING * (1.0 + above)
+    if above < 0.0:
+        assert cdsm.stiffness_range(pose, DOWN, minimum).high > 0.0
+    else:
+        with pytest.raises(cdsm.SingularStiffness, match=r"joint1 most.*lower minimum="):
+            cdsm.stiffness_range(pose, DOWN, minimum)
+
+
+def test_arm_of_force_controlled_cables_is_told_why_nothing_holds_it() -> None:
+    arm = presets.virtual_prototype()
+    cables = [replace(cable, control="force") for cable in arm.cables]
+    pose = cdsm.Manipulator(arm.geometry, cables=cables, gravity=arm.gravity).at(np.full(10, 0.1))
+    for plan in (cdsm.stiffness_range, cdsm.saturation):
+        with pytest.raises(cdsm.SingularStiffness, match='control="position"') as caught:
+            plan(pose, DOWN, 50.0, 500.0)
+        assert caught.value.direction.shape == (10,)
+
+
+@pytest.mark.parametrize("gravity", [-9.81, 0.0])
+def test_too_few_cables_are_counted(gravity: float) -> None:
+    whole = arms.random_arm(1, 6, "universal", STRAND)
+    arm = cdsm.Manipulator(whole.geometry, cables=whole.cables[-6:], gravity=(0.0, 0.0, gravity))
+    error = cdsm.InfeasibleTension if gravity else cdsm.SingularStiffness
+    said = "6 cables alone cannot hold 12 joints: .* at least 13"
+    for ask in (cdsm.stiffness_range, cdsm.saturation):
+        with pytest.raises(error, match=said):
+            ask(arm.at(np.full(12, 0.05)), DOWN, 10.0, 200.0)
+
+
+def test_advice_names_the_bound_that_rules() -> None:
+    arm = presets.virtual_prototype(STRAND)
+    first = replace(arm.cables[0], minimum=300.0)
+    pose = arm.with_cables([first, *arm.cables[1:]]).at(np.full(10, 0.1))
+    own = f"lower the minimum of {first.name} itself"
+    with pytest.raises(cdsm.InfeasibleTension, match=own):
+        cdsm.plan_stiffness(pose, DOWN, 8e4, 0.0, [310.0, *[40.0] * 14])
+    with pytest.raises(cdsm.UnreachableStiffness, match="raise maximum="):
+        cdsm.plan_stiffness(pose, DOWN, 1e6, 20.0, 600.0)
+    stretched = replace(first, minimum=900.0)
+    pose = arm.with_cables([stretched, *arm.cables[1:]]).at(np.full(10, 0.1))
+    with pytest.raises(cdsm.ElasticityRangeError, match=own):
+        cdsm.plan_stiffness(pose, DOWN, 8e4, 20.0)

@@ -1,0 +1,203 @@
+"""Files that were cut, shuffled and renumbered: an error of ours, or numbers, and nothing else."""
+
+import random
+import re
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.cli.path_file import read_path
+from tests.interchange.test_caspr import cable, folder, link
+from tests.support.arms import mixed_arm
+from tests.support.foreign import TREE, crab
+from tests.support.sweeps import short_arm
+
+LAW = cdsm.LinearElasticity(1e4)
+
+
+class Reader(NamedTuple):
+    """How a kind of file is read.
+
+    Attributes:
+        file: Its name in the folder of :func:`whole_files`.
+        read: From its path to whatever it describes.
+    """
+
+    file: str
+    read: Callable[[Path], Any]
+
+
+def _arm(arm: cdsm.Manipulator) -> cdsm.Stiffness:
+    """What is read is used, too."""
+    q = np.clip(np.full(arm.nv, 0.05), arm.lower, arm.upper)
+    K = cdsm.stiffness(arm.at(q), np.full(len(arm.cables), 20.0))
+    assert np.isfinite(K.joint).all()
+    cdsm.to_mjcf(arm)
+    return K
+
+
+def _geometry(path: Path) -> cdsm.Stiffness:
+    return _arm(cdsm.Manipulator(cdsm.Geometry.read(path), LAW))
+
+
+def _elasticity(path: Path) -> None:
+    law = cdsm.Elasticity.read(path)
+    last = min(law.high, law.low + 1e3)
+    F = np.linspace(law.low, last, 7)
+    assert np.isfinite([law.rigidity(F), law.strain(F), law.energy(F)]).all()
+
+
+def _tensile(path: Path) -> None:
+    test = cdsm.read_tensile_csv(path)
+    assert np.isfinite(test.displacement).all()
+    assert np.isfinite(test.force).all()
+
+
+def _path(path: Path) -> None:
+    found = read_path(path, short_arm())
+    for array in (found.angles, found.tips, found.target):
+        assert array is None or np.isfinite(array).all()
+
+
+READERS: dict[str, Reader] = {
+    "geometry": Reader("full.toml", _geometry),
+    "short geometry": Reader("short.toml", _geometry),
+    "arm": Reader("arm.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
+    "arm of a urdf": Reader("finger.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
+    "cables": Reader("cables.toml", lambda path: _arm(crab().with_cables(cdsm.read_cables(path)))),
+    "linear wire": Reader("linear.toml", _elasticity),
+    "strand": Reader("strand.toml", _elasticity),
+    "table": Reader("table.toml", _elasticity),
+    "urdf": Reader(
+        "robot.urdf",
+        lambda path: _arm(cdsm.Manipulator.from_urdf(path, crab().cables, tip="tip")),
+    ),
+    "caspr bodies": Reader(
+        "toy_bodies.xml", lambda path: _arm(cdsm.read_caspr(path.parent, elasticity=LAW))
+    ),
+    "caspr cables": Reader(
+        "toy_cables.xml", lambda path: _arm(cdsm.read_caspr(path.parent, elasticity=LAW))
+    ),
+    "tensile test": Reader("tensile.csv", _tensile),
+    "path": Reader("path.csv", _path),
+}
+
+
+def whole_files(path: Path) -> Path:
+    """Fill a folder with a whole file for every reader."""
+    mixed_arm().geometry.write(path / "full.toml")
+    (path / "short.toml").write_text(
+        "[universal]\njoints = 5\ncables_per_joint = 3\nlink_length = 0.04\nbase_length = 0.02\n"
+        "disk_offset = 0.01\nhole_radius = 0.03\nlink_mass = 0.5\n",
+        encoding="utf-8",
+    )
+    mixed_arm().write(path / "arm.toml")
+    crab().write(path / "finger.toml")
+    cdsm.write_cables(crab().cables, path / "cables.toml")
+    LAW.write(path / "linear.toml")
+    cdsm.presets.STRAND_1X19.write(path / "strand.toml")
+    table = cdsm.TabulatedElasticity((0.0, 20.0, 100.0, 300.0), (0.0, 2e-3, 5e-3, 9e-3))
+    table.write(path / "table.toml")
+    (path / "robot.urdf").write_text(TREE, encoding="utf-8")
+    folder(path, link(1, "R_Y") + link(2, "U_XZ"), cable())
+    rows = "\n".join(f"{0.01 * i:.3f},{3.0 * i:.2f}" for i in range(20))
+    (path / "tensile.csv").write_text(
+        f"# gauge_length = 500 mm\ndisplacement [mm],force [N]\n{rows}\n", encoding="utf-8"
+    )
+    joints = ",".join(f"{name} [deg]" for name in short_arm().joint_names)
+    rows = "\n".join(",".join([str(i)] * short_arm().nv) + ",1.5" for i in range(6))
+    (path / "path.csv").write_text(f"# a path\n{joints},target [N/mm]\n{rows}\n", encoding="utf-8")
+    return path
+
+
+# --- mutations ------------------------------------------------------------------------------
+
+TOKENS = (
+    *("nan", "inf", "-1", "1e400", "1e-320", "0", "0 0 0", "1 2", "9" * 25, "true", "é", "\n"),
+    *('""', "<", ">", "&lt;", "&x;", "'", '"', "[", "]", "{", "}", "<!--", "-->", "<![CDATA["),
+    *("=", ",", ";", "\t", "\r", "#", "[[", "]]", ".", "0x1", "1_0", "٣", "𝟛", "１"),
+    *("revolute", "prismatic", "fixed", "continuous", "link", "name", "tip", "null", "mm"),
+    *(b"\x00", b"\xff", b"\xfe\xff", b"\xef\xbb\xbf", b"\xed\xa0\x80", b"\x1a", b"\x85", b"\x0c"),
+)
+NUMBERS = (
+    *("nan", "inf", "-1", "0", "1e300", "-1e300", "1e-300", "1e12", "x", "", " 1 1", "-0.0"),
+    *("5e-324", "1e999", "0x10", "1e15", "1e16", "2147483648", "-9223372036854775809"),
+)
+
+
+def _bytes(token: str | bytes) -> bytes:
+    return token.encode() if isinstance(token, str) else token
+
+
+def shuffled(whole: bytes, rng: random.Random) -> bytes:
+    """A few cuts, insertions, flipped bits, changed bytes and repeated pieces."""
+    data = bytearray(whole)
+    for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
+        i = rng.randrange(len(data))
+        what = rng.random()
+        if what < 0.25:
+            del data[i : i + rng.randrange(1, 12)]
+        elif what < 0.5:
+            data[i:i] = _bytes(rng.choice(TOKENS))
+        elif what < 0.65:
+            data[i] = rng.randrange(32, 127)
+        elif what < 0.75:
+            data[i] ^= 1 << rng.randrange(8)
+        elif what < 0.8:
+            del data[i:]
+        else:
+            j = rng.randrange(len(data))
+            data[i:i] = data[j : j + rng.randrange(1, 60)]
+        data = data or bytearray(b"x")
+    return bytes(data)
+
+
+def renumbered(whole: bytes, rng: random.Random) -> bytes:
+    """One number replaced by one that is none, or too large, or too small."""
+    found = rng.choice(list(re.finditer(rb"-?\d+\.?\d*(?:e-?\d+)?", whole)))
+    return whole[: found.start()] + _bytes(rng.choice(NUMBERS)) + whole[found.end() :]
+
+
+def rearranged(whole: bytes, rng: random.Random) -> bytes:
+    """Lines or elements left out, doubled or exchanged."""
+    parts = re.split(rb"(?<=[\n>,])", whole)
+    i, j = rng.randrange(len(parts)), rng.randrange(len(parts))
+    what = rng.random()
+    if what < 0.3:
+        del parts[i]
+    elif what < 0.6:
+        parts.insert(j, parts[i])
+    else:
+        parts[i], parts[j] = parts[j], parts[i]
+    return b"".join(parts)
+
+
+MUTATIONS = (shuffled, renumbered, rearranged)
+FILES = 75
+"""Files of each kind."""
+
+
+def outcome(reader: Reader, path: Path) -> str:
+    """``read``, or the error of the library's own that a file is refused with."""
+    try:
+        reader.read(path)
+    except cdsm.CdsmError as error:
+        return type(error).__name__
+    return "read"
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_mutated_files_are_refused_or_read(name: str, tmp_path: Path) -> None:
+    path = whole_files(tmp_path) / READERS[name].file
+    whole, rng = path.read_bytes(), random.Random(f"{name} 1")
+    counts = Counter[str]()
+    for i in range(FILES):
+        path.write_bytes(MUTATIONS[i % len(MUTATIONS)](whole, rng))
+        counts[outcome(READERS[name], path)] += 1
+    # the changes do spoil something, and not everything
+    assert FILES > counts["read"] > 0

@@ -1,0 +1,137 @@
+"""Equilibria and load cycles of arms with sliding joints, laws of a user, and cables of force."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.support.values import Array
+from tests.support.locked import original_lengths
+
+STIFFENING = cdsm.Elasticity.from_rigidity(lambda F: 4e3 * (1.0 + F / 50.0), 0.0, 2000.0)
+LAWS = {"linear": cdsm.LinearElasticity(2e4), "user": STIFFENING}
+
+URDF = """<robot name="lift">
+  <link name="base"/>
+  <link name="carriage"><inertial><origin xyz="0 0 0"/><mass value="0.5"/>
+    <inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="arm"><inertial><origin xyz="0.1 0 0"/><mass value="0.2"/>
+    <inertia ixx="1e-4" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="tool"/>
+  <joint name="slide" type="prismatic"><parent link="base"/><child link="carriage"/>
+    <axis xyz="0 0 1"/><limit lower="-0.05" upper="0.05" effort="100" velocity="1"/></joint>
+  <joint name="turn" type="revolute"><parent link="carriage"/><child link="arm"/>
+    <axis xyz="0 1 0"/><limit lower="-0.6" upper="0.6" effort="100" velocity="1"/></joint>
+  <joint name="end" type="fixed"><parent link="arm"/><child link="tool"/>
+    <origin xyz="0.2 0 0"/></joint>
+</robot>"""
+
+
+def lift(law: cdsm.Elasticity, forced: tuple[str, ...] = (), friction: float = 0.0) -> Any:
+    """A carriage on a slide, held from above and below, and a hinge held by two cables."""
+
+    def cable(name: str, *sites: tuple[str, tuple[float, float, float]]) -> cdsm.Cable:
+        places = [cdsm.Site(link, place) for link, place in sites]
+        if len(places) > 2:
+            places[1] = cdsm.Site(*sites[1], friction=friction)
+        control: cdsm.cable.Control = "force" if name in forced else "position"
+        return cdsm.Cable(name, tuple(places), law, lead=0.0, control=control)
+
+    cables = [
+        cable("up", ("base", (0.0, 0.02, 0.3)), ("carriage", (0.0, 0.02, 0.02))),
+        cable("down", ("base", (0.0, -0.02, -0.3)), ("carriage", (0.0, -0.02, -0.02))),
+        *(
+            cable(
+                name,
+                ("base", (-0.1, 0.0, s * 0.25)),
+                ("carriage", (-0.03, 0.0, s * 0.06)),
+                ("arm", (0.12, 0.0, s * 0.02)),
+            )
+            for name, s in (("over", 1.0), ("under", -1.0))
+        ),
+    ]
+    return cdsm.Manipulator.from_urdf(URDF, cables=cables, tip="tool")
+
+
+def potential(pose: cdsm.Posture, tension: Array, force: Array, there: cdsm.Posture) -> float:
+    """Energy of cables, weights and a dead force at a posture; locked at ``pose``."""
+    arm, slide = there.link_pose("arm"), float(there.q[0])
+    total = 9.81 * (0.5 * slide + 0.2 * (arm @ [0.1, 0.0, 0.0, 1.0])[2]) - force @ there.tip[:3, 3]
+    longer = there.cable_lengths - (free := original_lengths(pose, tension))
+    for cable, l_0, more, F in zip(pose.arm.cables, free, longer, tension, strict=True):
+        held = cable.control == "position"
+        total += cable.energy(cable.tension(more, l_0), l_0) if held else F * more
+    return float(total)
+
+
+FORCED = {"locked": (), "one force": ("over",), "two forces": ("up", "under")}
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("forced", FORCED)
+def test_rest_is_the_minimum_of_the_potential(law: str, forced: str) -> None:
+    arm = lift(LAWS[law], FORCED[forced])
+    pose = arm.at([0.01, 0.1])
+    pull = cdsm.distribute_tension(pose, 30.0)
+    force = np.array([2.0, 0.0, -6.0])
+    rest = cdsm.equilibrium(pose, pull, np.append(force, np.zeros(3)))
+    assert rest.stable
+    assert abs(rest.residual).max() < 1e-10
+    assert abs(rest.pose.q - pose.q).max() > 1e-4
+    least, rng = potential(pose, pull.values, force, rest.pose), np.random.default_rng(2)
+    for _ in range(10):
+        step = 1e-4 * rng.normal(size=2)
+        there = potential(pose, pull.values, force, arm.at(rest.pose.q + step))
+        rise = step @ rest.stiffness.joint @ step / 2.0
+        assert there - least == pytest.approx(rise, rel=0.05)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("forced", FORCED)
+def test_load_cycle_without_friction_and_weight_test_give_the_same_rest(
+    law: str, forced: str
+) -> None:
+    pose = lift(LAWS[law], FORCED[forced]).at([0.01, 0.1])
+    pull = cdsm.distribute_tension(pose, 30.0)
+    force = np.array([0.0, 0.0, -6.0])
+    rest = cdsm.equilibrium(pose, pull, np.append(force, np.zeros(3)))
+    cycle = cdsm.load_cycle(pose, pull, np.append(force, np.zeros(3))[None])
+    np.testing.assert_allclose(cycle.angles[-1], rest.pose.q, atol=1e-9)
+    test = cdsm.weight_test(pose, pull, force, steps=2)
+    np.testing.assert_allclose(test.states[-1].pose.q, rest.pose.q, atol=1e-9)
+    assert test.stiffness == pytest.approx(6.0 / abs(rest.displacement[2]), rel=1e-9)
+
+
+def test_stop_of_a_slide_carries_what_the_cables_do_not() -> None:
+    pose = lift(LAWS["linear"]).at([0.045, 0.0])
+    pull = cdsm.distribute_tension(pose, 30.0)
+    rest = cdsm.equilibrium(pose, pull, [0.0, 0.0, 4000.0, 0.0, 780.0, 0.0])
+    assert rest.at_limit == ("slide",)
+    assert rest.pose.q[0] == pytest.approx(0.05, abs=1e-15)
+    assert rest.stop_torque[0] < 0.0
+    assert "which pushes with" in str(rest)
+    assert "N" in str(rest)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("forced", FORCED)
+def test_friction_loops_close_and_lose_work(law: str, forced: str) -> None:
+    pose = lift(LAWS[law], FORCED[forced], friction=0.2).at([0.01, 0.1])
+    pull = cdsm.distribute_tension(pose, 30.0)
+    path = np.zeros((40, 6))
+    path[:, 2] = 8.0 * np.sin(np.linspace(0.0, 4.0 * math.pi, 41)[1:])
+    history = cdsm.load_cycle(pose, pull, path)
+    assert not history.snaps.any()
+    np.testing.assert_allclose(history.tip[39], history.tip[19], atol=1e-4 * _span(history.tip))
+    z, f = history.tip[19:, 2], history.wrenches[19:, 2]
+    work = float(np.diff(z) @ (f[1:] + f[:-1]) / 2.0)
+    assert work == pytest.approx(history.dissipated[20:].sum(), rel=0.05, abs=1e-9)
+    for T, cable in zip(history.tensions, pose.arm.cables, strict=True):
+        if cable.control == "force":  # its motor holds the tension
+            np.testing.assert_allclose(T[:, 0], pull[cable.name], rtol=1e-12)
+
+
+def _span(tip: Array) -> float:
+    return float(np.ptp(tip, axis=0).max())
