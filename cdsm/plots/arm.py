@@ -154,7 +154,9 @@ def frame_arms(axes: Any, label: str = "{} [mm]") -> Array:
     for name, middle, size in zip("xyz", limits.mean(axis=1), ranges, strict=True):
         ticks = MaxNLocator(max(2, round(5.0 * size / ranges.max())), prune="both")
         getattr(axes, f"{name}axis").set_major_locator(ticks)
-        getattr(axes, f"set_{name}label")(label.format(name), labelpad=-6.0)
+        getattr(axes, f"set_{name}label")(
+            label.format(name), labelpad=-3.0 if name == "x" else -6.0
+        )
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     axes.tick_params(pad=-3.0)
     axes.set_box_aspect(ranges)
@@ -173,12 +175,12 @@ def finish(
     side = abs(np.array([math.sin(_AZIMUTH), math.cos(_AZIMUTH), 0.0]))
     up = abs(np.array([*(math.sin(_ELEVATION) * side[[1, 0]]), math.cos(_ELEVATION)]))
     width = style.ONE_COLUMN * (1.0 if colors is None else 0.82)
-    scale = (width - 0.8) / float(side @ ranges)  # inch per mm
+    scale = (width - 0.95) / float(side @ ranges)  # inch per mm
     below = 0.3 if axes.get_legend_handles_labels()[0] else 0.05
     height = scale * float(up @ ranges) + 0.4
     total = height + below + 0.25
     figure.set_size_inches(style.ONE_COLUMN, total)
-    axes.set_position((-0.09, (below + 0.14) / total, width / style.ONE_COLUMN, height / total))
+    axes.set_position((-0.07, (below + 0.14) / total, width / style.ONE_COLUMN, height / total))
     zoom = _UNZOOMED * scale * float(np.linalg.norm(ranges)) / min(height, width)
     axes.set_box_aspect(ranges, zoom=zoom)
     for artist in (*axes.lines, *axes.collections):

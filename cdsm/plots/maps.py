@@ -35,6 +35,10 @@ _WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest 
 _ROBUST: Final = (2.0, 98.0)  # percentiles at the ends of the colours, as in xarray
 _FLAT = 1e-9  # tips are in a plane if an extent is below this part of the largest
 _THIN = 0.3  # least ratio of the sides of a map, which leaves room for its labels
+_MARGIN = 0.05  # around the tips, over their largest extent
+_TALLEST = 2.3  # largest height of a map [inch]
+_LABELS = 0.75  # space for the labels beside and below a map [inch]
+_BAR, _HEADING = 1.0, 0.6  # width of the colour bar with its label, height of the title [inch]
 _HUGE = 1e300
 _SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
 
@@ -82,7 +86,7 @@ def plot_map(
 
     Args:
         dataset: Result of :func:`~cdsm.sweep` with the output ``tip_position``. Use ``sel`` if it
-            has more than 9 style.panels.
+            has more than 9 panels.
         quantity: Quantity with one number per entry: ``"softest"``, ``"stiffest"``,
             ``"isotropy"``, ``"margin"``; or ``"along"`` (a panel for each direction).
         section: Axis, position and half thickness [m] of a slab. Only tips inside it are shown.
@@ -91,7 +95,7 @@ def plot_map(
         bins: Number of cells along the longest side of a map.
 
     Raises:
-        InvalidInput: ``dataset`` is not a sweep or has too many style.panels or no such quantity,
+        InvalidInput: ``dataset`` is not a sweep or has too many panels or no such quantity,
             ``quantity`` has more than one number per entry, ``section`` is invalid or contains no
             tip, the statistic is unknown, or ``bins`` is not a whole number from 2 to 500.
         MissingExtra: xarray is not installed.
@@ -118,12 +122,21 @@ def plot_map(
         statistic = "median"
     columns = 2 if len(maps) == 4 else min(len(maps), 3)
     rows = -(-len(maps) // columns)
-    figure, grid = style.panels(style.TWO_COLUMNS, 0.9 + 2.6 * rows, columns, rows)
+    limits = [_limits(each.points, bins) for each in maps]
+    shapes = [float(np.ptp(x) / np.ptp(y)) for x, y in limits]
+    shares = [max(shapes[column::columns]) for column in range(columns)]
+    width = style.ONE_COLUMN if columns == 1 else style.TWO_COLUMNS
+    size = min(_TALLEST, (width - _BAR - _LABELS * columns) / sum(shares))
+    height = _HEADING + rows * (size + _LABELS)
+    figure, grid = style.panels(width, height, columns, rows, width_ratios=shares)
+    figure.set_layout_engine("compressed")  # panels with equal axes stand side by side
     colors, extend = _colors(every)
     for axes in grid.ravel()[len(maps) :]:
         axes.set_axis_off()
-    for axes, each in zip(grid.ravel(), maps, strict=False):
+    for axes, each, (x, y), shape in zip(grid.ravel(), maps, limits, shapes, strict=False):
         _draw(axes, each, colors, statistic, bins)
+        axes.set(xlim=x, ylim=y, aspect="equal")
+        axes.locator_params("x", nbins=max(2, round(5.0 * min(1.0, shape))))
         axes.set_title(textwrap.fill(each.title, 110 // columns))
     name = dataset[quantity].long_name.split(",")[0]
     title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
@@ -132,7 +145,8 @@ def plot_map(
         unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))[1]
         label = f"{f'{statistic} of a cell: ' if statistic else ''}{name} [{unit}]{sign}"
         label = textwrap.fill(label, 45)
-        bar = figure.colorbar(colors, ax=grid, extend=extend, extendfrac=0.02, label=label)
+        look = {"extend": extend, "extendfrac": 0.02, "aspect": 20 * rows}
+        bar = figure.colorbar(colors, ax=grid, label=label, **look)
         if isinstance(colors.norm, LogNorm):
             bar.ax.yaxis.set_major_formatter("{x:g}")
             bar.ax.yaxis.set_minor_formatter(NullFormatter())
@@ -241,19 +255,29 @@ def _draw(
     else:
         from scipy.stats import binned_statistic_2d  # here, because it imports slowly
 
-        low, high = points.min(axis=0), points.max(axis=0)
-        size = float((high - low).max()) / bins or 1.0
-        edges = [np.arange(a, b + size, size) for a, b in zip(low, high + size / bins, strict=True)]
+        middle, extent = _box(points)
+        size = (1.0 + _FLAT) * float(extent.max()) / bins
+        count = np.maximum(np.ceil(extent / size), 1.0)
+        first = middle - size * count / 2.0
+        edges = [a + size * np.arange(n + 1.0) for a, n in zip(first, count, strict=True)]
         cells = binned_statistic_2d(*points[known].T, values[known], statistic, edges)
         axes.pcolormesh(*edges, np.ma.masked_invalid(cells[0].T), zorder=2, **look)
     if look["cmap"].name == "PuOr":  # the middle of the scale is white
         axes.set_facecolor("0.88")
     for letter, axis in zip("xy", shown.plane, strict=True):
         getattr(axes, f"set_{letter}label")(f"{'xyz'[axis]} [mm]")
-    ends = np.array([axes.get_xlim(), axes.get_ylim()])
-    middle, half = ends.mean(axis=1), np.ptp(ends, axis=1) / 2.0
+
+
+def _box(points: Array) -> tuple[Array, Array]:
+    """Return the middle and the extent (2,) of the box around tips (N, 2) [mm]."""
+    every = points if len(points) else np.zeros((1, 2))
+    extent = np.ptp(every, axis=0)
+    return every.min(axis=0) + extent / 2.0, extent if extent.any() else extent + 1.0
+
+
+def _limits(points: Array, bins: int) -> Array:
+    """Return the ends of both axes (2, 2) [mm] of a panel that shows ``points``, or their cells."""
+    middle, extent = _box(points)
+    half = extent / 2.0 + max(_MARGIN, 0.5 / bins) * extent.max()
     half = np.maximum(half, _THIN * half.max())
-    low, high = middle - half, middle + half
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.locator_params("x", nbins=max(2, round(5.0 * min(1.0, half[0] / half[1]))))
-    axes.set_aspect("equal")
+    return np.transpose([middle - half, middle + half])

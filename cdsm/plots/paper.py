@@ -146,7 +146,7 @@ def _plot_changes(result: paper.StiffnessFigure) -> Figure:
         rows.append((f"change, {reading} [%]", lines))
     stated = np.array([result.claims[0].paper])
     rows[1][1].append((x[-1:], stated, {**_DOT, "label": "paper, at the end"}))
-    figure, grid = _multiples(result, 5.6, rows, sharey="row")
+    figure, grid = _multiples(result, 6.2, rows, sharey="row")
     _draw_bars(grid[0], first, active)
     for axes in grid[1:].flat:
         axes.axhline(0.0, color="0.2", linewidth=0.6)
