@@ -145,7 +145,7 @@ def plot_map(
         unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))[1]
         label = f"{f'{statistic} of a cell: ' if statistic else ''}{name} [{unit}]{sign}"
         label = textwrap.fill(label, 45)
-        look = {"extend": extend, "extendfrac": 0.02, "aspect": 20 * rows}
+        look: dict[str, Any] = {"extend": extend, "extendfrac": 0.02, "aspect": 20 * rows}
         bar = figure.colorbar(colors, ax=grid, label=label, **look)
         if isinstance(colors.norm, LogNorm):
             bar.ax.yaxis.set_major_formatter("{x:g}")
