@@ -26,6 +26,7 @@ ELLIPSOID_GRID: Final = (13, 25)
 
 _LARGEST = 0.3  # largest half axis of a drawn ellipsoid, as a fraction of the arm's length
 _FLATTEST = 0.35  # smallest range of an axis, as a fraction of the largest
+_PADS: Final = {"x": -3.0, "y": -6.0, "z": -6.0}  # from the numbers of an axis to its label
 _UNZOOMED = 0.97  # side of the square of 3D axes, over the diagonal of their box at zoom 1
 _ELEVATION, _AZIMUTH = np.deg2rad((24.0, -62.0))  # of the eye
 
@@ -151,12 +152,11 @@ def frame_arms(axes: Any, label: str = "{} [mm]") -> Array:
     limits = np.reshape(axes.get_w_lims(), (3, 2))
     ranges = np.ptp(limits, axis=1)
     ranges = np.maximum(ranges, _FLATTEST * ranges.max())  # keep space around a flat arm
-    for name, middle, size in zip("xyz", limits.mean(axis=1), ranges, strict=True):
+    middles = limits.mean(axis=1)
+    for (name, pad), middle, size in zip(_PADS.items(), middles, ranges, strict=True):
         ticks = MaxNLocator(max(2, round(5.0 * size / ranges.max())), prune="both")
         getattr(axes, f"{name}axis").set_major_locator(ticks)
-        getattr(axes, f"set_{name}label")(
-            label.format(name), labelpad=-3.0 if name == "x" else -6.0
-        )
+        getattr(axes, f"set_{name}label")(label.format(name), labelpad=pad)
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     axes.tick_params(pad=-3.0)
     axes.set_box_aspect(ranges)

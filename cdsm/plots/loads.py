@@ -102,13 +102,11 @@ def plot_load_history(history: LoadHistory) -> Figure:
         left.legend()
     cable = int(np.argmax([np.ptp(T, axis=1).max() for T in history.tensions]))
     tensions, F = history.tensions[cable], history.reference_tension[cable]
-    last = tensions.shape[1] - 1
-    ends = {0: ("at the motor", style.BLUE), last: ("at the end", style.VERMILLION)}
-    for j, own in enumerate(np.vstack([np.full(last + 1, F), tensions]).T):
-        label, color = ends.get(
-            j, ("between" if j == 1 else None, str(0.4 + 0.4 * j / (last or 1)))
-        )
-        right.plot(own, color=color, label=label, lw=0.9, zorder=2.5 if j in ends else 2.0)
+    values = np.vstack([np.full(tensions.shape[1], F), tensions])
+    right.plot(values[:, 0], color=style.BLUE, linewidth=0.9, zorder=3, label="at the motor")
+    for line in right.plot(values[:, 1:-1], color="0.6", linewidth=0.9)[:1]:
+        line.set_label("between")
+    right.plot(values[:, -1], color=style.VERMILLION, linewidth=0.9, label="at the end")
     style.whole_numbers(right.xaxis)
     right.set(xlabel="number of the load", ylabel="tension of each segment [N]")
     right.legend(title=history.reference.arm.cables[cable].name, **style.BESIDE)
@@ -150,8 +148,9 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     for panel in (error, tension):
         panel.set_ylim(bottom=0.0)
     changes = t[1:][(np.diff(run.wrench, axis=0) != 0.0).any(axis=1)][:1]
-    for panel, at in ((panel, at) for panel in axes[:, 0] for at in changes):
-        panel.axvline(at, color="0.3", linewidth=0.8, linestyle=":")
+    for panel in axes[:, 0]:
+        for at in changes:
+            panel.axvline(at, color="0.3", linewidth=0.8, linestyle=":")
     danger = f"{run.warnings[0].split(':')[0]}. " if run.warnings else ""
     dotted = "; dotted: the load changes" if changes.size else ""
     style.heading(figure, f"{danger}{run.plan.arm.name}, law {run.law}{dotted}")
