@@ -26,7 +26,7 @@ ELLIPSOID_GRID: Final = (13, 25)
 
 _LARGEST = 0.3  # largest half axis of a drawn ellipsoid, as a fraction of the arm's length
 _FLATTEST = 0.35  # smallest range of an axis, as a fraction of the largest
-_PADS: Final = {"x": -3.0, "y": -6.0, "z": -6.0}  # from the numbers of an axis to its label
+_PADS: Final = {"x": -3.0, "y": -6.0, "z": -4.0}  # from the numbers of an axis to its label
 _UNZOOMED = 0.97  # side of the square of 3D axes, over the diagonal of their box at zoom 1
 _ELEVATION, _AZIMUTH = np.deg2rad((24.0, -62.0))  # of the eye
 
@@ -159,6 +159,7 @@ def frame_arms(axes: Any, label: str = "{} [mm]") -> Array:
         getattr(axes, f"set_{name}label")(label.format(name), labelpad=pad)
         getattr(axes, f"set_{name}lim")(middle - size / 2.0, middle + size / 2.0)
     axes.tick_params(pad=-3.0)
+    axes.tick_params("z", pad=0.0)
     axes.set_box_aspect(ranges)
     return np.asarray(ranges)
 

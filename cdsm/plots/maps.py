@@ -137,7 +137,7 @@ def plot_map(
         _draw(axes, each, colors, statistic, bins)
         axes.set(xlim=x, ylim=y, aspect="equal")
         axes.locator_params("x", nbins=max(2, round(5.0 * min(1.0, shape))))
-        axes.set_title(textwrap.fill(each.title, 110 // columns))
+        axes.set_title(textwrap.fill(each.title, round(14.0 * (size * shape + 0.5))))
     name = dataset[quantity].long_name.split(",")[0]
     title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
     if np.isfinite(every).any():

@@ -227,7 +227,7 @@ def _numbers(shown: Shown) -> Iterator[tuple[str, str, str]]:
 
 
 def _table(rows: Iterable[tuple[str, str, str]]) -> str:
-    lines = [f"| {what} | {value} | {unit} |" for what, value, unit in rows]
+    lines = [f"| {what} | {value} | &nbsp;{unit} |" for what, value, unit in rows]
     return "\n".join(["| | | |", "|:--|--:|:--|", *lines]) if lines else ""
 
 

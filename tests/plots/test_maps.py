@@ -85,7 +85,7 @@ def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
     figure.draw_without_rendering()
     titles = [axes.get_title() for axes in figure.axes[:9]]
     assert [each.split(",")[0] for each in titles[::3]] == [f"direction {u}" for u in "xyz"]
-    assert [each.split(", ")[1][0] for each in titles[:3]] == ["y", "z", "x"]
+    assert [each.split(",")[1].strip()[0] for each in titles[:3]] == ["y", "z", "x"]
     assert "no value" in [text.get_text() for text in figure.legends[0].get_texts()]
 
     section = plots.plot_map(found, "softest", section=("y", 0.01, 0.02))

@@ -169,7 +169,7 @@ def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force
     said = numbers(shown)
     assert said["displacement"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.displacement)
     assert said["stiffness along x, y, z"] == along(rest.stiffness)
-    listed = re.findall(r"\| (\S+) \| N", tensions_text(shown))
+    listed = re.findall(r"\| (\S+) \| &nbsp;N", tensions_text(shown))
     assert listed == [f"{F:.4g}" for F in rest.tension]
     # it moves, and by more than a stiff arm would: the direction of a wrong sign fails here
     assert float(rest.displacement @ FORCE) > 0.0
