@@ -23,8 +23,8 @@ class Parameter(NamedTuple):
     unit: str  # unit shown to people
     size: float  # size of ``unit`` in SI
     part: Literal["joints", "links", "routes", "cables"]  # of the geometry, or a Cable of the arm
-    attribute: str = ""  # its name there; empty: a change of the arm, see ``neutral``
-    neutral: float = math.nan  # value of a change that leaves the arm as it is
+    attribute: str  # its name there
+    neutral: float = math.nan  # of a change of this number: the value that leaves it as it is
 
 
 PARAMETERS: Final = {
@@ -34,10 +34,10 @@ PARAMETERS: Final = {
     "link_mass": Parameter("g", 1e-3, "links", "mass"),
     "lead": Parameter("mm", 1e-3, "routes", "lead"),
     "hole_angle": Parameter("deg", math.pi / 180.0, "routes", "angle"),
-    "phase": Parameter("deg", math.pi / 180.0, "routes", neutral=0.0),
+    "phase": Parameter("deg", math.pi / 180.0, "routes", "angle", neutral=0.0),
     "friction": Parameter("", 1.0, "cables", "friction"),
     "spring": Parameter("N/mm", 1e3, "cables", "series_stiffness"),
-    "rigidity": Parameter("", 1.0, "cables", neutral=1.0),
+    "rigidity": Parameter("", 1.0, "cables", "elasticity", neutral=1.0),
 }
 """All parameters by name; :class:`ArmParameters` explains them."""
 
@@ -78,7 +78,7 @@ class ArmParameters:
         taken = set[tuple[str, int]]()
         for name in self.names:
             kind, where = self._place(name)
-            numbers = {(PARAMETERS[kind].attribute or kind, i) for i in where}
+            numbers = {(PARAMETERS[kind].attribute, i) for i in where}
             if taken & numbers:
                 raise InvalidInput(name, f"frees {kind} of a joint twice.")
             taken |= numbers
@@ -165,14 +165,15 @@ class ArmParameters:
         """Return the values in SI that the parameter ``name`` has now."""
         kind, where = self._place(name)
         _, _, part, attribute, neutral = PARAMETERS[kind]
-        if not attribute:
+        if not math.isnan(neutral):
             return [neutral]
         if kind == "hole_radius":
             return [self._geometry.hole_radii[i] for i in where]
         if kind == "friction":
             return [max(site.friction for site in self.arm.cables[i].sites) for i in where]
-        owners: Any = self._geometry.cables if part == "routes" else self.arm.cables
-        owners = getattr(self._geometry, part) if part in ("joints", "links") else owners
+        owners: Any = self.arm.cables
+        if part != "cables":
+            owners = self._geometry.cables if part == "routes" else getattr(self._geometry, part)
         return [getattr(owners[i], attribute) for i in where]
 
 

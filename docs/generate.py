@@ -41,6 +41,7 @@ CHAPTERS = {
     "planning": "Planning",
     "tolerancing": "Uncertainty",
     "identification": "Identification",
+    "parameters": "Identification",
     "interchange": "Other programs",
     "control": "Control",
     "design": "Design",

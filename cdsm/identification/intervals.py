@@ -35,6 +35,8 @@ def interval(
     tangent = np.linalg.lstsq(beside, -jacobian[:, i], rcond=1e-6)[0]
     width = math.sqrt(rise) / float(np.linalg.norm(jacobian[:, i] + beside @ tangent))
 
+    precision = 3e-4 if problem.has_loops else 1e-6  # in half widths
+
     @cache
     def excess(u: float) -> float:
         """Return √Δχ² − √rise with x_i = u, almost linear in u; inf where there is no model."""
@@ -65,7 +67,7 @@ def interval(
                     break
             elif excess(far) >= 0.0:
                 x = best.copy()
-                x[i] = brentq(excess, near, far, xtol=1e-6 * width, rtol=1e-12)
+                x[i] = brentq(excess, near, far, xtol=precision * width, rtol=1e-12)
                 return float(problem.values(x)[i])
             else:
                 end -= abs(far - near)

@@ -20,7 +20,7 @@ TensionOf = Callable[..., Tension | ArrayLike]
 
 _DECADES = 100.0  # bounds that are positive and this factor apart: the logarithm is searched
 _STEP, _STEP_OF_LOOPS = 1e-6, 1e-5  # of finite differences; loops are less exact, and have kinks
-_FINE, _OF_LOOPS = 1e-12, 1e-6  # relative fall of χ² at which a search ends
+_FALL = (1e-12, 1e-6), (1e-6, 1e-5)  # of χ², at which a search ends: fine, coarse; with loops
 _INSIDE = 1e-6  # nearest start to a bound: a search that starts on a bound may stay there
 
 
@@ -172,9 +172,9 @@ class Problem:
             lambda part: self.jacobian(at(part), moving),
             bounds=(0.0, 1.0),
             x_scale="jac",
-            ftol=_OF_LOOPS if coarse or self.has_loops else _FINE,
-            xtol=1e-8 if coarse or self.has_loops else _FINE,
-            gtol=_FINE,
+            ftol=_FALL[self.has_loops][coarse],
+            xtol=1e-8 if coarse or self.has_loops else 1e-12,
+            gtol=1e-12,
             max_nfev=200,
         )
         return at(found.x)

@@ -87,3 +87,30 @@ def test_the_arm_keeps_its_tolerances() -> None:
     tolerances = cdsm.Tolerances(lead=1e-3)
     arm = ARM.with_tolerances(tolerances)
     assert cdsm.ArmParameters(arm, ("lead",))(lead=0.2).tolerances == tolerances
+
+
+def test_a_cable_has_parameters_of_its_own() -> None:
+    names = ("phase@1", "hole_angle@cable2_1", "lead@cable2_1", "friction@cable1_2")
+    parameters = cdsm.ArmParameters(ARM, names)
+    assert parameters.present["phase@1"] == 0.0
+    assert parameters.present["lead@cable2_1"] == 0.3
+    values = {"phase@1": 0.1, "hole_angle@cable2_1": 0.2, "lead@cable2_1": 0.5}
+    arm = parameters(**values, **{"friction@cable1_2": 0.3})
+    routes, old = arm.geometry.cables, GEOMETRY.cables
+    assert routes[0].angle == pytest.approx(old[0].angle + 0.1)
+    assert (routes[3].angle, routes[3].lead, routes[4].lead) == (0.2, 0.5, 0.3)
+    y, z = arm.cables[3].sites[0].position[1:]
+    assert math.atan2(z, y) == pytest.approx(0.2)
+    assert arm.cables[1].sites[0].friction == 0.3 != arm.cables[0].sites[0].friction
+    with pytest.raises(cdsm.InvalidInput, match="twice"):
+        cdsm.ArmParameters(ARM, ("lead@2", "lead@cable2_1"))
+    with pytest.raises(cdsm.InvalidInput, match="twice"):
+        cdsm.ArmParameters(ARM, ("phase", "hole_angle@cable2_1"))
+    with pytest.raises(cdsm.UnknownName, match="cable9_1"):
+        cdsm.ArmParameters(ARM, ("lead@cable9_1",))
+
+
+def test_one_radius_of_all_holes_is_that_of_the_geometry() -> None:
+    geometry = cdsm.ArmParameters(ARM, ("hole_radius",))(hole_radius=0.03).geometry
+    assert geometry.hole_radius == 0.03
+    assert geometry.hole_radii == (0.03, 0.03)
