@@ -37,6 +37,7 @@ _FLAT = 1e-9  # tips are in a plane if an extent is below this part of the large
 _THIN = 0.3  # least ratio of the sides of a map, which leaves room for its labels
 _MARGIN = 0.05  # around the tips, over their largest extent
 _TALLEST = 2.3  # largest height of a map [inch]
+_CHARACTERS = 15.0  # of a label in an inch
 _LABELS = 0.75  # space for the labels beside and below a map [inch]
 _BAR, _HEADING = 1.0, 0.6  # width of the colour bar with its label, height of the title [inch]
 _HUGE = 1e300
@@ -120,16 +121,9 @@ def plot_map(
         )
     if statistic is None and len(slabs) == 3 and not path:
         statistic = "median"
-    columns = 2 if len(maps) == 4 else min(len(maps), 3)
-    rows = -(-len(maps) // columns)
     limits = [_limits(each.points, bins) for each in maps]
     shapes = [float(np.ptp(x) / np.ptp(y)) for x, y in limits]
-    shares = [max(shapes[column::columns]) for column in range(columns)]
-    width = style.ONE_COLUMN if columns == 1 else style.TWO_COLUMNS
-    size = min(_TALLEST, (width - _BAR - _LABELS * columns) / sum(shares))
-    height = _HEADING + rows * (size + _LABELS)
-    figure, grid = style.panels(width, height, columns, rows, width_ratios=shares)
-    figure.set_layout_engine("compressed")  # panels with equal axes stand side by side
+    figure, grid, size = _panels(shapes)
     colors, extend = _colors(every)
     for axes in grid.ravel()[len(maps) :]:
         axes.set_axis_off()
@@ -137,15 +131,15 @@ def plot_map(
         _draw(axes, each, colors, statistic, bins)
         axes.set(xlim=x, ylim=y, aspect="equal")
         axes.locator_params("x", nbins=max(2, round(5.0 * min(1.0, shape))))
-        axes.set_title(textwrap.fill(each.title, round(14.0 * (size * shape + 0.5))))
+        axes.set_title(textwrap.fill(each.title, round(_CHARACTERS * (size * shape + 0.5))))
     name = dataset[quantity].long_name.split(",")[0]
     title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
     if np.isfinite(every).any():
         sign = "; below 0: unstable" if quantity == "margin" else ""
         unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))[1]
         label = f"{f'{statistic} of a cell: ' if statistic else ''}{name} [{unit}]{sign}"
-        label = textwrap.fill(label, 45)
-        look: dict[str, Any] = {"extend": extend, "extendfrac": 0.02, "aspect": 20 * rows}
+        label = textwrap.fill(label, round(_CHARACTERS * len(grid) * (size + 0.5)))
+        look: dict[str, Any] = {"extend": extend, "extendfrac": 0.02, "aspect": 20 * len(grid)}
         bar = figure.colorbar(colors, ax=grid, label=label, **look)
         if isinstance(colors.norm, LogNorm):
             bar.ax.yaxis.set_major_formatter("{x:g}")
@@ -155,6 +149,19 @@ def plot_map(
     style.heading(figure, title)
     style.legend_below(figure, grid, 2)
     return figure
+
+
+def _panels(shapes: list[float]) -> tuple[Figure, Any, float]:
+    """Return a figure, its panels, and their height [inch]; ``shapes`` are widths over heights."""
+    columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
+    rows = -(-len(shapes) // columns)
+    shares = [max(shapes[column::columns]) for column in range(columns)]
+    width = style.ONE_COLUMN if columns == 1 else style.TWO_COLUMNS
+    size = min(_TALLEST, (width - _BAR - _LABELS * columns) / sum(shares))
+    height = _HEADING + rows * (size + _LABELS)
+    figure, grid = style.panels(width, height, columns, rows, width_ratios=shares)
+    figure.set_layout_engine("compressed")  # panels with equal axes stand side by side
+    return figure, grid, size
 
 
 def _maps(
