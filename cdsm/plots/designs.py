@@ -45,10 +45,10 @@ def plot_designs(found: DesignSearch) -> Figure:
     if len(objectives) == 1:
         figure, axes = panels(ONE_COLUMN, 2.4, 1)
         panel = axes[0, 0]
-        steps = [step for step in found.history if step.feasible]
-        counts = [step.designs for step in steps]
-        best = [step.best / scales[0] for step in steps]
-        panel.plot(counts, best, color=BLUE, marker=".", markersize=3, linewidth=1.2)
+        goals = np.where(found.evaluated.feasible, found.evaluated.goals[:, 0], np.inf)
+        best = np.minimum.accumulate(goals)
+        known = np.flatnonzero(np.isfinite(best))
+        panel.step(known + 1, objectives[0].sign * best[known] / scales[0], where="post")
         panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         panel.set(xlabel="designs evaluated", ylabel=names[0])
         return figure
