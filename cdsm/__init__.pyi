@@ -24,9 +24,7 @@ from cdsm.design.evaluation import evaluate_designs as evaluate_designs
 from cdsm.design.goals import Constraint as Constraint
 from cdsm.design.goals import Objective as Objective
 from cdsm.design.problem import DesignProblem as DesignProblem
-from cdsm.design.problem_file import read_problem as read_problem
 from cdsm.design.refine import refine_design as refine_design
-from cdsm.design.result import DesignProgress as DesignProgress
 from cdsm.design.result import DesignSearch as DesignSearch
 from cdsm.design.search import search_designs as search_designs
 from cdsm.design.variables import Variable as Variable

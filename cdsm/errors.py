@@ -47,7 +47,7 @@ class InvalidInput(CdsmError, ValueError):
         self.name = name
 
 
-class UnknownName(CdsmError, LookupError):
+class UnknownName(CdsmError, LookupError, ValueError):
     """A ``name``, e.g. of a link, a solver or a stiffness term, that is not among ``known``."""
 
     def __init__(self, kind: str, name: object, known: Iterable[str], remedy: str = "") -> None:

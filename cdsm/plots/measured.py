@@ -209,8 +209,11 @@ def plot_designs(found: DesignSearch) -> Figure:
     names = [textwrap.fill(label, _WIDEST) for label in found._labels]
     if len(objectives) == 1:
         figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.4)
-        steps = [step for step in found.history if step.feasible]
-        axes.plot([one.designs for one in steps], [one.best / scales[0] for one in steps], ".-")
+        goals = np.where(found.evaluated.feasible, found.evaluated.goals[:, 0], np.inf)
+        best = np.minimum.accumulate(goals)
+        known = np.flatnonzero(np.isfinite(best))
+        shown = objectives[0].sign * best[known] / scales[0]
+        axes.step(known + 1, shown, where="post")
         style.whole_numbers(axes.xaxis)
         axes.set(xlabel="designs evaluated", ylabel=names[0])
         return figure
