@@ -47,7 +47,7 @@ class InvalidInput(CdsmError, ValueError):
         self.name = name
 
 
-class UnknownName(CdsmError, LookupError):
+class UnknownName(CdsmError, LookupError, ValueError):
     """A ``name``, e.g. of a link, a solver or a stiffness term, that is not among ``known``."""
 
     def __init__(self, kind: str, name: object, known: Iterable[str], remedy: str = "") -> None:
@@ -66,24 +66,12 @@ class FileError(CdsmError, OSError):
         self.path = str(path)
 
 
-class StoreError(FileError):
-    """A store in use by another run, or of another sweep (``differences``, texts; maybe none)."""
-
-    def __init__(self, path: object, problem: str, differences: Texts = ()) -> None:
-        super().__init__(path, problem)
-        self.differences = tuple(differences)
-
-
 class MissingExtra(CdsmError, ImportError):
     """A ``package`` that is not installed; ``extra`` of ``cdsm-stiffness`` installs it."""
 
     def __init__(self, package: str, extra: str) -> None:
         super().__init__(f"{package} is missing; run pip install -e '.[{extra}]' in cdsm's clone.")
         self.package, self.extra = package, extra
-
-
-class ClusterError(CdsmError):
-    """A dask cluster that cannot compute, e.g. because its client is closed or a worker failed."""
 
 
 class MissingWire(CdsmError, LookupError):

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, NamedTuple, final
 
 import numpy as np
 
-from cdsm.cable import Cable
+from cdsm.cable import Cable, Site
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry
 from cdsm.geometry.cables import require_own_cables, serpentine_cables
@@ -98,7 +98,7 @@ class ArmParameters:
 
         A ``rigidity`` is 1 and a ``phase`` 0.
         """
-        return {name: float(np.median(self._values(name))) for name in self.names}
+        return {name: float(np.median(self.values(name))) for name in self.names}
 
     def __call__(self, **values: float) -> Manipulator:
         """Build the arm with these values of parameters, in SI.
@@ -161,8 +161,8 @@ class ArmParameters:
             raise InvalidInput(name, f"the arm has the joints 1 to {count}.")
         return kind, [i for i, k in enumerate(joints) if not at or k == int(place)]
 
-    def _values(self, name: str) -> list[float]:
-        """Return the values in SI that the parameter ``name`` has now."""
+    def values(self, name: str) -> list[float]:
+        """Return the values in SI that the parameter ``name`` has in the joints or cables."""
         kind, where = self._place(name)
         _, _, part, attribute, neutral = PARAMETERS[kind]
         if not math.isnan(neutral):
@@ -187,9 +187,7 @@ def _changed(
 
     ``laws`` has the scaled laws so far: cables that share one are computed together.
     """
-    pairs = zip(old.sites, routed.sites, strict=True)
-    sites = tuple(replace(site, position=moved.position) for site, moved in pairs)
-    cable = replace(old, sites=sites, lead=routed.lead)
+    cable = replace(old, sites=holes_like(routed, old), lead=routed.lead)
     if "friction" in changes:
         cable = cable.with_friction(changes["friction"])
     if "spring" in changes:
@@ -199,3 +197,16 @@ def _changed(
         shared = laws.setdefault((law, factor), law.scaled(factor))
         cable = replace(cable, elasticity=shared)
     return cable
+
+
+def holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
+    """Return the sites of ``cable``, with the friction and the wrap of the holes of ``other``.
+
+    A hole that only ``cable`` passes gets the friction of the nearest hole that ``other`` passes.
+    """
+    sites, known = list(cable.sites), other._holes
+    for i in cable._holes if known else ():
+        near = min(max(i, known[0]), known[-1])
+        wrap = other.sites[near].wrap if i == near else 0.0
+        sites[i] = replace(sites[i], friction=other.sites[near].friction, wrap=wrap)
+    return tuple(sites)

@@ -7,9 +7,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import cdsm
-from cdsm.plots.style import BLUE, MM, SMALL, TEXT, VERMILLION
+from cdsm.plots.style import BLUE, MM, VERMILLION
 
 GRAY = "0.35"
+TEXT, SMALL = 8.0, 7.0
 
 
 def flat_arm(friction: float = 0.0) -> cdsm.Manipulator:

@@ -13,8 +13,8 @@ from matplotlib.colors import Normalize
 from PIL import Image
 
 import cdsm
-from cdsm.plots.arm import draw_arm
-from cdsm.plots.style import COLOR_MAP, MM, TEXT, equal_axes, picture_axes
+from cdsm.plots.arm import draw_arm, picture
+from cdsm.plots.style import COLOR_MAP, MM
 
 FOLDER = Path(__file__).parent / "pictures"
 FRAMES = 48
@@ -28,7 +28,7 @@ geometry = cdsm.Geometry.universal(
 arm = cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
 
 
-def picture() -> None:
+def still() -> None:
     """Draw README's arm at README's posture, with tensions and compliance."""
     pose = arm.at([0.17, 0.09, 0.17, 0.09, -0.14, 0, -0.14, 0])
     tension = cdsm.distribute_tension(pose, minimum=50.0)
@@ -46,7 +46,8 @@ def animation() -> None:
     poses = [arm.at(angles) for angles in plan.angles]
     tips = MM * np.array([pose.tip[:3, 3] for pose in [*poses, poses[0]]])
     scale = Normalize(plan.tensions.min(), plan.tensions.max())
-    figure, axes = picture_axes()
+    figure, axes = picture()
+    figure.set_dpi(150)
     figure.set_size_inches(3.5, 2.7)
     axes.set_position((-0.14, -0.26, 1.34, 1.5))
     canvas: Any = FigureCanvasAgg(figure)
@@ -57,11 +58,11 @@ def animation() -> None:
         draw_arm(axes, pose, colormaps[COLOR_MAP](scale(values)))
         axes.plot(*tips.T, color="0.7", linewidth=0.8)
         axes.set(xlim=(0, 270), ylim=(-110, 110), zlim=(-110, 110))
-        equal_axes(axes, 0.86)
+        axes.set_box_aspect((270, 220, 220), zoom=0.86)
         figure.suptitle(
             f"{along.item() / 1e3:.2f} N/mm along z, tensions {values.min():.0f} to "
             f"{values.max():.0f} N",
-            fontsize=TEXT,
+            fontsize=8.0,
         )
         canvas.draw()
         frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
@@ -72,5 +73,5 @@ def animation() -> None:
 
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
-    picture()
+    still()
     animation()

@@ -263,12 +263,12 @@ def export(
 
         tension = tensions.distribute(pose, load.at_tip(pose.arm))
         model = mujoco_model(pose.arm, pose, tension, actuators, damping_ratio, damping)
-        motion, unit = model.motion, JointUnits(pose.arm.slides).joined("N m s/rad", "N s/m")
+        unit = JointUnits(pose.arm.slides).joined("N m s/rad", "N s/m")
         numbers |= {
             "stable": model.unstable is None,
-            "time_step_s": motion.time_step,
-            "cable_damping_N_s_per_m": by_cable(pose.arm, motion.wires),
-            key("joint_damping", unit): motion.joints,
+            "time_step_s": model.time_step,
+            "cable_damping_N_s_per_m": by_cable(pose.arm, model.cable_damping),
+            key("joint_damping", unit): model.joint_damping,
             "actuators": model.actuators,
         }
         warnings += filter(None, [model.unstable])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,7 @@ import typer
 import cdsm
 from cdsm.cli.files import out_folder
 from cdsm.cli.options import AsJson
-from cdsm.cli.output import answer, console
+from cdsm.cli.output import answer
 from cdsm.cli.values import misuse
 
 
@@ -62,21 +61,19 @@ def design(
     from cdsm.support.files import make_folder, write_text
     from cdsm.support.validation import whole_number
 
-    file = read_problem(problem)
+    task, search = read_problem(problem)
     if (out / "arm.toml").exists() and not (out / "front.csv").exists():
         raise misuse("--out", f"{out} has an arm.toml that no search wrote; give another folder.")
-    task = file.problem
     if refine:
         require_smooth(task)
     folder = make_folder(out)
     processes = checked_threads(jobs)
     found = cdsm.search_designs(
         task,
-        generations=generations or file.generations,
-        population=population or file.population,
-        seed=file.seed if seed is None else seed,
+        generations=generations or search.generations,
+        population=population or search.population,
+        seed=search.seed if seed is None else seed,
         jobs=processes,
-        report=partial(_tell, task.objectives[0]),
     )
     number = found.compromise
     if choose is not None:
@@ -86,7 +83,7 @@ def design(
         found, number = cdsm.refine_design(task, found.design(number)), 0
     paths = [
         write_text(folder / "designs.csv", every),
-        write_text(folder / "front.csv", found.measured(jobs=processes).to_csv()),
+        write_text(folder / "front.csv", found.best.to_csv()),
         cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
         cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),
         *found.write_arm(folder, number),
@@ -98,23 +95,4 @@ def design(
         lambda: {**found.to_dict(), **written},
         found._text(number),
         f"design {number} is written to {folder}: {names}",
-    )
-
-
-def _tell(first: cdsm.Objective, step: cdsm.DesignProgress) -> None:
-    """Print a line about a generation of the search, if standard error is a terminal.
-
-    ``first`` is the first objective; the line has its best value so far.
-    """
-    if not console().is_terminal:
-        return
-    best = (
-        f"{first.words} {first.shown(step.best)}"
-        if step.feasible
-        else f"none feasible yet, the nearest misses by {100.0 * step.missed:.3g} %"
-    )
-    console().print(
-        f"generation {step.generation}: {step.designs} designs, {step.feasible} feasible, "
-        f"best: {best}",
-        highlight=False,
     )

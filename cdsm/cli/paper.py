@@ -38,8 +38,7 @@ def reproduce(
     for compute in track(paper.FIGURES.values(), "recomputing the paper"):
         result = compute()
         results.append(result)
-        figure = cdsm.plots.plot_paper(result)
-        written.append(cdsm.plots.save_figure(figure, out / f"{result.name}.{kind}"))
+        written.append(cdsm.plots.save_figure(result.plot(), out / f"{result.name}.{kind}"))
     written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
     numbers = json.dumps(paper.to_dict(results), indent=1, allow_nan=False)
     written.append(write_text(out / "reproduction.json", numbers + "\n"))

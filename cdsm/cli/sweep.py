@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
     from cdsm.support.values import Array
+    from cdsm.sweeps.poses import PoseSet
 
 
 _POSES = "--grid, --path, --random"
@@ -64,7 +65,7 @@ class PoseOptions:
     ] = None
     seed: Annotated[int | None, typer.Option(help="Seed of --random; default 0.")] = None
 
-    def read(self, arm: cdsm.Manipulator) -> cdsm.PoseSet:
+    def read(self, arm: cdsm.Manipulator) -> PoseSet:
         """Build the set of postures; BadParameter unless one of the three kinds is given."""
         if sum(given is not None for given in (self.grid, self.path, self.random)) != 1:
             raise misuse(_POSES, "give one of --grid, --path and --random.")

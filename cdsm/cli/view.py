@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import webbrowser
-from dataclasses import fields
 from pathlib import Path
 from typing import Annotated
 
@@ -37,20 +36,16 @@ def view(
     largest_force: Annotated[
         float, typer.Option(help="Upper end of the sliders of the force [N].")
     ] = 20.0,
-    host: Annotated[
-        str,
-        typer.Option(
-            help="Address to listen at; the default is this machine alone. With another, other "
-            "machines can connect; they need the token in the URL."
-        ),
-    ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to listen at; 0 for any free one.")] = 8080,
     browser: Annotated[
         bool, typer.Option("--browser", help="Open the page in a browser, too.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Show an arm in the browser: move joints, tip, tension and load, and see its stiffness."""
+    """Show an arm in the browser: move joints, tip, tension and load, and see its stiffness.
+
+    Only this machine can connect. From another one: ssh -L 8080:localhost:8080 THIS_MACHINE.
+    """
     from cdsm.cli.path_file import PathFile, read_path
 
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
@@ -59,7 +54,6 @@ def view(
         motion = PathFile(None, None, None) if path is None else read_path(path, robot)
         with cdsm.view.serve(
             robot,
-            host=host,
             port=port,
             q=None if pose is None else pose.q,
             minimum=tensions.min_tension,
@@ -71,7 +65,6 @@ def view(
             solver=tensions.solver,
             largest_tension=largest_tension,
             largest_force=largest_force,
-            arm_arguments=_arguments(arm),
         ) as page:
             text = f"shown at {page.url}; Ctrl-C ends it"
             conditions = tensions.conditions(robot, friction=sag)
@@ -80,13 +73,3 @@ def view(
             if browser:
                 webbrowser.open(page.url)
             page.wait()
-
-
-def _arguments(arm: ArmOptions) -> list[str]:
-    """Return the command-line arguments that describe an arm: its file, and the options given."""
-    given = [str(arm.arm)]
-    for field in fields(arm)[1:]:
-        value, option = getattr(arm, field.name), f"--{field.name.replace('_', '-')}"
-        if value != field.default:
-            given.append(option if value is True else f"{option}={value}")
-    return given

@@ -1,30 +1,26 @@
-"""Evaluate many designs: in this process or in several processes."""
+"""Evaluate many designs, in this process or in several."""
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cdsm.design.goals import KINDS
 from cdsm.design.problem import MISSED, DesignProblem
-from cdsm.design.quantities import Found, measure, with_margin
-from cdsm.design.variables import UNITS
-from cdsm.errors import InvalidInput
+from cdsm.design.quantities import Found, measure
+from cdsm.errors import UnknownName
 from cdsm.support.progress import progress_bar
 from cdsm.support.tables import csv_text
 from cdsm.support.validation import instance, number_array, whole_number
 from cdsm.support.values import Array, Named, ReadOnlyState, frozen
-
-if TYPE_CHECKING:
-    from multiprocessing.synchronize import Semaphore
 
 
 @final
@@ -50,12 +46,11 @@ class Designs(ReadOnlyState, Named):
         """Return a quantity (D,) by its key, such as ``mass`` or ``stiffness (0, 0, 1)``.
 
         Raises:
-            InvalidInput: The quantity is not in ``problem.measures``.
+            UnknownName: The quantity is not in ``problem.measures``.
         """
-        keys = self.keys()
-        if key not in keys:
-            raise InvalidInput("measure", f"{key!r} given; give {', '.join(keys)}.")
-        return np.asarray(self.values[:, keys.index(key)])
+        if key not in self.keys():
+            raise UnknownName("quantity of the problem", key, self.keys())
+        return np.asarray(self.values[:, self.keys().index(key)])
 
     def keys(self) -> tuple[str, ...]:
         """Return the keys of the quantities."""
@@ -68,17 +63,31 @@ class Designs(ReadOnlyState, Named):
         Column 0 is the fraction of all pairs of posture and load that are not held: not balanced,
         or unstable. It is 0 if the problem does not require that all are held.
         """
-        return violations(self.problem, self.values)
+        held = np.nan_to_num(self[MISSED])
+        found = [self.problem.needs_all * (1.0 - held)]
+        for each in self.problem.constraints:
+            inside = each.distance(self[each.key])
+            found.append(np.where(np.isnan(inside), np.inf, np.maximum(-inside, 0.0)))
+        return np.column_stack(found)
 
     @property
-    def _goals(self) -> Array:
+    def goals(self) -> Array:
         """Objectives (D, objectives), negated if they are maximised: searches minimise them."""
         return np.column_stack([each.sign * self[each.key] for each in self.problem.objectives])
 
     @property
-    def feasible(self) -> Array:
-        """Whether each design meets all constraints (D,): 1 or 0."""
-        return np.asarray((self.violations == 0.0).all(axis=1), dtype=np.float64)
+    def feasible(self) -> NDArray[np.bool_]:
+        """Whether each design meets all constraints (D,)."""
+        return np.asarray((self.violations == 0.0).all(axis=1))
+
+    def some(self, rows: NDArray[np.intp]) -> Designs:
+        """Return some of the designs, by their indices (n,)."""
+        return replace(
+            self,
+            designs=frozen(self.designs[rows]),
+            values=frozen(self.values[rows]),
+            faults=tuple(self.faults[i] for i in rows.tolist()),
+        )
 
     def to_csv(self) -> str:
         """Return a table as CSV: a row for each design, with variables and all quantities in SI.
@@ -86,24 +95,22 @@ class Designs(ReadOnlyState, Named):
         The last columns are ``feasible``, 1 or 0, and ``fault``, the reason why no arm can be
         built.
         """
-        columns = self._columns() | {"feasible": self.feasible.astype(int), "fault": self.faults}
+        columns = self.columns() | {"feasible": self.feasible.astype(int), "fault": self.faults}
         rows = enumerate(zip(*columns.values(), strict=True))
         return csv_text(["design", *columns], ([i, *row] for i, row in rows))
 
-    def _columns(self) -> dict[str, Sequence[Any]]:
+    def columns(self) -> dict[str, Sequence[Any]]:
         """Return a column for each variable and quantity, by its heading.
 
         The heading has the name, the margin for tolerances if there is one, and the unit.
         """
-        rows = [self.problem.values(each) for each in self.designs]
-        found: dict[str, Sequence[Any]] = {}
-        for variable, column in zip(self.problem.variables, zip(*rows, strict=True), strict=True):
-            unit = UNITS.get(variable.of)
-            found[variable.name + (f" [{unit}]" if unit else "")] = column
-        for each in self.problem.measures:
-            found[f"{with_margin(self.problem, each, each.key)} [{KINDS[each.of].unit}]"] = self[
-                each.key
-            ].tolist()
+        problem, found = self.problem, dict[str, Sequence[Any]]()
+        rows = [problem.values(each) for each in self.designs]
+        for variable, column in zip(problem.variables, zip(*rows, strict=True), strict=True):
+            found[f"{variable.of} [{variable.unit}]" if variable.unit else variable.of] = column
+        for each in problem.measures:
+            words = problem.with_margin(each, each.key)
+            found[f"{words} [{KINDS[each.of].unit}]"] = self[each.key].tolist()
         return found
 
     def __len__(self) -> int:
@@ -113,23 +120,8 @@ class Designs(ReadOnlyState, Named):
         return f"<Designs: {len(self)}, {int(self.feasible.sum())} feasible>"
 
 
-def violations(problem: DesignProblem, values: Array) -> Array:
-    """Compute :attr:`Designs.violations` from the quantities (D, m) of D designs."""
-    keys = [each.key for each in problem.measures]
-    held = values[:, keys.index(MISSED)]
-    found = [np.where(held == held, 1.0 - held, 1.0) if problem.needs_all else np.zeros(len(held))]
-    for constraint in problem.constraints:
-        column = values[:, keys.index(constraint.key)]
-        found.append(np.array([constraint.violation(value) for value in column.tolist()]))
-    return np.column_stack(found)
-
-
 def evaluate_designs(
-    problem: DesignProblem,
-    designs: ArrayLike,
-    *,
-    jobs: int = 1,
-    progress: bool = True,
+    problem: DesignProblem, designs: ArrayLike, *, jobs: int = 1, progress: bool = True
 ) -> Designs:
     """Compute all quantities of designs over all postures and loads of the problem.
 
@@ -144,67 +136,44 @@ def evaluate_designs(
         InvalidInput: A design is outside its ranges, or ``jobs`` is below 1.
     """
     instance("problem", problem, DesignProblem)
-    rows = number_array("designs", designs)
-    if rows.ndim != 2:
-        raise InvalidInput("designs", f"shape {rows.shape} given, (D, n) needed: a row each.")
+    rows = np.atleast_2d(number_array("designs", designs))
     for row in rows:
         problem.values(row)
-    found = []
-    with (
-        workers(problem, jobs) as compute,
-        progress_bar("designs", len(rows), wanted=progress, rate=True) as advance,
-    ):
-        for each in compute(rows):
-            found.append(each)
-            advance(1)
-    return gathered(problem, rows, found)
+    with workers(problem, jobs, progress, len(rows)) as compute:
+        return gathered(problem, rows, compute(rows))
 
 
-def gathered(problem: DesignProblem, rows: Array, found: Sequence[Found]) -> Designs:
+def gathered(problem: DesignProblem, rows: Array, found: Iterable[Found]) -> Designs:
     """Build :class:`Designs` from ``rows``, the designs (D, n), and ``found``, their quantities."""
-    width = len(problem.measures)
+    values, faults = zip(*found, strict=True) if len(rows) else ((), ())
     return Designs(
         problem=problem,
         designs=frozen(rows.copy()),
-        values=frozen(np.array([each.values for each in found]).reshape(-1, width)),
-        faults=tuple(each.fault for each in found),
+        values=frozen(np.reshape(values, (len(rows), len(problem.measures)))),
+        faults=faults,
     )
 
 
-Compute = Callable[[Array], Iterable[Found]]
-"""Function that evaluates designs (D, n), in their order."""
-
-
 @contextmanager
-def workers(problem: DesignProblem, jobs: int) -> Iterator[Compute]:
+def workers(
+    problem: DesignProblem, jobs: int, progress: bool, total: int
+) -> Iterator[Callable[[Array], Iterable[Found]]]:
     """Open a context with a function that evaluates designs (D, n), and returns results in order.
 
-    The function uses ``jobs`` processes.
+    The function uses ``jobs`` processes, and moves the bar.
     """
     whole_number("jobs", jobs, 1)
-    if jobs == 1:
-        yield lambda rows: (measure(problem, row) for row in rows)
-    else:
-        context = get_context("spawn")  # a forked process would inherit threads of BLAS
-        given = problem, context.Semaphore(1)
-        with ProcessPoolExecutor(jobs, context, _set_problem, given) as pool:
-            try:
-                yield lambda rows: pool.map(
-                    _in_worker, rows, chunksize=max(1, min(16, len(rows) // 8))
-                )
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+    compute = partial(measure, problem)
+    with progress_bar("designs", total, wanted=progress, rate=True) as advance:
 
+        def counted(found: Iterable[Found]) -> Iterator[Found]:
+            for each in found:
+                advance(1)
+                yield each
 
-_problem: list[DesignProblem] = []  # the problem of a worker process
-
-
-def _set_problem(problem: DesignProblem, first: Semaphore) -> None:
-    _problem[:] = [problem]
-    if not first.acquire(block=False):  # one process says that it compiles kernels, for all
-        logging.getLogger("cdsm").setLevel(logging.ERROR)
-
-
-def _in_worker(row: Array) -> Found:
-    return measure(_problem[0], row)
+        if jobs == 1:
+            yield lambda rows: counted(map(compute, rows))
+            return
+        # a forked process would inherit threads of BLAS
+        with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+            yield lambda rows: counted(pool.map(compute, rows, chunksize=4))

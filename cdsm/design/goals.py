@@ -3,31 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, NamedTuple, final, get_args
+from typing import Final, Literal, NamedTuple, final
 
 from cdsm.errors import InvalidInput
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.validation import one_of, scalar
-
-MeasureName = Literal[
-    "stiffness",
-    "softest",
-    "margin",
-    "deflection",
-    "motor_force",
-    "payload",
-    "force_radius",
-    "tension_factor",
-    "cable_clearance",
-    "link_clearance",
-    "disk_clearance",
-    "workspace",
-    "held",
-    "mass",
-    "length",
-    "wire_length",
-]
+from cdsm.support.values import Array
 
 
 class Kind(NamedTuple):
@@ -38,28 +20,18 @@ class Kind(NamedTuple):
     shown: tuple[str, float]  # unit shown to the user, and its size in SI
     best: Literal["most", "least"]  # whether the largest or the smallest value is best
     directed: bool = False  # whether it has a direction
-    note: str = ""  # what a printed table says below it
 
 
-_ONE = ("", 1.0)
-_MM = ("mm", 1e-3)
-_STIFF = ("N/mm", 1e3)
+_ONE, _MM, _STIFF, _N = ("", 1.0), ("mm", 1e-3), ("N/mm", 1e3), ("N", 1.0)
 
 KINDS: Final[dict[str, Kind]] = {
     "stiffness": Kind("least stiffness along", "N/m", _STIFF, "most", directed=True),
     "softest": Kind("least stiffness in any direction", "N/m", _STIFF, "most"),
     "margin": Kind("least eigenvalue of K", "N m/rad", ("N m/rad", 1.0), "most"),
-    "deflection": Kind(
-        "largest first-order deflection under the load",
-        "m",
-        _MM,
-        "least",
-        note="deflection: by the load on locked motors, to first order, with the stiffness of the "
-        "least tensions without the load",
-    ),
-    "motor_force": Kind("largest tension", "N", ("N", 1.0), "least"),
-    "payload": Kind("least payload along", "N", ("N", 1.0), "most", directed=True),
-    "force_radius": Kind("least payload in any direction", "N", ("N", 1.0), "most"),
+    "deflection": Kind("largest first-order deflection under the load", "m", _MM, "least"),
+    "motor_force": Kind("largest tension", "N", _N, "least"),
+    "payload": Kind("least payload along", "N", _N, "most", directed=True),
+    "force_radius": Kind("least payload in any direction", "N", _N, "most"),
     "tension_factor": Kind("least tension factor", "1", _ONE, "most"),
     "cable_clearance": Kind("least clearance between cables", "m", _MM, "most"),
     "link_clearance": Kind("least clearance of cables from links", "m", _MM, "most"),
@@ -84,35 +56,33 @@ class Measure:
             None.
     """
 
-    of: MeasureName
+    of: str
     direction: Direction | None = None
 
     def __post_init__(self) -> None:
-        one_of("measure", self.of, get_args(MeasureName))
-        if (self.direction is None) == KINDS[self.of].directed:
-            raise InvalidInput(
-                "direction",
-                f"is needed for {self.of}."
-                if self.direction is None
-                else f"has no meaning for {self.of}.",
-            )
+        one_of("quantity of a design", self.of, KINDS)
+        if KINDS[self.of].directed and self.direction is None:
+            raise InvalidInput("direction", f"is needed for {self.of}.")
         if self.direction is not None:
+            if not KINDS[self.of].directed:
+                raise InvalidInput("direction", f"has no meaning for {self.of}.")
             u = unit_direction("direction", self.direction)
             self.__dict__.update(direction=tuple(u.tolist()))
 
     @property
     def key(self) -> str:
         """Name of the column of the quantity, such as ``mass`` or ``stiffness (0, 0, 1)``."""
-        if self.direction is None:
-            return self.of
-        return f"{self.of} {coordinates(self.direction, '.3g')}"  # type: ignore[arg-type]
+        return self.of + self._along
 
     @property
     def words(self) -> str:
         """Name of the quantity as text, with its direction."""
-        words = KINDS[self.of].words
-        along = "" if self.direction is None else f" {self.key.removeprefix(self.of + ' ')}"
-        return words + along
+        return KINDS[self.of].words + self._along
+
+    @property
+    def _along(self) -> str:
+        u = self.direction
+        return "" if u is None else f" {coordinates(u, '.3g')}"  # type: ignore[arg-type]
 
     @property
     def unit(self) -> tuple[str, float]:
@@ -160,8 +130,7 @@ class Objective(Measure):
     def __post_init__(self) -> None:
         super().__post_init__()
         goal = KINDS[self.of].best if self.goal is None else self.goal
-        one_of("goal", goal, ("most", "least"))
-        self.__dict__.update(goal=goal)
+        self.__dict__.update(goal=one_of("goal", goal, ("most", "least")))
 
     @property
     def sign(self) -> float:
@@ -193,10 +162,7 @@ class Constraint(Measure):
         super().__post_init__()
         if (self.at_least is None) == (self.at_most is None):
             raise InvalidInput(self.of, "needs at_least or at_most, one of them.")
-        for name in ("at_least", "at_most"):
-            given = getattr(self, name)
-            if given is not None:
-                self.__dict__[name] = scalar(f"{self.of}.{name}", given)
+        scalar(f"{self.of}.{'at_most' if self.at_least is None else 'at_least'}", self.limit)
 
     @property
     def limit(self) -> float:
@@ -206,25 +172,14 @@ class Constraint(Measure):
         return limit
 
     @property
-    def _scale(self) -> float:
-        """Number by which violations are divided: the magnitude of the limit.
-
-        If the limit is 0, it is the size of the unit shown to the user. It is negative for
-        ``at_most``.
-        """
-        size = abs(self.limit) or self.unit[1]
-        return size if self.at_most is None else -size
-
-    @property
     def asked(self) -> str:
         """The limit as text, such as ``at most 5 mm``."""
-        which = "at most" if self.at_least is None else "at least"
-        return f"{which} {self.shown(self.limit)}"
+        return f"at {'most' if self.at_least is None else 'least'} {self.shown(self.limit)}"
 
-    def violation(self, value: float) -> float:
-        """Return how far a value [SI] violates the limit, divided by the limit [-].
+    def distance(self, value: Array) -> Array:
+        """Return how far values [SI] are inside the limit, divided by it [-]; negative if outside.
 
-        It is 0 if the limit is met, and inf for NaN.
+        If the limit is 0, it is divided by the size of the unit shown to the user.
         """
-        far = (value - self.limit) / self._scale
-        return max(0.0, -far) if far == far else float("inf")
+        size = abs(self.limit) or self.unit[1]
+        return (value - self.limit) / (size if self.at_most is None else -size)

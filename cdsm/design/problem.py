@@ -3,36 +3,38 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import final, get_args
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.cable import Cable, Site
-from cdsm.design.goals import Constraint, Measure, MeasureName, Objective
-from cdsm.design.variables import WHOLE, Value, Variable, changed, present, require_compatible
+from cdsm.design.goals import Constraint, Measure, Objective
+from cdsm.design.variables import WHOLE, Value, Variable, changed
 from cdsm.errors import InvalidInput
-from cdsm.geometry.cables import require_own_cables, serpentine_cables
+from cdsm.geometry.cables import require_own_cables
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import require
+from cdsm.parameters import PARAMETERS, ArmParameters
 from cdsm.support.format import plural
 from cdsm.support.validation import NO_WRENCH, instance, number_array, scalar, sequence_of
 from cdsm.support.values import Array, Given, ReadOnlyState, frozen
-from cdsm.sweeps.poses import PoseSet, poses_of
+from cdsm.sweeps.poses import PoseSet, joint_angles
 from cdsm.tension import checked_bounds
 from cdsm.tolerances import Tolerances
-from cdsm.wires.catalogue import as_wire
 
 MISSED = "held"
 """Key of the fraction of postures and loads that are held; it is computed for every problem."""
 
+SURE = {"stiffness": -1.0, "margin": -1.0, "motor_force": 1.0}
+"""Quantities that hold with a margin for tolerances, and its sign."""
+
 
 @final
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class DesignProblem(ReadOnlyState):
     """Design problem: variables of an arm, objectives, constraints; the argument of all searches.
 
@@ -52,9 +54,9 @@ class DesignProblem(ReadOnlyState):
         minimum: Lower bound of all tensions [N], unless it is a variable.
         maximum: Upper bound of all tensions [N].
         worst_friction: Whether all segments of the cables stay within the bounds, whatever loads
-            came before; see :func:`~cdsm.distribute_tension`. ``motor_force`` and the quantities of
-            wires then belong to the largest tension that friction can cause along each cable.
-        diameter: Diameter of the cables [m], for clearances and the life of wires.
+            came before; see :func:`~cdsm.distribute_tension`. ``motor_force`` then belongs to the
+            largest tension that friction can cause along each cable.
+        diameter: Diameter of the cables [m], for clearances.
         tolerances: Tolerances of every design; constraints on ``stiffness``, ``margin`` and
             ``motor_force`` must then be met with a margin of ``coverage`` standard uncertainties
             u. The value of such a quantity includes the margin, e.g. stiffness − coverage · u.
@@ -72,7 +74,7 @@ class DesignProblem(ReadOnlyState):
     postures: PoseSet | ArrayLike
     constraints: Sequence[Constraint] = ()
     loads: Given[ArrayLike, Array] = NO_WRENCH  # type: ignore[assignment]
-    minimum: float = 10.0
+    minimum: float = 0.0
     maximum: float = math.inf
     worst_friction: bool = False
     diameter: float = 0.0
@@ -87,23 +89,18 @@ class DesignProblem(ReadOnlyState):
         constraints = sequence_of("constraints", self.constraints, Constraint)
         if not variables or not objectives:
             raise InvalidInput("variables", "give one variable and one objective or more.")
-        require_compatible(variables, geometry)
+        _require_compatible(variables, self.arm)
         loads = np.atleast_2d(number_array("loads", self.loads, "wrench"))
         if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
             raise InvalidInput("loads", f"shape {loads.shape} given, (n, 6) needed.")
         postures = self.postures
         if not isinstance(postures, PoseSet):
             postures = frozen(number_array("postures", postures))
-        poses_of(self.arm, postures)  # raises for a wrong shape
+        joint_angles(self.arm, postures)  # raises for a wrong shape
         checked_bounds(self.arm, self.minimum, self.maximum)
         asked = {measure.of for measure in (*objectives, *constraints)}
-        require(
-            asked,
-            self.arm,
-            self.maximum,
-            worst_friction=self.worst_friction,
-            diameter=self.diameter,
-        )
+        friction, diameter = self.worst_friction, self.diameter
+        require(asked, self.arm, self.maximum, worst_friction=friction, diameter=diameter)
         if "deflection" in asked and not loads[:, :3].any(axis=1).all():
             raise InvalidInput("loads", "deflection needs a force in every load.")
         if self.tolerances is not None:
@@ -116,8 +113,27 @@ class DesignProblem(ReadOnlyState):
             constraints=constraints,
             loads=frozen(loads),
             postures=postures,
-            coverage=float(self.coverage),
         )
+
+    @staticmethod
+    def read(path: str | os.PathLike[str]) -> DesignProblem:
+        """Read a problem from a PROBLEM.toml; all numbers are in SI: m, rad, N, N/m, kg.
+
+        ``arm`` is the path of an ARM.toml, relative to the folder of the file. ``[postures]`` has
+        ``random`` (a number, and ``seed``), ``grid`` (angles [rad] by joint) or ``angles`` (a list
+        of postures). ``loads`` is a list of wrenches (6 numbers) or forces (3). The keys of
+        ``[[variables]]``, ``[[objectives]]`` and ``[[constraints]]`` are the attributes of
+        :class:`Variable`, :class:`Objective` and :class:`Constraint`. ``tolerances`` is the path of
+        a file of :class:`Tolerances`. All other keys are attributes of this class. The command
+        ``cdsm design`` reads ``[search]`` too. ``examples/design.toml`` has comments.
+
+        Raises:
+            FileError: The file, or one that it names, cannot be read, or does not describe a design
+                problem; the error lists every fault.
+        """
+        from cdsm.design.problem_file import read_problem
+
+        return read_problem(path)[0]
 
     @cached_property
     def measures(self) -> tuple[Measure, ...]:
@@ -125,18 +141,6 @@ class DesignProblem(ReadOnlyState):
         asked = {each.key: each for each in (*self.objectives, *self.constraints)}
         asked.setdefault(MISSED, Measure("held"))
         return tuple(Measure(each.of, each.direction) for each in asked.values())
-
-    def in_full(self) -> DesignProblem:
-        """Return the problem with every other quantity added as an objective.
-
-        Quantities that need a direction, or data that the problem does not have, are not added.
-        """
-        full, asked = self, {each.of for each in self.measures}
-        for of in get_args(MeasureName):
-            if of not in asked:
-                with suppress(InvalidInput):  # a direction, or a maximum of the tensions
-                    full = replace(full, objectives=(*full.objectives, Objective(of)))
-        return full
 
     @property
     def needs_all(self) -> bool:
@@ -150,20 +154,11 @@ class DesignProblem(ReadOnlyState):
     @cached_property
     def bounds(self) -> Array:
         """Smallest and largest value of each variable (n, 2) in SI; for choices, their indices."""
-        return frozen(
-            np.array(
-                [
-                    (0.0, len(each.choices) - 1.0) if each.choices else (each.low, each.high)
-                    for each in self.variables
-                ],
-                dtype=np.float64,
-            )
-        )
-
-    @property
-    def is_continuous(self) -> bool:
-        """Whether all variables are real numbers in a range."""
-        return all(variable.is_continuous for variable in self.variables)
+        ends = [
+            (0.0, len(each.choices) - 1.0) if each.choices else (each.low, each.high)
+            for each in self.variables
+        ]
+        return frozen(np.array(ends, dtype=np.float64))
 
     def values(self, design: ArrayLike) -> tuple[Value, ...]:
         """Return the value of each variable in a design, which has one number per variable (n,).
@@ -178,13 +173,11 @@ class DesignProblem(ReadOnlyState):
         found: list[Value] = []
         for variable, number, a, b in zip(self.variables, x.tolist(), low, high, strict=True):
             if not a <= number <= b:
-                raise InvalidInput(
-                    "design", f"{variable.name} = {number:g} is outside {a:g} to {b:g}."
-                )
-            if variable.choices:
-                found.append(variable.choices[round(number)])
-            else:
-                found.append(round(number) if variable.of in WHOLE else number)
+                said = f"{variable.of} = {number:g} is outside {a:g} to {b:g}."
+                raise InvalidInput("design", said)
+            whole = variable.choices or variable.kind in WHOLE
+            value = round(number) if whole else number
+            found.append(variable.choices[int(value)] if variable.choices else value)
         return tuple(found)
 
     def arm_of(self, design: ArrayLike) -> Manipulator:
@@ -194,63 +187,43 @@ class DesignProblem(ReadOnlyState):
             InvalidInput: A number of the design is outside its range.
             GeometryError: No valid arm has these values; the error lists every fault.
         """
-        geometry, wire = changed(self.arm.geometry, self.variables, self.values(design))
-        old = self.arm.cables
-        law = None if wire is None else as_wire(wire)
-        routed = serpentine_cables(geometry, law or old[0].elasticity)
-        like: Sequence[Cable] = old
-        if len(routed) != len(old):
-            joints = [route.joint for route in self.arm.geometry.cables]
-            at = [route.joint for route in geometry.cables]
-            like = tuple(old[joints.index(joint) if joint in joints else 0] for joint in at)
-        minimum = self.minimum_of(design)
-        cables = [
-            replace(
-                kept,
-                name=cable.name,
-                sites=_with_holes_like(cable, kept),
-                lead=cable.lead,
-                elasticity=law or kept.elasticity,
-                minimum=max(kept.minimum, minimum),
-                maximum=min(kept.maximum, self.maximum),
-            )
-            for cable, kept in zip(routed, like, strict=True)
-        ]
-        made = Manipulator(
-            geometry,
-            cables=cables,
-            gravity=self.arm.gravity,
-            original_length=self.arm.original_length,
-        )
-        return made.with_tolerances(self.arm.tolerances)
+        made, low = self._made(design), self.minimum_of(design)
+        bounds = [(max(c.minimum, low), min(c.maximum, self.maximum)) for c in made.cables]
+        pairs = zip(made.cables, bounds, strict=True)
+        return made.with_cables([replace(c, minimum=a, maximum=b) for c, (a, b) in pairs])
+
+    def _made(self, design: ArrayLike) -> Manipulator:
+        """Build the arm of a design, without the problem's bounds."""
+        return changed(self.arm, dict(zip(self.variables, self.values(design), strict=True)))
 
     def minimum_of(self, design: ArrayLike) -> float:
         """Return the lower bound of the tensions [N] in a design (n,); see :meth:`values`."""
         for variable, value in zip(self.variables, self.values(design), strict=True):
-            if variable.of == "minimum":
+            if variable.kind == "minimum":
                 return float(value)
         return float(self.minimum)
 
     def postures_of(self, arm: Manipulator) -> Array:
         """Return the postures q (P, nv) [rad] of an arm; InvalidInput if they do not fit it."""
-        poses = poses_of(arm, self.postures)
-        return poses.angles({dim: slice(0, size) for dim, size in poses.sizes.items()})
+        return joint_angles(arm, self.postures)
 
     @cached_property
     def start(self) -> Array | None:
         """:attr:`arm` as a design (n,) [m, rad, N, -]; None if a variable is outside its range."""
-        found = []
-        for variable, (low, high) in zip(self.variables, self.bounds.tolist(), strict=True):
-            value: Value | None = present(variable, self.arm.geometry, self.minimum)
-            if variable.of == "wire":
-                now = self.arm.cables[0].elasticity
-                value = next((c for c in variable.choices if as_wire(c) == now), None)
-            if variable.choices and value is not None:
-                value = variable.choices.index(value) if value in variable.choices else None
-            if value is None or isinstance(value, str) or not low <= value <= high:
-                return None
-            found.append(float(value))
-        return frozen(np.array(found))
+        found = [each.present(self.arm, self.minimum) for each in self.variables]
+        known = [each for each in found if each is not None]
+        return frozen(np.array(known)) if len(known) == len(found) else None
+
+    def has_margin(self, each: Measure) -> bool:
+        """Whether a quantity includes a margin for tolerances: it is constrained, and may vary."""
+        bounded = any(constraint.key == each.key for constraint in self.constraints)
+        return bounded and self.tolerances is not None and each.of in SURE
+
+    def with_margin(self, each: Measure, words: str) -> str:
+        """Return ``words`` with the margin of the quantity if it has one: ``stiffness - 2 u``."""
+        if not self.has_margin(each):
+            return words
+        return f"{words} {'+' if SURE[each.of] > 0.0 else '-'} {self.coverage:g} u"
 
     def __repr__(self) -> str:
         return f"<DesignProblem {str(self).splitlines()[0]}>"
@@ -258,29 +231,24 @@ class DesignProblem(ReadOnlyState):
     def __str__(self) -> str:
         counts = plural(len(self.variables), "variable"), plural(len(self.loads), "load")
         lines = [f"{self.arm.name}: {', '.join(counts)}"]
-        lines += [
-            f"  {each.name}: "
-            + (
-                ", ".join(map(each.shown, each.choices))
-                or f"{each.shown(each.low or 0.0)} to {each.shown(each.high or 0.0)}"
-            )
-            for each in self.variables
-        ]
+        for each in self.variables:
+            ends = f"{each.shown(each.low or 0.0)} to {each.shown(each.high or 0.0)}"
+            lines.append(f"  {each.of}: {', '.join(map(each.shown, each.choices)) or ends}")
         lines += [f"  {each.goal}: {each.words}" for each in self.objectives]
         lines += [f"  {each.words}: {each.asked}" for each in self.constraints]
         return "\n".join(lines)
 
 
-def _with_holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
-    """Return the sites of ``cable``, with the friction and the wrap of the holes of ``other``.
-
-    A hole that only ``cable`` passes gets the friction of the nearest hole that ``other`` passes.
-    """
-    sites, known = list(cable.sites), other._holes
-    for i in cable._holes if known else ():
-        near = min(max(i, known[0]), known[-1])
-        like = other.sites[near]
-        if like.friction != sites[i].friction or like.wrap:
-            wrap = like.wrap if i == near else 0.0
-            sites[i] = replace(sites[i], friction=like.friction, wrap=wrap)
-    return tuple(sites)
+def _require_compatible(variables: Sequence[Variable], arm: Manipulator) -> None:
+    """Raise InvalidInput or UnknownName unless the arm has what the variables change, each once."""
+    for each in variables:
+        each.require(arm)
+    ArmParameters(arm, tuple(each.of for each in variables if each.kind in PARAMETERS))
+    others = [each.of for each in variables if each.kind not in PARAMETERS]
+    if len({*others}) < len(others):
+        twice = next(name for name in others if others.count(name) > 1)
+        raise InvalidInput("variables", f"{twice} is named twice.")
+    kinds = {each.kind for each in variables}
+    of_cables = [each.of for each in variables if "@cable" in each.of]
+    if "cables_per_joint" in kinds and of_cables:
+        raise InvalidInput("variables", f"cables_per_joint replaces the cable of {of_cables[0]}.")

@@ -1,13 +1,13 @@
-"""PROBLEM.toml: a design problem and its search in one file."""
+"""PROBLEM.toml: a design problem and its search in one file; see :meth:`DesignProblem.read`."""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -19,34 +19,13 @@ from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import read_text
 from cdsm.support.format import plural
-from cdsm.support.records import Integer, Number, parse, read_toml, record
+from cdsm.support.records import Integer, Number, faults_at, parse, read_toml, record
+from cdsm.support.validation import one_of
 from cdsm.sweeps.poses import GridPoses, PoseSet, RandomPoses
 from cdsm.tolerances import Tolerances
 
-
-@record
-class _Variable:
-    of: str
-    low: Number | None = None
-    high: Number | None = None
-    joint: Integer | None = None
-    cable: str | None = None
-    choices: Annotated[tuple[Any, ...], Field(strict=False)] = ()
-
-
-@record
-class _Objective:
-    of: str
-    direction: Any = None
-    goal: str | None = None
-
-
-@record
-class _Constraint:
-    of: str
-    direction: Any = None
-    at_least: Number | None = None
-    at_most: Number | None = None
+_Kind = TypeVar("_Kind")
+_Tables = Annotated[tuple[dict[str, Any], ...], Field(strict=False)]
 
 
 @record
@@ -58,7 +37,9 @@ class _Postures:
 
 
 @record
-class _Search:
+class Search:
+    """Settings of a search: its generations, the designs in each, and the seed."""
+
     generations: Integer = 40
     population: Integer = 40
     seed: Integer = 0
@@ -68,63 +49,24 @@ class _Search:
 class _File:
     arm: str
     postures: _Postures
-    variables: Annotated[tuple[_Variable, ...], Field(strict=False, min_length=1)]
-    objectives: Annotated[tuple[_Objective, ...], Field(strict=False, min_length=1)]
-    constraints: Annotated[tuple[_Constraint, ...], Field(strict=False)] = ()
+    variables: _Tables
+    objectives: _Tables
+    constraints: _Tables = ()
     loads: Any = None
-    minimum: Number = 10.0
+    minimum: Number = 0.0
     maximum: Number | None = None
     worst_friction: bool = False
     diameter: Number = 0.0
     tolerances: str | None = None
     coverage: Number = 2.0
-    search: _Search = Field(default_factory=lambda: _Search())
+    search: Search = Field(default_factory=Search)
 
 
-class ProblemFile(NamedTuple):
-    """A design problem and the settings of its search, read from a file.
-
-    Attributes:
-        problem: The problem.
-        generations: Number of generations.
-        population: Number of designs in each generation.
-        seed: Seed of the search.
-    """
-
-    problem: DesignProblem
-    generations: int
-    population: int
-    seed: int
-
-    def __repr__(self) -> str:
-        search = f"{plural(self.generations, 'generation')} of {plural(self.population, 'design')}"
-        return f"<ProblemFile: {str(self.problem).splitlines()[0]}, {search}>"
-
-
-def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
-    """Read a design problem from a PROBLEM.toml; all numbers are in SI: m, rad, N, N/m, kg.
-
-    ``arm`` is the path of an ARM.toml, relative to the folder of the file. ``[postures]`` has
-    ``random`` (a number, and ``seed``), ``grid`` (angles [rad] by joint) or ``angles`` (a list of
-    postures). ``loads`` is a list of wrenches (6 numbers) or forces (3). The keys of
-    ``[[variables]]`` are the attributes of :class:`Variable`, with ``joint`` or ``cable`` instead
-    of ``at``. The keys of ``[[objectives]]`` and ``[[constraints]]`` are the attributes of
-    :class:`Objective` and :class:`Constraint`. ``tolerances`` is the path of a file of
-    :class:`Tolerances`. ``[search]`` has ``generations``, ``population`` and ``seed``. All other
-    keys are attributes of :class:`DesignProblem`.
-
-    Args:
-        path: The file; ``examples/design.toml`` is one with comments.
-
-    Raises:
-        FileError: The file, or one that it names, cannot be read, or does not describe a design
-            problem; the error lists every fault.
-    """
-    text = read_text(path)
-    folder = Path(path).parent
+def read_problem(path: str | os.PathLike[str]) -> tuple[DesignProblem, Search]:
+    """Read a problem and the settings of its search; FileError lists every fault."""
     try:
-        file = parse(_File, read_toml(text))
-        return ProblemFile(_problem(file, folder), **asdict(file.search))
+        file = parse(_File, read_toml(read_text(path)))
+        return _problem(file, Path(path).parent), file.search
     except GeometryError as error:
         faults = error.faults
     except FileError:
@@ -135,49 +77,54 @@ def read_problem(path: str | os.PathLike[str]) -> ProblemFile:
 
 
 def _problem(file: _File, folder: Path) -> DesignProblem:
-    parts: dict[str, list[Any]] = {"variables": [], "objectives": [], "constraints": []}
-    faults = []
-    for name, kept in parts.items():
-        for i, entry in enumerate(getattr(file, name), start=1):
-            try:
-                kept.append(_built(entry))
-            except CdsmError as error:
-                faults.append(f"{name}[{i}]: {error}")
+    faults: list[str] = []
+    parts = {
+        "variables": _built(Variable, file.variables, "variables", faults),
+        "objectives": _built(Objective, file.objectives, "objectives", faults),
+        "constraints": _built(Constraint, file.constraints, "constraints", faults),
+    }
     try:
         postures = _postures(file.postures)
     except CdsmError as error:
-        faults.append(f"postures: {error}")
+        faults += [f"postures: {error}"]
     if faults:
         raise GeometryError(faults)
     arm = Manipulator.read(folder / file.arm)
     _check_angles(file.postures.angles, arm.joint_names)
-    tolerances = None if file.tolerances is None else Tolerances.read(folder / file.tolerances)
     return DesignProblem(
         arm=arm,
-        **{name: tuple(kept) for name, kept in parts.items()},
+        **parts,  # type: ignore[arg-type]
         postures=postures,
         loads=_loads(file.loads),
         minimum=file.minimum,
         maximum=math.inf if file.maximum is None else file.maximum,
         worst_friction=file.worst_friction,
         diameter=file.diameter,
-        tolerances=tolerances,
+        tolerances=None if file.tolerances is None else Tolerances.read(folder / file.tolerances),
         coverage=file.coverage,
     )
 
 
-def _built(entry: Any) -> Any:
-    if isinstance(entry, _Variable):
-        at = entry.cable if entry.joint is None else entry.joint
-        return Variable(entry.of, entry.low, entry.high, at, entry.choices)  # type: ignore[arg-type]
-    if isinstance(entry, _Objective):
-        return Objective(entry.of, entry.direction, entry.goal)  # type: ignore[arg-type]
-    return Constraint(entry.of, entry.direction, entry.at_least, entry.at_most)
+def _built(
+    kind: type[_Kind], tables: Sequence[dict[str, Any]], name: str, faults: list[str]
+) -> tuple[_Kind, ...]:
+    """Build one ``kind`` from each table; add what is wrong to ``faults``."""
+    made, known = list[_Kind](), [each.name for each in fields(kind)]  # type: ignore[arg-type]
+    for i, table in enumerate(tables, start=1):
+        where = f"{name}[{i}]"
+        try:
+            for key in table:
+                one_of("key", key, known)
+            if "of" not in table:
+                raise InvalidInput("of", "is missing.")
+            made.append(kind(**table))
+        except CdsmError as error:
+            faults += faults_at(where, error)  # type: ignore[arg-type]
+    return tuple(made)
 
 
 def _postures(entry: _Postures) -> PoseSet | Any:
-    given = [entry.random, entry.grid, entry.angles]
-    if sum(each is not None for each in given) != 1:
+    if sum(each is not None for each in (entry.random, entry.grid, entry.angles)) != 1:
         raise InvalidInput("random", "give one of random, grid and angles.")
     if entry.random is not None:
         return RandomPoses(entry.random, entry.seed)

@@ -12,7 +12,7 @@ from cdsm.design.goals import KINDS
 from cdsm.design.problem import DesignProblem
 from cdsm.design.quantities import Found, measure_cases
 from cdsm.design.result import DesignSearch
-from cdsm.design.search import best_of, progress_of
+from cdsm.design.search import best_of
 from cdsm.errors import InvalidInput
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array
@@ -87,7 +87,7 @@ def refine_design(
             return np.full(sum(each.size for each in first), _NOT_HELD)
         parts = [z[-1] - found[0] / scale]
         for limit, each in zip(limits, found[1:], strict=True):
-            parts.append((each - limit.limit) / limit._scale - _SAFE)
+            parts.append(limit.distance(each) - _SAFE)
         return np.concatenate([part.ravel() for part in parts])
 
     minimize(
@@ -100,16 +100,14 @@ def refine_design(
         options={"maxiter": iterations, "ftol": 1e-9},
     )
     designs, quantities = zip(*visited, strict=True)
-    values = np.array([each.values for each in quantities])
-    history = (progress_of(problem, n, values[:n]) for n in range(1, len(values) + 1))
-    return best_of(gathered(problem, np.array(designs), quantities), 0, history)
+    return best_of(gathered(problem, np.array(designs), quantities), 0)
 
 
 def require_smooth(problem: DesignProblem) -> None:
     """Raise InvalidInput if :func:`refine_design` cannot treat a problem."""
     for variable in problem.variables:
         if not variable.is_continuous:
-            raise InvalidInput("problem", f"{variable.name} is not continuous; use search_designs.")
+            raise InvalidInput("problem", f"{variable.of} is not continuous; use search_designs.")
     if len(problem.objectives) != 1:
         raise InvalidInput("problem", "has several objectives; leave one, or use search_designs.")
     objective = problem.objectives[0]

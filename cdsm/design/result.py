@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.design.evaluation import Designs, evaluate_designs
-from cdsm.design.goals import KINDS
+from cdsm.design.evaluation import Designs
 from cdsm.design.problem import DesignProblem
-from cdsm.design.quantities import with_margin
 from cdsm.design.workshop import cable_table, hole_table
 from cdsm.interchange.mjcf import write_mjcf
 from cdsm.manipulator import Manipulator
@@ -23,33 +21,18 @@ from cdsm.support.files import make_folder, write_text
 from cdsm.support.format import aligned, plain, plural
 from cdsm.support.tidy import data_frame
 from cdsm.support.validation import whole_number
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState
 from cdsm.urdf import write_urdf
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+_DEFLECTION = (
+    "deflection: by the load on locked motors, to first order, with the stiffness of the least "
+    "tensions without the load"
+)
 _PRINTED = 20  # number of designs, evenly spread over a front, that a printed table shows
-
-
-class DesignProgress(NamedTuple):
-    """State of a search after a generation.
-
-    Attributes:
-        generation: Number of the generation, from 1.
-        designs: Number of designs that were evaluated.
-        feasible: Number of these that meet all constraints.
-        best: Best feasible value of the first objective, in SI; before a design is feasible, the
-            value of the design with the smallest violations.
-        missed: Smallest sum of violations [-]; 0 once a design is feasible.
-    """
-
-    generation: int
-    designs: int
-    feasible: int
-    best: float
-    missed: float
 
 
 @final
@@ -64,14 +47,12 @@ class DesignSearch(ReadOnlyState):
         front: Pareto front: indices (n,) into ``evaluated`` of the feasible designs for which no
             other is at least as good in all objectives and better in one; the best in the first
             objective comes first.
-        history: State after each generation; of :func:`refine_design`, after each design.
     """
 
     problem: DesignProblem
     seed: int
     evaluated: Designs
     front: NDArray[np.intp]
-    history: tuple[DesignProgress, ...]
 
     @property
     def compromise(self) -> int:
@@ -80,7 +61,7 @@ class DesignSearch(ReadOnlyState):
         The ideal point has the best value of each objective on the front. Differences are divided
         by the range of each objective on the front.
         """
-        goals = self.evaluated._goals[self.front]
+        goals = self.best.goals
         size = np.ptp(goals, axis=0)
         scaled = (goals - goals.min(axis=0)) / np.where(size > 0.0, size, 1.0)
         return int(np.linalg.norm(scaled, axis=1).argmin())
@@ -134,38 +115,15 @@ class DesignSearch(ReadOnlyState):
             write_text(into / "cables.csv", cable_table(arm)),
         ]
 
-    def measured(self, *, jobs: int = 1, progress: bool = True) -> Designs:
-        """Evaluate the designs of the front in every quantity for which the problem has the data.
-
-        ``measured().to_csv()`` is the table of the front, with all these quantities.
-        ``evaluated.to_csv()`` is the table of all designs, with the quantities of the problem only.
-
-        Args:
-            jobs: Number of processes; :func:`evaluate_designs` says what a script then needs.
-            progress: Show a bar, if there is a terminal.
-
-        Raises:
-            InvalidInput: ``jobs`` is below 1.
-        """
-        return evaluate_designs(
-            self.problem.in_full(), self._front.designs, jobs=jobs, progress=progress
-        )
-
     @property
-    def _front(self) -> Designs:
-        """Designs of the Pareto front, with their quantities."""
-        whole = self.evaluated
-        return replace(
-            whole,
-            designs=frozen(whole.designs[self.front]),
-            values=frozen(whole.values[self.front]),
-            faults=("",) * len(self.front),
-        )
+    def best(self) -> Designs:
+        """Designs of the Pareto front; ``best.to_csv()`` is their table."""
+        return self.evaluated.some(self.front)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table of the front in SI, a row per design; needs pandas (MissingExtra)."""
         names = [str(i) for i in range(len(self.front))]
-        return data_frame(self._front._columns(), "design", names)
+        return data_frame(self.best.columns(), "design", names)
 
     def to_dict(self) -> dict[str, object]:
         """Return the front and the compromise in SI for JSON, with units in the keys."""
@@ -174,7 +132,7 @@ class DesignSearch(ReadOnlyState):
             "feasible": int(self.evaluated.feasible.sum()),
             "seed": self.seed,
             "compromise": self.compromise,
-            "front": self._front._columns(),
+            "front": self.best.columns(),
         }
         return plain(numbers)
 
@@ -201,10 +159,12 @@ class DesignSearch(ReadOnlyState):
             f"{more}; * is the compromise"
         )
         asked = [
-            f"asked: {with_margin(problem, each, each.words)} {each.asked}"
+            f"asked: {problem.with_margin(each, each.words)} {each.asked}"
             for each in problem.constraints
         ]
-        notes = [KINDS[each.of].note for each in problem.measures if KINDS[each.of].note]
+        notes = []
+        if "deflection" in {each.of for each in problem.measures}:
+            notes = [_DEFLECTION]
         if problem.tolerances is not None and problem.constraints:
             notes.append("u: standard uncertainty by the tolerances")
         return "\n".join([head, *aligned(self._table(shown)), *asked, *notes])
@@ -222,14 +182,14 @@ class DesignSearch(ReadOnlyState):
     def _labels(self) -> list[str]:
         """Name and unit of each objective, for the axes of a figure."""
         problem = self.problem
-        words = [(with_margin(problem, x, x.words), x.unit[0]) for x in problem.objectives]
+        words = [(problem.with_margin(x, x.words), x.unit[0]) for x in problem.objectives]
         return [f"{name} [{unit}]" if unit else name for name, unit in words]
 
     def _table(self, shown: Sequence[int]) -> list[list[str]]:
         """Return header and rows for the designs ``shown`` of the front, in units for the user."""
         problem = self.problem
-        keys = [with_margin(problem, each, each.key) for each in problem.measures]
-        rows = [["design", *(variable.name for variable in problem.variables), *keys]]
+        keys = [problem.with_margin(each, each.key) for each in problem.measures]
+        rows = [["design", *(variable.of for variable in problem.variables), *keys]]
         for i in shown:
             row, values = problem.values(self.design(i)), self.values(i).values()
             chosen = (v.shown(x) for v, x in zip(problem.variables, row, strict=True))

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import warnings
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.design.evaluation import Designs, gathered, violations, workers
-from cdsm.design.infeasible import explain
+from cdsm.design.evaluation import Designs, gathered, workers
 from cdsm.design.problem import DesignProblem
-from cdsm.design.quantities import Found
-from cdsm.design.result import DesignProgress, DesignSearch
+from cdsm.design.quantities import Found, quiet_arm
+from cdsm.design.result import DesignSearch
 from cdsm.design.variables import WHOLE
+from cdsm.errors import CdsmError, InfeasibleDesign, JointLimitError
+from cdsm.stiffness_matrix import stiffness
 from cdsm.support.extras import need
-from cdsm.support.progress import progress_bar
+from cdsm.support.format import plural
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
+from cdsm.tension import distribute_tension
 
 _FAR = 1e3
 """Number that stands for a violation or an objective that does not exist."""
@@ -32,7 +33,6 @@ def search_designs(
     population: int = 40,
     seed: int = 0,
     jobs: int = 1,
-    report: Callable[[DesignProgress], None] | None = None,
     progress: bool = True,
 ) -> DesignSearch:
     """Search for the best designs of a problem: the Pareto front of its objectives.
@@ -47,7 +47,6 @@ def search_designs(
         population: Number of designs in each generation.
         seed: Seed of all random numbers.
         jobs: Number of processes, as for :func:`evaluate_designs`.
-        report: Function that is called after each generation with its :class:`DesignProgress`.
         progress: Show a bar, if there is a terminal.
 
     Raises:
@@ -61,83 +60,30 @@ def search_designs(
     size = whole_number("population", population, 4)
     whole_number("seed", seed, 0)
     need("design", "pymoo")
-    algorithm = _algorithm(problem, size, steps, seed)
     rows: list[Array] = []
     found: list[Found] = []
-    history: list[DesignProgress] = []
     with (
-        workers(problem, jobs) as compute,
-        progress_bar("designs", steps * size, wanted=progress, rate=True) as advance,
+        workers(problem, jobs, progress, steps * size) as compute,
+        warnings.catch_warnings(action="ignore"),  # pymoo and its parts warn of themselves
     ):
-        for step in range(steps):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # pymoo and its parts warn of themselves
-                asked = algorithm.ask()
-            if asked is None or not len(asked):
-                break
-            names = [each.name for each in problem.variables]
-            designs = np.array([[float(each[x]) for x in names] for each in asked.get("X")])
+
+        def evaluate(designs: Array) -> Designs:
             evaluated = [*compute(designs)]
-            advance(len(designs))
-            _tell(problem, algorithm, asked, designs, evaluated)
-            rows += [*designs]
-            found += evaluated
-            values = np.array([each.values for each in found])
-            history.append(progress_of(problem, step + 1, values))
-            if report is not None:
-                report(history[-1])
-    return best_of(gathered(problem, np.array(rows), found), seed, history)
+            rows.extend(designs)
+            found.extend(evaluated)
+            return gathered(problem, designs, evaluated)
+
+        _minimize(problem, evaluate, steps, size, seed)
+    return best_of(gathered(problem, np.array(rows), found), seed)
 
 
-def best_of(evaluated: Designs, seed: int, history: Iterable[DesignProgress]) -> DesignSearch:
-    """Return the result of a search; raise InfeasibleDesign if no evaluated design is feasible."""
-    front = pareto(evaluated)
-    if not len(front):
-        explain(evaluated)
-    return DesignSearch(
-        problem=evaluated.problem,
-        seed=seed,
-        evaluated=evaluated,
-        front=frozen(front),
-        history=tuple(history),
-    )
-
-
-def pareto(designs: Designs) -> NDArray[np.intp]:
-    """Return the indices (m,) of the feasible designs that no other feasible design dominates.
-
-    They are sorted by the first objective, the best first. Of designs with equal objectives, only
-    the first is returned.
-    """
-    goals = designs._goals
-    usable = np.flatnonzero((designs.feasible == 1.0) & np.isfinite(goals).all(axis=1))
-    kept: list[int] = []
-    for i in usable.tolist():
-        others = goals[usable]
-        beats = (others <= goals[i]).all(axis=1) & (others < goals[i]).any(axis=1)
-        same = any((goals[k] == goals[i]).all() for k in kept)
-        if not beats.any() and not same:
-            kept.append(i)
-    return np.array(sorted(kept, key=lambda i: tuple(goals[i])), dtype=np.intp)
-
-
-def progress_of(problem: DesignProblem, generation: int, values: Array) -> DesignProgress:
-    """Return the state of a search after a generation.
-
-    ``values`` (D, m) are the quantities of all designs so far.
-    """
-    missed = violations(problem, values).sum(axis=1)
-    feasible = missed == 0.0
-    first = problem.objectives[0]
-    column = [each.key for each in problem.measures].index(first.key)
-    goal = np.where(feasible, first.sign * values[:, column], math.inf)
-    best = int(goal.argmin()) if feasible.any() else int(missed.argmin())
-    value, least = float(values[best, column]), float(missed.min())
-    return DesignProgress(generation, len(values), int(feasible.sum()), value, least)
-
-
-def _algorithm(problem: DesignProblem, population: int, generations: int, seed: int) -> Any:
-    """Build pymoo's NSGA-II for a problem, ready for its first ``ask``."""
+def _minimize(
+    problem: DesignProblem,
+    evaluate: Callable[[Array], Designs],
+    generations: int,
+    population: int,
+    seed: int,
+) -> None:
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.mixed import (
         MixedVariableDuplicateElimination,
@@ -147,50 +93,113 @@ def _algorithm(problem: DesignProblem, population: int, generations: int, seed: 
     from pymoo.core.population import Population
     from pymoo.core.problem import Problem
     from pymoo.core.variable import Choice, Integer, Real
+    from pymoo.optimize import minimize
 
     named: dict[str, Any] = {}
     for variable, (low, high) in zip(problem.variables, problem.bounds.tolist(), strict=True):
         if variable.choices:
-            named[variable.name] = Choice(options=[float(i) for i in range(len(variable.choices))])
-        elif variable.of in WHOLE:
-            named[variable.name] = Integer(bounds=(round(low), round(high)))
+            named[variable.of] = Choice(options=[float(i) for i in range(len(variable.choices))])
+        elif variable.kind in WHOLE:
+            named[variable.of] = Integer(bounds=(round(low), round(high)))
         else:
-            named[variable.name] = Real(bounds=(low, high))
-    bare = Problem(
-        vars=named, n_obj=len(problem.objectives), n_ieq_constr=1 + len(problem.constraints)
-    )
-    random = np.random.default_rng(seed)
-    first = MixedVariableSampling()(bare, population, random_state=random)
+            named[variable.of] = Real(bounds=(low, high))
+
+    class Task(Problem):  # type: ignore[misc]
+        def _evaluate(self, x: Any, out: dict[str, Array], *_: Any, **__: Any) -> None:
+            designs = evaluate(np.array([[float(each[name]) for name in named] for each in x]))
+            goals = designs.goals
+            missed = np.nan_to_num(designs.violations, nan=_FAR, posinf=_FAR)
+            missed[~np.isfinite(goals).all(axis=1), 0] += 1.0
+            out["F"], out["G"] = np.where(np.isfinite(goals), goals, _FAR), missed
+
+    constraints = 1 + len(problem.constraints)
+    task = Task(vars=named, n_obj=len(problem.objectives), n_ieq_constr=constraints)
+    first = MixedVariableSampling()(task, population, random_state=np.random.default_rng(seed))
     if problem.start is not None:
-        given = {
-            each.name: round(x) if each.of in WHOLE and not each.choices else x
-            for each, x in zip(problem.variables, problem.start.tolist(), strict=True)
-        }
+        given = dict(zip(named, problem.start.tolist(), strict=True))
+        given |= {name: round(given[name]) for name, x in named.items() if isinstance(x, Integer)}
         first = Population.merge(Population.new(X=[given]), first[1:])
+    elimination = MixedVariableDuplicateElimination()
     algorithm = NSGA2(
         pop_size=population,
         sampling=first,
-        mating=MixedVariableMating(eliminate_duplicates=MixedVariableDuplicateElimination()),
-        eliminate_duplicates=MixedVariableDuplicateElimination(),
+        mating=MixedVariableMating(eliminate_duplicates=elimination),
+        eliminate_duplicates=elimination,
     )
-    algorithm.setup(bare, termination=("n_gen", generations), seed=seed, verbose=False)
-    return algorithm
+    minimize(task, algorithm, ("n_gen", generations), seed=seed, copy_algorithm=False)
 
 
-def _tell(
-    problem: DesignProblem, algorithm: Any, asked: Any, designs: Array, evaluated: list[Found]
-) -> None:
-    """Give pymoo's algorithm the objectives and violations of the designs that it ``asked`` for."""
-    whole = gathered(problem, designs, evaluated)
-    goals = whole._goals
-    missed = np.nan_to_num(whole.violations, nan=_FAR, posinf=_FAR)
-    lost = ~np.isfinite(goals).all(axis=1)
-    missed[lost, 0] += 1.0
-    asked.set("F", np.where(np.isfinite(goals), goals, _FAR))
-    asked.set("G", missed)
-    asked.set("H", np.zeros((len(designs), 0)))
-    for each in asked:
-        each.evaluated.update(("F", "G", "H"))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        algorithm.tell(infills=asked)
+def best_of(evaluated: Designs, seed: int) -> DesignSearch:
+    """Return the result of a search; raise InfeasibleDesign if no evaluated design is feasible."""
+    front = pareto(evaluated)
+    if not len(front):
+        _explain(evaluated)
+    return DesignSearch(
+        problem=evaluated.problem, seed=seed, evaluated=evaluated, front=frozen(front)
+    )
+
+
+def pareto(designs: Designs) -> NDArray[np.intp]:
+    """Return the indices (m,) of the feasible designs that no other feasible design dominates.
+
+    They are sorted by the first objective, the best first. Of designs with equal objectives, only
+    the first is returned.
+    """
+    goals = designs.goals
+    usable = np.flatnonzero(designs.feasible & np.isfinite(goals).all(axis=1))
+    _, first = np.unique(goals[usable], axis=0, return_index=True)  # sorted by the columns
+    distinct = goals[usable[first]]
+    no_worse = (distinct[:, None] <= distinct).all(axis=2)  # each is no worse than itself
+    return np.asarray(usable[first][no_worse.sum(axis=0) == 1])
+
+
+def _explain(designs: Designs) -> NoReturn:
+    """Raise InfeasibleDesign: what the design of the smallest sum of violations misses."""
+    problem, count = designs.problem, plural(len(designs), "design")
+    missed = np.nan_to_num(designs.violations, posinf=1e9)
+    arms = np.array([not fault for fault in designs.faults])
+    if not arms.any():
+        raise InfeasibleDesign(f"none of {count} is an arm: {designs.faults[0]}", (), ())
+    best = int(np.where(arms, missed.sum(axis=1), np.inf).argmin())
+    row, said = designs.designs[best], dict[str, str]()
+    if missed[best, 0] > 0.0:
+        share, why = f"{100.0 * missed[best, 0]:.3g} %", _first_reason(problem, row)
+        said["held"] = f"{share} of its postures and loads are not held: {why}"
+    for each, miss in zip(problem.constraints, missed[best, 1:].tolist(), strict=True):
+        if miss > 0.0:
+            value = float(designs[each.key][best])
+            now = "does not exist" if np.isnan(value) else each.shown(value)
+            far = f", {100.0 * miss:.3g} % off" if miss < 1e9 else ""
+            words = problem.with_margin(each, each.words)
+            said[each.key] = f"{words} {now}, {each.asked} is asked{far}"
+    for objective in problem.objectives:
+        value = float(designs[objective.key][best])
+        if not np.isfinite(value):
+            said.setdefault(objective.key, f"{objective.words} is {objective.shown(value)}")
+    values = zip(problem.variables, problem.values(row), strict=True)
+    chosen = ", ".join(f"{each.of} {each.shown(value)}" for each, value in values)
+    raise InfeasibleDesign(
+        f"none of {count} meets all constraints. The nearest one ({chosen}) misses: "
+        f"{'; '.join(said.values()).rstrip('.')}. Loosen what it misses, widen a variable, or "
+        "search longer.",
+        tuple(said),
+        tuple(row.tolist()),
+    )
+
+
+def _first_reason(problem: DesignProblem, row: Array) -> str:
+    """Return which posture a design does not hold first, and why."""
+    bounds, worst, number = (problem.minimum_of(row), problem.maximum), problem.worst_friction, 0
+    try:
+        arm = quiet_arm(problem, row)
+        for number, q in enumerate(problem.postures_of(arm)):
+            pose = arm.at(q)
+            for load in problem.loads:
+                pull = distribute_tension(pose, *bounds, load, worst_friction=worst)
+                margin = stiffness(pose, pull).margin
+                if margin <= 0.0:
+                    return f"posture {number}: UNSTABLE, least eigenvalue of K {margin:.3g} N m/rad"
+    except CdsmError as error:
+        why = error.problem if isinstance(error, JointLimitError) else error
+        return f"posture {number}: {why}"
+    return "its tensions are at the edge"

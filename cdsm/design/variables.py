@@ -1,92 +1,72 @@
-"""Design variables: quantities of an arm that a search may choose, and the geometry they give."""
+"""Design variables: numbers of an arm that a search may choose, and the arm that has them."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal, final, get_args
+from functools import lru_cache
+from typing import Final, final
 
+from cdsm.cable import Cable
 from cdsm.errors import InvalidInput
 from cdsm.geometry import CableRoute, Geometry
+from cdsm.geometry.cables import serpentine_cables
 from cdsm.geometry.uniform import evenly_spaced, hinge_hole_angles
 from cdsm.geometry.units import WIDEST, doubts_about_angle, doubts_about_units
+from cdsm.manipulator import Manipulator
+from cdsm.parameters import PARAMETERS, ArmParameters, holes_like
 from cdsm.support.format import place
-from cdsm.support.validation import one_of, quantity, scalar, whole_number
+from cdsm.support.validation import instance, one_of, quantity, scalar, whole_number
 from cdsm.support.warning import warn
-from cdsm.wires.catalogue import Wire, as_wire
-
-VariableName = Literal[
-    "hole_radius",
-    "disk_offset",
-    "link_length",
-    "lead",
-    "phase",
-    "hole_angle",
-    "end",
-    "cables_per_joint",
-    "wire",
-    "minimum",
-]
+from cdsm.wires.catalogue import as_wire
 
 Value = float | int | str
 """Value of a variable: a number in SI, or the name or the rigidity [N] of a wire."""
 
 WHOLE: Final = ("end", "cables_per_joint")
-_OF_JOINT: Final = ("hole_radius", "disk_offset", "link_length", "lead", "phase")
-_OF_CABLE: Final = ("hole_angle", "end")
-UNITS: Final = {
-    "hole_radius": "m",
-    "disk_offset": "m",
-    "link_length": "m",
-    "lead": "m",
-    "phase": "rad",
-    "hole_angle": "rad",
-    "minimum": "N",
-}
-"""SI unit of each variable that has one."""
+"""Variables that are whole numbers."""
 
+_NAMES: Final = (*PARAMETERS, *WHOLE, "wire", "minimum")
+_SI: Final = {"mm": "m", "deg": "rad", "g": "kg", "N/mm": "N/m"}
+_KINDS: Final = {"m": "length", "kg": "mass", "N/m": "stiffness", "N": "tension"}
 _WIDEST_ANGLE = 4.0 * math.pi  # a range of angles beyond this [rad] is probably in degrees
 
 
 @final
 @dataclass(frozen=True)
 class Variable:
-    """Design variable: a quantity of an arm that a search may choose.
+    """Design variable: a number of an arm that a search may choose.
 
     Attributes:
-        of: ``"hole_radius"``, ``"disk_offset"``, ``"link_length"`` [m]: of one joint or of all
-            joints; a link keeps its mass per length. ``"lead"`` [m], and ``"phase"`` [rad], an
-            angle added to the hole angles: of the cables of one joint or of all joints.
-            ``"hole_angle"`` [rad]: of one cable. ``"end"``: number of the joint at which one cable
-            ends. ``"cables_per_joint"``: number of evenly spaced cables of each joint. ``"wire"``:
-            wire of all cables. ``"minimum"`` [N]: lower bound of all tensions.
-        low: Smallest value, in SI: [m], [rad] or [N]; None with ``choices``.
-        high: Largest value, in SI: [m], [rad] or [N]; None with ``choices``.
-        at: Number of the joint, from 1, or name of the cable, that is changed; None: all.
+        of: A parameter of an arm as in :class:`ArmParameters`, such as ``"hole_radius"`` of all
+            joints, ``"hole_radius@2"`` of one, or ``"hole_angle@cable1_2"``; a link keeps its mass
+            per length. Or ``"end@cable2_1"``, the number of the joint at which a cable ends;
+            ``"cables_per_joint"``, the number of evenly spaced cables of each joint; ``"wire"`` of
+            all cables; ``"minimum"`` [N], the lower bound of all tensions.
+        low: Smallest value, in SI: [m], [rad], [N], …; None with ``choices``.
+        high: Largest value, in SI; None with ``choices``.
         choices: Values to choose from, instead of a range; always needed for a wire.
 
     Raises:
-        UnknownName: ``of`` is unknown.
-        InvalidInput: The range is empty or not of numbers; ``at`` is missing, or is given for a
-            variable that has one value for the arm.
+        UnknownName: There is no such variable.
+        InvalidInput: The range is empty or not of numbers; or joint or cable are missing, or given
+            for a variable that has one value for the arm.
     """
 
-    of: VariableName
+    of: str
     low: float | None = None
     high: float | None = None
-    at: int | str | None = None
     choices: Sequence[Value] = ()
 
     def __post_init__(self) -> None:
-        one_of("variable", self.of, get_args(VariableName))
+        one_of("variable", self.kind if instance("of", self.of, str) else "", _NAMES)
         if not isinstance(self.choices, (tuple, list)):
             raise InvalidInput("choices", f"{self.choices!r} given; give a list.")
         self.__dict__.update(choices=tuple(self.choices))
         if bool(self.choices) == (self.low is not None or self.high is not None):
             raise InvalidInput(self.of, "needs low and high, or choices.")
-        if self.of == "wire":
+        if self.kind == "wire":
             if not self.choices:
                 raise InvalidInput(self.of, "has no range; give choices: names, or EA in N.")
             for wire in self.choices:
@@ -96,50 +76,108 @@ class Variable:
             if len(set(values)) < len(values):
                 raise InvalidInput(self.of, "names a choice twice.")
         else:
-            if self.low is None or self.high is None:
-                raise InvalidInput(self.of, "needs both low and high.")
-            kind = {"m": "length", "N": "tension"}.get(UNITS.get(self.of, ""))
-            low, high = (
-                scalar(self.of, each) if kind is None else quantity(self.of, each, kind, zero=True)
-                for each in (self.low, self.high)
-            )
-            if not low < high:
-                raise InvalidInput(self.of, f"from {low:g} to {high:g} given; give low < high.")
-            if self.of in WHOLE:
-                low, high = (_whole(self.of, each) for each in (low, high))
-            self.__dict__.update(low=low, high=high)
-            if self.of in ("hole_radius", "disk_offset"):
-                for doubt in doubts_about_units(0.0, [(self.of, high, WIDEST)]):
-                    warn(doubt)
-            if UNITS.get(self.of) == "rad":
-                most = max(-low, high)
-                for doubt in doubts_about_angle(f"{self.of} up to", most, _WIDEST_ANGLE):
-                    warn(doubt)
-        if self.of in _OF_CABLE and not isinstance(self.at, str):
-            raise InvalidInput(self.of, f"needs at= the name of a cable, not {self.at!r}.")
-        if self.of in _OF_JOINT and self.at is not None:
-            whole_number(f"{self.of}.at", self.at, 1)
-        if self.of not in (*_OF_CABLE, *_OF_JOINT) and self.at is not None:
-            raise InvalidInput(self.of, f"at={self.at!r} given; it has one value for the arm.")
+            self.__dict__.update(zip(("low", "high"), self._range(), strict=True))
+        of_cable = self.kind in ("hole_angle", "end")
+        if of_cable and not self.at:
+            raise InvalidInput(self.of, f"needs the name of a cable: {self.of}@cable1_1.")
+        if self.at and not of_cable and self.kind not in PARAMETERS:
+            raise InvalidInput(self.of, f"has one value for the arm: {self.kind}.")
+
+    def _range(self) -> tuple[float, float]:
+        if self.low is None or self.high is None:
+            raise InvalidInput(self.of, "needs both low and high.")
+        kind = _KINDS.get(self.unit)
+        low, high = (
+            scalar(self.of, each) if kind is None else quantity(self.of, each, kind, zero=True)
+            for each in (self.low, self.high)
+        )
+        if not low < high:
+            raise InvalidInput(self.of, f"from {low:g} to {high:g} given; give low < high.")
+        if self.kind in WHOLE:
+            low, high = (_whole(self.of, each) for each in (low, high))
+        doubts = list[str]()
+        if self.kind in ("hole_radius", "disk_offset"):
+            doubts = doubts_about_units(0.0, [(self.of, high, WIDEST)])
+        elif self.unit == "rad":
+            doubts = doubts_about_angle(f"{self.of} up to", max(-low, high), _WIDEST_ANGLE)
+        for doubt in doubts:
+            warn(doubt)
+        return low, high
 
     @property
-    def name(self) -> str:
-        """Name of the variable, such as ``hole_radius`` or ``hole_radius of joint 2``."""
-        if self.at is None:
-            return self.of
-        return f"{self.of} of {f'joint {self.at}' if isinstance(self.at, int) else self.at}"
+    def kind(self) -> str:
+        """The part of ``of`` before the @, such as ``hole_radius``."""
+        return self.of.partition("@")[0]
+
+    @property
+    def at(self) -> str:
+        """The number of the joint or the name of the cable after the @, or empty: all."""
+        return self.of.partition("@")[2]
+
+    @property
+    def unit(self) -> str:
+        """SI unit, or empty."""
+        if self.kind == "minimum":
+            return "N"
+        return _SI.get(PARAMETERS[self.kind].unit, "") if self.kind in PARAMETERS else ""
 
     @property
     def is_continuous(self) -> bool:
         """Whether the variable is a real number in a range."""
-        return not self.choices and self.of not in WHOLE
+        return not self.choices and self.kind not in WHOLE
+
+    @property
+    def reroutes(self) -> bool:
+        """Whether the variable changes the cables themselves, not a number of them."""
+        return self.kind in (*WHOLE, "wire")
 
     def shown(self, value: Value) -> str:
         """Return a value [SI] as text, in the unit shown to the user: mm, degrees, N."""
-        unit = UNITS.get(self.of)
-        if unit is None or isinstance(value, str):
-            return f"{value}" if isinstance(value, (str, int)) else f"{value:g}"
-        return f"{value:.4g} N" if unit == "N" else place(value, unit)
+        if isinstance(value, (str, int)):
+            return f"{value}"
+        if self.unit in ("m", "rad"):
+            return place(value, self.unit)
+        if self.kind not in PARAMETERS:
+            return f"{value:.4g} {self.unit}".rstrip()
+        unit, size, *_ = PARAMETERS[self.kind]
+        return f"{value / size:.4g} {unit}".rstrip()
+
+    def require(self, arm: Manipulator) -> None:
+        """Raise InvalidInput or UnknownName if an arm lacks the joint or the cable of this."""
+        if self.kind == "end":
+            one_of("cable", self.at, arm.geometry.cable_names)
+            if not self.choices:
+                whole_number(f"{self.of}.high", self.high, 2, len(arm.geometry.joints))
+        elif self.kind in PARAMETERS:
+            ArmParameters(arm, (self.of,))
+
+    def present(self, arm: Manipulator, minimum: float) -> float | None:
+        """Return the value in an arm, the index of a choice; None if it has another or several."""
+        geometry = arm.geometry
+        found: Sequence[object]
+        match self.kind:
+            case "end":
+                found = [geometry.cables[geometry.cable_names.index(self.at)].joint]
+            case "cables_per_joint":
+                joints = [cable.joint for cable in geometry.cables]
+                found = [joints.count(k + 1) for k in range(len(geometry.joints))]
+            case "minimum":
+                found = [minimum]
+            case "wire":
+                laws = {cable.elasticity for cable in arm.cables}
+                found = [each for each in self.choices if {as_wire(each)} == laws][:1]
+            case _:
+                found = ArmParameters(arm, (self.of,)).values(self.of)
+        values = {*found}
+        if len(values) != 1:
+            return None
+        (value,) = values
+        if self.choices:
+            return float(self.choices.index(value)) if value in self.choices else None
+        assert isinstance(value, (int, float))
+        assert self.low is not None
+        assert self.high is not None
+        return float(value) if self.low <= value <= self.high else None
 
 
 def _whole(name: str, value: float) -> int:
@@ -147,54 +185,67 @@ def _whole(name: str, value: float) -> int:
     return whole_number(name, round(value) if float(value).is_integer() else value, 1)
 
 
-def changed(
-    geometry: Geometry, variables: Sequence[Variable], values: Iterable[Value]
-) -> tuple[Geometry, Wire | None]:
-    """Return the geometry in which ``variables`` have ``values`` [SI], and the wire, if it changes.
+def changed(arm: Manipulator, values: dict[Variable, Value]) -> Manipulator:
+    """Build the arm in which the variables have these values [SI].
 
-    Raises GeometryError if no valid geometry has these values.
+    Raises GeometryError if no valid arm has them.
     """
-    wire: Wire | None = None
-    common = geometry.hole_radius
-    joints, links, cables = [*geometry.joints], [*geometry.links], [*geometry.cables]
-    # where cables end first: lead and phase belong to the cables of a joint
-    pairs = sorted(zip(variables, values, strict=True), key=lambda pair: pair[0].of not in WHOLE)
-    for variable, value in pairs:
-        of, at = variable.of, variable.at
-        if of == "wire" or isinstance(value, str):
-            wire = value
+    routing = tuple((variable, value) for variable, value in values.items() if variable.reroutes)
+    base = _rerouted(arm, routing) if routing else arm
+    numbers: dict[str, float] = {}
+    for variable, value in values.items():
+        if variable.kind not in PARAMETERS:
             continue
-        where = range(1, len(joints) + 1) if at is None or of in _OF_CABLE else [int(at)]
-        match of:
+        numbers[variable.of] = scalar(variable.of, value)
+        if variable.kind == "link_length":
+            links = base.geometry.links
+            own = [int(variable.at)] if variable.at else range(1, len(links) + 1)
+            for k in own:  # a link keeps its mass per length
+                mass = links[k - 1].mass * numbers[variable.of] / links[k - 1].length
+                numbers.setdefault(f"link_mass@{k}", mass)
+    return _parameters(base, tuple(numbers))(**numbers) if numbers else base
+
+
+@lru_cache(maxsize=16)
+def _parameters(arm: Manipulator, names: tuple[str, ...]) -> ArmParameters:
+    return ArmParameters(arm, names)
+
+
+@lru_cache(maxsize=16)
+def _rerouted(arm: Manipulator, values: tuple[tuple[Variable, Value], ...]) -> Manipulator:
+    """Return the arm with as many cables, their ends and their wire as the values say."""
+    geometry, law = arm.geometry, None
+    routes = [*geometry.cables]
+    for variable, value in values:
+        match variable.kind:
+            case "wire":
+                law = as_wire(value)
             case "cables_per_joint":
-                cables = _even(geometry, int(value))
+                routes = _even(geometry, int(value))
             case "end":
-                c = geometry.cable_names.index(str(at))
-                cables[c] = replace(cables[c], joint=int(value))
-            case "hole_angle":
-                c = geometry.cable_names.index(str(at))
-                cables[c] = replace(cables[c], angle=value)
-            case "lead":
-                cables = [replace(c, lead=value) if c.joint in where else c for c in cables]
-            case "phase":
-                turns = [value if c.joint in where else 0.0 for c in cables]
-                cables = [replace(c, angle=c.angle + x) for c, x in zip(cables, turns, strict=True)]
-            case "link_length":
-                for k in where:
-                    mass = links[k - 1].mass * value / links[k - 1].length
-                    links[k - 1] = replace(links[k - 1], length=value, mass=mass)
-            case "hole_radius":
-                common = value if at is None else common
-                own = None if at is None else value
-                for k in where:
-                    joints[k - 1] = replace(joints[k - 1], hole_radius=own)
-            case "disk_offset":
-                for k in where:
-                    joints[k - 1] = replace(joints[k - 1], disk_offset=value)
-    new = geometry.replace(
-        joints=tuple(joints), links=tuple(links), cables=tuple(cables), hole_radius=common
+                c = geometry.cable_names.index(variable.at)
+                routes[c] = replace(routes[c], joint=int(value))
+    geometry = geometry.replace(cables=tuple(routes))
+    like: Sequence[Cable] = arm.cables
+    if len(routes) != len(like):
+        joints = [route.joint for route in arm.geometry.cables]
+        firsts = [joints.index(each.joint) if each.joint in joints else 0 for each in routes]
+        like = tuple(arm.cables[first] for first in firsts)
+    routed = serpentine_cables(geometry, law or arm.cables[0].elasticity)
+    cables = [
+        replace(
+            kept,
+            name=cable.name,
+            sites=holes_like(cable, kept),
+            lead=cable.lead,
+            elasticity=law or kept.elasticity,
+        )
+        for cable, kept in zip(routed, like, strict=True)
+    ]
+    made = Manipulator(
+        geometry, cables=cables, gravity=arm.gravity, original_length=arm.original_length
     )
-    return new, wire
+    return made.with_tolerances(arm.tolerances)
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:
@@ -210,69 +261,3 @@ def _even(geometry: Geometry, count: int) -> list[CableRoute]:
         like = [cable for cable in geometry.cables if cable.joint == k + 1] or [geometry.cables[0]]
         cables += [replace(like[0], joint=k + 1, angle=angle) for angle in angles[k]]
     return cables
-
-
-def present(variable: Variable, geometry: Geometry, minimum: float) -> float:
-    """Return the current value of a variable in an arm [SI].
-
-    ``minimum`` is the current lower bound of all tensions [N]. The result is NaN for a wire, or if
-    joints or cables have different values.
-    """
-    own = [
-        [cable for cable in geometry.cables if cable.joint == k]
-        for k in range(1, len(geometry.joints) + 1)
-    ]
-    values: Sequence[float]
-    match variable.of:
-        case "end" | "hole_angle":
-            cable = geometry.cables[geometry.cable_names.index(str(variable.at))]
-            return cable.joint if variable.of == "end" else cable.angle
-        case "hole_radius":
-            values = geometry.hole_radii
-        case "disk_offset":
-            values = [joint.disk_offset for joint in geometry.joints]
-        case "link_length":
-            values = [link.length for link in geometry.links]
-        case "lead":
-            values = [_common([cable.lead for cable in cables]) for cables in own]
-        case "cables_per_joint":
-            values = [len(cables) for cables in own]
-        case "phase":
-            values = [0.0] * len(own)
-        case "minimum":
-            values = [minimum]
-        case "wire":
-            return math.nan
-    return values[variable.at - 1] if isinstance(variable.at, int) else _common(values)
-
-
-def _common(values: Sequence[float]) -> float:
-    """Return the common value of all ``values``; NaN if they differ or there is none."""
-    return values[0] if len(set(values)) == 1 else math.nan
-
-
-def require_compatible(variables: Sequence[Variable], geometry: Geometry) -> None:
-    """Raise InvalidInput or UnknownName unless variables fit the arm and each other.
-
-    The arm must have their joints and cables, and no two may change the same thing.
-    """
-    for variable in variables:
-        _require_present(variable, geometry)
-    for name, count in Counter(variable.name for variable in variables).items():
-        if count > 1:
-            raise InvalidInput("variables", f"{name} is named twice.")
-    kinds = {variable.of for variable in variables}
-    if "cables_per_joint" in kinds and kinds & {"end", "hole_angle"}:
-        raise InvalidInput(
-            "variables", "cables_per_joint replaces the cables that end or hole_angle name."
-        )
-
-
-def _require_present(variable: Variable, geometry: Geometry) -> None:
-    """Raise InvalidInput or UnknownName if the arm lacks the joint or the cable of a variable."""
-    if isinstance(variable.at, str):
-        one_of("cable", variable.at, geometry.cable_names)
-    elif variable.at is not None:
-        whole_number(f"{variable.of}.at", variable.at, 1, len(geometry.joints))
-    if variable.of == "end" and not variable.choices:
-        whole_number("end.high", variable.high, 2, len(geometry.joints))

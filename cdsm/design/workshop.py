@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 
+from cdsm.batch import evaluate
 from cdsm.manipulator import Manipulator
 from cdsm.support.tables import csv_text
 from cdsm.support.values import Array
 from cdsm.wires.catalogue import label
 
 _DIGITS = 4
+_GRID = 41  # angles of each axis: lengths within the limits are found to 1 µm
 _INSIDE = 1e-6  # distance from a joint limit, over the range: there two disks touch, holes may meet
 
 
@@ -46,43 +47,37 @@ def cable_table(arm: Manipulator) -> str:
     to fix both ends.
     """
     straight = arm.cable_lengths(np.clip(0.0, arm.lower, arm.upper))
-    rows = []
-    for c, cable in enumerate(arm.cables):
-        joint = arm.geometry.cables[c].joint
-        shortest, longest = _extremes(arm, c)
-        lengths = (cable.lead, straight[c], shortest, longest, longest - shortest)
-        rows.append([cable.name, joint, label(cable.elasticity), *(_mm(1e3 * x) for x in lengths)])
+    shortest, longest = _extremes(arm)
+    leads = [cable.lead for cable in arm.cables]
+    lengths = np.column_stack([leads, straight, shortest, longest, longest - shortest])
+    rows = [
+        [cable.name, route.joint, label(cable.elasticity), *map(_mm, own)]
+        for cable, route, own in zip(arm.cables, arm.geometry.cables, 1e3 * lengths, strict=True)
+    ]
     head = ["cable", "ends after joint", "wire", "lead [mm]", "straight [mm]", "shortest [mm]"]
     return csv_text([*head, "cut [mm]", "stroke [mm]"], rows)
 
 
-def _extremes(arm: Manipulator, c: int) -> tuple[float, float]:
-    """Return the shortest and the longest length [m] of cable ``c`` within the joint limits.
+def _extremes(arm: Manipulator) -> tuple[Array, Array]:
+    """Return the shortest and the longest length (C,) [m] of the cables within the joint limits.
 
-    A segment crosses at most one joint, so the length is a sum with a term for each joint. The
-    search starts with each joint at the best of its limits and zero, and then follows the gradient.
+    A segment crosses at most one joint, so a length is a sum with a term for each joint, and a
+    grid over one joint after the other finds all of it.
     """
-    from scipy.optimize import minimize  # slow to import
-
     inset = _INSIDE * (arm.upper - arm.lower)
     low, high = arm.lower + inset, arm.upper - inset
-    ends = np.array([low, np.clip(0.0, low, high), high])
-    blocks = np.split(np.arange(arm.nv), np.cumsum([len(x.axes) for x in arm.geometry.joints])[:-1])
-    found = []
-    for sign in (1.0, -1.0):
-        start = ends[1].copy()
-        for own in blocks:
-            tried = np.repeat(start[None], 3 ** len(own), axis=0)
-            tried[:, own] = [*itertools.product(*ends[:, own].T)]
-            start = min(tried, key=lambda q: sign * arm.cable_lengths(q)[c])
-
-        def length(q: Array, sign: float = sign) -> tuple[float, Array]:
-            pose = arm.at(q)
-            return sign * float(pose.cable_lengths[c]), sign * pose.length_jacobian[c]
-
-        bounds = [*zip(low, high, strict=True)]
-        found.append(sign * float(minimize(length, start, jac=True, bounds=bounds).fun))
-    return found[0], found[1]
+    straight = np.clip(0.0, low, high)
+    shortest = longest = at_rest = arm.cable_lengths(straight)
+    first = 0
+    for joint in arm.geometry.joints:
+        own = slice(first, first + len(joint.axes))
+        grid = np.meshgrid(*np.linspace(low[own], high[own], _GRID).T)
+        q = np.tile(straight, (grid[0].size, 1))
+        q[:, own] = np.stack([each.ravel() for each in grid], axis=1)
+        change = evaluate(arm, q, outputs=["cable_lengths"])["cable_lengths"] - at_rest
+        shortest, longest = shortest + change.min(axis=0), longest + change.max(axis=0)
+        first = own.stop
+    return shortest, longest
 
 
 def _mm(value: float) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination
 from cdsm.identification.measurement import WeightLoop
@@ -88,9 +89,7 @@ class ExperimentPlan(Result):
 
     def plot(self) -> Figure:
         """Plot the expected 95 % intervals, and how often each candidate is tested."""
-        from cdsm.plots.measured import plot_experiment_plan  # matplotlib imports slowly
-
-        return plot_experiment_plan(self)
+        return cdsm.plots.plot_experiment_plan(self)
 
     def __str__(self) -> str:
         times = ((label, f"{count}×") for label, count in self.repetitions.items())

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtr, chdtrc, ndtri
 
+import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination
 from cdsm.identification.intervals import interval
@@ -194,9 +195,7 @@ class Identification(Result):
 
     def plot(self) -> Figure:
         """Plot predicted and measured stiffnesses [N/mm] and loops [mm], and residuals in σ."""
-        from cdsm.plots.measured import plot_identification  # matplotlib imports slowly
-
-        return plot_identification(self, self.reading_names, self._verdict)
+        return cdsm.plots.plot_identification(self, self.reading_names, self._verdict)
 
     def __str__(self) -> str:
         half = float(ndtri(0.975)) * self.std

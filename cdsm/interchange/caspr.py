@@ -8,26 +8,54 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable, Site
 from cdsm.errors import CableError, FileError, InvalidInput, UnknownName
-from cdsm.interchange.caspr_bodies import BASE, Body, read_bodies, read_root, refuse, whole
 from cdsm.manipulator import GRAVITY, Manipulator
-from cdsm.support.files import as_path
-from cdsm.support.xml import XmlFault, numbers
+from cdsm.support.directions import AXES
+from cdsm.support.files import as_path, read_text
+from cdsm.support.values import Array
+from cdsm.support.xml import XmlFault, numbers, parse_xml
 from cdsm.urdf import TIP, E, inertial, joint, origin, urdf_text
 from cdsm.wires.elasticity import Elasticity
 
 if TYPE_CHECKING:
     from lxml import etree
 
-_COMMENT: Final = "\n  Made by cdsm from a CASPR model. Units: m, rad, kg.\n"
+_BASE: Final = "base"  # name of link 0
+
+_JOINTS: Final = {
+    **{f"R_{axis}": axis.lower() for axis in "XYZ"},
+    **{f"U_{axes}": axes.lower() for axes in ("XY", "YZ", "XZ")},
+    "S_EULER_XYZ": "xyz",
+    "S_FIXED_XYZ": "xyz",
+    **{f"P_{axes}": axes for axes in ("X", "XY", "XZ")},
+    "PLANAR_XY": "XYz",
+    "PLANAR_YZ": "YZx",
+    "PLANAR_XZ": "XZy",
+    "T_XYZ": "XYZ",
+    "SPATIAL_EULER_XYZ": "XYZxyz",
+    "R_AXIS": "?",
+    "P_AXIS": "!",
+}
+"""Coordinates of each joint type: x, y, z turn, X, Y, Z slide, ? turns and ! slides on any axis."""
+
+
+class _Link(NamedTuple):
+    """Link of a CASPR model, with what cables and other links need of it."""
+
+    name: str
+    centre: Array  # of mass (3,) [m]
+    end: Array  # (3,) [m]
+    joint_names: list[str]  # in the order of CASPR's coordinates
 
 
 def read_caspr(
@@ -64,19 +92,28 @@ def read_caspr(
     Raises:
         InvalidInput: ``elasticity`` is not an Elasticity, or ``cables`` is missing.
         FileError: A file cannot be read, is not a CASPR model, or has parts that cannot be mapped:
-            other joints, cables that are not ideal, pulleys. Every such part is named.
+            other joints, cables that are not ideal, pulleys. The first such part is named.
         UrdfError: A link has impossible moments of inertia.
         UnknownName: The set of cables does not exist.
         CableError: A cable cannot be routed.
     """
     if not isinstance(elasticity, Elasticity):
         raise InvalidInput("elasticity", f"{elasticity!r} given; an Elasticity is needed.")
-    bodies_file, cables_file = _files(bodies, cables)
-    links = read_bodies(bodies_file)
-    routed = _read_cables(cables_file, links, elasticity, cable_set)
-    urdf = _urdf(bodies_file.stem.removesuffix("_bodies"), links)
+    path = as_path(bodies)
+    if path.is_dir():
+        path, of_cables = (_one_file(path, kind) for kind in ("bodies", "cables"))
+    elif cables is None:
+        problem = "not given; give the file of the cables too, or the folder of both."
+        raise InvalidInput("cables", problem)
+    else:
+        of_cables = as_path(cables)
+    with _reading(path) as read:
+        parts, links = _read_bodies(read("bodies_system", "bodies"))
+    with _reading(of_cables) as read:
+        routed = _read_cables(read("cables", "cables"), links, elasticity, cable_set)
+    comment = "\n  Made by cdsm from a CASPR model. Units: m, rad, kg.\n"
     return Manipulator.from_urdf(
-        urdf,
+        urdf_text(path.stem.removesuffix("_bodies") or "caspr", parts, comment),
         routed,
         tip=TIP,
         joint_names=[name for link in links for name in link.joint_names],
@@ -85,74 +122,135 @@ def read_caspr(
     )
 
 
-def _files(
-    bodies: str | os.PathLike[str], cables: str | os.PathLike[str] | None
-) -> tuple[Path, Path]:
-    first = as_path(bodies)
-    if not first.is_dir():
-        if cables is None:
-            raise InvalidInput(
-                "cables", "not given; give the file of the cables too, or the folder of both."
-            )
-        return first, as_path(cables)
+def _one_file(folder: Path, kind: str) -> Path:
+    files = sorted(folder.glob(f"*_{kind}.xml"))
+    if len(files) != 1:
+        found = ", ".join(file.name for file in files) or "none"
+        raise FileError(folder, f"holds {found} where one *_{kind}.xml is needed.")
+    return files[0]
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[Callable[[str, str], etree._Element]]:
+    """Yield a function that parses a file; its DOCTYPE may name a DTD, which is not read."""
+    text = read_text(path)
+    try:
+        yield lambda tag, dtd: parse_xml(text, tag, rf"(\.\./)*templates/{dtd}\.dtd")
+    except (XmlFault, CableError) as error:
+        raise FileError(path, f"cannot be read as a CASPR model: {error}.") from None
+
+
+def _whole(where: str, text: str | None, most: int) -> int:
+    (value,) = numbers(where, text, 1)
+    if value not in range(most + 1):
+        raise XmlFault(f"{where} is link {value:g}; one of 0 to {most} is needed")
+    return int(value)
+
+
+def _read_bodies(root: etree._Element) -> tuple[list[etree._Element], list[_Link]]:
+    """Read the links with their joints; return the elements of a URDF too."""
+    elements = root.findall("links/*")
+    order = [element.get("num") for element in elements]
+    if not order or order != [str(n) for n in range(1, len(order) + 1)]:
+        raise XmlFault(f"links are numbered {order}; 1 to the number of links is needed")
+    counts = Counter(element.get("name") for element in elements)
+    links = [_Link(_BASE, np.zeros(3), np.zeros(3), [])]
+    parts = [E.link(name=_BASE)]
+    for number, element in enumerate(elements, start=1):
+        name = element.get("name") or ""
+        if not name or counts[name] > 1 or name in (_BASE, TIP):
+            name = f"link{number}"
+        if element.tag != "link_rigid":
+            raise XmlFault(f"<{element.tag}> {name}: only <link_rigid> is supported")
+        links.append(_body(element, name, links, parts))
+    parts += [E.link(name=TIP)]
+    place = origin(links[-1].end)
+    return [*parts, joint("fixed", f"{TIP}_joint", links[-1].name, TIP, place)], links
+
+
+def _body(
+    element: etree._Element, name: str, links: list[_Link], parts: list[etree._Element]
+) -> _Link:
+    """Read a link, and add it and its joints to the ``parts`` of a URDF."""
+
+    def values(path: str, count: int = 3) -> Array:
+        where = f"{name}: <{path.rpartition('/')[2]}>"
+        return np.array(numbers(where, element.findtext(path), count))
+
+    body, kind = "physical/inertia", element.find("joint")
+    if kind is None or kind.get("type") not in _JOINTS:
+        given, known = None if kind is None else kind.get("type"), ", ".join(_JOINTS)
+        raise XmlFault(f"{name}: the joint type {given!r} is not supported; {known} are")
+    mass, centre = float(values("physical/mass", 1)[0]), values("physical/com_location")
+    if mass < 0.0:
+        raise XmlFault(f"{name}: <mass> {mass:g} kg given; it cannot be negative")
+    keys = [[f"{body}/I{min(a, b)}{max(a, b)}" for b in "xyz"] for a in "xyz"]
+    inertia = np.array([[values(key, 1)[0] for key in row] for row in keys])
+    if (reference := element.find(body).get("ref")) not in ("com", "joint"):
+        raise XmlFault(f"{name}: <inertia ref={reference!r}>; com or joint is needed")
+    if reference == "joint":
+        inertia -= mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    joints = _joints(name, kind)
+    names = [label for _, label, *_ in joints]
+    if kind.get("type") == "S_FIXED_XYZ":
+        joints.reverse()  # turns about fixed axes X, Y, Z equal turns about moving axes Z, Y, X
+    parent = links[_whole(f"{name}: its parent", element.findtext("parent/num"), len(links) - 1)]
+    carrier, place = parent.name, values("parent/location")
+    for i, (turns, label, *settings) in enumerate(joints, start=1):
+        # single joints of one link need massless links between them
+        child = name if i == len(joints) else f"{name}_{i}"
+        parts += [joint(turns, label, carrier, child, origin(place), *settings)]
+        parts += [E.link(name=child)]
+        carrier, place = child, np.zeros(3)
+    if mass:
+        parts[-1].append(inertial(mass, inertia, origin(centre)))
+    return _Link(name, centre, values("physical/end_location"), names)
+
+
+def _joints(name: str, element: etree._Element) -> list[tuple[str, str, Any, Any]]:
+    """Split a CASPR joint into joints of one coordinate, in the order of its coordinates."""
+    axes = _JOINTS[str(element.get("type"))]
+    low, high = (
+        numbers(f"{name}: joint {key}", element.get(key), len(axes)) for key in ("q_min", "q_max")
+    )
     found = []
-    for kind in ("bodies", "cables"):
-        files = sorted(first.glob(f"*_{kind}.xml"))
-        if len(files) != 1:
-            listed = ", ".join(file.name for file in files) or "none"
-            raise FileError(first, f"holds {listed} where one *_{kind}.xml is needed.")
-        found.append(files[0])
-    return found[0], found[1]
-
-
-# --- cables ---------------------------------------------------------------------------------
+    for axis, lower, upper in zip(axes, low, high, strict=True):
+        if lower > upper:
+            raise XmlFault(f"{name}: joint q_min {lower:g} is above q_max {upper:g}")
+        tail = {"?": "turn", "!": "slide"}.get(axis, f"slide_{axis.lower()}" * axis.isupper())
+        xyz = AXES.get(axis.lower()) or numbers(f"{name}: joint axis", element.get("axis"), 3)
+        if not any(xyz):
+            raise XmlFault(f"{name}: joint axis {xyz} has no direction")
+        kind = "prismatic" if axis in "XYZ!" else "revolute"
+        limit = E.limit(effort=0.0, velocity=0.0, lower=lower, upper=upper)
+        found.append((kind, f"{name}_{tail or axis}", E.axis(xyz=xyz), limit))
+    return found
 
 
 def _read_cables(
-    path: Path, bodies: Sequence[Body], elasticity: Elasticity, wanted: str | None
-) -> tuple[Cable, ...]:
-    root = read_root(path, "cables", "cables")
+    root: etree._Element, links: list[_Link], elasticity: Elasticity, wanted: str | None
+) -> list[Cable]:
     sets = {str(each.get("id")): each for each in root.findall("cable_set")}
     name = root.get("default_cable_set") if wanted is None else wanted
     if not isinstance(name, str) or name not in sets:
         raise UnknownName("set of cables", name, tuple(sets))
-    faults: list[str] = []
-    cables: list[Cable] = []
-    used: dict[str, int] = {}
-    for element in sets[name]:
-        label = _unique(str(element.get("name") or f"cable{len(cables) + 1}"), used)
-        try:
-            cables.append(_cable(element, label, bodies, elasticity))
-        except (XmlFault, CableError) as error:
-            faults.append(str(error))
-    if not faults and not cables:
+    if not len(sets[name]):
         others = ", ".join(repr(each) for each in sets if len(sets[each])) or "none"
-        faults.append(f"the set {name!r} holds no cables; sets with cables are {others}")
-    refuse(path, faults)
-    return tuple(cables)
+        raise XmlFault(f"the set {name!r} holds no cables; sets with cables are {others}")
+    cables: list[Cable] = []
+    used: Counter[str] = Counter()
+    for element in sets[name]:
+        label = element.get("name") or f"cable{len(cables) + 1}"
+        used[label] += 1
+        label += f" #{used[label]}" if used[label] > 1 else ""
+        cables.append(_cable(element, label, links, elasticity))
+    return cables
 
 
-def _unique(name: str, used: dict[str, int]) -> str:
-    """Return ``name``, or the first of ``name #2``, ``name #3``, … that is not in ``used``.
-
-    Add the result to ``used``.
-    """
-    label, count = name, used.get(name, 1)
-    while label in used:
-        count += 1
-        label = f"{name} #{count}"
-    used[name] = count
-    used[label] = 1 if label != name else count
-    return label
-
-
-def _cable(
-    element: etree._Element, name: str, bodies: Sequence[Body], elasticity: Elasticity
-) -> Cable:
+def _cable(element: etree._Element, name: str, links: list[_Link], elasticity: Elasticity) -> Cable:
     if element.tag != "cable_ideal":
-        raise XmlFault(
-            f"<{element.tag}> {name}: only <cable_ideal> is supported; give the elasticity here"
-        )
+        only = "only <cable_ideal> is supported; give the elasticity here"
+        raise XmlFault(f"<{element.tag}> {name}: {only}")
     reference = element.get("attachment_reference")
     if reference not in ("com", "joint"):
         raise XmlFault(f"{name}: attachment_reference {reference!r}; com or joint is needed")
@@ -164,42 +262,9 @@ def _cable(
     for place in element.findall("attachments/*"):
         if place.tag != "attachment":
             raise XmlFault(f"{name}: <{place.tag}> is not supported; a cable passes points only")
-        number = whole(f"{name}: <link>", place.findtext("link"))
-        if not 0 <= number <= len(bodies):
-            raise XmlFault(f"{name}: there is no link {number}, but 0 to {len(bodies)}")
+        link = links[_whole(f"{name}: <link>", place.findtext("link"), len(links) - 1)]
         point = np.array(numbers(f"{name}: <location>", place.findtext("location"), 3))
-        if number and reference == "com":
-            point = point + bodies[number - 1].centre
-        link = bodies[number - 1].name if number else BASE
-        sites.append(Site(link, tuple(point.tolist())))
-    return Cable(
-        name=name,
-        sites=tuple(sites),
-        elasticity=elasticity,
-        minimum=max(low, 0.0),
-        maximum=high if high > 0.0 else math.inf,
-    )
-
-
-# --- URDF -----------------------------------------------------------------------------------
-
-
-def _urdf(name: str, bodies: Sequence[Body]) -> str:
-    """Return the URDF text of a robot with ``bodies`` as links; ``tool0`` ends the last one."""
-    links, joints = [E.link(name=BASE)], []
-    names = [BASE, *(body.name for body in bodies)]
-    for body in bodies:
-        parent, place = names[body.parent], body.place
-        for i, each in enumerate(body.joints, start=1):
-            # single joints of one link need massless links between them
-            child = body.name if i == len(body.joints) else f"{body.name}_{i}"
-            axis = E.axis(xyz=each.axis)
-            limit = E.limit(effort=0.0, velocity=0.0, lower=each.lower, upper=each.upper)
-            joints.append(joint(each.kind, each.name, parent, child, origin(place), axis, limit))
-            links.append(E.link(name=child))
-            parent, place = child, np.zeros(3)
-        if body.mass:
-            links[-1].append(inertial(body.mass, body.inertia, origin(body.centre)))
-    links.append(E.link(name=TIP))
-    joints.append(joint("fixed", f"{TIP}_joint", names[-1], TIP, origin(bodies[-1].end)))
-    return urdf_text(name or "caspr", [*links, *joints], _COMMENT)
+        point = point + link.centre if reference == "com" else point
+        sites.append(Site(link.name, tuple(point.tolist())))
+    high = high if high > 0.0 else math.inf
+    return Cable(name, tuple(sites), elasticity, minimum=max(low, 0.0), maximum=high)

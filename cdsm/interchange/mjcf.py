@@ -11,25 +11,27 @@ of the real cable changes with its tension.
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
+import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.interchange.mjcf_bodies import add_bodies, row
-from cdsm.interchange.mjcf_motion import Motion, choose_motion
+from cdsm.interchange.mjcf_bodies import Carried, add_bodies, mass_matrix, row
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.report.checks import TOLERANCE, balance_error
+from cdsm.statics.modes import vibrations
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.instability import verdict
 from cdsm.support.files import write_text
-from cdsm.support.format import coordinates
+from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.validation import RANGES, instance, one_of, scalar
 from cdsm.support.values import Array
 from cdsm.support.warning import warn
@@ -37,8 +39,16 @@ from cdsm.tension import Tension
 
 Actuators = Literal["length", "tension", "none"]
 
+DAMPING_RATIO = 0.05
+"""Default damping ratio of the least damped mode [-]."""
+
 _CABLE = 5e-4  # radius [m] of a drawn cable
 _MOST = RANGES["tension"].high  # tension of a motor [N]; MuJoCo's ranges have two ends
+_SHARE = 0.5  # least share of ω² from the cables, for modes that count for the damping
+_STEPS = [
+    float(f"{digit}e-{n}") for n in range(3, 12) for digit in (2, 1, 0.5)
+]  # [s]; MuJoCo: 2 ms
+_PHASE = 0.2  # largest ω·dt [rad]: frequencies are right within 0.2 %; explicit springs bear 2
 
 _CONTROLS = {
     "length": "a locked motor per cable; its ctrl is the wire it pays out [m], 0 at the posture",
@@ -48,15 +58,16 @@ _CONTROLS = {
 }
 
 
-@dataclass(frozen=True)
-class MuJoCoModel:
+class MuJoCoModel(NamedTuple):
     """MJCF text, and the settings that were chosen for it."""
 
     text: str
-    motion: Motion
+    time_step: float  # [s]
+    cable_damping: Array  # (C,) [N s/m]
+    joint_damping: float  # of every joint [N m s/rad], [N s/m] where it slides
     actuators: str
     unstable: str | None  # the warning for an unstable arm
-    remarks: tuple[str, ...]  # lines shown to the user on what was chosen
+    remarks: Sequence[str]  # lines shown to the user on what was chosen
 
 
 def to_mjcf(
@@ -71,38 +82,24 @@ def to_mjcf(
     """Write the arm as MJCF text, which MuJoCo loads unchanged.
 
     Bodies, joints, tendons and actuators have the names of links, joints and cables. The sites of a
-    cable are ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. Links without a drawable
-    visual are sticks. The model has no leads (straight cables of constant length before the first
-    site), no friction in the holes, and no wrench. Apply the wrench in MuJoCo at run time;
-    ``xfrc_applied`` acts at the centre of mass of a link. Motors that keep lengths have the
-    constant stiffness k of the posture, so a large load moves an arm with nonlinear wires by
-    another amount than :func:`~cdsm.equilibrium` says.
-
-    A new ``mjData`` and the keyframe ``pose`` have the joint coordinates of the posture, which are
-    those of cdsm. ``actuators`` is one of
+    cable are ``name/1``, ``name/2``, …; the site at the tip is ``tool0``. A new ``mjData`` and the
+    keyframe ``pose`` have the joint coordinates of the posture. The model has no leads (straight
+    cables before the first site), no friction in the holes, and no wrench: apply it at run time.
+    ``actuators`` is one of
 
     - ``length``: one motor per cable keeps its original length, as in :func:`~cdsm.equilibrium`.
       Its force is k (u + L_rest − L), never a push. Its ``ctrl`` u is the length of wire that it
       pays out [m]. The motor of a force-controlled cable keeps F + u, with u in N.
     - ``tension``: one motor per cable pulls with the tension ``ctrl`` [N]: F in the keyframe, zero
-      in a new ``mjData``. The cables add no passive stiffness: most arms are then unstable and need
-      a controller.
+      in a new ``mjData``. Most arms are then unstable and need a controller.
     - ``none``: each cable is a spring of stiffness k and rest length L_rest. Force-controlled
-      cables are motors without ``ctrl``; so are springs softer than F/L, whose rest length would
-      be negative.
+      cables, and springs softer than F/L, are motors without ``ctrl``.
 
-    Time step: 1, 2 or 5 times a power of ten [s], at most 0.2/ω and at most MuJoCo's 2 ms. ω is the
-    highest natural frequency [rad/s], K_θ φ = ω² M φ, with the mass matrix M of the exported
-    bodies. Moving bodies without mass get 1e-6 kg and 1e-9 kg m², so an arm of massless links needs
-    steps of microseconds.
-
-    Damping: each cable has the damping c = β k [N s/m]. A mode φ then has the damping ratio
-    ζ = β (J_L φ)ᵀ k (J_L φ)/2ω, about β ω/2. β is chosen so that the least damped mode, usually the
-    lowest, has the ``damping_ratio``. This choice ignores modes that get less than half of their ω²
-    from the cables; they may be damped less.
-
-    A comment at the top states time step, damping with the range of ζ, and actuators. If K_θ is not
-    positive definite, the model leaves the posture by itself: the comment says UNSTABLE, and a
+    The time step is 1, 2 or 5 times a power of ten [s], at most 0.2/ω and MuJoCo's 2 ms, with the
+    highest natural frequency ω [rad/s] of K_θ and the exported bodies. Moving bodies without mass
+    get 1e-6 kg and 1e-9 kg m². Each cable has the damping c = β k [N s/m], with β such that the
+    least damped mode that gets half of its ω² or more from the cables has the ``damping_ratio``.
+    A comment at the top states all this. If K_θ is not positive definite, it says UNSTABLE, and a
     warning is issued.
 
     Args:
@@ -112,8 +109,7 @@ def to_mjcf(
         actuators: ``length``, ``tension`` or ``none``. Default: ``length``; without tensions
             ``none``.
         damping_ratio: ζ of the least damped mode [-]; 0.05 by default. It needs tensions.
-        damping: Damping of every joint instead [N m s/rad], [N s/m] for prismatic joints. MuJoCo
-            integrates damping implicitly, so strong damping needs no smaller time step.
+        damping: Damping of every joint instead [N m s/rad], [N s/m] for prismatic joints.
 
     Raises:
         InvalidInput: Only one of ``pose`` and ``tension`` is given, the posture is of another arm,
@@ -171,51 +167,74 @@ def mujoco_model(
         raise InvalidInput(name, "follows from the stiffness; give pose and tension too.")
     if damping is not None and damping_ratio is not None:
         raise InvalidInput("damping", "give it or damping_ratio, not both.")
-    ratio, damping = _checked("damping_ratio", damping_ratio), _checked("damping", damping)
+    for name, value in (("damping_ratio", damping_ratio), ("damping", damping)):
+        if value is not None and scalar(name, value) < 0.0:
+            raise InvalidInput(name, f"{value:g} given; it cannot be negative.")
 
     root = etree.Element("mujoco", model=arm.name)
     compiler = etree.SubElement(root, "compiler", angle="radian", autolimits="true")
     compiler.set("inertiafromgeom", "false")
     # implicit in velocities only: integrators implicit in positions take energy from springs
     option = etree.SubElement(root, "option", gravity=row(arm.gravity), integrator="implicitfast")
-    start = {} if pose is None else dict(zip(arm.joint_names, pose.q.tolist(), strict=True))
+    angles = [0.0] * arm.nv if pose is None else pose.q.tolist()
+    start = dict(zip(arm.joint_names, angles, strict=True))
     masses = add_bodies(root, arm, start)
-    motion = choose_motion(arm, K, masses, ratio, damping)
-    option.set("timestep", repr(motion.time_step))
+    of_joints = 0.0 if damping is None else float(damping)
+    step, of_cables, said = _motion(arm, K, masses, damping_ratio, damping)
+    option.set("timestep", repr(step))
     joints = list(root.iter("joint"))  # in MuJoCo's order, depth first
-    if motion.joints:
-        for joint in joints:
-            joint.set("damping", repr(motion.joints))
-    tensions = _cables(root, arm, K, actuators, motion.wires) if arm.cables else []
+    for joint in joints:
+        joint.set("damping", repr(of_joints))
+    controls = _cables(root, arm, K, actuators, of_cables)
     if K is not None:
         frame = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose")
         frame.set("qpos", row([start[joint.get("name")] for joint in joints]))
-        if tensions:
-            frame.set("ctrl", row(tensions))
+        if controls:
+            frame.set("ctrl", row(controls))
 
     loaded = K if K is None or actuators != "tension" else _as_force_controlled(K)
     unstable = None if loaded is None or loaded.is_stable else verdict(loaded)
-    remarks = (
-        *motion.said,
-        f"actuators  {actuators}: {_CONTROLS[actuators]}",
-        "friction   of the cables in their holes is left out",
-        *(() if K is None else _missing(K)),
-    )
-    said = [unstable] if unstable is not None else []
-    for line in reversed(["Generated by cdsm. Units: m, rad, kg, N.", *said, *remarks]):
+    said += [f"actuators  {actuators}: {_CONTROLS[actuators]}"]
+    said += ["friction   of the cables in their holes is left out"]
+    said += [] if K is None else _missing(K)
+    top = ["Generated by cdsm. Units: m, rad, kg, N.", *([unstable] if unstable else []), *said]
+    for line in reversed(top):
         root.insert(0, etree.Comment(f" {line.replace('--', '- -')} "))  # XML's rule
     etree.indent(root, space="  ")
     text: str = etree.tostring(root, encoding="unicode") + "\n"
-    return MuJoCoModel(text, motion, actuators, unstable, remarks)
+    return MuJoCoModel(text, step, of_cables, of_joints, actuators, unstable, said)
 
 
-def _checked(name: str, value: float | None) -> float | None:
-    """Return the argument ``name``, a damping, as a float; raise InvalidInput if it is negative."""
-    if value is None:
-        return None
-    if (number := scalar(name, value)) < 0.0:
-        raise InvalidInput(name, f"{number:g} given; it cannot be negative.")
-    return number
+def _motion(
+    arm: Manipulator,
+    K: Stiffness | None,
+    masses: list[Carried],
+    ratio: float | None,
+    damping: float | None,
+) -> tuple[float, Array, list[str]]:
+    """Choose the time step [s] and the damping of each cable (C,) [N s/m]; say both in lines.
+
+    Joint dampers with the same effect would slow down the slow motions of a long arm tenfold.
+    """
+    step, of, wires = _STEPS[0], "MuJoCo's own", np.zeros(len(arm.cables))
+    unit = JointUnits(arm.slides).joined("N m s/rad", "N s/m")
+    damped = f"{damping or 0.0:.4g} {unit} at every joint"
+    if K is not None:
+        squares, shapes = vibrations(K, mass_matrix(K.posture, masses))
+        fastest = math.sqrt(abs(squares).max())
+        step = next((each for each in _STEPS if each * fastest <= _PHASE), _STEPS[-1])
+        of = f"for frequencies up to {fastest / math.tau:.4g} Hz"
+        swings = squares > 0.0
+        omega = np.sqrt(squares[swings])
+        stretch = K.posture.length_jacobian @ shapes[:, swings]
+        ratios = K.cable_stiffness @ stretch**2 / (2.0 * omega)  # for β = 1 s
+        resisted = 2.0 * ratios >= _SHARE * omega
+        if damping is None and resisted.any():
+            beta = (DAMPING_RATIO if ratio is None else ratio) / ratios[resisted].min()
+            wires = beta * K.cable_stiffness
+            damped = f"ratio {beta * ratios.min():.2g} to {beta * ratios.max():.2g} of the modes, "
+            damped += f"by the cables: {wires.min():.4g} to {wires.max():.4g} N s/m"
+    return step, wires, [f"time step  {1e3 * step:g} ms, {of}", f"damping    {damped}"]
 
 
 def _missing(K: Stiffness) -> Iterator[str]:
@@ -235,34 +254,25 @@ def _as_force_controlled(K: Stiffness) -> Stiffness:
     return stiffness(free.at(K.posture.q, check_limits=False), K.tension, wrench=K.wrench)
 
 
-# --- cables ---------------------------------------------------------------------------------
-
-
 def _cables(
     root: etree._Element, arm: Manipulator, K: Stiffness | None, actuators: str, damping: Array
 ) -> list[float]:
-    """Add tendons and their actuators to ``root``; return ``ctrl`` of each actuator at the posture.
-
-    ``actuators`` is the kind of these; see :func:`to_mjcf`. ``damping`` (C,) [N s/m] is the damping
-    coefficient of each tendon.
-    """
-    tendon, motors = etree.SubElement(root, "tendon"), etree.Element("actuator")
+    """Add tendons and actuators of the kind; return ``ctrl`` of each actuator at the posture."""
+    tendon, motors = etree.SubElement(root, "tendon"), etree.SubElement(root, "actuator")
     at_start = []
     for c, cable in enumerate(arm.cables):
         spatial = etree.SubElement(tendon, "spatial", name=cable.name, width=repr(_CABLE))
         for i in range(1, len(cable.sites) + 1):
             etree.SubElement(spatial, "site", site=f"{cable.name}/{i}")
-        if damping[c]:
-            spatial.set("damping", repr(float(damping[c])))
+        spatial.set("damping", repr(float(damping[c])))
         F, k, length = 0.0, 0.0, 0.0
         if K is not None:
             F, k = float(K.tension[c]), float(K.cable_stiffness[c])
             length = float(K.posture.cable_lengths[c]) - cable.lead
         rest = length - F / k if k > 0.0 else -1.0
         if actuators == "none" and (K is None or rest >= 0.0):
-            if K is not None:
-                spatial.set("stiffness", repr(k))
-                spatial.set("springlength", f"0 {rest!r}")
+            spring = {"stiffness": repr(k), "springlength": f"0 {rest!r}"}
+            spatial.attrib.update(spring if K is not None else {})
             continue
         # force along the tendon, which pulls where it is negative: gain ctrl + bias
         gain, bias, control = k, [k * length - F, -k, 0.0], 0.0
@@ -272,13 +282,11 @@ def _cables(
             motor.set("ctrlrange", f"0 {_MOST!r}")
         elif actuators == "none":
             gain = 0.0
-        elif k == 0.0:
-            gain = -1.0
-            motor.set("ctrlrange", f"{-F!r} {_MOST!r}")
-        motor.attrib.update({"biastype": "affine", "gainprm": repr(gain), "biasprm": row(bias)})
-        if actuators == "length":
+        else:
             motor.set("forcerange", f"{-_MOST!r} 0")
+            if k == 0.0:
+                gain = -1.0
+                motor.set("ctrlrange", f"{-F!r} {_MOST!r}")
+        motor.attrib.update({"biastype": "affine", "gainprm": repr(gain), "biasprm": row(bias)})
         at_start.append(control)
-    if len(motors):
-        root.append(motors)
     return at_start

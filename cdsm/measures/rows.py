@@ -59,10 +59,11 @@ def measured(
     """
     kinds = [name for name in names if name in KINDS]
     found = {name: np.empty(len(q)) for name in names}
-    for n, row in enumerate(q):
+    for n, row in enumerate(q if names else ()):
         pose = arm.at(row)
-        for kind, nearest in distances(pose, diameter, kinds=kinds).items():
-            found[kind][n] = nearest.distance
+        if kinds:
+            for kind, nearest in distances(pose, diameter, kinds=kinds).items():
+                found[kind][n] = nearest.distance
         if "tension_factor" in found:
             found["tension_factor"][n] = tension_factor(pose)
     return found

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias, final
+from typing import TYPE_CHECKING, TypeAlias, final
 
+import cdsm
 from cdsm.support.result import Result, unit
+
+if TYPE_CHECKING:
+    from matplotlib import figure
 
 HEADER = (
     *("figure", "quantity", "paper", "computed", "difference", "original length", "hung weight"),
@@ -86,6 +90,10 @@ class Figure(Result):
     name: str
     title: str = field(metadata=unit("1"))
     claims: tuple[Claim, ...] = field(metadata=unit("1"))
+
+    def plot(self) -> figure.Figure:
+        """Plot the curves, with the numbers that the paper prints."""
+        return cdsm.plots.plot_paper(self)
 
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:

@@ -1,44 +1,38 @@
-"""Plot arms, maps, plans, loads, and the figures of the paper. Axes show mm and N/mm.
+"""Plot arms, maps, paths and attainable stiffness, and save figures. Axes show mm and N/mm.
 
 Every function returns a new :class:`matplotlib.figure.Figure`, as wide as one or two columns of a
-journal. Show it in a notebook, or write it with :func:`save_figure`. No function changes the global
-state of matplotlib.
+journal. Show it in a notebook, or write it with :func:`save_figure`. Results have a method ``plot``
+of their own, which calls the functions of this package that are not listed in ``__all__``.
 """
 
 from cdsm.plots.arm import plot_arm
-from cdsm.plots.budget import plot_monte_carlo, plot_uncertainty
-from cdsm.plots.by_cable import (
-    plot_shares,
-    plot_stiffness_plan,
-    plot_stiffness_range,
-    plot_tensions,
-)
-from cdsm.plots.designs import plot_designs
-from cdsm.plots.forces import plot_force_polytope
-from cdsm.plots.loads import (
-    plot_critical_load,
-    plot_critical_tension,
-    plot_load_history,
-    plot_weight_test,
-)
+from cdsm.plots.loads import plot_critical_load as plot_critical_load
+from cdsm.plots.loads import plot_critical_tension as plot_critical_tension
+from cdsm.plots.loads import plot_load_history as plot_load_history
+from cdsm.plots.loads import plot_tracking_run as plot_tracking_run
+from cdsm.plots.loads import plot_weight_test as plot_weight_test
 from cdsm.plots.maps import plot_map
-from cdsm.plots.paper import plot_paper
-from cdsm.plots.path import plot_modes, plot_path
-from cdsm.plots.planning import plot_path_plan, plot_saturation, plot_stiffness_ranges
+from cdsm.plots.measured import plot_designs as plot_designs
+from cdsm.plots.measured import plot_elasticity as plot_elasticity
+from cdsm.plots.measured import plot_experiment_plan as plot_experiment_plan
+from cdsm.plots.measured import plot_force_polytope as plot_force_polytope
+from cdsm.plots.measured import plot_identification as plot_identification
+from cdsm.plots.measured import plot_monte_carlo as plot_monte_carlo
+from cdsm.plots.measured import plot_tensile_fit as plot_tensile_fit
+from cdsm.plots.measured import plot_uncertainty as plot_uncertainty
+from cdsm.plots.paper import plot_paper as plot_paper
+from cdsm.plots.path import plot_modes as plot_modes
+from cdsm.plots.path import plot_path
+from cdsm.plots.planning import plot_path_plan as plot_path_plan
+from cdsm.plots.planning import plot_saturation as plot_saturation
+from cdsm.plots.planning import plot_shares as plot_shares
+from cdsm.plots.planning import plot_stiffness_plan as plot_stiffness_plan
+from cdsm.plots.planning import plot_stiffness_range as plot_stiffness_range
+from cdsm.plots.planning import plot_stiffness_ranges
+from cdsm.plots.planning import plot_tensions as plot_tensions
 from cdsm.plots.style import save_figure
-from cdsm.plots.tracking import plot_tracking_run
-from cdsm.plots.wires import plot_cables, plot_elasticity
 
-# fmt: off
-__all__ = [
-    "plot_arm", "plot_cables", "plot_critical_load", "plot_critical_tension",
-    "plot_designs", "plot_elasticity", "plot_force_polytope", "plot_load_history", "plot_map",
-    "plot_modes", "plot_monte_carlo", "plot_paper", "plot_path", "plot_path_plan",
-    "plot_saturation", "plot_shares", "plot_stiffness_plan", "plot_stiffness_range",
-    "plot_stiffness_ranges", "plot_tensions", "plot_tracking_run", "plot_uncertainty",
-    "plot_weight_test", "save_figure",
-]
-# fmt: on
+__all__ = ["plot_arm", "plot_map", "plot_path", "plot_stiffness_ranges", "save_figure"]
 
 
 def __dir__() -> list[str]:

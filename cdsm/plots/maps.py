@@ -2,86 +2,72 @@
 
 from __future__ import annotations
 
-import itertools
+import math
 import textwrap
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
+from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.map_panels import Case, Map, cases_of, drawable, slices_of
-from cdsm.plots.style import (
-    BLACK,
-    BLUE,
-    COLOR_MAP,
-    MM,
-    N_PER_MM,
-    ORANGE,
-    PURPLE,
-    SMALL,
-    TEXT,
-    TICKS,
-    TWO_COLUMNS,
-    VERMILLION,
-    caption,
-    heading,
-    panels,
-    plain_log_ticks,
-)
-from cdsm.support.directions import XYZ
+from cdsm.plots import style
+from cdsm.plots.style import MM, N_PER_MM
 from cdsm.support.tidy import check_sweep, status_names
-from cdsm.support.validation import one_of, whole_number
+from cdsm.support.validation import one_of, scalar, whole_number
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     import xarray
 
-_UNITS: Final = {
-    "N m-1": (N_PER_MM, "N/mm"),
-    "N m rad-1": (1.0, "N m/rad"),
-    "N m rad-1 or N m-1": (1.0, "N m/rad or N/m"),
-    "1": (1.0, "-"),
-}
-"""Factor and label of the colour bar for each unit of a Dataset."""
-
-_WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
-
-_EQUAL = 1e-9
-"""Values that differ by less than this fraction of the largest are drawn as equal.
-
-The colour scale then extends 5 % to either side of them.
-"""
-
-_MIDDLE = (0.05, 0.95)
-"""Probabilities of two quantiles. If these are d apart, values more than d outside are outliers."""
-
-_TALLEST = 4.0  # largest height of a panel [inch]
-_BAR = 0.17  # width of the colour bar [inch]
-_NARROWEST = 1.2  # least width of a title, and of a panel without its ticks [inch]
-
 Statistic = Literal["median", "min", "max"]
 
-_MARKS: Final[dict[str, tuple[str, str, float]]] = {
-    "unstable": ("x", VERMILLION, 14.0),
-    "infeasible": (".", "0.75", 8.0),
-    "outside_elasticity": ("+", PURPLE, 18.0),
-    "solver_failed": ("^", ORANGE, 14.0),
-    "singular": ("d", VERMILLION, 14.0),
-    "immobile": ("s", "0.5", 10.0),
-    "beyond_limits": ("v", "0.6", 10.0),
-    "coincident_sites": ("*", BLACK, 18.0),
-    "worker_lost": ("1", BLACK, 20.0),
-    "pending": ("2", "0.5", 20.0),
-}
-"""Marker, colour and size [pt²] of entries without the quantity, by status."""
+_UNITS: Final = {"N m-1": (N_PER_MM, "N/mm"), "N m rad-1": (1.0, "N m/rad"), "1": (1.0, "-")}
+"""Factor and label of the colour bar for each unit of a Dataset."""
+
+_MOST_PANELS = 9
+_WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
+_ROBUST: Final = (2.0, 98.0)  # percentiles at the ends of the colours, as in xarray
+_FLAT = 1e-9  # tips are in a plane if an extent is below this part of the largest
+_THIN = 0.3  # least ratio of the sides of a map, which leaves room for its labels
+_MARGIN = 0.05  # around the tips, over their largest extent
+_TALLEST = 2.3  # largest height of a map [inch]
+_CHARACTERS = 15.0  # of a label in an inch
+_LABELS = 0.75  # space for the labels beside and below a map [inch]
+_BAR, _HEADING = 1.0, 0.6  # width of the colour bar with its label, height of the title [inch]
+_HUGE = 1e300
+_SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
 
 
+_NONE: Final = {"marker": ".", "c": "0.75", "s": 8.0, "label": "no value"}
+_UNSTABLE: Final = {"marker": "x", "c": style.VERMILLION, "s": 14.0, "lw": 0.7, "label": "unstable"}
+
+
+class Map(NamedTuple):
+    """The tips in one panel, with their values and whether the arm is unstable there."""
+
+    title: str
+    plane: list[int]  # indices of the two base axes that the panel shows
+    points: Array  # tips (N, 2) [mm]
+    values: Array  # the quantity (N,), NaN if missing
+    unstable: NDArray[np.bool_]  # (N,)
+
+
+class Slab(NamedTuple):
+    """A slab of the workspace, which a panel shows along its normal."""
+
+    title: str
+    normal: int  # index of the axis normal to the slab
+    middle: float = 0.0  # position on this axis [mm]
+    half: float = np.inf  # half the thickness [mm]
+
+
+@style.styled
 def plot_map(
     dataset: xarray.Dataset,
     quantity: str = "softest",
@@ -95,14 +81,13 @@ def plot_map(
     Tips in a plane and tips in a section are drawn as dots, or as cells if a statistic is given. A
     cloud of tips is drawn in three slices through its middle, as cells; a path is drawn as dots, as
     seen along each axis. Several postures may put the tip into one cell; the statistic determines
-    the value that the cell shows. An entry (a posture in a case) without the quantity is marked by
-    its status; in a map of cells, no mark is drawn in a cell that has a value. Unstable entries are
-    marked instead of coloured, except in a map of the margin. Outliers, far from the middle 90 % of
-    the values, and infinite values have a colour of their own, at the ends of the colour bar.
+    the value that the cell shows. An entry (a posture in a case) without the quantity has a cross
+    if it is unstable, else a grey dot. Unstable entries are not coloured, except in a map of the
+    margin. The colours end at the 2nd and the 98th percentile.
 
     Args:
-        dataset: Result of :func:`~cdsm.sweeps.run.sweep` with the output ``tip_position``. Use
-            ``sel`` if it has more than 9 panels.
+        dataset: Result of :func:`~cdsm.sweep` with the output ``tip_position``. Use ``sel`` if it
+            has more than 9 panels.
         quantity: Quantity with one number per entry: ``"softest"``, ``"stiffest"``,
             ``"isotropy"``, ``"margin"``; or ``"along"`` (a panel for each direction).
         section: Axis, position and half thickness [m] of a slab. Only tips inside it are shown.
@@ -111,180 +96,195 @@ def plot_map(
         bins: Number of cells along the longest side of a map.
 
     Raises:
-        InvalidInput: ``dataset`` is not a sweep or has too many panels, ``quantity`` is the status
-            or has more than one number per entry, ``section`` is invalid or contains no tip, or
-            ``bins`` is not a whole number from 2 to 500.
-        UnknownName: The sweep has no such quantity or no tip positions, or the axis or the
-            statistic is unknown.
+        InvalidInput: ``dataset`` is not a sweep or has too many panels or no such quantity,
+            ``quantity`` has more than one number per entry, ``section`` is invalid or contains no
+            tip, the statistic is unknown, or ``bins`` is not a whole number from 2 to 500.
         MissingExtra: xarray is not installed.
     """
     check_sweep(dataset)
-    if quantity == "status":
-        raise InvalidInput(
-            "quantity", "status given; a map of any other quantity marks each status at its tips."
-        )
     remedy = "tip_position and the quantity must be among outputs= of the sweep."
-    one_of("quantity", "tip_position", [str(each) for each in dataset.data_vars], remedy)
-    tips = MM * dataset["tip_position"].transpose(..., "axis")
-    poses = [str(dim) for dim in tips.dims[:-1]]
-    if quantity not in [*dataset.data_vars]:
-        one_of("quantity", quantity, drawable(dataset, poses), remedy)
+    for name in ("tip_position", quantity):
+        one_of("quantity", name, [str(each) for each in dataset.data_vars], remedy)
     if statistic is not None:
         one_of("statistic", statistic, get_args(Statistic))
     whole_number("bins", bins, 2, 500)
-    words = status_names(dataset)
-    cases = list(cases_of(dataset, quantity, poses, words))
-    points = tips.values.reshape(-1, 3)
-    known = np.isfinite(points).all(axis=1)
+    tips = MM * dataset["tip_position"].transpose(..., "axis")
+    poses, points = [str(dim) for dim in tips.dims[:-1]], tips.values.reshape(-1, 3)
     path = "distance" in dataset.coords and poses == ["pose"]  # a joint may have this name
-    slices, cloud = slices_of(points[known], section, path)
-    factor, unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))
-    maps = [
-        Map(
-            ", ".join(filter(None, [case.title, part.title])),
-            points[inside][:, part.plane],
-            factor * case.values[inside],
-            case.status[inside],
-            part.plane,
-            bool(part.contains(np.zeros((1, 3)))[0]),
-        )
-        for case in cases
-        for part in slices
-        for inside in [known & part.contains(points)]
-    ]
-    if not any(len(each.points) for each in maps):
+    slabs = list(_slabs(points[np.isfinite(points).all(axis=1)], section, path))
+    maps = list(_maps(dataset, quantity, poses, points, slabs))
+    every = np.concatenate([each.values for each in maps])
+    if not len(every):
         raise InvalidInput(
             "section" if section is not None else "dataset",
             "has no tip to show; widen the section, or sweep over other postures.",
         )
-    every = np.concatenate([each.values for each in maps])
+    if statistic is None and len(slabs) == 3 and not path:
+        statistic = "median"
+    limits = [_limits(each.points, bins) for each in maps]
+    shapes = [float(np.ptp(x) / np.ptp(y)) for x, y in limits]
+    figure, grid, size = _panels(shapes)
     colors, extend = _colors(every)
-    shown = statistic or ("median" if cloud else None)
-    beside = 2 if cloud and len(cases) > 3 else 1  # cases in a row
-    columns = beside * len(slices) if cloud else 2 if len(maps) == 4 else min(len(maps), 3)
-    rows = -(-len(cases) // beside) if cloud else -(-len(maps) // columns)
-    ratio = max(np.ptp(each.limits[1]) / np.ptp(each.limits[0]) for each in maps)
-    height = min((TWO_COLUMNS - 1.3) / columns * ratio, _TALLEST)
-    titled = max(height / ratio, _NARROWEST)
-    width = max(height / ratio, _NARROWEST + 0.4)
-    size = 1.3 + width * columns + 0.5, 0.9 + (0.45 + height) * rows
-    figure, grid = panels(*size, columns, rows)
-    order = grid.reshape(rows, beside, -1).swapaxes(0, 1).ravel()  # the first cases on the left
-    for axes, each in itertools.zip_longest(order, maps):
-        if each is None:
-            axes.set_axis_off()
-            continue
-        _draw(axes, each, colors, words, shown, bins)
-        caption(axes, textwrap.fill(each.title, round(16 * titled)))
-        axes.locator_params("x", nbins=min(TICKS, round(2.4 * height / ratio)))
-    title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
+    for axes in grid.ravel()[len(maps) :]:
+        axes.set_axis_off()
+    for axes, each, (x, y), shape in zip(grid.ravel(), maps, limits, shapes, strict=False):
+        _draw(axes, each, colors, statistic, bins)
+        axes.set(xlim=x, ylim=y, aspect="equal")
+        axes.locator_params("x", nbins=max(2, round(5.0 * min(1.0, shape))))
+        axes.set_title(textwrap.fill(each.title, round(_CHARACTERS * (size * shape + 0.5))))
     name = dataset[quantity].long_name.split(",")[0]
-    if not np.isfinite(every).any():
-        found = "exists at none" if np.isnan(every).all() else "is infinite at all"
-        title += f": {name} {found} of these tips"
-    else:
-        bar = figure.colorbar(colors, ax=grid, extend=extend, aspect=size[1] / _BAR)
+    title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
+    if np.isfinite(every).any():
         sign = "; below 0: unstable" if quantity == "margin" else ""
-        of = f"{shown} of a cell: " if shown else ""
-        bar.set_label(textwrap.fill(f"{of}{name} [{unit}]{sign}", 45), fontsize=TEXT)
+        unit = _UNITS.get(dataset[quantity].units, (1.0, dataset[quantity].units))[1]
+        label = f"{f'{statistic} of a cell: ' if statistic else ''}{name} [{unit}]{sign}"
+        label = textwrap.fill(label, round(_CHARACTERS * len(grid) * (size + 0.5)))
+        look: dict[str, Any] = {"extend": extend, "extendfrac": 0.02, "aspect": 20 * len(grid)}
+        bar = figure.colorbar(colors, ax=grid, label=label, **look)
         if isinstance(colors.norm, LogNorm):
-            plain_log_ticks(bar.ax.yaxis)
-        bar.ax.tick_params(which="both", labelsize=SMALL)
-    # slices show a part of the entries, and some entries have no tip
-    _legend(figure, cases if section is None else maps, maps, words)
-    heading(figure, title)
+            bar.ax.yaxis.set_major_formatter("{x:g}")
+            bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        title += f": {name} exists at none of these tips"
+    style.heading(figure, title)
+    style.legend_below(figure, grid, 2)
     return figure
 
 
-def _colors(values: Array) -> tuple[ScalarMappable, str]:
-    """Return a colour scale for ``values`` without outliers, and the ends beyond which they are.
+def _panels(shapes: list[float]) -> tuple[Figure, Any, float]:
+    """Return a figure, its panels, and their height [inch]; ``shapes`` are widths over heights."""
+    columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
+    rows = -(-len(shapes) // columns)
+    shares = [max(shapes[column::columns]) for column in range(columns)]
+    width = style.ONE_COLUMN if columns == 1 else style.TWO_COLUMNS
+    size = min(_TALLEST, (width - _BAR - _LABELS * columns) / sum(shares))
+    height = _HEADING + rows * (size + _LABELS)
+    figure, grid = style.panels(width, height, columns, rows, width_ratios=shares)
+    figure.set_layout_engine("compressed")  # panels with equal axes stand side by side
+    return figure, grid, size
 
-    The ends are ``"neither"``, ``"min"``, ``"max"`` or ``"both"``.
-    """
+
+def _maps(
+    dataset: xarray.Dataset, quantity: str, poses: list[str], points: Array, slabs: list[Slab]
+) -> Iterator[Map]:
+    """Yield the map of each slab, for each combination of the coordinates besides ``poses``."""
+    value, status = dataset[quantity], dataset["status"]
+    dims = [str(dim) for dim in value.dims]
+    if quantity == "status" or not {*poses} <= {*dims} <= {*status.dims, "direction"}:
+        raise InvalidInput(
+            "quantity",
+            f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
+            "such as softest, stiffest, isotropy, margin or along.",
+        )
+    cases = {dim: dataset.sizes[dim] for dim in dims if dim not in poses}
+    if (count := math.prod(cases.values())) > _MOST_PANELS:
+        listed = ", ".join(f"{dim} ({size})" for dim, size in cases.items())
+        raise InvalidInput(
+            "dataset",
+            f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
+            f"dataset.isel({next(iter(cases))}=[0]).",
+        )
+    # a dimension that the quantity does not have cannot change its status: take index 0
+    status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
+    status = status.broadcast_like(value)
+    factor = _UNITS.get(value.units, (1.0, ""))[0]
+    (buckled,) = (code for code, word in status_names(dataset).items() if word == "unstable")
+    for place in np.ndindex(*cases.values()):
+        at = dict(zip(cases, place, strict=True))
+        x, code = (one.isel(at).transpose(*poses).values.ravel() for one in (value, status))
+        unstable = code == buckled
+        x = factor * (x if quantity == "margin" else np.where(unstable, np.nan, x))
+        names = [_name(dataset[dim][i]) for dim, i in at.items()]
+        for slab in slabs:
+            inside = abs(points[:, slab.normal] - slab.middle) <= slab.half
+            plane = [axis for axis in range(3) if axis != slab.normal]
+            title = ", ".join(filter(None, (*names, slab.title)))
+            yield Map(title, plane, points[inside][:, plane], x[inside], unstable[inside])
+
+
+def _name(coordinate: xarray.DataArray) -> str:
+    """Write a coordinate of a case: ``minimum 20 N``."""
+    value, unit = coordinate.item(), coordinate.attrs.get("units", "1")
+    said = value if isinstance(value, str) else f"{value:g}"
+    return f"{coordinate.name} {said}{'' if unit == '1' else f' {unit}'}"
+
+
+def _slabs(points: Array, section: Any, path: bool) -> Iterator[Slab]:
+    """Yield the slab of each panel, for tips (N, 3) [mm]: their plane, or three slices or views."""
+    if section is not None:
+        if not isinstance(section, (tuple, list)) or len(section) != 3:
+            said = f"{section!r} given; an axis, its place and the half thickness [m] needed."
+            raise InvalidInput("section", said)
+        axis = "xyz".index(one_of("axis", section[0], tuple("xyz")))
+        yield _slice(axis, *(MM * scalar("section", each) for each in section[1:]))
+        return
+    extent = np.ptp(np.vstack([points, np.zeros(3)]), axis=0)  # the base is at the origin
+    if extent.min() <= _FLAT * extent.max():
+        yield Slab("", int(extent.argmin()))
+        return
+    for axis in (1, 2, 0):
+        x = points[:, axis]
+        seen = Slab(f"seen along {'xyz'[axis]}", axis)
+        yield seen if path else _slice(axis, float(np.median(x)), _SLICE * float(np.ptp(x)))
+
+
+def _slice(axis: int, middle: float, half: float) -> Slab:
+    title = f"{'xyz'[axis]} = {round(middle, 1) + 0.0:.3g} ± {half:.2g} mm"
+    return Slab(title.replace(" ", "\xa0"), axis, middle, half)  # no line break
+
+
+def _colors(values: Array) -> tuple[ScalarMappable, str]:
+    """Return a colour scale for ``values`` without outliers, and the ends beyond which they are."""
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
-    low, high = float(finite.min()), float(finite.max())
-    wide = low > 0.0 and high > _WIDE * low
-    measure = np.log(finite) if low > 0.0 else finite
-    near, far = np.quantile(measure, _MIDDLE)
-    inner = finite[(measure >= 2.0 * near - far) & (measure <= 2.0 * far - near)]
-    low, high = float(inner.min()), float(inner.max())
-    scale, name = LogNorm if wide and high > _WIDE * low else Normalize, COLOR_MAP
-    over = VERMILLION
+    low, high = np.percentile(finite, _ROBUST)
+    scale, name = Normalize, style.COLOR_MAP
     if finite.min() < 0.0 < finite.max():  # a margin: colours show its sign, zero is in the middle
         high, name = max(-low, high), "PuOr"
-        low, over = -high, BLUE
-    below, above = bool((finite < low).any()), bool((values > high).any())
-    cmap = colormaps[name].with_extremes(under=BLACK, over=over)
-    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[below, above]
-    if high - low <= _EQUAL * abs(high):
-        low, high = low - 0.05 * abs(low), high + 0.05 * abs(high)
-    return ScalarMappable(scale(low, high), cmap), extend
+        low = -high
+    elif low > 0.0 and high > _WIDE * low:
+        scale = LogNorm
+    beyond = bool((finite < low).any()), bool((values > high).any())
+    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond]
+    return ScalarMappable(scale(low, high), colormaps[name]), extend
 
 
 def _draw(
-    axes: Any,
-    shown: Map,
-    colors: ScalarMappable,
-    words: Mapping[int, str],
-    statistic: Statistic | None,
-    bins: int,
+    axes: Any, shown: Map, colors: ScalarMappable, statistic: Statistic | None, bins: int
 ) -> None:
-    known = ~np.isnan(shown.values)
-    limits, marked = shown.limits, ~known
-    highest: Any = colors.norm.vmax
-    finite = np.minimum(shown.values, 2.0 * abs(highest))  # infinities are not drawn
-    if statistic is not None and known.any():
+    points, values = shown.points, np.minimum(shown.values, _HUGE)  # inf would not be drawn
+    known = ~np.isnan(values)
+    look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap}
+    for chosen, mark in ((~shown.unstable & ~known, _NONE), (shown.unstable & ~known, _UNSTABLE)):
+        if chosen.any():
+            axes.scatter(*points[chosen].T, **mark)
+    if statistic is None or not known.any():
+        axes.scatter(*points[known].T, c=values[known], s=8.0, linewidths=0.0, **look)
+    else:
         from scipy.stats import binned_statistic_2d  # here, because it imports slowly
 
-        size = np.ptp(limits, axis=1).max() / bins
-        edges = [np.arange(low, high + size, size) for low, high in limits]
-        cells, *_, cell = binned_statistic_2d(
-            *shown.points[known].T, finite[known], statistic, edges, expand_binnumbers=True
-        )
-        axes.pcolormesh(*edges, np.ma.masked_invalid(cells.T), norm=colors.norm, cmap=colors.cmap)
-        taken = {tuple(each) for each in cell.T.tolist()}
-        places = np.stack([np.digitize(x, e) for x, e in zip(shown.points.T, edges, strict=True)])
-        marked &= [tuple(each) not in taken for each in places.T.tolist()]
-    for code in np.unique(shown.status[marked]).tolist():
-        mark, color, area = _MARKS[words[code]]
-        chosen = shown.points[marked & (shown.status == code)]
-        axes.scatter(*chosen.T, marker=mark, c=color, s=area, linewidths=0.7)
-    if statistic is None:
-        axes.scatter(
-            *shown.points[known].T,
-            c=finite[known],
-            norm=colors.norm,
-            cmap=colors.cmap,
-            s=8.0,
-            linewidths=0.0,
-        )
-    axes.set(xlim=limits[0], ylim=limits[1])
-    if colors.norm.vmin == -highest:  # the middle of the scale is white
+        middle, extent = _box(points)
+        size = (1.0 + _FLAT) * float(extent.max()) / bins
+        count = np.maximum(np.ceil(extent / size), 1.0)
+        first = middle - size * count / 2.0
+        edges = [a + size * np.arange(n + 1.0) for a, n in zip(first, count, strict=True)]
+        cells = binned_statistic_2d(*points[known].T, values[known], statistic, edges)
+        axes.pcolormesh(*edges, np.ma.masked_invalid(cells[0].T), zorder=2, **look)
+    if look["cmap"].name == "PuOr":  # the middle of the scale is white
         axes.set_facecolor("0.88")
-    if shown.shows_base:
-        axes.plot(0.0, 0.0, "s", color="0.1", markersize=4)
     for letter, axis in zip("xy", shown.plane, strict=True):
-        getattr(axes, f"set_{letter}label")(f"{XYZ[axis]} [mm]")
-    axes.locator_params(nbins=TICKS)
-    axes.set_aspect("equal")
+        getattr(axes, f"set_{letter}label")(f"{'xyz'[axis]} [mm]")
 
 
-def _legend(
-    figure: Figure, counted: Sequence[Case | Map], maps: Sequence[Map], words: Mapping[int, str]
-) -> None:
-    """Draw the legend of the statuses: marker, name, and percentage of the entries of ``counted``.
+def _box(points: Array) -> tuple[Array, Array]:
+    """Return the middle and the extent (2,) of the box around tips (N, 2) [mm]."""
+    every = points if len(points) else np.zeros((1, 2))
+    extent = np.ptp(every, axis=0)
+    return every.min(axis=0) + extent / 2.0, extent if extent.any() else extent + 1.0
 
-    It lists the statuses of entries without a value, and the base if one of ``maps`` shows it.
-    """
-    status = np.concatenate([each.status[np.isnan(each.values)] for each in counted])
-    total = sum(each.status.size for each in counted)
-    handles = []
-    if any(each.shows_base for each in maps):
-        handles.append(Line2D([], [], marker="s", color="0.1", linestyle="", label="base"))
-    for value, count in zip(*np.unique(status, return_counts=True), strict=True):
-        word = words[int(value)]
-        mark, color, _ = _MARKS[word]
-        label = f"{word.replace('_', ' ')}: {100.0 * count / total:.3g} %"
-        handles.append(Line2D([], [], marker=mark, color=color, linestyle="", label=label))
-    if handles:
-        figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=SMALL)
+
+def _limits(points: Array, bins: int) -> Array:
+    """Return the ends of both axes (2, 2) [mm] of a panel that shows ``points``, or their cells."""
+    middle, extent = _box(points)
+    half = extent / 2.0 + max(_MARGIN, 0.5 / bins) * extent.max()
+    half = np.maximum(half, _THIN * half.max())
+    return np.transpose([middle - half, middle + half])

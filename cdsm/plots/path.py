@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.animation import PillowWriter
+from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.arm import BESIDE_BAR, color_scale, draw_arm, frame_arms, tension_bar
-from cdsm.plots.style import (
-    COLORS,
-    MM,
-    SCREEN,
-    VERMILLION,
-    expect,
-    fill_canvas,
-    finish_picture,
-    heading,
-    picture_axes,
-)
+from cdsm.plots import style
+from cdsm.plots.arm import color_scale, draw_arm, draw_bones, finish, picture
+from cdsm.plots.style import MM
 from cdsm.support.files import as_path, write_file
 from cdsm.support.validation import number_array
 from cdsm.support.values import Array
@@ -34,15 +24,14 @@ if TYPE_CHECKING:
     from cdsm.posture import Posture
     from cdsm.statics.modes import Modes
 
-_GHOSTS: Final = 5  # number of postures that are drawn over each other
-_FRAMES: Final = 150  # largest number of frames of an animation; a longer path is thinned out
-_RATE: Final = 15  # frames per second
-_SHAPES: Final = 3  # number of modes that are drawn
-
-_DEFLECTED: Final = 0.25
-"""Largest displacement of the tip in the picture of a mode, divided by the arm length."""
+_GHOSTS = 5  # number of postures that are drawn over each other
+_FRAMES = 150  # largest number of frames of an animation; a longer path is thinned out
+_RATE = 15  # frames per second
+_SHAPES = 3  # number of modes that are drawn
+_DEFLECTED = 0.25  # largest displacement of the tip in the picture of a mode, over the arm's length
 
 
+@style.styled
 def plot_path(
     path: PathPlan | Sequence[Posture],
     *,
@@ -62,110 +51,78 @@ def plot_path(
             end in ``.gif``.
         FileError: The animation cannot be written.
     """
-    poses, planned = _postures(path)
-    colored = planned if tensions is None else number_array("tensions", tensions)
-    figure, axes = picture_axes()
-    shown = np.unique(np.linspace(0, len(poses) - 1, _GHOSTS).round().astype(int)).tolist()
-    limits = _limits(poses)
-    for k, shade in zip(shown[:-1], np.linspace(0.8, 0.5, len(shown) - 1), strict=True):
-        _draw_skeleton(axes, poses[k], f"{shade:.2f}")
-    draw_arm(axes, poses[-1])
+    poses: Sequence[Posture] = path if isinstance(path, Sequence) else []
+    pulls = tensions
+    if not isinstance(path, Sequence):
+        style.expect("path", path, "PathPlan")
+        poses = [K.posture for K in path.stiffness]
+        pulls = path.tensions if tensions is None else tensions
+    for pose in poses:
+        style.expect("path", pose, "Posture")
+    if not poses or any(pose.arm != poses[0].arm for pose in poses):
+        said = "give postures of one arm, or a plan that reaches its target at some samples."
+        raise InvalidInput("path", said)
+    figure, axes = picture()
+    *ghosts, last = _some(poses, _GHOSTS)
+    for k, shade in zip(ghosts, np.linspace(0.8, 0.5, len(ghosts)), strict=True):
+        draw_bones(axes, poses[k], color=f"{shade:.2f}", linewidth=2.0)
+    draw_arm(axes, poses[last])
     tips = MM * np.array([pose.tip[:3, 3] for pose in poses])
-    axes.plot(*tips.T, color=VERMILLION, linewidth=1.2, label="path of the tip")
-    axes.plot(*tips[-1:].T, "o", color=VERMILLION, markersize=3, label="its end")
-    frame_arms(axes, limits)
+    axes.plot(*tips.T, color=style.VERMILLION, label="path of the tip")
+    axes.plot(*tips[-1:].T, "o", color=style.VERMILLION, label="its end")
     title = f"{poses[0].arm.name}: the last of {len(poses)} postures, others pale"
-    finish_picture(figure, axes, title)
+    finish(figure, title)
     if animate is not None:
-        _animate(animate, poses, colored, limits)
+        _animate(animate, poses, None if pulls is None else number_array("tensions", pulls), axes)
     return figure
 
 
+@style.styled
 def plot_modes(modes: Modes) -> Figure:
     """Plot an arm and its deflections by up to three modes: growing modes, then the lowest.
 
-    A stable arm has no growing modes. Deflections are enlarged: the tip moves by at most 25 % of
-    the length of the arm. Raises InvalidInput if ``modes`` is not a result of :func:`~cdsm.modes`.
+    Deflections are enlarged: the tip moves by at most 25 % of the length of the arm.
     """
-    expect("modes", modes, "Modes")
     pose = modes.stiffness.posture
-    figure, axes = picture_axes()
-    _draw_skeleton(axes, pose, "0.6")
-    named = [(rate, f"grows at {rate:.3g}/s") for rate in modes.growth_rates]
-    named += [(frequency, f"{frequency:.3g} Hz") for frequency in modes.frequencies]
+    figure, axes = picture()
+    draw_bones(axes, pose, color="0.6", linewidth=2.0)
+    names = [f"grows at {rate:.3g}/s" for rate in modes.growth_rates]
+    names += [f"{frequency:.3g} Hz" for frequency in modes.frequencies]
     shapes = np.hstack([modes.growth_shapes, modes.shapes]).T
-    poses = [pose]
-    for shape, (_, label), color in zip(shapes, named, COLORS[:_SHAPES], strict=False):
-        moved = np.linalg.norm(pose.jacobian[:3] @ shape)
-        step = _DEFLECTED * pose.arm.length / max(moved, np.linalg.norm(shape) * pose.arm.length)
-        bent = pose.arm.at(pose.q + step * shape, check_limits=False)
-        poses.append(bent)
-        bones = np.concatenate([*bent.bones])
-        axes.plot(*(MM * bones.T), color=color, linewidth=1.5, label=label)
-    frame_arms(axes, _limits(poses))
+    for shape, name, color in zip(shapes, names, style.COLORS[:_SHAPES], strict=False):
+        moved = np.linalg.norm(pose.jacobian[:3] @ shape) / pose.arm.length
+        step = _DEFLECTED / max(moved, np.linalg.norm(shape)) * shape
+        draw_bones(axes, pose.arm.at(pose.q + step, check_limits=False), color=color)
+        axes.plot([], [], [], color=color, label=name)
     unstable = "" if modes.is_stable else "UNSTABLE: "
-    finish_picture(figure, axes, f"{unstable}{pose.arm.name}, enlarged modes")
-    return figure
+    return finish(figure, f"{unstable}{pose.arm.name}, enlarged modes")
 
 
-def _postures(path: PathPlan | Sequence[Posture]) -> tuple[list[Posture], Array | None]:
-    """Return the P postures of a path, and their tensions (P, C) [N] if it is a plan."""
-    tensions = None
-    if isinstance(path, Sequence):
-        poses = list(path)
-    else:
-        expect("path", path, "PathPlan")
-        poses, tensions = [K.posture for K in path.stiffness], path.tensions
-    for pose in poses:
-        expect("path", pose, "Posture")
-        if pose.arm != poses[0].arm:
-            raise InvalidInput("path", "has postures of two arms; give those of one.")
-    if not poses:
-        raise InvalidInput(
-            "path", "has no posture to draw; give one, or a plan that reaches its target."
-        )
-    return poses, tensions
-
-
-def _limits(poses: Sequence[Posture]) -> Array:
-    """Return the limits (3, 2) [mm] of axes that contain all postures."""
-    points = MM * np.concatenate(
-        [each for pose in poses for each in (*pose.cable_paths, *pose.bones)]
-    )
-    return np.array([points.min(axis=0), points.max(axis=0)]).T
-
-
-def _draw_skeleton(axes: Any, pose: Posture, shade: str) -> None:
-    for bone in pose.bones:
-        axes.plot(*(MM * bone.T), color=shade, linewidth=2.0)
+def _some(poses: Sequence[Posture], most: int) -> Sequence[int]:
+    """Return the numbers of up to ``most`` postures, evenly, with both ends."""
+    return tuple(np.unique(np.linspace(0, len(poses) - 1, most).round().astype(int)).tolist())
 
 
 def _animate(
-    path: str | os.PathLike[str], poses: Sequence[Posture], tensions: Array | None, limits: Array
+    path: str | os.PathLike[str], poses: Sequence[Posture], tensions: Array | None, like: Any
 ) -> None:
-    """Write a GIF of up to 150 postures; ``limits`` (3, 2) [mm] are the limits of the axes."""
+    """Write a GIF of up to 150 postures, coloured by tension, within the limits of ``like``."""
     if as_path(path).suffix.lower() != ".gif":
         raise InvalidInput("animate", f"{str(path)!r} given; it must end in .gif.")
-    figure, axes = picture_axes()
+    figure, axes = picture()
     colors = None if tensions is None else color_scale(tensions)
-    if colors is not None:
-        tension_bar(figure, colors)
-    chosen = np.unique(np.linspace(0, len(poses) - 1, _FRAMES).round().astype(int)).tolist()
+    axes.auto_scale_xyz(*np.reshape(like.get_w_lims(), (3, 2)))
+    finish(figure, " ", colors)
 
     def draw(k: int) -> None:
-        axes.clear()
+        for line in list(axes.lines):
+            line.remove()
         shades = None if colors is None or tensions is None else colors.to_rgba(tensions[k])
         draw_arm(axes, poses[k], shades)
-        frame_arms(axes, limits)
-        heading(figure, f"{poses[0].arm.name}, posture {k} of {len(poses) - 1}")
+        for line in axes.lines:
+            line.set_clip_on(False)
+        style.heading(figure, f"{poses[0].arm.name}, posture {k} of {len(poses) - 1}")
 
-    def fill(aside: Path) -> None:
-        writer = PillowWriter(fps=_RATE)
-        with writer.saving(figure, aside, SCREEN):
-            for k in chosen:
-                draw(k)
-                writer.grab_frame()
-
-    draw(0)
-    fill_canvas(axes, 1.0 if colors is None else BESIDE_BAR)
-    write_file(path, fill)
+    film: Any = FuncAnimation(figure, draw, _some(poses, _FRAMES), init_func=lambda: None)
+    writer = PillowWriter(_RATE)
+    write_file(path, lambda aside: film.save(aside, writer, dpi=figure.dpi))

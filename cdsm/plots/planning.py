@@ -1,4 +1,4 @@
-"""Plot attainable stiffness, saturation against tension, and plans along a path."""
+"""Plot attainable stiffness, saturation, plans, and a number for each cable."""
 
 from __future__ import annotations
 
@@ -7,46 +7,32 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cdsm.errors import InvalidInput
-from cdsm.plots.style import (
-    BLUE,
-    COLORS,
-    GREEN,
-    N_PER_MM,
-    ONE_COLUMN,
-    SCREEN,
-    SMALL,
-    STYLES,
-    TWO_COLUMNS,
-    VERMILLION,
-    cable_lines,
-    caption,
-    direction_name,
-    expect,
-    from_zero,
-    heading,
-    legend,
-    panels,
-    styled,
-)
+from cdsm.plots import style
+from cdsm.plots.style import N_PER_MM
+from cdsm.support.format import plural
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
+    from cdsm.batch import Tensions
     from cdsm.planning.path_plan import PathPlan
+    from cdsm.planning.plan import StiffnessPlan
     from cdsm.planning.range import StiffnessRange
     from cdsm.planning.saturation import Saturation
+    from cdsm.stiffness_matrix import Shares
+    from cdsm.tension import Tension
 
-_SAME = 1e-9  # largest entry of a unit direction outside a plane in which it lies
+    _Case = tuple[Tension, str, str]
 
-_JUMP = 3.0
-"""A change of the target is drawn as a step if it is more than this factor times the change before
-and the change after it. Changes of the other sign do not matter."""
+_SAME = 1e-9  # largest difference between the entries of two equal unit directions
+_WIDE = 12  # above this number of cables, a figure with their names is two columns wide
+_MOST_NAMES = 72  # largest number of names below an axis; of more, every second, third, … is shown
 
 
+@style.styled
 def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Figure:
     """Plot the attainable stiffness [N/mm] against the direction, as a polar diagram.
 
@@ -64,115 +50,178 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
     """
     every = [one for each in ranges.values() for one in each]
     for one in every:
-        expect("ranges", one, "StiffnessRange")
+        style.expect("ranges", one, "StiffnessRange")
     if not every or not all(ranges.values()):
         raise InvalidInput("ranges", "is empty; give ranges of several directions by label.")
-    u = np.array([one.direction for one in every])
-    normal = int(abs(u).max(axis=0).argmin())
-    if abs(u[:, normal]).max() > _SAME:
+    u = abs(np.array([one.direction for one in every])).max(axis=0)
+    if u.min() > _SAME:
         raise InvalidInput("ranges", "has directions that are in no plane of two base axes.")
-    first, second = (axis for axis in range(3) if axis != normal)
-    figure = Figure(figsize=(ONE_COLUMN, 4.2), dpi=SCREEN, layout="constrained")
-    axes: Any = styled(figure.add_subplot(projection="polar"))
+    first, second = plane = sorted(np.argsort(u)[1:].tolist())
+    figure = Figure(figsize=(style.ONE_COLUMN, 4.2))
+    axes: Any = figure.add_subplot(projection="polar")
 
     def around(found: Sequence[StiffnessRange], values: Sequence[float]) -> tuple[Array, Array]:
         v = np.array([one.direction for one in found])
-        turn = np.arctan2(v[:, second], v[:, first])
-        order = np.argsort(turn := np.mod(turn, np.pi))
-        half, radius = turn[order], N_PER_MM * np.array(values)[order]
-        return (
-            np.concatenate([half, half + np.pi, half[:1] + 2.0 * np.pi]),
-            np.concatenate([radius, radius, radius[:1]]),
-        )
+        half = np.mod(np.arctan2(v[:, second], v[:, first]), np.pi)
+        turn, radius = np.sort(half), N_PER_MM * np.array(values)[np.argsort(half)]
+        return np.append(turn, [*(turn + np.pi), turn[0]]), np.append(radius, [*radius, radius[0]])
 
-    shades = colormaps["cividis"](np.linspace(0.0, 0.85, len(ranges)))
-    for k, ((label, found), shade) in enumerate(zip(ranges.items(), shades, strict=True)):
+    shades = colormaps[style.COLOR_MAP](np.linspace(0.0, 0.85, len(ranges)))
+    for k, (label, found) in enumerate(ranges.items()):
         high = around(found, [one.high for one in found])
-        axes.plot(*high, STYLES[k % len(STYLES)], color=to_hex(shade), label=f"stiffest, {label}")
-    label, found = [*ranges.items()][-1]
+        axes.plot(*high, style.STYLES[k % 4], color=shades[k], label=f"stiffest, {label}")
     low = around(found, [one.low for one in found])
     axes.fill(*low, color="0.85", label=f"below the attainable range, {label}")
     axes.plot(*low, color="0.4", linewidth=0.8)
-    letters = "xyz"[first], "xyz"[second]
-    ends = [f"{sign}{letter}" for sign in "+-" for letter in letters]
+    ends = [f"{sign}{'xyz'[axis]}" for sign in "+-" for axis in plane]
     axes.set_xticks(np.deg2rad([0.0, 90.0, 180.0, 270.0]), ends)
-    heading(figure, "attainable stiffness along u [N/mm]")
     axes.set_rlabel_position(60.0)
     axes.yaxis.set_major_locator(MaxNLocator(4))
-    figure.legend(loc="outside lower center", fontsize=SMALL, handlelength=2.4)
+    style.heading(figure, "attainable stiffness along u [N/mm]")
+    figure.legend(loc="outside lower center")
     return figure
 
 
+@style.styled
 def plot_saturation(found: Saturation) -> Figure:
-    """Plot the stiffness against the lower bound of all tensions.
-
-    Raises InvalidInput if ``found`` is not a result of :func:`~cdsm.saturation`.
-    """
-    expect("found", found, "Saturation")
-    figure, ((axes,),) = panels(ONE_COLUMN, 2.6, 1)
-    axes.plot(found.minimum, N_PER_MM * found.along, color=BLUE, label="least tensions")
-    axes.set(xlabel="lower bound of tension [N]")
-    axes.set_ylabel(f"stiffness along {direction_name(found.direction)} [N/mm]")
+    """Plot the stiffness against the lower bound of all tensions."""
+    figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.6)
+    axes.plot(found.minimum, N_PER_MM * found.along, label="least tensions")
+    direction = style.direction_name(found.direction)
+    axes.set(xlabel="lower bound of tension [N]", ylabel=f"stiffness along {direction} [N/mm]")
     axes.set_ylim(bottom=0.0)
     if np.isfinite(found.bound):
         label = f"saturates at {found.bound:.4g} N"
-        axes.axvline(found.bound, color=VERMILLION, linestyle="--", label=label)
+        axes.axvline(found.bound, color=style.VERMILLION, linestyle="--", label=label)
     if found.minimum[0] < found.stiffest < found.minimum[-1]:
         label = f"softer above {found.stiffest:.4g} N"
-        axes.axvline(found.stiffest, color=GREEN, linestyle="-.", label=label)
-    legend(axes, loc="lower right")
-    heading(figure, found.posture.arm.name)
+        axes.axvline(found.stiffest, color=style.GREEN, linestyle="-.", label=label)
+    axes.legend(loc="lower right")
+    style.heading(figure, found.posture.arm.name)
     return figure
 
 
+@style.styled
 def plot_path_plan(plan: PathPlan) -> Figure:
-    """Plot wanted and planned stiffness, and tensions, against the samples of a path.
-
-    Infeasible samples are shaded. The legend names up to 24 cables; a colour bar numbers more.
-    Raises InvalidInput if ``plan`` is not a result of :func:`~cdsm.plan_path`.
-    """
-    expect("plan", plan, "PathPlan")
-    figure, ((above,), (below,)) = panels(TWO_COLUMNS, 4.6, 1, rows=2, sharex=True)
-    size = len(plan.target)
-    wanted = N_PER_MM * plan.target.reshape(size, -1)
+    """Plot wanted and planned stiffness, and tensions, along a path; shade infeasible samples."""
+    figure, ((above,), (below,)) = style.panels(style.TWO_COLUMNS, 4.6, rows=2, sharex=True)
+    x, rows = np.arange(float(len(plan.target))), list(plan.planned)
+    wanted = N_PER_MM * plan.target.reshape(len(x), -1)
     # NaN leaves a gap in the line at samples that are not planned
     achieved = np.full(wanted.shape, np.nan)
-    tensions = np.full((size, plan.tensions.shape[1]), np.nan)
-    rows = list(plan.planned)
+    tensions = np.full((len(x), plan.tensions.shape[1]), np.nan)
     achieved[rows] = N_PER_MM * plan.achieved.reshape(len(rows), wanted.shape[1])
     tensions[rows] = plan.tensions
     for k, u in enumerate(plan.direction.reshape(-1, 3)):
-        color = COLORS[k % len(COLORS)]
-        label = "wanted" if k == 0 else None
-        above.plot(*_stepped(wanted[:, k]), color="0.7", linewidth=4.0, label=label)
-        label = f"reached along {direction_name(u)}"
-        above.plot(achieved[:, k], ".-", color=color, linewidth=1.0, markersize=3, label=label)
-    line = {"marker": ".", "linewidth": 0.9, "markersize": 2}
-    cable_lines(below, np.arange(0.0, size), tensions, plan.arm.cables.names, **line)
-    for axes in (above, below):
-        for index in (sample.index for sample in plan.infeasible):
-            axes.axvspan(index - 0.5, index + 0.5, color=VERMILLION, alpha=0.15, linewidth=0.0)
-    from_zero(above, wanted, achieved)
-    from_zero(below, tensions)
-    shaded = "; shaded: infeasible" if plan.infeasible else ""
+        label, color = f"reached along {style.direction_name(u)}", style.COLORS[k % 7]
+        wide = {"color": "0.7", "linewidth": 4.0, "label": None if k else "wanted"}
+        above.step(x, wanted[:, k], where="mid", **wide)
+        above.plot(x, achieved[:, k], ".-", color=color, linewidth=1.0, label=label)
+    line = {"marker": ".", "linewidth": 0.9, "markersize": 2.0}
+    style.cable_lines(below, x, tensions, plan.arm.cables.names, **line)
+    for axes, values in ((above, (wanted, achieved)), (below, (tensions,))):
+        style.from_zero(axes, *values)
+        for i in (sample.index for sample in plan.infeasible):
+            axes.axvspan(i - 0.5, i + 0.5, color=style.VERMILLION, alpha=0.15, linewidth=0.0)
     above.set_ylabel("stiffness [N/mm]")
-    caption(above, f"{plan.arm.name}{shaded}")
-    legend(above, loc="lower right")
-    below.xaxis.set_major_locator(MaxNLocator(integer=True))
+    above.set_title(f"{plan.arm.name}{'; shaded: infeasible' if plan.infeasible else ''}")
+    above.legend(loc="lower right")
+    style.whole_numbers(below.xaxis)
     below.set(xlabel="sample", ylabel="tension of each cable [N]")
     return figure
 
 
-def _stepped(values: Array) -> tuple[Array, Array]:
-    """Return x and y of a line through ``values`` (S,) at x = 0, 1, …, S − 1.
+@style.styled
+def plot_shares(shares: Shares) -> Figure:
+    """Plot the contribution of each cable, gravity, load and springs to a stiffness as bars."""
+    arm, rest = shares.stiffness.posture.arm, [*shares.others.values()]
+    none = np.zeros(len(rest))
+    passive, active = (N_PER_MM * np.append(each, none) for each in (shares.passive, shares.active))
+    others = N_PER_MM * np.append(0.0 * shares.active, rest)
+    figure, axes = _by_name([*arm.cables.names, *shares.others], "contribution [N/mm]")
+    # bars of one sign stand on each other, so that none hides another
+    on = np.where(active * passive > 0.0, passive, 0.0)
+    x = np.arange(len(passive))
+    axes.bar(x, passive, color=style.BLUE, label="passive: elasticity")
+    axes.bar(x, active, bottom=on, color=style.ORANGE, label="active: tension")
+    axes.bar(x, others, color=style.GREEN, label=", ".join(shares.others))
+    axes.axhline(0.0, color="0.2", linewidth=0.8)
+    total = f"{N_PER_MM * shares.total:.4g} N/mm along {style.direction_name(shares.direction)}"
+    unstable = "" if shares.stiffness.is_stable else "UNSTABLE: "
+    style.heading(figure, f"{unstable}{arm.name}: contributions to {total}")
+    axes.legend()
+    return figure
 
-    A change much larger than the changes beside it becomes a vertical step halfway.
+
+@style.styled
+def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
+    """Plot the planned tension of each cable, beside those of the softest and the stiffest arm.
+
+    Raises InvalidInput if ``attainable`` is not of the posture and the direction of the plan.
     """
-    changes = np.diff(values)
-    around = np.pad(changes, 1)
-    # only neighbouring changes of equal sign make a ramp; up and back down is two steps
-    ramp = np.maximum(around[:-2] * np.sign(changes), around[2:] * np.sign(changes))
-    last = np.flatnonzero(abs(changes) > _JUMP * np.maximum(ramp, 0.0))
-    at = np.repeat(last + 1, 2)
-    beside = np.stack([values[last], values[last + 1]], axis=1).ravel()
-    return np.insert(np.arange(0.0, values.size), at, at - 0.5), np.insert(values, at, beside)
+    F, misses = plan.tension, "" if plan.reached else f", missed by {100.0 * plan.misfit:.2g} %"
+    if attainable is None:
+        return _plot_tensions([(F, f"planned{misses}", "o")], f"{F.posture.arm.name}: plan")
+    style.expect("attainable", attainable, "StiffnessRange")
+    same = F.posture._equals(attainable.posture) and plan.direction.shape == (3,)
+    if not same or abs(plan.direction - attainable.direction).max() > _SAME:
+        raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
+    said = f"planned: {N_PER_MM * float(plan.achieved):.4g} N/mm"
+    return _plot_range(attainable, [(F, said, "o")])
+
+
+@style.styled
+def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
+    """Plot the tension of each cable for the softest and for the stiffest arm."""
+    return _plot_range(attainable)
+
+
+@style.styled
+def plot_tensions(tensions: Tensions) -> Figure:
+    """Plot the median tension of each cable over many postures, with the least and the largest.
+
+    Raises InvalidInput if all tensions are NaN.
+    """
+    found = tensions.values[tensions.ok]
+    if not len(found):
+        raise InvalidInput("tensions", "have no posture with tensions; see their status.")
+    figure, axes = _by_name(tensions.arm.cables.names, "tension [N]")
+    low, middle, high = np.quantile(found, [0.0, 0.5, 1.0], axis=0)
+    reach = [middle - low, high - middle]
+    axes.errorbar(np.arange(len(middle)), middle, reach, fmt="o", linewidth=0.8)
+    style.from_zero(axes, high)
+    count = f"{len(found)} of {plural(len(tensions), 'posture')}"
+    axes.set_title(f"{tensions.arm.name}: median and range, {count}")
+    return figure
+
+
+def _by_name(names: Sequence[str], label: str) -> tuple[Figure, Any]:
+    """Build a figure and its panel, with a place for each name at 0, 1, 2, … of the x-axis."""
+    width = style.TWO_COLUMNS if len(names) > _WIDE else style.ONE_COLUMN
+    figure, ((axes,),) = style.panels(width, 2.8)
+    step = -(-len(names) // _MOST_NAMES)
+    places = np.arange(len(names))[::step]
+    axes.set_xticks(places, names[::step], rotation=60, ha="right", rotation_mode="anchor")
+    axes.set_ylabel(label)
+    return figure, axes
+
+
+def _plot_range(attainable: StiffnessRange, between: Sequence[_Case] = ()) -> Figure:
+    softest = f"softest: {N_PER_MM * attainable.low:.4g} N/mm"
+    stiffest = f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm"
+    ends = (attainable.low_tension, softest, "v"), (attainable.high_tension, stiffest, "^")
+    along = f"stiffness along {style.direction_name(attainable.direction)}"
+    shown = [ends[0], *between, ends[1]]
+    return _plot_tensions(shown, f"{attainable.posture.arm.name}: {along}")
+
+
+def _plot_tensions(shown: Sequence[_Case], title: str) -> Figure:
+    """Plot the tensions of the same cables in several cases, each (tensions, label, marker)."""
+    figure, axes = _by_name(shown[0][0].posture.arm.cables.names, "tension [N]")
+    colors = {"v": style.GREEN, "o": style.BLUE, "^": style.VERMILLION}
+    for F, label, marker in shown:
+        axes.plot(F.values, marker, color=colors[marker], ls=":", lw=0.8, label=label)
+    axes.set_title(title)
+    style.from_zero(axes, *(F.values for F, *_ in shown))
+    axes.legend()
+    return figure

@@ -1,4 +1,4 @@
-"""Status of each posture of a batch, instead of the error that a single posture raises."""
+"""Status of each posture of a batch or sweep, instead of the error that one posture raises."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from cdsm.support.format import plural
 
 @unique
 class Status(IntEnum):
-    """Status of one posture of a batch. It says which quantities exist; the others are NaN.
+    """Status of one posture of a batch or sweep. It says which quantities exist; others are NaN.
 
     The status names the first failure. A computation of a single posture raises the error in
     brackets instead. A negative margin (unstable arm) and an infinite stiffness ``along`` (immobile
-    direction) are not failures.
+    direction) are not failures; a sweep tells the first apart as UNSTABLE.
     """
 
     OK = 0
@@ -49,6 +49,11 @@ class Status(IntEnum):
     IMMOBILE = 7
     """The tip can hardly move in some direction (SingularStiffness): cartesian and pseudoinverse do
     not exist, all other quantities exist."""
+    UNSTABLE = 8
+    """Only in sweeps: the arm buckles (margin ≤ 0): softest, stiffest and isotropy do not exist. If
+    the tip is also IMMOBILE, cartesian and pseudoinverse do not exist."""
+    PENDING = 9
+    """Only in stores of sweeps: not computed yet, no quantity exists."""
 
     @classmethod
     def of(cls, error: CdsmError) -> Status | None:

@@ -1,1 +1,1 @@
-"""Sweeps over many postures and cases, as labelled Datasets; on this machine or a cluster."""
+"""Sweeps over many postures and cases, as labelled Datasets; in memory, on dask, or in a store."""

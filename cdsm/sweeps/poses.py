@@ -1,47 +1,64 @@
 """Pose sets: grids over named joints, paths along a polyline, Sobol points within the limits.
 
-A pose set does not depend on an arm; :func:`poses_of` builds its postures for an arm. The joint
-angles of a grid are computed block by block, so a large grid is never in memory.
+A pose set does not depend on an arm. In chunks, its joint angles are computed where they are
+needed, so a large set is never in memory.
 """
 
 from __future__ import annotations
 
-import itertools
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.support.validation import number_array, one_of, scalar, whole_number
+from cdsm.support.extras import need
+from cdsm.support.validation import instance, number_array, one_of, scalar, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
-from cdsm.sweeps.arguments import Label, distinct, label
-from cdsm.sweeps.blocks import Block
+
+if TYPE_CHECKING:
+    import xarray
 
 MAXIMUM_POSES = 2**30
-"""Maximum number of postures of a path or a random set; scipy's Sobol sequence has 30 bits."""
+"""Maximum number of postures of a sweep; scipy's Sobol sequence has 30 bits."""
 
-_DRAWN = 2**16  # number of Sobol points drawn at once
+_ALL = slice(None)
 
 
-class Poses(NamedTuple):
-    """Postures of a sweep, built for an arm from a pose set or an array."""
+class _Postures(NamedTuple):
+    """Postures of an arm, from a pose set or an array."""
 
     sizes: dict[str, int]  # length of each dimension
-    angles: Callable[[Block], Array]  # joint angles of a block (n, nv) [rad], in C order
-    labels: dict[str, Label]  # coordinates by name, those of the dimensions first
+    angles: Callable[..., Array]  # joint angles (…, nv) [rad] of a slice of each dimension
     description: str  # in words
+    coordinates: dict[str, Any]  # as xarray takes them
 
 
 class PoseSet(ABC):
     """Set of postures to sweep over: a grid, a path or random postures."""
 
+    def angles(self, arm: Manipulator, chunk: int | None = None) -> xarray.DataArray:
+        """Return the joint angles of this set: its dimensions, then ``joint`` [rad].
+
+        Args:
+            arm: The arm.
+            chunk: If given, the array is lazy: a dask array in chunks of at most so many postures,
+                each computed where it is needed. :func:`~cdsm.sweep` then returns a lazy Dataset.
+
+        Raises:
+            UnknownName: The arm has no such joint.
+            InvalidInput: The set does not fit the arm, or has more than 2³⁰ postures.
+            MissingExtra: xarray, or dask for chunks, is not installed.
+        """
+        return angles_of(arm, self, None if chunk is None else whole_number("chunk", chunk, 1))
+
     @abstractmethod
-    def _of(self, arm: Manipulator) -> Poses:
+    def _of(self, arm: Manipulator) -> _Postures:
         """Build the postures of this set for an arm."""
 
 
@@ -51,8 +68,7 @@ class GridPoses(PoseSet):
     """Grid of all combinations of angles of named joints; each joint name becomes a dimension.
 
     In the Dataset each joint of the arm, also one that does not move, is a coordinate with the name
-    of the joint. So a sweep refuses a joint name that the Dataset uses already, such as ``along``,
-    or that NetCDF and Zarr do not accept, such as ``a/b``.
+    of the joint. So a sweep refuses joints called like another variable, such as ``along``.
 
     Args:
         angles: Angles [rad] of each joint of the grid, by joint name: (n,) or one number; [m] for
@@ -60,64 +76,46 @@ class GridPoses(PoseSet):
         rest: Angles [rad] of joints that do not move, by joint name; 0 for all joints not named.
 
     Attributes:
-        swept: Name of each joint of the grid, with its angles [rad].
-        resting: Name of each joint in ``rest``, with its angle [rad].
+        swept: Angles [rad] of each joint of the grid, by name.
+        resting: Angle [rad] of each joint in ``rest``, by name.
 
     Raises:
-        InvalidInput: No joint is named; or a joint has no angles, an angle twice, or is also in
-            ``rest``.
+        InvalidInput: No joint is named; one has no angles, an angle twice, or is in ``rest`` too.
     """
 
-    swept: tuple[tuple[str, tuple[float, ...]], ...]
-    resting: tuple[tuple[str, float], ...]
+    swept: Mapping[str, tuple[float, ...]]
+    resting: Mapping[str, float]
 
     def __init__(
         self, angles: Mapping[str, ArrayLike], rest: Mapping[str, float] | None = None
     ) -> None:
-        still = {} if rest is None else rest
-        for name, given in (("angles", angles), ("rest", still)):
-            if not isinstance(given, Mapping):
-                raise InvalidInput(name, f"{given!r} given; a mapping of joint names is needed.")
-        if not angles:
-            raise InvalidInput("angles", "is empty; name at least one joint and its angles [rad].")
-        for name in angles.keys() & still.keys():
+        given, still = angles, {} if rest is None else rest
+        if not (isinstance(given, Mapping) and given and isinstance(still, Mapping)):
+            problem = f"{angles!r} and rest {rest!r} given; mappings of joint names are needed."
+            raise InvalidInput("angles", problem)
+        for name in given.keys() & still.keys():
             raise InvalidInput("rest", f"{name} is swept over; leave it out here.")
-        swept = {name: distinct(f"angles[{name!r}]", each) for name, each in angles.items()}
+        swept = {k: tuple(distinct(f"angles[{k!r}]", a).tolist()) for k, a in given.items()}
         resting = {name: scalar(f"rest[{name!r}]", angle) for name, angle in still.items()}
-        object.__setattr__(
-            self, "swept", tuple((name, tuple(each.tolist())) for name, each in swept.items())
-        )
-        object.__setattr__(self, "resting", tuple(resting.items()))
+        self.__dict__.update(swept=swept, resting=resting)
 
-    def _of(self, arm: Manipulator) -> Poses:
-        names = arm.joint_names
-        rest = np.zeros(arm.nv)
-        for name, angle in self.resting:
-            rest[names.index(one_of("joint", name, names))] = angle
-        swept = {one_of("joint", name, names): np.array(values) for name, values in self.swept}
-        columns = [names.index(name) for name in swept]
+    def _of(self, arm: Manipulator) -> _Postures:
+        q: dict[str, Any] = dict.fromkeys(arm.joint_names, 0.0)
+        for name, given in {**self.resting, **self.swept}.items():
+            q[one_of("joint", name, arm.joint_names)] = np.array(given)
 
-        def angles(block: Block) -> Array:
-            parts = [values[block[name]] for name, values in swept.items()]
-            grid = np.meshgrid(*parts, indexing="ij")
-            q = np.tile(rest, (grid[0].size, 1))
-            for column, values in zip(columns, grid, strict=True):
-                q[:, column] = values.ravel()
-            return q
+        def angles(*parts: slice) -> Array:
+            along = [q[name][part] for name, part in zip(self.swept, parts, strict=True)]
+            grid = np.meshgrid(*along, indexing="ij", sparse=True)
+            column = {**q, **dict(zip(self.swept, grid, strict=True))}
+            return np.stack(np.broadcast_arrays(*column.values()), axis=-1)
 
-        still = {name: x for name, x in zip(names, rest.tolist(), strict=True) if name not in swept}
-        units = dict(zip(names, arm.joint_units, strict=True))
-        labels = {
-            name: label(
-                (name,) if name in swept else (),
-                values,
-                f"{'way' if units[name] == 'm' else 'angle'} of {name}",
-                units[name],
-            )
-            for name, values in {**swept, **still}.items()
-        }
-        sizes = {name: len(values) for name, values in swept.items()}
-        return Poses(sizes, angles, labels, f"grid over {', '.join(swept)}")
+        coordinates: dict[str, Any] = {}
+        for name, unit in zip(q, arm.joint_units, strict=True):
+            told = {"long_name": f"{'way' if unit == 'm' else 'angle'} of {name}", "units": unit}
+            coordinates[name] = ((name,) if name in self.swept else (), q[name], told)
+        sizes = {name: len(values) for name, values in self.swept.items()}
+        return _Postures(sizes, angles, f"grid over {', '.join(sizes)}", coordinates)
 
 
 @final
@@ -131,40 +129,33 @@ class PathPoses(ReadOnlyState, PoseSet):
             uses the waypoints themselves.
 
     Raises:
-        InvalidInput: ``waypoints`` is not (n, nv) with n ≥ 2, the path has no length, or ``count``
-            is below 2 or above 2³⁰.
+        InvalidInput: ``waypoints`` are not (n, nv), n ≥ 2, or all equal; or ``count`` is below 2.
     """
 
     waypoints: ArrayLike
     count: int | None = None
 
     def __post_init__(self) -> None:
-        waypoints = number_array("waypoints", self.waypoints)
-        if waypoints.ndim != 2 or len(waypoints) < 2:
-            raise InvalidInput(
-                "waypoints",
-                f"shape {waypoints.shape} given, (n, nv) needed: two or more postures [rad].",
-            )
+        points = number_array("waypoints", self.waypoints)
+        if points.ndim != 2 or len(points) < 2:
+            problem = f"shape {points.shape} given, (n, nv) needed: two or more postures [rad]."
+            raise InvalidInput("waypoints", problem)
         if self.count is not None:
             whole_number("count", self.count, 2, MAXIMUM_POSES)
-        object.__setattr__(self, "waypoints", frozen(waypoints))
-        if self.count is not None and not self._distances[-1] > 0.0:
-            raise InvalidInput("waypoints", "are all the same posture; give two different ones.")
+            if not np.ptp(points, axis=0).any():
+                raise InvalidInput("waypoints", "are all the same posture; give different ones.")
+        self.__dict__["waypoints"] = frozen(points)
 
-    @property
-    def _distances(self) -> Array:
-        """Return the length of the path, summed √Σδθ², up to each waypoint, (n,) [rad]."""
-        steps = np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
-
-    def _of(self, arm: Manipulator) -> Poses:
-        known = self._distances
-        q, distances = checked_angles("waypoints", self.waypoints, arm), known
+    def _of(self, arm: Manipulator) -> _Postures:
+        q = _rows("waypoints", self.waypoints, arm)
+        known = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1)))
+        way = known
         if self.count is not None:
-            distances = np.linspace(0.0, known[-1], self.count)
-            q = np.column_stack([np.interp(distances, known, column) for column in q.T])
-        distance = label(("pose",), distances, "way along the path in joint space", _unit(arm))
-        return _listed(q, arm, f"path of {len(known)} waypoints", {"distance": distance})
+            way = np.linspace(0.0, known[-1], self.count)
+            q = np.column_stack([np.interp(way, known, column) for column in q.T])
+        told = {"long_name": "way along the path in joint space", "units": _unit(arm)}
+        description, distance = f"path of {len(known)} waypoints", (("pose",), way, told)
+        return _Postures({"pose": len(q)}, q.__getitem__, description, {"distance": distance})
 
 
 @final
@@ -187,44 +178,97 @@ class RandomPoses(PoseSet):
         whole_number("count", self.count, 1, MAXIMUM_POSES)
         whole_number("seed", self.seed, 0)
 
-    def _of(self, arm: Manipulator) -> Poses:
-        from scipy.stats import qmc  # takes half a second to import
+    def _of(self, arm: Manipulator) -> _Postures:
+        def angles(part: slice) -> Array:
+            from scipy.stats import qmc  # takes half a second to import
 
-        sequence = qmc.Sobol(arm.nv, seed=np.random.default_rng(self.seed))
-        q = np.empty((self.count, arm.nv))
-        # the first point is drawn alone: else scipy warns of counts that are not powers of two
-        edges = [0, *range(1, self.count, _DRAWN), self.count]
-        for start, stop in itertools.pairwise(edges):
-            q[start:stop] = sequence.random(stop - start)
-        q *= arm.upper - arm.lower
-        q += arm.lower
+            start, stop, _ = part.indices(self.count)
+            sequence = qmc.Sobol(arm.nv, seed=np.random.default_rng(self.seed))
+            if start:
+                unit = sequence.fast_forward(start).random(stop - start)
+            else:  # scipy warns of a first draw that is no power of two
+                unit = sequence.random(1 << (stop - 1).bit_length())[:stop]
+            return np.asarray(arm.lower + unit * (arm.upper - arm.lower))
+
         description = f"{self.count} Sobol points within the joint limits, seed {self.seed}"
-        return _listed(q, arm, description, {})
+        return _Postures({"pose": self.count}, angles, description, {})
 
 
-def poses_of(arm: Manipulator, q: PoseSet | ArrayLike) -> Poses:
-    """Build the postures of a pose set, or of an array (N, nv) [rad], for an arm."""
+def joint_angles(arm: Manipulator, q: PoseSet | ArrayLike) -> Array:
+    """Return the joint angles (N, nv) [rad] of a pose set or array, checked."""
+    found = _postures_of(arm, q)
+    return found.angles(*[_ALL] * len(found.sizes)).reshape(-1, arm.nv)
+
+
+def angles_of(
+    arm: Manipulator, q: PoseSet | ArrayLike | xarray.DataArray, chunk: int | None = None
+) -> xarray.DataArray:
+    """Return the joint angles of a sweep with their coordinates; lazy if ``chunk`` is given."""
+    need("sweep", "xarray", *([] if chunk is None else ["dask"]))
+    import xarray
+
+    instance("arm", arm, Manipulator)
+    if isinstance(q, xarray.DataArray):
+        return _checked(arm, q, chunk)
+    sizes, angles, description, coordinates = _postures_of(arm, q)
+    if math.prod(sizes.values()) > MAXIMUM_POSES:
+        size = " x ".join(map(str, sizes.values()))
+        raise InvalidInput("q", f"has {size} postures; 2^30 are taken at most.")
+    if chunk is None:
+        values: Any = angles(*[_ALL] * len(sizes))
+    else:
+        import dask.array
+
+        def block(block_info: Any = None) -> Array:
+            return angles(*(slice(*ends) for ends in block_info[None]["array-location"][:-1]))
+
+        lazy: Any = dask.array  # untyped
+        most, shape = 8 * arm.nv * chunk, (*sizes.values(), arm.nv)
+        chunks = ("auto",) * len(sizes) + (arm.nv,)
+        chunks = lazy.core.normalize_chunks(chunks, shape, limit=most, dtype=np.float64)
+        values = lazy.map_blocks(block, chunks=chunks, meta=np.empty(0))
+    if "pose" in sizes:
+        told = {"long_name": "number of the posture", "units": "1"}
+        coordinates |= {"pose": (("pose",), np.arange(sizes["pose"]), told)}
+    about = {"long_name": "joint angles", "units": _unit(arm), "poses": description}
+    return xarray.DataArray(values, coordinates, (*sizes, "joint"), attrs=about)
+
+
+def distinct(name: str, values: ArrayLike) -> Array:
+    """Check and return the values (n,) of a dimension: one or more numbers, no two equal."""
+    array = np.atleast_1d(number_array(name, values))
+    if array.ndim > 1 or not array.size or len(np.unique(array)) < array.size:
+        raise InvalidInput(name, f"{values!r:.200} given; give one or more different numbers.")
+    return array
+
+
+def _postures_of(arm: Manipulator, q: PoseSet | ArrayLike) -> _Postures:
     if isinstance(q, PoseSet):
         return q._of(arm)
-    return _listed(checked_angles("q", q, arm), arm, "postures as given", {})
+    rows = _rows("q", q, arm)
+    return _Postures({"pose": len(rows)}, rows.__getitem__, "as given", {})
 
 
-def checked_angles(name: str, q: ArrayLike, arm: Manipulator) -> Array:
-    """Check and return joint angles (N, nv) [rad] of one or more postures of the arm."""
+def _rows(name: str, q: ArrayLike, arm: Manipulator) -> Array:
     angles = number_array(name, q)
     if angles.ndim != 2 or angles.shape[1] != arm.nv or not len(angles):
-        raise InvalidInput(
-            name,
-            f"shape {angles.shape} given, (N, {arm.nv}) needed: one or more postures, each one "
-            f"angle [rad] per joint, {', '.join(arm.joint_names)}.",
-        )
+        needed = f"(N, {arm.nv}) needed: one or more postures, each one angle [rad] per joint"
+        raise InvalidInput(name, f"shape {angles.shape} given, {needed}.")
     return angles
 
 
-def _listed(q: Array, arm: Manipulator, description: str, labels: dict[str, Label]) -> Poses:
-    labels["pose"] = label(("pose",), np.arange(len(q)), "number of the posture", "1")
-    labels["q"] = label(("pose", "joint"), frozen(q), "joint angles", _unit(arm))
-    return Poses({"pose": len(q)}, lambda block: q[block["pose"]], labels, description)
+def _checked(arm: Manipulator, q: xarray.DataArray, chunk: int | None) -> xarray.DataArray:
+    """Check a DataArray of joint angles; return it with ``joint`` last, and undivided there."""
+    if q.ndim < 2 or q.sizes.get("joint") != arm.nv or not q.size:
+        raise InvalidInput("q", f"{dict(q.sizes)} given; postures x joint={arm.nv} is needed.")
+    if "joint" in q.coords and tuple(q["joint"].values.tolist()) != arm.joint_names:
+        raise InvalidInput("q", f"its joints are not {', '.join(arm.joint_names)}, in this order.")
+    q = q.transpose(..., "joint")
+    if q.chunks is None:
+        number_array("q", q.values)
+        rows = q.size // len(q) // arm.nv  # in each entry of the first dimension
+        return q if chunk is None else q.chunk({q.dims[0]: max(1, chunk // rows)})
+    return q.chunk(joint=-1)
 
 
 def _unit(arm: Manipulator) -> str:

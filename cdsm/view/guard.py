@@ -1,39 +1,22 @@
-"""Check every client and message of the live view before viser receives it.
+"""Serve the view to browsers of this machine only, and pass on only what its page sends.
 
-viser serves every client that connects, and lets it change any property of any control. The guard
-refuses:
-
-- **A web page of another site**, open in a browser on this machine. It can reach every port of
-  this machine and could read the scene over a websocket. Its ``Origin`` header shows the site.
-- **DNS rebinding**: such a page uses a host name that it directs to this machine. The ``Host``
-  header shows that name.
-- **A connection of our page to another server**, by ``?websocket=`` in a link. That server could
-  run scripts in our page. A header of the page allows connections to its own server only.
-- **Messages that the page does not send.** A client may report its camera and a click in the
-  scene, drag the handle at the tip, move a slider within its range, and use a switch or a button.
-  The guard drops all other messages: requests to share the view on a public server, and changes
-  of any property that is not a value.
-- **Other machines** that do not know the token in the URL, if the address is not loopback.
-
-At a loopback address any program on this machine, of any user, can connect. The network traffic
-is not encrypted: whoever can read it has the token.
+viser serves every client, and lets it change any property of any control. The guard refuses web
+pages of other sites, which their ``Origin`` header shows, and other names of this machine, as after
+DNS rebinding. Our page may connect to its own server only. Of its messages pass: camera, drags of
+the tip's handle, and values of controls.
 """
 
 from __future__ import annotations
 
-import asyncio
-import dataclasses
-import hmac
 import ipaddress
-import logging
 import math
 import re
-import secrets
+import socket
 import threading
 from collections.abc import Callable
 from functools import partial
 from http import HTTPStatus
-from typing import Any, Final, final
+from typing import Any, Final, TypeGuard
 
 import msgspec
 import viser
@@ -41,200 +24,105 @@ from websockets.asyncio import server as websocket_server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from cdsm.errors import CdsmError
-from cdsm.view.messages import scene_message
+from cdsm.errors import CdsmError, InvalidInput
 
-_LOG = logging.getLogger(__name__)
+HANDLE: Final = "/target"
+"""Name of the scene node that clients may drag."""
 
-_LONGEST = 2**16
-"""Largest size of a message in bytes. Messages of the page have a few hundred."""
-
-_PAUSE = 1.0
-"""Seconds before an out-of-range value is corrected; the user may still be typing digits."""
-
+_FARTHEST = 1e6  # largest coordinate [m] to which it may be dragged
+_LONGEST = 2**16  # size of a message in bytes; those of the page have a few hundred
 _STARTING: Final = threading.Lock()
 
-_Reply = Callable[[ServerConnection, Request], Response | None]
 
-Control = (
-    viser.GuiSliderHandle[float]
-    | viser.GuiButtonHandle
-    | viser.GuiButtonGroupHandle
-    | viser.GuiCheckboxHandle
-)
-"""Types of controls that a client may use."""
+def guarded_server(host: object, port: int, label: str) -> viser.ViserServer:
+    """Start a viser server that refuses what our page does not send.
 
-
-class _Address(str):
-    """Address of one guard. The guard knows its server by the identity of this object.
-
-    Therefore two views in one process may have addresses of equal text.
+    viser has no option for this, so while it starts, the function that it calls to start a
+    websocket server is replaced. Raises InvalidInput if the address is not of this machine or not
+    available (viser would take another port), CdsmError if viser does not call that function.
     """
+    if not isinstance(host, str) or not _is_loopback(host):
+        raise InvalidInput(
+            "host",
+            f"{host!r} given; the view is for this machine alone: give 127.0.0.1, ::1 or "
+            f"localhost. From another machine use `ssh -L {port}:localhost:{port}`.",
+        )
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        socket.create_server((host, port), family=family).close()
+    except OSError as error:
+        said = f"{port} on {host} is not available ({error.strerror}); give another port, or 0."
+        raise InvalidInput("port", said) from None
+    original, called = websocket_server.serve, threading.Event()
 
-    __slots__ = ()
+    def serve(*args: Any, **options: Any) -> Any:
+        called.set()
+        options["process_request"] = partial(_answer, options["process_request"])
+        connect = partial(_Connection, lambda message: _allows(server, message))
+        return original(*args, **options | {"create_connection": connect, "max_size": _LONGEST})
 
-
-@final
-class Guard:
-    """Filter between viser and the clients of one live view that listens at ``host``.
-
-    Attributes:
-        token: First part of every path if other machines can connect, else empty.
-        refused: Number of refused requests and messages.
-    """
-
-    def __init__(self, host: str) -> None:
-        self.token = "" if _is_loopback(host) else secrets.token_urlsafe(32)
-        self.refused = 0
-        self._address = _Address(host)
-        self._controls: dict[str, Control] = {}
-
-    def start(self, port: int) -> viser.ViserServer:
-        """Start a viser server whose requests and messages pass through this guard.
-
-        viser has no option to filter its websocket server. While viser starts, this method
-        therefore replaces the function that starts the websocket server. If the port is taken,
-        viser uses the next free port. Raises CdsmError if viser does not call that function.
-        """
-        original, made = websocket_server.serve, threading.Event()
-
-        def serve(*args: Any, **options: Any) -> Any:
-            if len(args) < 2 or args[1] is not self._address:  # another server in this process
-                return original(*args, **options)
-            made.set()
-            options |= {
-                "process_request": partial(self._answer, options["process_request"]),
-                "create_connection": partial(_Connection, self),
-                "max_size": _LONGEST,
-            }
-            return original(*args, **options)
-
-        with _STARTING:
-            websocket_server.serve = serve  # type: ignore[assignment,misc]
-            try:
-                server = viser.ViserServer(self._address, port, "cdsm view", verbose=False)
-            finally:
-                websocket_server.serve = original  # type: ignore[misc]
-        if not made.is_set():
-            server.stop()
-            raise CdsmError(
-                f"viser {viser.__version__} starts its server in a way that cannot be guarded. "
-                "Install viser 1.1."
-            )
-        if self.token:
-            _LOG.warning(
-                "The view listens at %s: whoever reaches this machine over the network and has the "
-                "URL with its token can see the arm and move its sliders. The traffic is not "
-                "encrypted: whoever can read it has the token.",
-                self._address,
-            )
-        return server
-
-    def admit(self, control: Control) -> None:
-        """Allow clients to use ``control``; all other controls are refused."""
-        self._controls[control._impl.uuid] = control
-
-    def _answer(
-        self, reply: _Reply, connection: ServerConnection, request: Request
-    ) -> Response | None:
-        """Answer a request for a page or a websocket: refuse it, or let viser's ``reply`` answer.
-
-        ``reply`` returns None for a websocket, which is then opened.
-        """
-        hosts = request.headers.get_all("Host")
-        _, first, rest = [*request.path.partition("?")[0].split("/", 2), "", ""][:3]
-        fault = self._fault(hosts, request.headers.get_all("Origin"), first)
-        if fault:
-            self._refuse(fault)
-            return connection.respond(HTTPStatus.FORBIDDEN, "Not allowed to see this view.\n")
-        if self.token:
-            request = dataclasses.replace(request, path=f"/{rest}")
-        response = reply(connection, request)
-        if response is not None:
-            own = f"'self' ws://{hosts[0]} wss://{hosts[0]} data: blob:"
-            policy = f"connect-src {own}; frame-ancestors 'self'"
-            response.headers["Content-Security-Policy"] = policy
-        return response
-
-    def _fault(self, hosts: list[str], origins: list[str], first: str) -> str:
-        """Return the reason to refuse a request; empty if the request is allowed.
-
-        ``hosts`` and ``origins`` are the Host and Origin headers of the request, ``first`` is the
-        first part of its path.
-        """
-        if len(hosts) != 1:
-            return f"a request for {len(hosts)} hosts"
-        host = hosts[0]
-        # with a token any host name is allowed: a page that rebinds DNS does not know the token
-        if not self.token and not _is_loopback(re.sub(r":\d+$", "", host).strip("[]")):
-            return f"a request for another host, {host[:80]!a}"
-        if any(origin not in (f"http://{host}", f"https://{host}") for origin in origins):
-            return f"a request of another origin, {origins[0][:80]!a}"
-        given = first.encode(errors="surrogateescape")
-        if self.token and not hmac.compare_digest(given, self.token.encode()):
-            return "a request without the token"
-        return ""
-
-    def _permitted(self, raw: bytes) -> bytes | None:
-        """Check a client's message ``raw``; return its allowed part, packed for viser, or None."""
+    with _STARTING:
+        websocket_server.serve = serve  # type: ignore[assignment,misc]
         try:
-            # packed again: of two fields with one name, viser may read the one not checked here
-            message = msgspec.msgpack.decode(raw)
-            seen = scene_message(message)
-            if seen is not None:
-                return msgspec.msgpack.encode(seen)
-            match message:
-                case {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}:
-                    value = self._allowed(uuid, value)
-                    if value is not None and (len(message), len(message["updates"])) == (3, 1):
-                        message["updates"]["value"] = value
-                        return msgspec.msgpack.encode(message)
-            self._refuse(f"a message, {message!a:.80}")
-        except Exception as error:  # unknown bytes can cause any error
-            self._refuse(f"a message, {str(error)[:80]!a}")
-        return None
-
-    def _allowed(self, uuid: str, value: object) -> bool | float | str | None:
-        """Return ``value``, clipped to the range of a slider, for the control ``uuid``.
-
-        None if clients may not use this control, or not set this value.
-        """
-        control = self._controls.get(uuid)
-        if isinstance(control, viser.GuiButtonHandle):
-            return True if value is True else None
-        if isinstance(control, viser.GuiCheckboxHandle):
-            return value if isinstance(value, bool) else None
-        if isinstance(control, viser.GuiButtonGroupHandle):
-            return value if value in control.options else None
-        if control is None or isinstance(value, bool) or not isinstance(value, (int, float)):
-            return None
-        if not math.isfinite(value):
-            return None
-        within = float(min(max(value, control.min), control.max))
-        if within != value:  # viser updates the other clients, but not the sender
-            asyncio.get_running_loop().call_later(
-                _PAUSE, lambda: control._queue_update("value", control.value)
-            )
-        return within
-
-    def _refuse(self, what: str) -> None:
-        """Count a refused request or message, and log the count each time it has doubled."""
-        self.refused += 1
-        if self.refused & (self.refused - 1) == 0:
-            _LOG.warning("Refused from clients so far: %d; the last: %s.", self.refused, what)
+            server = viser.ViserServer(host, port, label, verbose=False)
+        finally:
+            websocket_server.serve = original  # type: ignore[misc]
+    if not called.is_set():
+        server.stop()
+        version = viser.__version__
+        raise CdsmError(f"viser {version} cannot be guarded from other sites; install viser 1.1.")
+    return server
 
 
 class _Connection(ServerConnection):
-    """Websocket connection that drops all messages which its guard refuses."""
+    """Websocket connection that drops all messages which ``allows`` refuses."""
 
-    def __init__(self, guard: Guard, *parts: Any, **limits: Any) -> None:
+    def __init__(self, allows: Callable[[Any], bool], *parts: Any, **limits: Any) -> None:
         super().__init__(*parts, **limits)
-        self._guard = guard
+        self._allows = allows
 
     async def recv(self, decode: bool | None = None) -> Any:
-        while (message := self._guard._permitted(await super().recv(decode=False))) is None:
-            pass
-        return message
+        while True:
+            try:
+                message = msgspec.msgpack.decode(await super().recv(decode=False))
+                # packed again: of two fields with one name, viser may read the one not checked here
+                if self._allows(message):
+                    return msgspec.msgpack.encode(message)
+            except (msgspec.MsgspecError, ValueError, TypeError, RecursionError):
+                pass
+
+
+def _allows(server: viser.ViserServer, message: Any) -> bool:
+    """Whether a message may pass; a number is clipped to its slider, as the page does."""
+    match message:
+        case {"type": "ViewerCameraMessage"}:
+            return True
+        case {"type": "GuiUpdateMessage", "uuid": str(uuid), "updates": {"value": value}}:
+            control = server.gui._gui_input_handle_from_uuid.get(uuid)
+            if isinstance(control, viser.GuiSliderHandle):
+                value = _number(value) and float(min(max(value, control.min), control.max))
+            message["updates"] = {"value": value}
+            return control is not None and type(value) is type(control.value)
+        case {"type": "TransformControlsUpdateMessage", "position": [*place]}:
+            message["wxyz"] = [1.0, 0.0, 0.0, 0.0]
+            near = [_number(x) and abs(x) <= _FARTHEST for x in place]
+            return bool(message.get("name") == HANDLE and near == [True, True, True])
+        case {"type": "TransformControlsDragStartMessage" | "TransformControlsDragEndMessage"}:
+            return bool(message.get("name") == HANDLE)
+    return False
+
+
+def _answer(reply: Any, connection: ServerConnection, request: Request) -> Response | None:
+    """Refuse a request for a page or a websocket, or let viser's ``reply`` answer it."""
+    hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+    here = len(hosts) == 1 and _is_loopback(re.sub(r":\d+$", "", hosts[0]).strip("[]"))
+    if not here or any(each != f"http://{hosts[0]}" for each in origins):
+        return connection.respond(HTTPStatus.FORBIDDEN, "Not allowed to see this view.\n")
+    response: Response | None = reply(connection, request)
+    if response is not None:  # a page, no websocket
+        own = f"'self' ws://{hosts[0]} data: blob:"
+        response.headers["Content-Security-Policy"] = f"connect-src {own}; frame-ancestors 'self'"
+    return response
 
 
 def _is_loopback(name: str) -> bool:
@@ -243,3 +131,7 @@ def _is_loopback(name: str) -> bool:
         return ipaddress.ip_address(name).is_loopback
     except ValueError:
         return name.lower() == "localhost"
+
+
+def _number(value: object) -> TypeGuard[float]:
+    return isinstance(value, (int, float)) and type(value) is not bool and math.isfinite(value)

@@ -5,30 +5,28 @@ from __future__ import annotations
 import contextlib
 import logging
 import threading
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable
+from concurrent import futures
 from typing import TYPE_CHECKING, Self, final
 
 import numpy as np
 
+from cdsm.kinematics import inverse_kinematics
 from cdsm.manipulator import Manipulator
+from cdsm.plots.style import MM
 from cdsm.support.values import Array
-from cdsm.view.controls import Controls
-from cdsm.view.path_player import PathPlayer
+from cdsm.view.guard import HANDLE
+from cdsm.view.panel import Panel
 from cdsm.view.scene import Scene
 from cdsm.view.state import Condition, Setting, Shown, show
-from cdsm.view.tip_handle import TipHandle
-from cdsm.view.worker import Worker
 
 if TYPE_CHECKING:
     import viser
 
-    from cdsm.view.guard import Guard
-
 _LOG = logging.getLogger(__name__)
 
-_SETTLED = 0.3  # seconds without a new setting before the remedies are computed, which takes longer
-_ARROW = 0.5  # length of the arrow of the largest force, as a fraction of the arm's length
+_SIZE = 0.2  # size of the handle at the tip, over the arm's length
+_FASTEST, _SPEED = 30.0, 10.0  # largest speed of a path, and its first speed [samples/s]
 
 
 @final
@@ -36,51 +34,29 @@ class View:
     """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``."""
 
     def __init__(
-        self,
-        arm: Manipulator,
-        start: Setting,
-        arm_arguments: Sequence[str] | None,
-        guard: Guard,
-        server: viser.ViserServer,
-        limits: tuple[float, float],
+        self, arm: Manipulator, start: Setting, server: viser.ViserServer, pull: float, push: float
     ) -> None:
-        self.arm = arm
-        self._guard, self._server = guard, server
-        self._closed = threading.Event()
-        self._worker = Worker(self._refresh)
-        self._player: PathPlayer | None = None
-        try:
-            request, scale = self._worker.request, _ARROW * arm.length / limits[1]
-            self._scene = Scene(server, arm, scale)
-            self._handle = TipHandle(server, arm, request)
-            self._controls = Controls(
-                server,
-                arm,
-                start,
-                arm_arguments,
-                limits,
-                scale,
-                request,
-                self._scene.cameras.fit,
-                guard.admit,
-            )
-            server.scene.on_click()(self._on_click)
-            self._refresh()
-        except BaseException:
-            self.close()
-            raise
+        self.arm, self._server = arm, server
+        self._closed, self._lock = threading.Event(), threading.Lock()
+        self._thread = futures.ThreadPoolExecutor(1, "cdsm view")
+        self._last: futures.Future[None] | None = None
+        self._player: Player | None = None
+        self._scene = Scene(server, arm, push)
+        self._handle = TipHandle(server.scene, arm, self._request)
+        self._panel = Panel(server.gui, arm, start, pull, push, self._request)
+        self._refresh()
+        self._scene.begin(server.initial_camera, self._shown, np.empty((0, 3)))
 
     @property
     def url(self) -> str:
-        """Address of the page; it contains a token if other machines can connect."""
-        host, token = self._server.get_host(), self._guard.token
-        place = f"{f'[{host}]' if ':' in host else host}:{self._server.get_port()}"
-        return f"http://{place}/{token}/" if token else f"http://{place}"
+        """Address of the page."""
+        host = self._server.get_host()
+        return f"http://{f'[{host}]' if ':' in host else host}:{self._server.get_port()}"
 
     @property
     def shown(self) -> Shown:
         """Results on the page, after waiting until all slider moves so far are computed."""
-        self._worker.wait()
+        futures.wait([self._last] if self._last else [])
         return self._shown
 
     def wait(self) -> None:
@@ -92,9 +68,9 @@ class View:
         if self._closed.is_set():
             return
         if self._player is not None:
-            self._player.close()
-        self._worker.close()
-        with quiet():
+            self._player.paused.set()
+        self._thread.shutdown()
+        with contextlib.redirect_stdout(None):  # viser prints that it stops
             self._server.stop()
         self._closed.set()
 
@@ -104,65 +80,119 @@ class View:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def __repr__(self) -> str:
-        return f"<View of {self.arm.name} at {self.url}>"
+    def add_path(self, path: Array, tips: Array) -> None:
+        """Draw the tips (S, 3) [m] of a path; add controls that play its joint angles, or tips."""
+        go = self._handle.aim if path is tips else self._panel.move
 
-    def _add_path(self, path: Array, tips: Array) -> None:
-        """Draw the tips (S, 3) [m] of a path, and add controls that play the path.
-
-        ``path`` is the joint angles (S, nv) [rad]; for a path given by its tips it is ``tips``.
-        """
-        self._scene.draw_path(tips)
-        go = self._handle.aim if path is tips else self._controls.move
-
-        def show(sample: Array) -> None:
+        def show_sample(sample: Array) -> None:
             go(sample)
-            self._worker.wait()
+            _ = self.shown
 
-        show(path[0])
-        self._player = PathPlayer(self._server, path, show, self._guard.admit)
+        show_sample(path[0])
+        self._scene.begin(self._server.initial_camera, self._shown, tips)
+        self._player = Player(self._server.gui, self._panel, path, show_sample)
 
-    def _on_click(self, event: viser.SceneClickEvent) -> None:
-        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
-        self._scene.names.choose(self.shown, origin, direction)
-        self._worker.request()
+    def _request(self) -> None:
+        """Request a refresh, from any thread. All requests during one together cause one more."""
+        with self._lock, contextlib.suppress(RuntimeError):  # the view is closed
+            if self._last is None or self._last.running() or self._last.done():
+                self._last = self._thread.submit(self._refresh)
 
     def _refresh(self) -> None:
-        setting = self._controls.setting
-        angles = self._handle.solve(setting.q)
-        if angles is not None:
-            self._controls.move(angles)
-            setting = self._controls.setting
-            self._handle.moved_to(setting.q)
         try:
-            shown = show(self.arm, setting)
-            self._put(shown)
-            unstable = shown.stiffness if shown.condition is Condition.UNSTABLE else None
-            if unstable is not None and self._worker.no_request_within(_SETTLED):
-                # tenths of a second: what would make the arm stable
-                self._put(replace(shown, problem="\n".join(unstable.warnings)))
+            self._handle.follow(self._panel)
+            self._put(show(self.arm, self._panel.setting))
         except Exception as error:  # a bug must not leave outdated numbers on the page
-            _LOG.exception("the view cannot show %s", setting)
+            _LOG.exception("the view cannot show %s", setting := self._panel.setting)
             problem = f"{type(error).__name__}: {error}"
             self._put(Shown(setting=setting, condition=Condition.FAILED, problem=problem))
 
     def _put(self, shown: Shown) -> None:
-        self._scene.names.all = self._controls.names.value
         with self._server.atomic():
-            self._scene.update(shown, follow=not self._handle.dragged)
-            self._handle.update(shown)
-            self._controls.update(shown, self._handle.remark(shown.setting.q))
+            self._scene.update(shown, self._panel.names.value)
+            self._panel.update(shown, self._scene, self._handle.update(shown))
         self._shown = shown
 
 
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Keep viser from printing to standard output; viser has no option for this."""
-    import rich
+@final
+class Player:
+    """Controls that play ``path``; ``go`` moves the arm to a row, and returns when it is shown."""
 
-    console = rich.get_console()
-    before, console.quiet = console.quiet, True
-    try:
-        yield
-    finally:
-        console.quiet = before
+    def __init__(
+        self, gui: viser.GuiApi, panel: Panel, path: Array, go: Callable[[Array], None]
+    ) -> None:
+        self._size, self.paused = float(len(path)), threading.Event()
+        self.paused.set()
+        with gui.add_folder("Path", order=0.0):
+            self.sample = panel.add_slider(f"sample of {len(path)}", 1.0, self._size, 1.0, 1.0)
+            self._speed = panel.add_slider("samples per s", 1.0, _FASTEST, _SPEED, 1.0)
+            self.button = gui.add_button("Play")
+        self.button.on_click(lambda _: self.play())
+        self.sample.on_update(lambda _: go(path[round(self.sample.value) - 1]))
+
+    def play(self) -> None:
+        """Play to the end, from the start if it is there; or pause, if it plays."""
+        if not self.paused.is_set():
+            self.paused.set()
+            return
+        self.paused.clear()
+        self.button.label = "Pause"
+        if self.sample.value == self._size:
+            self.sample.value = 1.0  # type: ignore[misc]
+        while self.sample.value < self._size and not self.paused.wait(1.0 / self._speed.value):
+            self.sample.value += 1.0  # type: ignore[misc]
+        self.paused.set()
+        self.button.label = "Play"
+
+
+@final
+class TipHandle:
+    """Handle at the tip, which users drag. Each drag calls ``changed``, in any thread."""
+
+    def __init__(
+        self, scene: viser.SceneApi, arm: Manipulator, changed: Callable[[], None]
+    ) -> None:
+        self._arm, self._changed = arm, changed
+        self._target: Array | None = None
+        self._dragged = False
+        self._remark, self._q = "", np.full(arm.nv, np.nan)
+        self._node = scene.add_transform_controls(
+            HANDLE, _SIZE * arm.length, disable_rotations=True, depth_test=False, opacity=0.7
+        )
+        self._node.on_update(self._on_drag)
+
+    async def _on_drag(self, event: viser.TransformControlsEvent) -> None:
+        # viser keeps the order of these calls only if the function is asynchronous
+        self._dragged = event.phase != "end"
+        if event.phase == "update":
+            self.aim(np.array(event.target.position))
+        else:
+            self._changed()
+
+    def aim(self, target: Array) -> None:
+        """Set a new target of the tip (3,) [m], and call ``changed``."""
+        self._target = target
+        self._changed()
+
+    def follow(self, panel: Panel) -> None:
+        """Move the joints of ``panel`` so that the tip is at, or nearest to, a new target."""
+        target, self._target = self._target, None
+        if target is None:
+            return
+        found = inverse_kinematics(self._arm, target, panel.setting.q)
+        panel.move(found.angles)
+        self._q, self._remark = panel.setting.q, ""
+        if not found.reachable:
+            stops = f" ({', '.join(found.at_limit)} at a limit)" if found.at_limit else ""
+            missed = f"{MM * found.position_error:.3g} mm"
+            self._remark = f"The tip stays {missed} away from the handle{stops}."
+
+    def update(self, shown: Shown) -> str:
+        """Move the handle to the tip, unless it is dragged; return why the tip did not reach it.
+
+        The reason is empty if the tip did, or if the arm has been moved since.
+        """
+        self._node.visible = shown.reference is not None
+        if shown.reference is not None and not self._dragged:
+            self._node.position = shown.reference.tip[:3, 3]
+        return self._remark if np.array_equal(shown.setting.q, self._q) else ""

@@ -1,199 +1,239 @@
-"""Write the text of the panel as HTML, in mm and N/mm; every number is in a named element."""
+"""Build the panel of the page: controls that set the arm, and text in mm and N/mm."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Final, NamedTuple
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, final
 
-import matplotlib
 import numpy as np
 
 from cdsm.manipulator import Manipulator
-from cdsm.plots.style import COLOR_MAP, MM, N_PER_MM
+from cdsm.plots.style import MM, N_PER_MM
+from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.stiffness_matrix.prints import model_of
-from cdsm.support.directions import XYZ
-from cdsm.support.format import coordinates, plural
-from cdsm.support.markup import Markup, element
+from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.values import Array
-from cdsm.view.state import ELLIPSOID, FORCE, SLIDES, STICKS, Condition, Shown
+from cdsm.tension import DEFAULT_SOLVER
+from cdsm.view.scene import ELLIPSOID, FORCE, SLIDES, STICKS, Scene
+from cdsm.view.state import Color, Condition, Setting, Shown
 from cdsm.wires.catalogue import wires_text
 
+if TYPE_CHECKING:
+    import viser
+
+_STEPS = 500  # least number of steps of a slider, which is a few hundred pixels long
+_LENGTHS = 10.0  # largest coordinate of a prismatic joint on its slider, over the arm's length
+_ROUND = 1e-9  # largest difference of an end of a slider from a round number, over a step
+
+_SAG: Final = (
+    "Tension the cables without the force, lock the motors, then apply the force: the arm moves to "
+    "its equilibrium. Otherwise the tensions hold the posture under the force."
+)
 _GREEN, _RED, _AMBER, _GREY = "#2f855a", "#c53030", "#b7791f", "#718096"
 _COLORS: Final = {
     Condition.STABLE: _GREEN,
     Condition.UNSTABLE: _RED,
     Condition.SINGULAR: _RED,
-    Condition.LEFT_REFERENCE: _AMBER,
+    Condition.MOVED: _AMBER,
 }
-_TEXT: Final = "padding:0 0.8em;margin-bottom:0.6em;font-size:0.85em;overflow-y:auto;"
-_BOX: Final = _TEXT + "height:27em"
-"""Style of the panel. Its height is fixed, so that sliders do not move while they are dragged."""
-
-_LIST: Final = _TEXT + "max-height:16em"
-_TABLE: Final = "width:100%;border-spacing:0 0.15em"
-_NUMBER: Final = "text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"
-_GRADIENT: Final = ",".join(
-    f"rgb({red},{green},{blue})"
-    for red, green, blue, _ in matplotlib.colormaps[COLOR_MAP](np.linspace(0, 1, 9), bytes=True)
-)
+_BOX: Final = '<div style="height:{};overflow-y:auto;font-size:0.8em">\n\n{}\n\n</div>'
+"""Box of fixed height, so that sliders do not move while they are dragged."""
 
 
-class _Row(NamedTuple):
-    """Row of the table on the page: its text, its numbers by name, and their unit."""
+@final
+class Panel:
+    """Panel of the page: controls that set the arm, and text about the arm.
 
-    what: str
-    values: dict[str, str]
-    unit: str
-
-
-def page_text(shown: Shown, force_scale: float, remark: str = "") -> str:
-    """Write the results ``shown`` as HTML: condition, remarks, table of numbers, legend.
-
-    ``force_scale`` [m/N] is the length of the force arrow per newton. ``remark`` stands above the
-    numbers.
+    The slider of the least tension ends at ``pull`` [N], those of the force at ± ``push`` [N].
+    ``changed`` is called, in any thread, when a control has changed.
     """
-    color = _COLORS.get(shown.condition, _GREY)
-    badge = f"background:{color};color:white;font-weight:bold;text-align:center;padding:0.2em"
-    parts = [element("div", _named("condition", shown.condition.value), style=badge)]
-    lines = "white-space:pre-line"
-    parts += [
-        element("p", _named(name, text), style=lines) for name, text in _remarks(shown, remark)
-    ]
-    rows = [_row(each) for each in _numbers(shown)]
-    if rows:
-        parts.append(element("table", *rows, style=_TABLE))
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        arm: Manipulator,
+        start: Setting,
+        pull: float,
+        push: float,
+        changed: Callable[[], None],
+    ) -> None:
+        self._gui, self._arm, self._start, self._changed = gui, arm, start, changed
+        friction = "friction in its holes where motors are locked" if arm.has_friction else ""
+        basis = f"wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
+        gui.add_markdown(escaped(f"{arm}; {basis}; {friction or 'frictionless'}"), order=-2.0)
+        self._text = gui.add_markdown("", order=-1.0)  # above the path, which has 0
+        with gui.add_folder("Load"):
+            self._load = [self.add_slider("least tension [N]", 0.0, pull, start.minimum)]
+            for axis, value in zip("xyz", start.force.tolist(), strict=True):
+                self._load.append(self.add_slider(f"force {axis} [N]", -push, push, value))
+            self._sag = self._add_switch("motors locked", start.sag, _SAG)
+        shown = JointUnits(arm.slides).shown
+        self._unit = np.array([unit for _, unit in shown])
+        most = np.where(arm.slides, _LENGTHS * arm.length, 2.0 * math.pi)
+        low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
+        ends = np.transpose([low, high, start.q] / self._unit).tolist()
+        with gui.add_folder("Joints"):
+            self.joints = [
+                self.add_slider(f"{name} [{unit.replace('deg', '°')}]", *numbers)
+                for name, (unit, _), numbers in zip(arm.joint_names, shown, ends, strict=True)
+            ]
+        buttons = gui.add_button_group("all", ("Straight", "Reset"))
+        buttons.on_click(self._press)
+        with gui.add_folder("Cable tensions"):
+            self.names = self._add_switch("show names", False, "Name the cables in the picture.")
+            self._tensions = gui.add_markdown("")
+        self._python = gui.add_markdown("")
+
+    @property
+    def setting(self) -> Setting:
+        """Current values of all controls."""
+        q = self._unit * [joint.value for joint in self.joints]
+        minimum, *force = [slider.value for slider in self._load]
+        F, sag = np.array(force), self._sag.value
+        return replace(self._start, q=q, minimum=minimum, force=F, sag=sag)
+
+    def update(self, shown: Shown, scene: Scene, remark: str) -> None:
+        """Write the text about the results ``shown``, and above it ``remark``, unless empty."""
+        self._text.content = results_text(shown, scene, remark)
+        self._tensions.content = tensions_text(shown)
+        self._python.content = python_text(self._arm, shown.setting)
+
+    def move(self, q: Array) -> None:
+        """Move the sliders of the joints to q (nv,) [rad] or [m], as far as their ends allow."""
+        for joint, value in zip(self.joints, q / self._unit, strict=True):
+            near = min(max(float(value), joint.min), joint.max)
+            joint.value = round(near, 9) + 0.0  # type: ignore[misc]
+
+    def add_slider(
+        self, label: str, low: float, high: float, initial: float, step: float = 0.0
+    ) -> viser.GuiSliderHandle[float]:
+        """Add a slider; its ends are rounded inwards to steps, since no limit may be passed."""
+        if step == 0.0:
+            step = 10.0 ** math.floor(math.log10((high - low) / _STEPS)) if high > low else 1.0
+        digits = max(0, round(-math.log10(step)))
+        low = min(round(math.ceil(low / step - _ROUND) * step, digits), initial)
+        high = max(round(math.floor(high / step + _ROUND) * step, digits), initial)
+        slider = self._gui.add_slider(label, low, high, round(step, digits), initial)
+        slider.precision = digits  # the box beside the slider has room for no more
+        slider.on_update(lambda _: self._changed())
+        return slider
+
+    def _add_switch(self, label: str, on: bool, hint: str) -> viser.GuiCheckboxHandle:
+        switch = self._gui.add_checkbox(label, on, hint=hint)
+        switch.on_update(lambda _: self._changed())
+        return switch
+
+    def _press(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        if event.target.value == "Straight":
+            self.move(np.zeros(self._arm.nv))
+            return
+        self.move(self._start.q)
+        load = [self._start.minimum, *self._start.force.tolist()]
+        for slider, value in zip(self._load, load, strict=True):
+            slider.value = value  # type: ignore[misc]
+        self._sag.value = self._start.sag  # type: ignore[misc]
+
+
+def results_text(shown: Shown, scene: Scene, remark: str = "") -> str:
+    """Write the results ``shown``: condition, remarks, table of numbers, legend of the scene."""
+    style = f"background:{_COLORS.get(shown.condition, _GREY)};color:white;text-align:center"
+    parts = [f'<div style="{style}"><b>{shown.condition.value}</b></div>']
+    parts += [escaped(each) for each in (remark, shown.problem) if each]
+    parts.append(_table(_numbers(shown)))
     if shown.stiffness is not None:
-        parts.append(element("div", _named("model", model_of(shown.stiffness)), style="color:gray"))
-    parts += _legend(shown, force_scale)
-    if shown.tensions is not None:
-        parts += _color_bar(shown.tensions)
-    return str(element("div", *parts, style=_BOX))  # msgspec accepts no subclass of str
-
-
-def basis_text(arm: Manipulator) -> str:
-    """Write as HTML for which arm, wires, gravity and friction the numbers on the page hold."""
-    friction = "friction in its holes where it sags" if arm.has_friction else "frictionless"
-    words = f"with wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
-    lines = element("div", str(arm)), element("div", _named("basis", f"{words}; {friction}"))
-    return str(element("div", *lines, style=_TEXT + "color:gray"))
+        parts.append(escaped(model_of(shown.stiffness)))
+    legend = [f"grid: {MM * scene.cell:g} mm"]
+    if shown.ellipsoid is not None:
+        legend.append(f"{_swatch(ELLIPSOID)} {shown.ellipsoid}")
+    if shown.posture is not None and shown.setting.force.any():
+        legend.append(f"{_swatch(FORCE)} force at the tip, {MM * scene.force_scale:.3g} mm per N")
+    sticking, sliding = map(len, shown.holes)
+    if sticking or sliding:
+        marks = _swatch(STICKS), _swatch(SLIDES)
+        legend.append(f"{marks[0]} {sticking} holes stick, {marks[1]} {sliding} slide")
+    parts.append("<br>".join(legend))
+    return _BOX.format("31em", "\n\n".join(parts))
 
 
 def tensions_text(shown: Shown) -> str:
-    """Write the tensions of all cables as HTML; mark slack cables and tensions at a bound."""
-    if shown.tensions is None or shown.posture is None or shown.cable_colors is None:
-        return str(element("div", "unknown", style=_LIST))
+    """Write the tensions of all cables; mark slack cables and tensions at a bound."""
+    if shown.tensions is None or shown.posture is None:
+        return "unknown"
     marks: dict[str, str] = {}
     if shown.rest is not None:
         marks = dict.fromkeys(shown.rest.slack, "slack")
     elif shown.tension is not None:
         marks = dict.fromkeys(shown.tension.at_minimum, "at lower bound")
         marks |= dict.fromkeys(shown.tension.at_maximum, "at upper bound")
-    rows = [
-        element(
-            "tr",
-            element("td", _swatch(color), " ", cable.name),
-            element("td", _named(f"tension-{c}", f"{F:.4g}"), style=_NUMBER),
-            element("td", "\xa0N"),
-            element("td", _named(f"bound-{c}", marks.get(cable.name, "")), style="color:gray"),
-        )
-        for c, (cable, F, color) in enumerate(
-            zip(shown.posture.arm.cables, shown.tensions, shown.cable_colors, strict=True)
-        )
-    ]
-    return str(element("div", element("table", *rows, style=_TABLE), style=_LIST))
+    names = shown.posture.arm.cables.names
+    rows = (
+        (f"{_swatch(color)} {escaped(name)}", f"{F:.4g}", f"N {marks.get(name, '')}")
+        for name, F, color in zip(names, shown.tensions, shown.cable_colors, strict=True)
+    )
+    return _BOX.format("16em", _table(rows))
 
 
-def _remarks(shown: Shown, remark: str) -> Iterator[tuple[str, str]]:
-    """Yield name and text of each remark above the numbers.
+def python_text(arm: Manipulator, setting: Setting) -> str:
+    """Write the lines of Python that compute the numbers, if the arm has the name ``arm``."""
+    wrench = f"[{_joined(setting.force)}, 0, 0, 0]"
+    given = [f"{setting.minimum:.12g}"]
+    given += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []
+    given += [f"wrench={wrench}"] if setting.force.any() and not setting.sag else []
+    given += [f"solver={setting.solver!r}"] if setting.solver != DEFAULT_SOLVER else []
+    last = "K = cdsm.stiffness(pose, tension)"
+    if setting.sag and arm.has_friction:
+        last = f"K = cdsm.load_cycle(pose, tension, [{wrench}]).stiffness(-1)"
+    elif setting.sag:
+        last = f"rest = cdsm.equilibrium(pose, tension, {wrench})"
+    return (
+        f"The same in Python:\n```\npose = arm.at([{_joined(setting.q)}])\n"
+        f"tension = cdsm.distribute_tension(pose, {', '.join(given)})\n{last}\n```"
+    )
 
-    They are ``remark``, unless it is empty, and the remarks about the results ``shown``.
-    """
-    if remark:
-        yield "remark", remark
-    if shown.problem:
-        yield "problem", shown.problem
-    if shown.rest is not None and shown.rest.at_limit:
-        yield "stops", f"rests on its stop: {', '.join(shown.rest.at_limit)}"
+
+def escaped(text: str) -> str:
+    """Return text in which no character means anything to Markdown or HTML."""
+    marked = re.sub(r"[^\w\s.,]|_", lambda found: f"&#{ord(found[0])};", text)
+    return marked.replace("\n", "<br>")
 
 
-def _numbers(shown: Shown) -> Iterator[_Row]:
-    K, principal, tensions, pose = shown.stiffness, shown.principal, shown.tensions, shown.posture
-    if shown.along is not None and principal is not None:
-        along = {f"along-{axis}": _stiffness(F) for axis, F in zip(XYZ, shown.along, strict=True)}
-        yield _Row("stiffness along x, y, z", along, "N/mm")
+def _numbers(shown: Shown) -> Iterator[tuple[str, str, str]]:
+    """Yield what each number is, the number, and its unit."""
+    K, source, tensions, pose = shown.stiffness, shown.source, shown.tensions, shown.posture
+    if source is not None:
+        along = ", ".join(f"{N_PER_MM * source.along(u):.4g}" for u in np.eye(3))
+        yield "stiffness along x, y, z", along, "N/mm"
+        principal = principal_stiffness(source.compliance[:3, :3])
         for name in ("softest", "stiffest"):
             direction = coordinates(principal[f"{name}_direction"], "z.2f")
-            yield _Row(f"{name}: {direction}", {name: _stiffness(float(principal[name]))}, "N/mm")
-        yield _Row("1 N moves the tip at most", {"most": f"{MM / principal['softest']:.3g}"}, "mm")
+            yield f"{name}: {direction}", f"{N_PER_MM * principal[name]:.4g}", "N/mm"
+        yield "largest compliance", f"{MM / principal['softest']:.3g}", "mm/N"
     if K is not None and shown.condition is not Condition.SINGULAR:
-        unit = K.posture.arm.stiffness_unit()
-        yield _Row("smallest joint stiffness", {"margin": f"{K.margin:.4g}"}, unit)
+        yield "smallest joint stiffness", f"{K.margin:.4g}", K.posture.arm.stiffness_unit()
     if pose is not None:
-        yield _Row("tip", {"tip": _millimetres(pose.tip[:3, 3])}, "mm")
+        yield "tip", _joined(MM * pose.tip[:3, 3], "z.1f"), "mm"
     if shown.rest is not None:
-        yield _Row("sagged by", {"sagged": _millimetres(shown.rest.displacement)}, "mm")
+        yield "displacement", _joined(MM * shown.rest.displacement, "z.1f"), "mm"
+        if shown.rest.at_limit:
+            yield "joint limit reached", escaped(", ".join(shown.rest.at_limit)), ""
     if tensions is not None and pose is not None:
         for name, c in (("smallest", tensions.argmin()), ("largest", tensions.argmax())):
-            what = f"{name} tension, {pose.arm.cables[c].name}"
-            yield _Row(what, {f"{name}-tension": f"{tensions[c]:.4g}"}, "N")
+            cable = escaped(pose.arm.cables[c].name)
+            swatch = _swatch(shown.cable_colors[c])
+            yield f"{name} tension, {swatch} {cable}", f"{tensions[c]:.4g}", "N"
 
 
-def _row(row: _Row) -> Markup:
-    span = str(4 - len(row.values))  # three columns of numbers
-    values = (_named(*each) for each in row.values.items())
-    return element(
-        "tr",
-        element("td", row.what),
-        *(element("td", value, colspan=span, style=_NUMBER) for value in values),
-        element("td", f"\xa0{row.unit}", style="white-space:nowrap"),
-    )
+def _table(rows: Iterable[tuple[str, str, str]]) -> str:
+    lines = [f"| {what} | {value} | &nbsp;{unit} |" for what, value, unit in rows]
+    return "\n".join(["| | | |", "|:--|--:|:--|", *lines]) if lines else ""
 
 
-def _legend(shown: Shown, force_scale: float) -> Iterator[Markup]:
-    """Yield HTML that explains what is drawn: ellipsoid, force arrow, marks of holes.
-
-    ``force_scale`` [m/N] is the length of the force arrow per newton.
-    """
-    if shown.ellipsoid is not None:
-        yield _key(ELLIPSOID, "ellipsoid", f"ellipsoid: {shown.ellipsoid}")
-    if shown.posture is not None and shown.setting.force.any():
-        yield _key(FORCE, "arrow", f"arrow: force at the tip, {MM * force_scale:.3g} mm per N")
-    sticking, sliding = map(len, shown.holes)
-    if sticking or sliding:
-        yield element(
-            "div",
-            *(_swatch(STICKS), " ", _named("sticking", f"{plural(sticking, 'hole')} stick,")),
-            *(" ", _swatch(SLIDES), " ", _named("sliding", f"{sliding} slide")),
-        )
+def _swatch(color: Color) -> str:
+    return f'<span style="background:rgb{color};border-radius:0.2em">&emsp;</span>'
 
 
-def _key(color: tuple[int, int, int], name: str, text: str) -> Markup:
-    return element("div", _swatch(color), " ", _named(name, text))
-
-
-def _swatch(color: object) -> Markup:
-    red, green, blue = map(int, color)  # type: ignore[call-overload]
-    size = "display:inline-block;width:0.8em;height:0.8em;border-radius:0.2em"
-    return element("span", style=f"{size};background:rgb({red},{green},{blue})")
-
-
-def _color_bar(tensions: Array) -> tuple[Markup, Markup]:
-    ends = f"{tensions.min():.4g}", f"{tensions.max():.4g}"
-    words = (element("span", word) for word in (ends[0], "cable tension [N]", ends[1]))
-    return (
-        element("div", style=f"height:0.7em;background:linear-gradient(to right,{_GRADIENT})"),
-        element("div", *words, style="display:flex;justify-content:space-between"),
-    )
-
-
-def _named(name: str, text: str) -> Markup:
-    return element("span", text, data_cdsm=name)
-
-
-def _millimetres(point: Array) -> str:
-    return ", ".join(f"{MM * x:z.1f}" for x in point)
-
-
-def _stiffness(value: float) -> str:
-    return f"{N_PER_MM * value:.4g}" if math.isfinite(value) else "∞"
+def _joined(values: Iterable[float], form: str = "z.12g") -> str:
+    return ", ".join(format(value, form) for value in values)

@@ -10,166 +10,156 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import CableError, UrdfError
+from cdsm.errors import UrdfError
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import ELLIPSOID_GRID
-from cdsm.posture import Posture
 from cdsm.support.values import Array
-from cdsm.view.cable_names import CableNames
-from cdsm.view.camera import Ball, Cameras
-from cdsm.view.state import ELLIPSOID, FORCE, GREY, SLIDES, STICKS, Condition, Shown
-from cdsm.view.surroundings import draw_surroundings
+from cdsm.view.state import GREY, Color, Condition, Shown
 
 if TYPE_CHECKING:
     import viser
 
 _LOG = logging.getLogger(__name__)
 
-_BODY = "/arm"
-_STICK: Final = (40, 40, 45)
+ELLIPSOID: Final[Color] = (200, 85, 61)
+FORCE: Final[Color] = (59, 111, 182)
+STICKS: Final[Color] = (40, 40, 45)
+SLIDES: Final[Color] = (220, 38, 127)
+
 _NOTHING: Final = np.zeros((1, 2, 3))
-_ABOVE = 0.1  # height of the label above the tip, as a fraction of the arm's length
+_ARROW = 0.5  # length of the arrow of the largest force, over the arm's length
+_SIDE: Final = np.array([0.44, -3.3, 1.64])  # from the arm to the first camera, over its radius
 
 
 class Scene:
-    """3D scene with an arm in a viser server.
+    """3D scene with an arm in a viser server; ``largest_force`` [N] has the longest arrow.
 
     Pinocchio's visualiser draws links with shapes in the URDF. Other links, or all links if a mesh
-    cannot be read, are drawn as sticks between joints. ``force_scale`` [m/N] is the length of the
-    force arrow per newton.
+    cannot be read, are drawn as sticks between joints.
     """
 
-    def __init__(self, server: viser.ViserServer, arm: Manipulator, force_scale: float) -> None:
-        length, scene = arm.length, server.scene
-        self._server, self._force_scale, self._length = server, force_scale, length
-        self._path = np.empty((0, 3))
-        self._up = np.array([0.0, 0.0, _ABOVE * length])
-        body = scene.add_frame(_BODY, show_axes=False)
-        cables = scene.add_frame("/cables", show_axes=False)
+    def __init__(self, server: viser.ViserServer, arm: Manipulator, largest_force: float) -> None:
+        self._arm, self._scene, length = arm, server.scene, arm.length
+        self.cell = 10.0 ** math.floor(math.log10(length / 5.0))  # size of a cell of the grid [m]
+        self.force_scale = _ARROW * length / largest_force  # length of the arrow per force [m/N]
+        self._draw_surroundings()
+        # without a posture, what is below these frames is hidden
+        frames = [self._scene.add_frame(name, show_axes=False) for name in ("/arm", "/cables")]
         try:
-            self._shapes = arm._body.visualizer(arm.urdf, server, _BODY)
+            self._shapes = arm._body.visualizer(arm.urdf, server, "/arm")
         except UrdfError as error:
             _LOG.warning("%s Sticks are drawn instead.", error)
             self._shapes = None
-        draw_surroundings(server, length)
-        thick = partial(scene.add_line_segments, points=_NOTHING, visible=False)
-        thin = partial(scene.add_line_segments, points=_NOTHING, thickness_units="screen")
-        self._sticks = thick("/sticks", colors=_STICK, thickness=0.012 * length)
-        self._brackets = thin("/brackets", colors=GREY, thickness=1.5, visible=False)
-        self._reference = thin("/reference", colors=GREY, thickness=2.5, visible=False)
+        self._frames = frames if self._shapes else frames[1:]
+        lines = partial(self._scene.add_line_segments, points=_NOTHING)
+        thick = partial(lines, thickness=0.012 * length, visible=False)
+        self._thin = thin = partial(lines, thickness_units="screen", colors=GREY, visible=False)
+        self._sticks = thick("/sticks", colors=STICKS)
+        self._brackets = thin("/brackets", thickness=1.5)
+        self._reference = thin("/reference", thickness=2.5)
+        self._sticking = thick("/holes/stick", colors=STICKS)
+        self._sliding = thick("/holes/slide", colors=SLIDES)
         # one node per cable: viser treats colours of single points as linear light, so they
-        # would differ from the colours of the bar
-        numbers = range(len(arm.cables))
-        self._cables = [thin(f"/cables/{i}", colors=GREY, thickness=2.5) for i in numbers]
-        self._sticking = thick("/holes/stick", colors=STICKS, thickness=0.012 * length)
-        self._sliding = thick("/holes/slide", colors=SLIDES, thickness=0.018 * length)
-        # hidden if there is no posture
-        self._parts = (cables,) if self._shapes is None else (body, cables)
-        self._ellipsoid = scene.add_mesh_simple(
+        # would differ from the colours of the table
+        names = [str(i) for i in range(len(arm.cables))]
+        self._cables = [thin(f"/cables/{i}", thickness=2.5, visible=True) for i in names]
+        self._ellipsoid = self._scene.add_mesh_simple(
             "/ellipsoid",
             np.zeros((math.prod(ELLIPSOID_GRID), 3)),
             _faces(*ELLIPSOID_GRID),
             color=ELLIPSOID,
             opacity=0.65,
             side="front",  # the two sides of a flat ellipsoid would flicker
-            cast_shadow=False,
-            receive_shadow=False,
-            visible=False,
         )
-        self._force = scene.add_arrows(
+        self._force = self._scene.add_arrows(
             "/force",
             _NOTHING,
             FORCE,
             shaft_radius=0.006 * length,
             head_radius=0.016 * length,
             head_length=0.04 * length,
-            visible=False,
         )
-        self._label = scene.add_label("/condition", "", anchor="bottom-center", visible=False)
-        self.names = CableNames(server)
-        self.cameras = Cameras(server, self._ball(_straight(arm)))
+        self._label = self._scene.add_label("/condition", "", anchor="bottom-center")
+        self._names = [self._scene.add_label(f"/names/{i}", "", visible=False) for i in names]
 
-    def update(self, shown: Shown, follow: bool) -> None:
-        """Draw the results ``shown``; ``follow`` lets the cameras follow the arm."""
+    def begin(self, camera: viser.InitialCameraConfig, shown: Shown, path: Array) -> None:
+        """Draw a path of the tip (S, 3) [m]; place the first camera to show arm and path."""
+        if len(path) > 1:
+            lines = np.stack([path[:-1], path[1:]], axis=1)
+            self._thin("/path", points=lines, colors=FORCE, thickness=1.5, visible=True)
+        pose, length = shown.posture, self._arm.length
+        points = np.concatenate([path, *(pose.bones if pose else [np.eye(2, 3)])])
+        low, high = points.min(axis=0), points.max(axis=0)
+        radius = max(float(np.linalg.norm(high - low)), length) / 2.0
+        camera.look_at = (low + high) / 2.0
+        camera.position = camera.look_at + radius * _SIDE
+        camera.fov, camera.near, camera.far = math.pi / 4.0, radius / 50.0, 200.0 * radius
+
+    def update(self, shown: Shown, names: bool) -> None:
+        """Draw the results ``shown``; ``names`` labels all cables."""
         pose, force, ellipsoid = shown.posture, shown.setting.force, shown.ellipsoid
-        for part in self._parts:
-            part.visible = pose is not None
+        for frame in self._frames:
+            frame.visible = pose is not None
         self._ellipsoid.visible = ellipsoid is not None
         # an invalid force has no arrow
         pushed = pose is not None and shown.condition is not Condition.INVALID
         self._force.visible = pushed and bool(force.any())
         self._label.visible = pose is not None and shown.condition is not Condition.STABLE
-        self._label.text = shown.condition.value
-        self.names.update(shown)
-        self._draw_lines(shown)
-        if pose is None or shown.cable_colors is None:
-            return
-        tip = pose.tip[:3, 3]
-        if self._shapes is not None:
-            self._shapes.place(pose.q)
-        for cable, path, color in zip(
-            self._cables, pose.cable_paths, shown.cable_colors, strict=True
-        ):
-            cable.points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
-            cable.colors = color
-        if ellipsoid is not None:
-            self._ellipsoid.vertices = ellipsoid.surface.reshape(3, -1).T.astype(np.float32)
-        if self._force.visible:
-            end = tip + self._force_scale * force
-            self._force.points = np.array([[tip, end]], dtype=np.float32)
-        self._label.position = tip + self._up
-        if follow:
-            self.cameras.follow(self._ball(pose))
-
-    def draw_path(self, tips: Array) -> None:
-        """Draw a path of the tip (S, 3) [m]; from now on, cameras are fitted to it and the arm."""
-        self._path = tips
-        lines = np.stack([tips[:-1], tips[1:]], axis=1).astype(np.float32)
-        self._server.scene.add_line_segments(
-            "/path", lines, FORCE, thickness=1.5, thickness_units="screen"
-        )
-
-    def _draw_lines(self, shown: Shown) -> None:
-        """Draw links without shapes as sticks, the reference of an arm that sags, and holes."""
-        pose, reference = shown.posture, shown.reference
         shaped = frozenset() if self._shapes is None else self._shapes.rows
         bones, brackets = ([], []) if pose is None else pose._stick_figure(shaped)
-        before = list(reference.bones) if shown.rest and reference else []
-        sticking, sliding = shown.holes
+        before = shown.reference.bones if shown.reference and shown.rest else ()
         for node, lines in (
             (self._sticks, bones),
             (self._brackets, brackets),
             (self._reference, before),
-            (self._sticking, sticking),
-            (self._sliding, sliding),
+            (self._sticking, shown.holes[0]),
+            (self._sliding, shown.holes[1]),
         ):
             node.visible = len(lines) > 0
-            if node.visible:
-                node.points = np.array(lines, dtype=np.float32)
+            node.points = np.array(lines if node.visible else _NOTHING, dtype=np.float32)
+        for label in self._names:
+            label.visible = names and pose is not None
+        if pose is None:
+            return
+        if self._shapes is not None:
+            self._shapes.place(pose.q)
+        for i, (cable, path) in enumerate(zip(self._cables, pose.cable_paths, strict=True)):
+            cable.points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
+            cable.colors = np.array(shown.cable_colors[i], dtype=np.uint8)
+            said = "" if shown.tensions is None else f": {shown.tensions[i]:.4g} N"
+            self._names[i].text = self._arm.cables[i].name + said
+            self._names[i].position = path[-1]
+        if ellipsoid is not None:
+            self._ellipsoid.vertices = ellipsoid.surface.reshape(3, -1).T.astype(np.float32)
+        tip = pose.tip[:3, 3]
+        if self._force.visible:
+            self._force.points = np.array([[tip, tip + self.force_scale * force]], np.float32)
+        self._label.text = shown.condition.value
+        self._label.position = tip + 0.1 * self._arm.length * np.eye(3)[2]
 
-    def _ball(self, pose: Posture | None) -> Ball:
-        points = np.array([[0.0, 0.0, 0.0], [self._length, 0.0, 0.0]])
-        if pose is not None:
-            points = np.concatenate([*pose.bones, *pose.cable_paths, self._path])
-        return Ball.around(points, least=0.5 * self._length)
-
-
-def _straight(arm: Manipulator) -> Posture | None:
-    """Return the posture with each joint as near zero as its limits allow.
-
-    None if two sites of a cable coincide there.
-    """
-    try:
-        return arm.at(np.clip(np.zeros(arm.nv), arm.lower, arm.upper))
-    except CableError:
-        return None
+    def _draw_surroundings(self) -> None:
+        """Add light, the base axes, and a grid below the base."""
+        scene, length = self._scene, self._arm.length
+        # an environment map and shadows take seconds without a GPU
+        scene.configure_environment_map(hdri=None)
+        scene.configure_default_lights(cast_shadow=False)
+        scene.add_light_ambient("/light", intensity=2.0)
+        scene.add_frame("/base", axes_length=0.15 * length, axes_radius=0.004 * length)
+        for axis, name in zip(0.17 * length * np.eye(3), "xyz", strict=True):
+            scene.add_label(f"/base/{name}", name, position=axis)
+        scene.add_grid(
+            "/grid",
+            2.4 * length,
+            2.4 * length,
+            position=(0.0, 0.0, -0.4 * length),
+            cell_size=self.cell,
+            section_size=5.0 * self.cell,
+            fade_distance=100.0 * length,
+        )
 
 
 def _faces(rows: int, columns: int) -> NDArray[np.uint32]:
-    """Return the triangles (n, 3) of a surface through a grid of points, as indices of points.
-
-    The grid has ``rows`` and ``columns`` of points; each of its cells is two triangles.
-    """
+    """Return the triangles (n, 3) of a surface through a grid of points, as indices of points."""
     points = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[:-1, 1:], points[1:, 1:]
     return np.stack([a, b, c, c, b, d], axis=-1).reshape(-1, 3)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import number_array, scalar
@@ -139,9 +140,7 @@ class TensileFit(Result):
 
     def plot(self) -> Figure:
         """Plot force [N] against strain [%] with the fit; EA [kN] with band and stages."""
-        from cdsm.plots.measured import plot_tensile_fit  # matplotlib imports slowly
-
-        return plot_tensile_fit(self)
+        return cdsm.plots.plot_tensile_fit(self)
 
 
 def fit_tensile_test(

@@ -39,11 +39,9 @@ def test_the_example_writes_front_figures_and_the_files_of_an_arm(tmp_path: Path
     assert {path.name for path in (tmp_path / "a").iterdir()} == {*names.split()}
     head, *rows = (tmp_path / "a" / "designs.csv").read_text().splitlines()
     assert len(rows) == 40
-    # the front has all measures for which the problem has the data
-    front = (tmp_path / "a" / "front.csv").read_text().splitlines()[0]
-    assert "softest [N/m],margin [N m/rad]" in front
-    assert "payload" not in front
-    assert head.count(",") < front.count(",")
+    front = (tmp_path / "a" / "front.csv").read_text().splitlines()
+    assert front[0] == head
+    assert len(front) <= len(rows)
     arm = cdsm.Manipulator.read(tmp_path / "a" / "arm.toml")
     assert cdsm.to_urdf(arm.geometry) == (tmp_path / "a" / "arm.urdf").read_text()
     code, again = run(*words, "--generations", "5", "--population", "8", "--json")

@@ -31,7 +31,7 @@ def test_grid_is_what_the_api_computes(
     assert str(out) in result.output
     assert "resumes" not in caplog.text
     assert call("sweep", geometry, *grid, *ARM, "--resume", store, "--out", out).exit_code == 0
-    assert "sweep of probe resumes: 20 of 20 entries are kept" in caplog.text
+    assert "sweep of probe resumes: 1 of 1 chunks are kept" in caplog.text
     poses = cdsm.GridPoses(
         {
             "joint1_1": np.deg2rad(np.linspace(-20.0, 20.0, 5)),
@@ -164,7 +164,7 @@ def test_a_sweep_says_what_to_do_where_the_solver_failed(
     given = ("sweep", geometry, "--grid", "joint1_1=5:5:1", *ARM, "--out", tmp_path / "s.nc")
     assert "--solver" not in call(*given).output
     found = cdsm.read_sweep(tmp_path / "s.nc")
-    found.status[0, 0] = cdsm.SweepStatus.SOLVER_FAILED
+    found.status[0, 0] = cdsm.Status.SOLVER_FAILED
     monkeypatch.setattr(cdsm, "sweep", lambda *_, **__: found)
     result = call(*given)
     assert result.exit_code == 0

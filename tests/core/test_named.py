@@ -252,16 +252,6 @@ def test_batch_has_one_row_for_each_posture_in_pandas_and_labels_in_xarray() -> 
     np.testing.assert_array_equal(pulls.to_pandas()[f"tension {NAMES[0]} [N]"], pulls.values[:, 0])
 
 
-def test_sweeps_become_tidy_tables() -> None:
-    grid = cdsm.GridPoses({POSE.arm.joint_names[0]: [0.0, 0.1]})
-    found = cdsm.sweep(POSE.arm, grid, minimum=[10.0, 20.0], progress=False)
-    table = cdsm.sweep_to_pandas(found)
-    assert len(table) == 4
-    first = found.isel({found.status.dims[0]: 0, "minimum": 1})
-    assert table["along_z [N m-1]"].iloc[1] == float(first.along.sel(direction="z"))
-    assert set(table["status"]) == {"ok"}
-
-
 def test_elasticities_are_read_and_written_by_methods(tmp_path: Path) -> None:
     law = cdsm.presets.STRAND_1X19
     assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law

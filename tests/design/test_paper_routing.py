@@ -27,7 +27,7 @@ def routing() -> cdsm.DesignProblem:
     return cdsm.DesignProblem(
         arm=arm,
         variables=tuple(
-            cdsm.Variable("hole_angle", route.angle - 2.1, route.angle + 2.1, at=name)
+            cdsm.Variable(f"hole_angle@{name}", route.angle - 2.1, route.angle + 2.1)
             for name, route in routes
         ),
         objectives=(cdsm.Objective("motor_force"),),

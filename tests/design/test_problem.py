@@ -40,7 +40,7 @@ def problem(**changes: Any) -> cdsm.DesignProblem:
         "arm": small_arm(),
         "variables": (
             cdsm.Variable("hole_radius", 0.015, 0.03),
-            cdsm.Variable("end", 1, 3, at="cable2_1"),
+            cdsm.Variable("end@cable2_1", 1, 3),
             cdsm.Variable("wire", choices=("solid-1.2mm", 48e3)),
         ),
         "objectives": (cdsm.Objective("motor_force"), cdsm.Objective("stiffness", "z")),
@@ -58,12 +58,12 @@ def problem(**changes: Any) -> cdsm.DesignProblem:
 @pytest.mark.parametrize("rough", [False, True])
 def test_quantities_are_those_of_single_postures(rough: bool) -> None:
     names = ["stiffness", "payload"]
-    objectives = tuple(cdsm.Objective(name, "z") for name in names)  # type: ignore[arg-type]
+    objectives = tuple(cdsm.Objective(name, "z") for name in names)
     others = ("softest", "margin", "deflection", "motor_force", "tension_factor",
               "cable_clearance", "link_clearance", "disk_clearance", "workspace", "held", "mass",
               "length", "wire_length", "force_radius")  # fmt: skip
     task = problem(
-        objectives=(*objectives, *(cdsm.Objective(name) for name in others)),  # type: ignore[arg-type]
+        objectives=(*objectives, *(cdsm.Objective(name) for name in others)),
         diameter=1e-3,
         worst_friction=rough,
     )
@@ -178,11 +178,11 @@ def test_all_quantities_of_a_posture_count_the_postures_that_are_held() -> None:
 def test_a_link_keeps_its_mass_per_length_and_joints_have_values_of_their_own() -> None:
     task = problem(
         variables=(
-            cdsm.Variable("link_length", 0.05, 0.1, at=2),
-            cdsm.Variable("disk_offset", 0.005, 0.02, at=1),
+            cdsm.Variable("link_length@2", 0.05, 0.1),
+            cdsm.Variable("disk_offset@1", 0.005, 0.02),
             cdsm.Variable("lead", 0.0, 0.5),
-            cdsm.Variable("phase", -1.0, 1.0, at=3),
-            cdsm.Variable("hole_angle", 0.0, 6.0, at="cable1_2"),
+            cdsm.Variable("phase@3", -1.0, 1.0),
+            cdsm.Variable("hole_angle@cable1_2", 0.0, 6.0),
             cdsm.Variable("minimum", 5.0, 50.0),
         )
     )
@@ -271,7 +271,7 @@ def rough(arm: cdsm.Manipulator) -> cdsm.Manipulator:
 
 def test_holes_keep_their_friction_in_every_design() -> None:
     arm = rough(small_arm(friction=0.0))
-    more = problem(arm=arm, variables=(cdsm.Variable("end", 1, 3, at="cable2_1"),))
+    more = problem(arm=arm, variables=(cdsm.Variable("end@cable2_1", 1, 3),))
     for end in (1, 2, 3):
         made = more.arm_of([float(end)])
         for old, new in zip(arm.cables, made.cables, strict=True):
@@ -311,15 +311,11 @@ def test_no_design_of_the_front_is_beaten() -> None:
     first = goals[found.front, 0]
     assert (np.diff(first) >= 0.0).all()
     assert "on the front" in str(found)
-    full = found.measured(progress=False)
-    np.testing.assert_array_equal(full["motor_force"], found.evaluated["motor_force"][found.front])
-    arm = found.arm(0)
-    factors = [cdsm.tension_factor(arm.at(q)) for q in BENT]
-    assert full["tension_factor"][0] == pytest.approx(min(factors), rel=1e-9)
-    assert full["force_radius"].min() > 0.0
-    head, *rows = full.to_csv().splitlines()
+    best = found.best
+    np.testing.assert_array_equal(best["motor_force"], found.evaluated["motor_force"][found.front])
+    head, *rows = best.to_csv().splitlines()
     assert len(rows) == len(found.front)
-    assert head.startswith("design,hole_radius [m],end of cable2_1,wire,motor_force [N],")
+    assert head.startswith("design,hole_radius [m],end@cable2_1,wire,motor_force [N],")
     assert head.endswith(",feasible,fault")
     assert all(row.endswith(",1,") for row in rows)
     json.dumps(found.to_dict(), allow_nan=False)
@@ -356,11 +352,11 @@ def test_an_infeasible_problem_is_named() -> None:
 
 CONTINUOUS = (
     cdsm.Variable("hole_radius", 0.012, 0.04),
-    cdsm.Variable("disk_offset", 0.005, 0.02, at=2),
-    cdsm.Variable("link_length", 0.05, 0.1, at=2),
+    cdsm.Variable("disk_offset@2", 0.005, 0.02),
+    cdsm.Variable("link_length@2", 0.05, 0.1),
     cdsm.Variable("lead", 0.0, 0.5),
-    cdsm.Variable("phase", -1.0, 1.0, at=3),
-    cdsm.Variable("hole_angle", -1.0, 6.0, at="cable1_2"),
+    cdsm.Variable("phase@3", -1.0, 1.0),
+    cdsm.Variable("hole_angle@cable1_2", -1.0, 6.0),
     cdsm.Variable("minimum", 5.0, 50.0),
 )
 
@@ -378,16 +374,13 @@ def test_refinement_finds_what_a_fine_search_finds() -> None:
     goals = np.where(grid.feasible == 1.0, grid["motor_force"], np.inf)
     assert best <= goals.min() * (1.0 + 1e-9)
     assert best > 0.8 * goals.min()
-    last = refined.history[-1]
-    assert (last.designs, last.best, last.missed) == (len(refined.evaluated), best, 0.0)
-    assert np.isfinite([each.best for each in refined.history]).all()
 
 
 START = 1.5e4
 
 
 def test_problems_that_cannot_be_refined_say_why() -> None:
-    with pytest.raises(cdsm.InvalidInput, match="end of cable2_1 is not continuous"):
+    with pytest.raises(cdsm.InvalidInput, match="end@cable2_1 is not continuous"):
         cdsm.refine_design(problem())
     two = problem(variables=CONTINUOUS)
     with pytest.raises(cdsm.InvalidInput, match="several objectives"):
@@ -401,9 +394,9 @@ def test_problems_that_cannot_be_refined_say_why() -> None:
     ("changes", "said"),
     [
         ({"variables": ()}, "one variable"),
-        ({"variables": (cdsm.Variable("end", 1, 4, at="cable2_1"),)}, "end.high: 4"),
-        ({"variables": (cdsm.Variable("hole_radius", 0.01, 0.02, at=9),)}, "hole_radius.at: 9"),
-        ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead is named twice"),
+        ({"variables": (cdsm.Variable("end@cable2_1", 1, 4),)}, "end@cable2_1.high: 4"),
+        ({"variables": (cdsm.Variable("hole_radius@9", 0.01, 0.02),)}, "joints 1 to 3"),
+        ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead of a joint twice"),
         ({"loads": np.zeros((1, 5))}, "loads: shape"),
         ({"diameter": 1.2}, "diameter: 1.2 m given; 0, or 1e-06 to 0.5 m"),
         ({"coverage": -3.0}, "coverage: -3 given; give 0 or more"),
@@ -431,11 +424,11 @@ def test_bad_problems_name_what_is_wrong(changes: dict[str, Any], said: str) -> 
         (lambda: cdsm.Variable("minimum", -5.0, 5.0), "cables only pull"),
         (lambda: cdsm.Variable("wire", 1.0, 2.0), "needs low and high, or|has no range"),
         (lambda: cdsm.Variable("end", 1, 3), "name of a cable"),
-        (lambda: cdsm.Variable("minimum", 1.0, 3.0, at=1), "one value for the arm"),
+        (lambda: cdsm.Variable("minimum@1", 1.0, 3.0), "one value for the arm"),
         (lambda: cdsm.Objective("stiffness"), "direction: is needed"),
         (lambda: cdsm.Objective("mass", "z"), "direction: has no meaning"),
         (lambda: cdsm.Constraint("mass"), "at_least or at_most"),
-        (lambda: cdsm.Objective("beauty"), "did you mean|no measure"),  # type: ignore[arg-type]
+        (lambda: cdsm.Objective("beauty"), "no quantity of a design is called .beauty"),
     ],
 )
 def test_bad_parts_name_what_is_wrong(make: Any, said: str) -> None:

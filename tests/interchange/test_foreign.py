@@ -2,8 +2,6 @@
 
 import copy
 import pickle
-import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -94,21 +92,6 @@ def test_copies_and_other_cables() -> None:
     assert fewer != arm
 
 
-def test_bounds_of_the_cables_hold_for_every_distribution() -> None:
-    arm = cdsm.presets.virtual_prototype()
-    tight = [replace(each, minimum=12.0 + c, maximum=400.0) for c, each in enumerate(arm.cables)]
-    bounded = arm.with_cables(tight)
-    pose = bounded.at(np.full(10, 0.1))
-    with pytest.raises(cdsm.InvalidInput, match=r"is below 12 N \(the cable's own minimum\)"):
-        cdsm.distribute_tension(pose, 0.0, 11.0)
-    pull = cdsm.distribute_tension(pose)
-    assert (pull.values >= 12.0 + np.arange(15)).all()
-    same = cdsm.distribute_tension(arm.at(pose.q), 12.0 + np.arange(15), 400.0)
-    np.testing.assert_array_equal(pull.values, same.values)
-    rows = cdsm.distribute_tensions(bounded, pose.q[None])
-    np.testing.assert_allclose(rows.values[0], pull.values, rtol=1e-9)
-
-
 @pytest.mark.parametrize(("tip", "said"), [("nose", "link"), ("a", "link")])
 def test_tip_must_be_a_link(tip: str, said: str) -> None:
     with pytest.raises(cdsm.UnknownName, match=said):
@@ -123,17 +106,6 @@ def test_cable_on_a_link_that_does_not_exist_is_named() -> None:
     )
     with pytest.raises(cdsm.CableError, match=r"lost.*wing"):
         cdsm.Manipulator.from_urdf(TREE, [lost], tip="tip")
-
-
-def test_modes_refuse_links_without_mass() -> None:
-    arm = crab()
-    pose = arm.at(POSTURE)
-    assert cdsm.modes(pose, cdsm.stiffness(pose, TENSION)).frequencies.size > 0
-    empty = re.sub(r"<inertial>.*?</inertial>", "", TREE)
-    weightless = cdsm.Manipulator.from_urdf(empty, arm.cables, tip="tip")
-    pose = weightless.at(POSTURE)
-    with pytest.raises(cdsm.SingularMass, match="no link of any mass"):
-        cdsm.modes(pose, cdsm.stiffness(pose, TENSION))
 
 
 def test_cables_that_meet_the_axis_turn_nothing() -> None:

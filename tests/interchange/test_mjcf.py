@@ -1,7 +1,6 @@
 """MuJoCo loads what is exported, computes the same, and holds a stable arm where it is."""
 
 import math
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,15 +11,24 @@ from lxml import etree
 from scipy.linalg import eigh
 
 import cdsm
-from cdsm.interchange.mjcf_bodies import add_bodies
-from cdsm.interchange.mjcf_motion import mass_matrix
+from cdsm.interchange.mjcf_bodies import add_bodies, mass_matrix
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture, random_wrench, readme_geometry
 from tests.support.foreign import POSTURE, TENSION, crab
 
 mujoco: Any = pytest.importorskip("mujoco")
 
+DATA = Path(__file__).parents[1] / "data"
 NOTHING = np.zeros(6)
+BODIES = {
+    "none": "",
+    "of a rod": '<inertia ixx="0" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
+    "of a plate": '<inertia ixx="3e-4" iyy="1e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
+    "of a needle": '<inertia ixx="1e-15" iyy="7e-2" izz="7.00001e-2" ixy="0" ixz="0" iyz="0"/>',
+    "of a long needle": '<inertia ixx="1e-9" iyy="7" izz="7" ixy="0" ixz="0" iyz="0"/>',
+    "of nothing real": '<inertia ixx="1e-4" iyy="1e-4" izz="9e-4" ixy="0" ixz="0" iyz="2e-5"/>',
+    "negative": '<inertia ixx="-1e-4" iyy="1e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
+}
 
 
 def loaded(arm: cdsm.Manipulator, *args: Any, **options: Any) -> tuple[Any, Any]:
@@ -35,158 +43,14 @@ def order(model: Any, arm: cdsm.Manipulator) -> Array:
     return np.array([model.joint(name).qposadr[0] for name in arm.joint_names])
 
 
-def net_torque(model: Any, data: Any, q: Array, wrench: Array = NOTHING) -> Array:
+def net_torque(model: Any, data: Any, q: Array, tip: str, wrench: Array = NOTHING) -> Array:
     """What is out of balance at q, in MuJoCo's order: bias less springs, actuators and wrench."""
     data.qpos[:] = q
     data.qvel[:] = 0.0
     mujoco.mj_forward(model, data)
-    tip = data.body("tool0") if "tool0" in names(model) else data.body("tip")
-    pulled = np.zeros(model.nv)
-    mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], tip.xpos, tip.id, pulled)
+    pulled, body = np.zeros(model.nv), data.body(tip)
+    mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], body.xpos, body.id, pulled)
     return np.asarray(data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator - pulled)
-
-
-def names(model: Any) -> list[str]:
-    return [model.body(i).name for i in range(model.nbody)]
-
-
-def serpentine(kind: str) -> tuple[cdsm.Manipulator, cdsm.Posture, cdsm.Tension]:
-    arm = mixed_arm() if kind == "mixed" else random_arm(3, 4, kind)
-    pose = random_posture(arm, 5)
-    return arm, pose, cdsm.distribute_tension(pose, 30.0)
-
-
-@pytest.mark.parametrize("actuators", ["length", "none"])
-@pytest.mark.parametrize("kind", ["universal", "hinged", "mixed"])
-def test_cables_are_in_balance_and_as_stiff(kind: str, actuators: str) -> None:
-    arm, pose, pull = serpentine(kind)
-    model, data = loaded(arm, pose, pull, actuators=actuators)
-    place = order(model, arm)
-    q = np.empty(arm.nv)
-    q[place] = pose.q
-    np.testing.assert_array_equal(data.qpos, q)
-    for c, cable in enumerate(arm.cables):
-        length = float(data.tendon(cable.name).length[0]) + cable.lead
-        assert length == pytest.approx(pose.cable_lengths[c], abs=1e-14)
-    np.testing.assert_allclose(moment_arms(model, data)[:, place], pose.length_jacobian, atol=1e-14)
-    scale = float(abs(pull.values @ abs(pose.length_jacobian)).max())
-    assert abs(net_torque(model, data, q)).max() < 1e-9 * max(1.0, scale)
-    check_stiffness(model, data, q, place, cdsm.stiffness(pose, pull).joint, NOTHING)
-
-
-def moment_arms(model: Any, data: Any) -> Array:
-    """J_L (C, nv) of MuJoCo, which stores it sparse."""
-    J = np.zeros((model.ntendon, model.nv))
-    for c, (start, count) in enumerate(zip(model.ten_J_rowadr, model.ten_J_rownnz, strict=True)):
-        J[c, model.ten_J_colind[start : start + count]] = data.ten_J[start : start + count]
-    return J
-
-
-def check_stiffness(model: Any, data: Any, q: Array, place: Array, K: Array, wrench: Array) -> None:
-    def slope(h: float) -> Array:
-        columns = [
-            net_torque(model, data, q + e, wrench) - net_torque(model, data, q - e, wrench)
-            for e in h * np.eye(q.size)
-        ]
-        return np.stack(columns, axis=1) / (2.0 * h)
-
-    h = 2.0**-12
-    extrapolated = (4.0 * slope(h / 2.0) - slope(h)) / 3.0
-    np.testing.assert_allclose(extrapolated[np.ix_(place, place)], K, atol=1e-6 * abs(K).max())
-
-
-def test_robot_of_somebody_elses_agrees_too() -> None:
-    arm = crab(gravity=(1.0, -2.0, -9.0))
-    pose = arm.at(POSTURE)
-    wrench = random_wrench(2, moment=False)
-    model, data = loaded(arm, pose, TENSION)
-    place = order(model, arm)
-    q = np.empty(arm.nv)
-    q[place] = POSTURE
-    K = cdsm.stiffness(pose, TENSION, wrench=wrench)
-    np.testing.assert_allclose(net_torque(model, data, q, wrench)[place], K.residual, atol=1e-10)
-    check_stiffness(model, data, q, place, K.joint, wrench)
-
-
-@pytest.mark.filterwarnings("ignore:UNSTABLE")
-@pytest.mark.parametrize("actuators", ["length", "none"])
-def test_soft_springs_and_held_forces_are_actuators(actuators: str) -> None:
-    arm, pose, pull = serpentine("universal")
-    cables = [
-        replace(cable, control="force")
-        if c % 3 == 0
-        else replace(cable, series_stiffness=200.0 if c % 3 == 1 else np.inf)
-        for c, cable in enumerate(arm.cables)
-    ]
-    soft = arm.with_cables(cables)
-    pose = soft.at(pose.q)
-    K = cdsm.stiffness(pose, pull.values)
-    model, data = loaded(soft, pose, pull.values, actuators=actuators)
-    held = sum(cable.control == "force" for cable in cables)
-    assert model.nu > held  # and springs whose rest length would be negative
-    place = order(model, soft)
-    q = np.empty(soft.nv)
-    q[place] = pose.q
-    scale = float(abs(pull.values @ abs(pose.length_jacobian)).max())
-    assert abs(net_torque(model, data, q)[place] - K.residual).max() < 1e-9 * max(1.0, scale)
-    check_stiffness(model, data, q, place, K.joint, NOTHING)
-
-
-def test_simulation_under_a_weight_settles_where_the_weight_test_says() -> None:
-    """Stiff linear cables that stay taut: MuJoCo's springs and ours are the same far away, too."""
-    arm = cdsm.Manipulator(
-        cdsm.Geometry.hinged(
-            joints=3,
-            twist=0.5,
-            link_length=0.05,
-            base_length=0.02,
-            disk_offset=0.01,
-            hole_radius=0.02,
-            link_mass=0.3,
-        ),
-        cdsm.LinearElasticity(2e3),
-    )
-    pose = arm.at([0.1, -0.1, 0.2])
-    pull = cdsm.distribute_tension(pose, 20.0)
-    force = np.array([0.0, 1.0, -2.0])
-    test = cdsm.weight_test(pose, pull, force)
-    model, data = loaded(arm, pose, pull, damping=0.05)
-    data.xfrc_applied[model.body("tool0").id, :3] = force
-    mujoco.mj_step(model, data, round(8.0 / model.opt.timestep))
-    assert abs(data.qvel).max() < 1e-9
-    np.testing.assert_allclose(data.body("tool0").xpos, test.states[-1].pose.tip[:3, 3], atol=1e-8)
-
-
-# --- time step ------------------------------------------------------------------------------
-
-
-def hinged(joints: int, **changes: Any) -> cdsm.Manipulator:
-    sizes: dict[str, Any] = {
-        "joints": joints,
-        "twist": 0.0,
-        "link_length": 0.03,
-        "base_length": 0.02,
-        "disk_offset": 0.005,
-        "hole_radius": 0.008,
-        "link_mass": 0.02,
-    }
-    return cdsm.Manipulator(cdsm.Geometry.hinged(**(sizes | changes)), cdsm.LinearElasticity(2e3))
-
-
-def universal(joints: int, link_mass: float) -> cdsm.Manipulator:
-    geometry = readme_geometry(joints=joints, link_mass=link_mass)
-    return cdsm.Manipulator(geometry, cdsm.presets.STRAND_1X19)
-
-
-BODIES = {
-    "none": "",
-    "of a rod": '<inertia ixx="0" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
-    "of a plate": '<inertia ixx="3e-4" iyy="1e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
-    "of a needle": '<inertia ixx="1e-15" iyy="7e-2" izz="7.00001e-2" ixy="0" ixz="0" iyz="0"/>',
-    "of a long needle": '<inertia ixx="1e-9" iyy="7" izz="7" ixy="0" ixz="0" iyz="0"/>',
-    "of nothing real": '<inertia ixx="1e-4" iyy="1e-4" izz="9e-4" ixy="0" ixz="0" iyz="2e-5"/>',
-    "negative": '<inertia ixx="-1e-4" iyy="1e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
-}
 
 
 def two_links(
@@ -223,6 +87,105 @@ def two_links(
     return cdsm.Manipulator.from_urdf(urdf, cables, tip="hand", check_inertia=False)
 
 
+def finger() -> tuple[cdsm.Posture, Array]:
+    cables = cdsm.read_cables(DATA / "finger_cables.toml")
+    arm = cdsm.Manipulator.from_urdf(DATA / "finger.urdf", cables, tip="fingertip")
+    pose = arm.at(np.deg2rad([20.0, 30.0, 20.0]))
+    return pose, cdsm.distribute_tension(pose, 5.0).values
+
+
+def serpentine(kind: str) -> tuple[cdsm.Posture, Array]:
+    arm = mixed_arm() if kind == "mixed" else random_arm(3, 4, kind)
+    pose = random_posture(arm, 5)
+    return pose, cdsm.distribute_tension(pose, 30.0).values
+
+
+def soft() -> tuple[cdsm.Posture, Array]:
+    """Some cables hold their tension, some have springs so soft that L_rest would be negative."""
+    pose, pull = serpentine("universal")
+    changes: list[dict[str, Any]] = [{"control": "force"}, {"series_stiffness": 200.0}, {}]
+    cables = [replace(cable, **changes[c % 3]) for c, cable in enumerate(pose.arm.cables)]
+    return pose.arm.with_cables(cables).at(pose.q), pull
+
+
+def held(arm: cdsm.Manipulator, q: Any, least: float) -> tuple[cdsm.Posture, Array]:
+    pose = arm.at(np.asarray(q))
+    return pose, cdsm.distribute_tension(pose, least).values
+
+
+ARMS: dict[str, Any] = {
+    **{kind: lambda kind=kind: serpentine(kind) for kind in ("universal", "hinged", "mixed")},
+    "tree with slides": lambda: (crab(gravity=(1.0, -2.0, -9.0)).at(POSTURE), TENSION),
+    "soft and force-controlled": soft,
+    "finger": finger,
+    "virtual prototype": lambda: held(
+        cdsm.presets.virtual_prototype(), np.deg2rad(np.full(10, 10.0)), 50.0
+    ),
+    "robot from a URDF": lambda: held(two_links(BODIES["of a plate"]), [0.1, -0.2], 10.0),
+}
+
+
+@pytest.mark.filterwarnings("ignore:UNSTABLE")
+@pytest.mark.parametrize("actuators", ["length", "none"])
+@pytest.mark.parametrize("name", ARMS)
+def test_balance_and_stiffness_are_those_of_mujoco(name: str, actuators: str) -> None:
+    """K_θ by differences of MuJoCo's torque; lengths, moment arms and the tip too."""
+    pose, F = ARMS[name]()
+    arm, wrench = pose.arm, random_wrench(2, moment=False)
+    model, data = loaded(arm, pose, F, actuators=actuators)
+    place, q = order(model, arm), np.empty(arm.nv)
+    q[place] = pose.q
+    np.testing.assert_array_equal(data.qpos, q)  # a new mjData begins at the posture
+    np.testing.assert_allclose(data.site("tool0").xpos, pose.tip[:3, 3], atol=1e-14)
+    for c, cable in enumerate(arm.cables):
+        length = float(data.tendon(cable.name).length[0]) + cable.lead
+        assert length == pytest.approx(pose.cable_lengths[c], abs=1e-14)
+    np.testing.assert_allclose(moment_arms(model, data)[:, place], pose.length_jacobian, atol=1e-14)
+    K = cdsm.stiffness(pose, F, wrench=wrench)
+
+    def slope(h: float) -> Array:
+        ends = [[q + e, q - e] for e in h * np.eye(q.size)]
+        of = [[net_torque(model, data, x, arm.tip_link, wrench) for x in pair] for pair in ends]
+        return np.stack([high - low for high, low in of], axis=1) / (2.0 * h)
+
+    missing = net_torque(model, data, q, arm.tip_link, wrench)[place] - K.residual
+    scale = float(abs(F @ abs(pose.length_jacobian)).max())
+    assert abs(missing).max() < 1e-9 * max(1.0, scale)
+    h = 2.0**-12
+    extrapolated = (4.0 * slope(h / 2.0) - slope(h)) / 3.0
+    near = {"rtol": 0.0, "atol": 1e-8 * abs(K.joint).max()}
+    np.testing.assert_allclose(extrapolated[np.ix_(place, place)], K.joint, **near)
+
+
+def moment_arms(model: Any, data: Any) -> Array:
+    """J_L (C, nv) of MuJoCo, which stores it sparse."""
+    J = np.zeros((model.ntendon, model.nv))
+    for c, (start, count) in enumerate(zip(model.ten_J_rowadr, model.ten_J_rownnz, strict=True)):
+        J[c, model.ten_J_colind[start : start + count]] = data.ten_J[start : start + count]
+    return J
+
+
+# --- time step ------------------------------------------------------------------------------
+
+
+def hinged(joints: int, **changes: Any) -> cdsm.Manipulator:
+    sizes: dict[str, Any] = {
+        "joints": joints,
+        "twist": 0.0,
+        "link_length": 0.03,
+        "base_length": 0.02,
+        "disk_offset": 0.005,
+        "hole_radius": 0.008,
+        "link_mass": 0.02,
+    }
+    return cdsm.Manipulator(cdsm.Geometry.hinged(**(sizes | changes)), cdsm.LinearElasticity(2e3))
+
+
+def universal(joints: int, link_mass: float) -> cdsm.Manipulator:
+    geometry = readme_geometry(joints=joints, link_mass=link_mass)
+    return cdsm.Manipulator(geometry, cdsm.presets.STRAND_1X19)
+
+
 HELD: dict[str, tuple[cdsm.Manipulator, Array, float]] = {
     "README's arm": (universal(4, 0.12), np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]), 50.0),
     "virtual prototype": (cdsm.presets.virtual_prototype(), np.deg2rad(np.full(10, 10.0)), 50.0),
@@ -241,6 +204,19 @@ HELD: dict[str, tuple[cdsm.Manipulator, Array, float]] = {
 SECONDS = 2.0
 
 
+def test_simulation_under_a_weight_settles_where_the_weight_test_says() -> None:
+    """Stiff linear cables that stay taut: MuJoCo's springs and ours are the same far away, too."""
+    arm = hinged(3, twist=0.5, link_length=0.05, disk_offset=0.01, hole_radius=0.02, link_mass=0.3)
+    pose, force = arm.at([0.1, -0.1, 0.2]), np.array([0.0, 1.0, -2.0])
+    pull = cdsm.distribute_tension(pose, 20.0)
+    test = cdsm.weight_test(pose, pull, force)
+    model, data = loaded(arm, pose, pull, damping=0.05)
+    data.xfrc_applied[model.body("tool0").id, :3] = force
+    mujoco.mj_step(model, data, round(8.0 / model.opt.timestep))
+    assert abs(data.qvel).max() < 1e-9
+    np.testing.assert_allclose(data.body("tool0").xpos, test.states[-1].pose.tip[:3, 3], atol=1e-8)
+
+
 def mass(model: Any, data: Any) -> Array:
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
@@ -248,7 +224,7 @@ def mass(model: Any, data: Any) -> Array:
 
 
 @pytest.fixture(params=HELD)
-def held(request: pytest.FixtureRequest) -> tuple[cdsm.Stiffness, Any, Any, Array, Array]:
+def stable(request: pytest.FixtureRequest) -> tuple[cdsm.Stiffness, Any, Any, Array, Array]:
     """A stable arm in balance; in MuJoCo, in its order: its modes ω² (nv,) and φ (nv, nv)."""
     arm, q, least = HELD[request.param]
     pose = arm.at(q)
@@ -261,9 +237,9 @@ def held(request: pytest.FixtureRequest) -> tuple[cdsm.Stiffness, Any, Any, Arra
     return K, model, data, squares, shapes
 
 
-def test_time_step_is_a_tenth_of_what_the_fastest_motion_bears(held: Any) -> None:
+def test_time_step_is_a_tenth_of_what_the_fastest_motion_bears(stable: Any) -> None:
     """MuJoCo's own mass matrix; semi-implicit Euler diverges from ω·dt = 2 on."""
-    _, model, _, squares, _ = held
+    _, model, _, squares, _ = stable
     step, phase = model.opt.timestep, math.sqrt(squares[-1]) * model.opt.timestep
     assert step <= 2e-3
     assert phase <= 0.2 * (1.0 + 1e-9)
@@ -272,12 +248,12 @@ def test_time_step_is_a_tenth_of_what_the_fastest_motion_bears(held: Any) -> Non
     assert float(f"{step:.0e}") == step
 
 
-def test_stable_arm_stays_where_it_is(held: Any) -> None:
+def test_stable_arm_stays_where_it_is(stable: Any) -> None:
     """A second or two are hundreds of periods: what diverges has grown from rounding by then.
 
     What holds moves by rounding alone; 1e-3 rad is less than any joint of a real arm shows.
     """
-    _, model, data, _, _ = held
+    _, model, data, _, _ = stable
     steps = min(round(SECONDS / model.opt.timestep), 40_000)
     mujoco.mj_step(model, data, steps)
     assert data.time == pytest.approx(steps * model.opt.timestep)  # it never began again
@@ -285,13 +261,13 @@ def test_stable_arm_stays_where_it_is(held: Any) -> None:
     assert abs(data.qvel).max() < 1e-6
 
 
-def test_energy_of_a_vibration_does_not_grow(held: Any) -> None:
+def test_energy_of_a_vibration_does_not_grow(stable: Any) -> None:
     """Knocked so that every mode swings by 0.1 mrad, without damping.
 
     Semi-implicit Euler keeps p²/2 + ω²q²/2 − ω²·dt·p·q/2, so the energy of a mode, which is that of
     the knock first, stays below it by 1/(1 − ω·dt/2); that of all modes too.
     """
-    K, model, data, squares, shapes = held
+    K, model, data, squares, shapes = stable
     amplitudes = 1e-4 / abs(shapes).max(axis=0)
     data.qvel[:] = shapes @ (amplitudes * np.sqrt(squares))
     start, M = data.qpos.copy(), mass(model, data)
@@ -310,28 +286,6 @@ def test_energy_of_a_vibration_does_not_grow(held: Any) -> None:
     bound = knock / (1.0 - math.sqrt(squares[-1]) * model.opt.timestep / 2.0)
     assert 0.5 * knock < most < 1.02 * bound  # 2 % for what is not linear
     assert K.is_stable
-
-
-def test_longer_steps_do_not_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bound is one that matters: at MuJoCo's own 2 ms the virtual prototype falls apart."""
-    monkeypatch.chdir(tmp_path)  # where MuJoCo leaves a log of it
-    arm, q, least = HELD["virtual prototype"]
-    pose = arm.at(q)
-    model, data = loaded(arm, pose, cdsm.distribute_tension(pose, least), damping=0.0)
-    model.opt.timestep = 2e-3
-    mujoco.mj_step(model, data, 300)
-    assert data.time < 250 * 2e-3  # MuJoCo gave up, and began again at the posture
-
-
-def test_a_wrench_is_part_of_what_is_stable() -> None:
-    """K_θ has the load of the Tension: pressed along its axis the finger buckles, hung it holds."""
-    arm = hinged(3, link_mass=0.001)
-    pose = arm.at(np.zeros(3))
-    for force, stable in ((200.0, True), (-200.0, False)):
-        pull = cdsm.distribute_tension(pose, 1.0, wrench=(force, 0, 0, 0, 0, 0))
-        assert cdsm.stiffness(pose, pull).is_stable is stable
-        with nullcontext() if stable else pytest.warns(UserWarning, match="UNSTABLE"):
-            assert ("UNSTABLE" not in cdsm.to_mjcf(arm, pose, pull)) is stable
 
 
 def test_unstable_arm_is_named_on_top_and_leaves() -> None:
@@ -401,31 +355,132 @@ def test_without_a_posture_the_tendons_only_lie_there() -> None:
     assert model.site("tool0").id >= 0
 
 
-def test_file_is_the_text(tmp_path: Path) -> None:
-    arm, pose, pull = serpentine("hinged")
-    path = cdsm.write_mjcf(arm, tmp_path / "arm.xml", pose, pull)
-    assert path.read_text(encoding="utf-8") == cdsm.to_mjcf(arm, pose, pull)
-    mujoco.MjModel.from_xml_path(str(path))
+# --- motors and damping ---------------------------------------------------------------------
 
 
-def test_bad_input_is_named() -> None:
-    arm, pose, pull = serpentine("hinged")
+def run(model: Any, data: Any, seconds: float) -> None:
+    """Step the model. MuJoCo begins again at zero seconds after numbers that are not finite."""
+    end = data.time + seconds
+    mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
+    assert data.time == pytest.approx(end)
+
+
+def ours(model: Any, arm: cdsm.Manipulator, values: Array) -> Array:
+    """Return values of MuJoCo's joints in the order of the arm's."""
+    return np.asarray(values[[model.joint(name).qposadr[0] for name in arm.joint_names]])
+
+
+@pytest.mark.parametrize(
+    ("force", "slack"), [((0.1, 0.0, -1.0), False), ((0.0, 0.0, -6.0), True)], ids=["taut", "slack"]
+)
+def test_locked_motors_hold_a_load_where_the_equilibrium_is(force: Any, slack: bool) -> None:
+    """With constant EA a motor holds l_0 as cdsm's does, beyond where its cable goes slack, too."""
+    pose, pull = finger()
+    rest = cdsm.equilibrium(pose, pull, (*force, 0.0, 0.0, 0.0))
+    assert bool(rest.slack) is slack
+    assert np.linalg.norm(rest.displacement) > 1e-4
+    model, data = loaded(pose.arm, pose, pull, damping_ratio=0.5)
+    data.xfrc_applied[model.body("fingertip").id, :3] = force
+    run(model, data, 1.0)
+    assert abs(data.qvel).max() < 1e-10
+    np.testing.assert_allclose(ours(model, pose.arm, data.qpos), rest.pose.q, atol=1e-10)
+    np.testing.assert_allclose(-data.actuator_force, rest.tension, atol=1e-7)
+
+
+def test_motor_pays_wire_out() -> None:
+    """δq = K_θ⁻¹ J_Lᵀ k u, to first order: paying the flexor out lets the finger stretch."""
+    pose, pull = finger()
+    K = cdsm.stiffness(pose, pull)
+    model, data = loaded(pose.arm, pose, pull, damping_ratio=0.5)
+    c = [cable.name for cable in pose.arm.cables].index("middle_flexor")
+    k = np.eye(len(pose.arm.cables))[c] * K.cable_stiffness[c]
+    slope = np.linalg.solve(K.joint, pose.length_jacobian.T @ k)
+    moved = []
+    for u in (2e-5, -2e-5):
+        mujoco.mj_resetData(model, data)
+        data.ctrl[c] = u
+        run(model, data, 0.5)
+        moved.append(ours(model, pose.arm, data.qpos) - pose.q)
+    assert slope[1] < 0.0  # less bent
+    np.testing.assert_allclose((moved[0] - moved[1]) / 4e-5, slope, rtol=1e-4, atol=1e-3)
+
+
+def test_motors_pull_with_the_tension_they_are_told() -> None:
+    pose, pull = finger()
+    with pytest.warns(UserWarning, match="UNSTABLE"):
+        model, data = loaded(pose.arm, pose, pull, actuators="tension")
+    mujoco.mj_forward(model, data)
+    assert not data.qfrc_actuator.any()
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    np.testing.assert_array_equal(data.ctrl, pull)
+    mujoco.mj_forward(model, data)
+    torque = ours(model, pose.arm, data.qfrc_actuator)
+    np.testing.assert_allclose(torque, -pose.length_jacobian.T @ pull, atol=1e-15)
+    assert abs(data.qfrc_actuator - data.qfrc_bias + data.qfrc_passive).max() < 1e-14
+    data.ctrl[:] = -1.0
+    mujoco.mj_forward(model, data)
+    assert not data.qfrc_actuator.any()  # cables only pull
+
+
+@pytest.mark.parametrize("ratio", [None, 0.01])
+@pytest.mark.parametrize("mode", [0, 1, 2])
+def test_modes_decay_as_stated(mode: int, ratio: float | None) -> None:
+    """Released in the shape of a mode, the energy falls by e^(−2 ζ ω t), with ζ ∝ ω."""
+    pose, pull = finger()
+    model, data = loaded(pose.arm, pose, pull, damping_ratio=ratio)
+    mujoco.mj_forward(model, data)
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    K = cdsm.stiffness(pose, pull).joint
+    squares, shapes = eigh(K, M)
+    omega, wanted = math.sqrt(squares[mode]), ratio or 0.05
+    wanted *= omega / math.sqrt(squares[0])
+    data.qpos[:] += 1e-5 * shapes[:, mode] / abs(shapes[:, mode]).max()
+
+    def energy() -> float:
+        away = data.qpos - pose.q
+        return float(data.qvel @ M @ data.qvel + away @ K @ away) / 2.0
+
+    before = energy()
+    mujoco.mj_step(model, data, round(2.0 * math.tau / omega / model.opt.timestep))
+    decay = math.log(before / energy()) / (2.0 * omega * data.time)
+    # K_θ is the passive part within 3 %, and implicit steps damp up to ω·dt more
+    assert decay == pytest.approx(wanted, rel=0.05 + omega * model.opt.timestep)
+
+
+def test_file_says_what_is_missing_for_balance() -> None:
+    pose, pull = finger()
+    assert "balance " not in cdsm.to_mjcf(pose.arm, pose, pull)
+    loaded = cdsm.distribute_tension(pose, 5.0, wrench=(0, 0, -1.5, 0, 0, 0))
+    text = cdsm.to_mjcf(pose.arm, pose, loaded)
+    assert (
+        "load       (0, 0, -1.5) N, (0, 0, 0) N m is not in the model: apply it to finger" in text
+    )
+    assert "balance " not in text
+    wrong = pull + 3.0 * np.eye(6)[0]
+    left = 3.0 * abs(pose.length_jacobian[0, 0])
+    text = cdsm.to_mjcf(pose.arm, pose, wrong)
+    assert f"balance    {left:.4g} N m are missing, most at proximal_joint" in text
+    urdf = pose.arm.urdf.replace("proximal_joint", "proximal--joint")
+    arm = cdsm.Manipulator.from_urdf(urdf, pose.arm.cables, tip="fingertip")
+    assert "most at proximal- -joint" in cdsm.to_mjcf(arm, arm.at(pose.q), wrong)
+
+
+def test_bad_input_is_named(tmp_path: Path) -> None:
+    pose, pull = finger()
+    path = cdsm.write_mjcf(pose.arm, tmp_path / "arm.xml", pose, pull)
+    assert path.read_text(encoding="utf-8") == cdsm.to_mjcf(pose.arm, pose, pull)
+    for options, said in (
+        ({"actuators": "lenght"}, "did you mean 'length'"),
+        ({"damping_ratio": -0.1}, "damping_ratio: -0.1 given"),
+        ({"damping": 0.1, "damping_ratio": 0.1}, "not both"),
+    ):
+        with pytest.raises(cdsm.CdsmError, match=said):
+            cdsm.to_mjcf(pose.arm, pose, pull, **options)
+    for options in ({"actuators": "length"}, {"damping_ratio": 0.1}):
+        with pytest.raises(cdsm.InvalidInput, match="give pose and tension"):
+            cdsm.to_mjcf(pose.arm, **options)
     with pytest.raises(cdsm.InvalidInput, match="pose and tension, or neither"):
-        cdsm.to_mjcf(arm, pose)
+        cdsm.to_mjcf(pose.arm, pose)
     with pytest.raises(cdsm.InvalidInput, match="another arm"):
         cdsm.to_mjcf(mixed_arm(), pose, pull)
-    with pytest.raises(cdsm.InvalidInput, match="damping"):
-        cdsm.to_mjcf(arm, damping=-1.0)
-
-
-def test_names_are_those_of_the_text_whatever_its_declaration_says() -> None:
-    """A declaration speaks of bytes on a disk; the text has been decoded already."""
-    urdf = (
-        '<?xml version="1.0" encoding="ISO-8859-1"?><robot name="r"><link name="ä"/>'
-        '<link name="ö"/><joint name="j" type="revolute"><parent link="ä"/><child link="ö"/>'
-        '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
-    )
-    sites = cdsm.Site("ä", (0.0, 0.0, 0.1)), cdsm.Site("ö", (0.1, 0.0, 0.1))
-    rope = cdsm.Cable("c", sites, cdsm.LinearElasticity(1e4))
-    model, _ = loaded(cdsm.Manipulator.from_urdf(urdf, [rope], tip="ö"))
-    assert {"ä", "ö"} <= set(names(model))

@@ -1,4 +1,4 @@
-"""Workspace maps show every tip where it is, in mm, under its own colour or status."""
+"""Workspace maps show every tip where it is, in mm, under its own colour or as unstable."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ PLANAR = cdsm.GridPoses(
 
 
 def drawn(figure: Figure, panel: int = 0) -> list[PathCollection]:
-    """The scatters of a panel: each status that is missing, then colours."""
+    """The scatters of a panel: tips without a value, unstable ones, then colours."""
     figure.draw_without_rendering()
     return [each for each in figure.axes[panel].collections if isinstance(each, PathCollection)]
 
@@ -31,8 +31,7 @@ def places(scatter: PathCollection) -> Array:
 @pytest.fixture(scope="module")
 def planar() -> xr.Dataset:
     """Springs so soft that the upper bounds buckle the arm, in the plane of x and z."""
-    arm = short_arm(spring=1500.0)
-    return cdsm.sweep(arm, PLANAR, minimum=[5.0, 40.0, 100.0])
+    return cdsm.sweep(short_arm(spring=1500.0), PLANAR, minimum=[5.0, 40.0, 100.0])
 
 
 def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Dataset) -> None:
@@ -51,9 +50,8 @@ def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Datase
 
 
 def test_a_path_is_seen_whole_along_each_axis() -> None:
-    arm = short_arm()
     ends = np.array([[0.3, -0.2, 0.1, 0.2, -0.1, 0.3], [-0.1, 0.2, 0.2, 0.3, 0.2, -0.2]])
-    found = cdsm.sweep(arm, cdsm.PathPoses(ends, 20), minimum=20.0)
+    found = cdsm.sweep(short_arm(), cdsm.PathPoses(ends, 20), minimum=20.0)
     figure = plots.plot_map(found, "softest")
     tips = 1e3 * found.tip_position.values
     for panel, (axis, shown) in enumerate((("y", [0, 2]), ("z", [0, 1]), ("x", [1, 2]))):
@@ -62,10 +60,7 @@ def test_a_path_is_seen_whole_along_each_axis() -> None:
         assert figure.axes[panel].get_title() == f"seen along {axis}"
 
 
-def test_unstable_entries_are_marked_and_counted(planar: xr.Dataset) -> None:
-    unstable = (planar.status == cdsm.SweepStatus.UNSTABLE).values
-    assert not unstable[..., 0].any()
-    assert unstable[..., 2].all()
+def test_unstable_entries_are_marked_and_have_a_margin(planar: xr.Dataset) -> None:
     tips = 1e3 * planar.tip_position.values.reshape(-1, 3)[:, [0, 2]]
     for quantity in ("softest", "along"):
         data = planar.isel(direction=[2]) if quantity == "along" else planar
@@ -73,32 +68,26 @@ def test_unstable_entries_are_marked_and_counted(planar: xr.Dataset) -> None:
         marked, colors = drawn(figure, 2)
         np.testing.assert_allclose(places(marked), tips)
         assert not len(places(colors))
-        told = [text.get_text() for text in figure.legends[0].get_texts()]
-        assert told == [f"unstable: {100 * unstable.mean():.3g} %"]  # no base: it is far away
-
-
-def test_the_margin_is_shown_with_its_sign_also_where_it_is_negative(planar: xr.Dataset) -> None:
+        assert [text.get_text() for text in figure.legends[0].get_texts()] == ["unstable"]
     figure = plots.plot_map(planar, "margin")
     (colors,) = drawn(figure, 2)
-    np.testing.assert_allclose(
-        np.asarray(colors.get_array()), planar.margin[..., 2].values.ravel(), rtol=1e-12
-    )
+    shown, margins = np.asarray(colors.get_array()), planar.margin[..., 2].values.ravel()
+    assert (shown < 0.0).all()
+    np.testing.assert_allclose(shown, margins, rtol=1e-12)
     assert colors.norm.vmin == -colors.norm.vmax  # type: ignore[operator]
-    assert figure.axes[-1].get_ylabel() == "stability margin [N m/rad]; below 0: unstable"
+    label = figure.axes[-1].get_ylabel().replace("\n", " ")
+    assert label == "stability margin [N m/rad]; below 0: unstable"
 
 
-def test_three_dimensions_sections_and_statuses() -> None:
+def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
     arm = short_arm(cdsm.presets.STRAND_1X19)
     found = cdsm.sweep(arm, cdsm.RandomPoses(256), minimum=20.0, maximum=400.0)
     figure = plots.plot_map(found, "along")
     figure.draw_without_rendering()
     titles = [axes.get_title() for axes in figure.axes[:9]]
     assert [each.split(",")[0] for each in titles[::3]] == [f"direction {u}" for u in "xyz"]
-    assert [each.split(", ")[1][0] for each in titles[:3]] == ["y", "z", "x"]  # slices of a cloud
-    infeasible = float((found.status == cdsm.SweepStatus.INFEASIBLE).mean())
-    assert 0.0 < infeasible < 1.0
-    told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert f"infeasible: {100 * infeasible:.3g} %" in told
+    assert [each.split(",")[1].strip()[0] for each in titles[:3]] == ["y", "z", "x"]
+    assert "no value" in [text.get_text() for text in figure.legends[0].get_texts()]
 
     section = plots.plot_map(found, "softest", section=("y", 0.01, 0.02))
     shown = np.vstack([places(each) for each in drawn(section)])
@@ -108,8 +97,6 @@ def test_three_dimensions_sections_and_statuses() -> None:
     order = [np.lexsort(each.T) for each in (shown, inside[:, [0, 2]])]
     np.testing.assert_allclose(shown[order[0]], inside[:, [0, 2]][order[1]], rtol=1e-12)
     assert section.axes[0].get_title() == "y\xa0=\xa010\xa0±\xa020\xa0mm"
-    section = plots.plot_map(found, "softest", section=("y", -4.95e-5, 0.02))
-    assert section.axes[0].get_title() == "y\xa0=\xa00\xa0±\xa020\xa0mm"
 
 
 @pytest.mark.parametrize("statistic", ["median", "min", "max"])
@@ -122,44 +109,44 @@ def test_cells_show_the_statistic_of_their_tips(planar: xr.Dataset, statistic: s
     tips = 1e3 * one.tip_position.values.reshape(-1, 3)[:, [0, 2]]
     values = 1e-3 * one.softest.values.ravel()
     assert 1 < shown.count() < len(values)
+    counted = 0
     for row, column in np.argwhere(~np.ma.getmaskarray(shown)):
         low, high = corners[row, column], corners[row + 1, column + 1]
         inside = ((tips >= low) & (tips < high)).all(axis=1)
-        expected = getattr(np, statistic)(values[inside])
-        assert shown[row, column] == pytest.approx(expected)
+        counted += int(inside.sum())
+        assert shown[row, column] == pytest.approx(getattr(np, statistic)(values[inside]))
+    assert counted == len(values)
     assert figure.axes[-1].get_ylabel().startswith(f"{statistic} of a cell: stiffness in the")
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"quantity": "status"}, "quantity: status given; a map of any other quantity marks"),
-        ({"quantity": "softness"}, r"no quantity is called 'softness'.*Known: [a-z, ]+\. tip"),
+        ({"quantity": "status"}, "quantity: status has the dimensions"),
+        ({"quantity": "softness"}, r"no quantity is called 'softness'.*must be among outputs="),
         ({"quantity": "tip_position"}, "tip_position has the dimensions"),
         ({"section": ("w", 0.0, 0.1)}, "no axis is called 'w'"),
         ({"section": 3.0}, "section: 3.0 given"),
         ({"statistic": "mean"}, "no statistic is called 'mean'"),
         ({"bins": 1}, "bins"),
         ({"section": ("y", 5.0, 0.1)}, "section: has no tip to show"),
-        ({"quantity": "along"}, "makes 9 panels|"),
     ],
 )
 def test_what_cannot_be_shown_is_named(
     arguments: dict[str, Any], said: str, planar: xr.Dataset
 ) -> None:
-    if said.endswith("|"):
-        planar = cdsm.sweep(short_arm(), PLANAR, minimum=np.arange(10.0, 14.0))
-        said = r"makes 12 panels, of minimum \(4\), direction \(3\); choose up to 9"
     with pytest.raises(cdsm.CdsmError, match=said):
         plots.plot_map(planar, **arguments)
 
 
-def test_a_sweep_without_tips_cannot_be_shown() -> None:
-    said = r"tip_position and the quantity must be among outputs= of the sweep"
-    with pytest.raises(cdsm.UnknownName, match=said):
-        plots.plot_map(cdsm.sweep(short_arm(), PLANAR, minimum=20.0, outputs="margin"), "margin")
+def test_sweeps_that_cannot_be_shown_are_refused() -> None:
+    arm = short_arm()
+    many = cdsm.sweep(arm, PLANAR, minimum=np.arange(10.0, 14.0))
+    with pytest.raises(cdsm.InvalidInput, match=r"12 panels, of minimum \(4\), direction \(3\)"):
+        plots.plot_map(many, "along")
+    with pytest.raises(cdsm.CdsmError, match="must be among outputs="):
+        plots.plot_map(cdsm.sweep(arm, PLANAR, minimum=20.0, outputs="margin"), "margin")
     with pytest.raises(cdsm.InvalidInput, match="the Dataset of a sweep is needed"):
         plots.plot_map(3)  # type: ignore[arg-type]
-    beyond = cdsm.sweep(short_arm(), np.full((2, 6), 3.0), minimum=20.0)
     with pytest.raises(cdsm.InvalidInput, match="has no tip to show"):
-        plots.plot_map(beyond)
+        plots.plot_map(cdsm.sweep(arm, np.full((2, 6), 3.0), minimum=20.0))

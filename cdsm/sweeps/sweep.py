@@ -1,0 +1,126 @@
+"""Run a sweep: in memory, on dask, or into a store."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdsm.batch.inputs import given_wrench
+from cdsm.errors import InvalidInput
+from cdsm.manipulator import Manipulator
+from cdsm.support.directions import XYZ, Direction, unit_directions
+from cdsm.support.extras import need
+from cdsm.support.files import as_path
+from cdsm.support.validation import NO_WRENCH, flag, instance, one_of, quantity, sequence_of, text
+from cdsm.sweeps.cases import Cases
+from cdsm.sweeps.files import stored
+from cdsm.sweeps.poses import PoseSet, angles_of, distinct
+from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
+from cdsm.tension import checked_bounds
+
+if TYPE_CHECKING:
+    import xarray
+
+_CHUNK = 2  # a chunk of a store has so many times the postures that are computed together
+
+
+def sweep(
+    arm: Manipulator,
+    q: PoseSet | ArrayLike | xarray.DataArray,
+    *,
+    minimum: ArrayLike = 0.0,
+    maximum: float = np.inf,
+    wrench: ArrayLike | Mapping[str, ArrayLike] = NO_WRENCH,
+    direction: Direction | Sequence[Direction] | Mapping[str, Direction] = XYZ,
+    outputs: Iterable[str] = DEFAULT,
+    worst_friction: bool = False,
+    diameter: float = 0.0,
+    store: str | os.PathLike[str] | None = None,
+    progress: bool = True,
+) -> xarray.Dataset:
+    """Compute the stiffness at many postures, for all combinations of the given argument values.
+
+    At each posture the tensions F are the least that balance the arm (Eqs. 13, 17), and the
+    stiffness is that under F (Eq. 16). A failure sets the ``status`` of its entry, see
+    :class:`~cdsm.Status`; NaN stands only where the status says so. Coordinates and variables have
+    ``long_name`` and ``units`` (SI). The attribute ``arm`` is the ARM.toml of the arm.
+
+    Args:
+        arm: The arm.
+        q: Postures: :class:`~cdsm.GridPoses` (a dimension for each joint of the grid),
+            :class:`~cdsm.PathPoses`, :class:`~cdsm.RandomPoses`, joint angles (N, nv) [rad]
+            (dimension ``pose``), or a DataArray of joint angles with the dimension ``joint``. If
+            the DataArray is chunked, the result is a lazy Dataset: dask computes it, on the cluster
+            whose client is active, when it is needed. A chunk costs some 30 ms of its own.
+        minimum: Lower bound of all tensions [N]. Several bounds make the dimension ``minimum``.
+        maximum: Upper bound of all tensions [N]; inf for no bound.
+        wrench: Wrench at ``tool0`` in base axes (6,): force [N], then moment [N m]. Several, (W, 6)
+            or by name, make the dimension ``wrench``.
+        direction: Direction of ``along``: an axis such as ``"z"``, or (3,), any length. Several,
+            axes, (D, 3) or by name, make the dimension ``direction``.
+        outputs: Names of quantities: keys of :data:`~cdsm.sweeps.quantities.QUANTITIES`.
+        worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
+            within the bounds, whatever loads came before. Then the bounds at the motors are
+            narrower.
+        diameter: Diameter of the cables [m], for clearances.
+        store: Zarr folder to which results are written chunk by chunk, so that they need not fit
+            into memory. A new run with the same arguments computes only the chunks that are
+            missing. The returned Dataset reads from the store when needed. The chunks of a chunked
+            DataArray are those of the store.
+        progress: Show a bar, if there is a terminal.
+
+    Returns:
+        Dataset of the outputs [SI] and ``status``. The dimensions of each are those of the
+        postures; then ``wrench`` and ``minimum``, if several are given and the output depends on
+        them; then its own, such as ``cable``.
+
+    Raises:
+        InvalidInput: An argument is wrong; the error names it and the reason.
+        UnknownName: A joint or an output does not exist.
+        MissingExtra: xarray, dask, or zarr for a store, is not installed.
+        FileError: The store cannot be created, read or written, or has another sweep.
+    """
+    need("sweep", "xarray", "dask", *(["zarr"] if store is not None else []))
+    names = (outputs,) if isinstance(outputs, str) else tuple(sequence_of("outputs", outputs, str))
+    if not names or len({*names}) < len(names):
+        raise InvalidInput("outputs", f"{names} given; name some of {', '.join(QUANTITIES)}, once.")
+    lows = distinct("minimum", minimum)
+    for low in lows.tolist():
+        checked_bounds(instance("arm", arm, Manipulator), low, maximum)
+    loads, wrenches = _named(wrench)
+    ways, directions = _named(direction)
+    W = given_wrench(wrenches, len(wrenches))
+    u = unit_directions("direction", directions)
+    cases = Cases(
+        arm=arm,
+        outputs=tuple(one_of("output", name, QUANTITIES) for name in names),
+        wrench=np.atleast_2d(W),
+        minimum=lows,
+        maximum=quantity("maximum", maximum, "tension", zero=True, infinite=True),
+        direction=np.atleast_2d(u),
+        worst_friction=worst_friction,
+        diameter=diameter,
+        names={
+            "wrench": None if W.ndim == 1 else loads or range(len(W)),
+            "minimum": None if np.ndim(minimum) == 0 else lows.tolist(),
+            "direction": None if u.ndim == 1 else ways or range(len(u)),
+        },
+    )
+    given = getattr(q, "chunks", None) is not None
+    shown = flag("progress", progress)
+    if store is None:
+        return cases.dataset(angles_of(arm, q), shown)
+    angles = angles_of(arm, q, _CHUNK * cases.together)
+    return stored(as_path(store), cases, angles, given, shown)
+
+
+def _named(value: Any) -> tuple[Sequence[str] | None, Any]:
+    """Return the names of several vectors, if they have any, and the vectors."""
+    if isinstance(value, Mapping):
+        return [text("name", name) for name in value], [*value.values()]
+    words = isinstance(value, (list, tuple)) and all(isinstance(each, str) for each in value)
+    return value if words else None, value
