@@ -26,10 +26,10 @@ def hole_table(arm: Manipulator) -> str:
     rows = []
     for number, disk in enumerate(geometry.disks, start=1):
         for name, route in zip(geometry.cable_names, geometry.cables, strict=True):
-            if number > 2 * route.joint:
+            if disk.joint > route.joint:
                 continue
             _, y, z = disk.hole(route)
-            ends = "ends" if number == 2 * route.joint else "passes"
+            ends = "ends" if disk == geometry.disks_of(route)[-1] else "passes"
             sizes = (1e3 * disk.x, 1e3 * disk.radius, 1e3 * disk.radius_of(route))
             angle = math.degrees(route.angle) % 360.0
             rows.append([number, disk.link, *map(_mm, sizes), name, ends, _mm(angle)])

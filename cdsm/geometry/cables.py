@@ -22,10 +22,10 @@ def serpentine_cables(
 ) -> tuple[Cable, ...]:
     """Return the cables of a serpentine arm, routed through the holes of its disks.
 
-    A cable of joint k passes the base disk and every disk of links 1…k−1. It ends on the first disk
-    of link k. Its hole in a disk is at (x, R cos φ, R sin φ) in the frame of the link: x is the
-    position of the disk, φ the angle of the :class:`~cdsm.CableRoute`, R the radius of the route,
-    or the hole radius of the disk. The i-th cable of joint k has the name ``cable{k}_{i}``.
+    A cable of joint k passes all disks before it, and ends on the first disk after it. Its hole in
+    a disk is at (x, R cos φ, R sin φ) in the frame of the link: x is the position of the disk, φ
+    the angle of the :class:`~cdsm.CableRoute`, R the radius of the route, or the hole radius of the
+    disk. The i-th cable of joint k has the name ``cable{k}_{i}``.
 
     Args:
         geometry: The arm.
@@ -42,9 +42,9 @@ def serpentine_cables(
     if len(laws) != n:
         raise InvalidInput("elasticity", f"{len(laws)} laws given; give 1, or 1 for each of {n}.")
     new = partial(Cable, series_stiffness=series_stiffness, control=control)
-    cables, disks = [], geometry.disks
+    cables = []
     for name, route, law in zip(names, geometry.cables, laws, strict=True):
-        mu, passed = route.friction, disks[: 2 * route.joint]
+        mu, passed = route.friction, geometry.disks_of(route)
         friction = [mu if route.lead else 0.0, *[mu] * (len(passed) - 2), 0.0]
         holes = zip(passed, friction, strict=True)
         sites = tuple(Site(disk.link, disk.hole(route), mu) for disk, mu in holes)

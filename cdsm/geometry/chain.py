@@ -1,35 +1,42 @@
 """The chain of bodies and joints of a geometry: one description for URDF, disks and springs.
 
-A beam of length l, bending stiffness EI and torsion stiffness GJ becomes pieces of l/n each: two
-universal joints at 1/6 and 5/6 of the piece with springs 2 EI n/l, and a joint about its axis in
-the middle with GJ n/l. At 1/6 and 5/6, a cable beside the beam shortens as beside an arc, to second
-order. The axes are y, z at the first joint and z, y at the second: in equal order, a bend that is
-not about one of them would twist the beam.
+A beam of length l, bending stiffness EI and torsion stiffness GJ becomes n pieces: two universal
+joints at 1/6 and 5/6 of each piece with springs 2 EI n/l, and a joint about its axis in the middle
+with GJ n/l. There, a cable beside the beam shortens as beside an arc, to second order. The axes are
+y, z at the first joint and z, y at the second: in equal order, a bend that is about neither of them
+would twist the beam.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from cdsm.geometry.parts import Disk, Joint, Link
 
-Y, Z, X = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 STEEPEST = math.radians(80.0)
 """Largest angle of a joint without a limit of its own [rad]."""
 
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _OF_CROSS = 0.01  # mass of the cross of a beam's joint, taken from its piece
+_POISSON = 0.3
+_LEAST, _NEAR = 1e-6, 1e-9  # two disks that are closer than this [m] are one
+
+
+Sizes = tuple[float, float, float]
+"""Hole radius and outer radius of the disks of a joint [m], and the limit of the joint [rad]."""
 
 
 class Body(NamedTuple):
-    """A rigid body: solid cylinder along x, from 0 to ``length`` [m], or the cross of a joint."""
+    """A rigid body along x, from 0 to ``length`` [m]; or the cross of a universal joint."""
 
     name: str
     length: float
-    mass: float  # [kg]; 0: a placeholder, which simulators need
-    radius: float  # of the cylinder that gives its moments of inertia [m]
-    cross: bool = False
+    mass: float  # [kg]
+    joint: int  # number of the joint before it; 0: the base
+    kind: str  # "link", "cross", or "beam"
 
 
 class Axis(NamedTuple):
@@ -42,72 +49,133 @@ class Axis(NamedTuple):
     axis: tuple[float, ...]
     limit: float  # both ways [rad]
     stops: bool  # whether the limit is where disks touch
-    stiffness: float = 0.0  # k [N m/rad]
-    rest_angle: float = 0.0  # q_0 [rad]
+    stiffness: float  # k of its spring [N m/rad]; 0: none
+    rest_angle: float  # q_0 [rad]
 
 
 @dataclass
 class Chain:
-    """Bodies one behind another along x. ``go`` runs on along the last one, ``joint`` ends it."""
+    """Bodies one behind another along x; the last one is at ``link`` and has reached ``x`` [m]."""
 
-    radius: float  # of the current body
     link: str = "base_disk"
+    behind: int = 0  # number of the joint before it
+    at: int = 0  # number of the joint that is being added
+    kind: str = "link"
     x: float = 0.0
     mass: float = 0.0
     bodies: list[Body] = field(default_factory=list)
     axes: list[Axis] = field(default_factory=list)
     disks: list[Disk] = field(default_factory=list)
 
-    def go(self, dx: float, mass: float = 0.0) -> None:
-        self.x += dx
-        self.mass += mass
-
     def end(self) -> None:
-        """End the current body."""
-        cross = self.link.startswith("cross") or self.link.endswith(("_cross1", "_cross2"))
-        self.bodies.append(Body(self.link, self.x, self.mass, self.radius, cross))
+        """End the last body."""
+        self.bodies.append(Body(self.link, self.x, self.mass, self.behind, self.kind))
 
-    def joint(
+    def turn(
+        self, name: str, axis: tuple[float, ...], child: str, kind: str, *more: float | bool
+    ) -> None:
+        """End the last body at a joint, and begin the next; ``more`` as the last of an Axis."""
+        limit, stops, *spring = more
+        self.axes.append(
+            Axis(name, self.link, child, self.x, axis, float(limit), bool(stops), *spring)
+        )
+        self.end()
+        self.link, self.kind, self.x, self.mass, self.behind = child, kind, 0.0, 0.0, self.at
+
+    def disk(self, joint: int, radius: float, outer: float) -> None:
+        """Put a disk here, unless there is one."""
+        last = self.disks[-1] if self.disks else None
+        if not (last and last.link == self.link and abs(last.x - self.x) < _NEAR):
+            self.disks.append(Disk(self.link, self.x, joint, radius, outer))
+
+    def run(
         self,
-        name: str,
-        axis: tuple[float, ...],
-        child: str,
+        stem: str,
+        length: float,
+        of: Joint | Link,
+        mass: float,
+        end: str,
         limit: float,
         stops: bool,
-        spring: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        self.axes.append(Axis(name, self.link, child, self.x, axis, limit, stops, *spring))
-        self.end()
-        self.link, self.x, self.mass = child, 0.0, 0.0
+        """Run along a beam of this length [m]; the body at its end is called ``end``."""
+        EI, GJ, n = of.bending_stiffness, of.torsion_stiffness, of.pieces
+        assert EI is not None
+        GJ = EI / (1.0 + _POISSON) if GJ is None else GJ
+        piece, each = length / n, mass / n * (1.0 - 2.0 * _OF_CROSS)
+        limit, spring = limit / (2 * n), (2.0 * EI / piece, 0.0)
 
-    def beam(self, stem: str, length: float, of: Joint | Link, mass: float, end: str) -> None:
-        """Run along a beam of length [m]; the body at its end is called ``end``."""
-        n = of.pieces
-        l, k = length / n, 2.0 * of.bending_stiffness * n / length
-        spring, twist = (k, 0.0), (of.torsion_stiffness * n / length, 0.0)
-        limit, stops = self.limits(of)
-        weight = mass / n * (1.0 - 4.0 * _OF_CROSS)
+        def go(part: float) -> None:
+            self.x += part * piece
+            self.mass += part * each
 
-        def universal(name: str, cross: str, child: str, order: str) -> None:
-            axes = {"y": Y, "z": Z}
-            self.joint(f"{name}_{order[0]}", axes[order[0]], cross, limit, stops, spring)
-            self.mass = 2.0 * _OF_CROSS * mass / n
-            self.joint(f"{name}_{order[1]}", axes[order[1]], child, limit, stops, spring)
+        def bend(name: str, cross: str, child: str, order: str, kind: str) -> None:
+            ends = limit, stops, *spring
+            self.turn(f"{name}_{order[0]}", _AXES[order[0]], cross, "beam", *ends)
+            self.mass = _OF_CROSS * mass / n
+            self.turn(f"{name}_{order[1]}", _AXES[order[1]], child, kind, *ends)
 
         for p in range(1, n + 1):
             own = stem if n == 1 else f"{stem}_{p}"
-            self.go(l / 6.0, weight / 6.0)
-            universal(f"{own}_bend1", f"{own}_cross1", f"{own}_middle", "yz")
-            self.go(l / 3.0, weight / 3.0)
-            if math.isfinite(of.torsion_stiffness):
-                self.joint(f"{own}_twist", X, f"{own}_middle2", STEEPEST, False, twist)
-            self.go(l / 3.0, weight / 3.0)
-            universal(f"{own}_bend2", f"{own}_cross2", end if p == n else f"{own}_end", "zy")
-            self.go(l / 6.0, weight / 6.0)
+            go(1.0 / 6.0)
+            bend(f"{own}_bend1", f"{own}_cross1", f"{own}_middle1", "yz", "beam")
+            go(1.0 / 3.0)
+            if math.isfinite(GJ):
+                ends = STEEPEST, False, GJ / piece, 0.0
+                self.turn(f"{own}_twist", _AXES["x"], f"{own}_middle2", "beam", *ends)
+            go(1.0 / 3.0)
+            last = (end, "link") if p == n else (f"{own}_end", "beam")
+            bend(f"{own}_bend2", f"{own}_cross2", last[0], "zy", last[1])
+            go(1.0 / 6.0)
 
-    def limits(self, of: Joint | Link) -> tuple[float, bool]:
-        """Return the limit of each joint of a beam, and whether disks touch there."""
-        if isinstance(of, Link):
-            return STEEPEST / (2 * of.pieces), False
-        limit = of.limit or min(STEEPEST, 2.0 * math.atan(of.disk_offset / self.disks[-1].radius))
-        return limit / (2 * of.pieces), of.limit is None
+
+def chain_of(
+    base_length: float, joints: Sequence[Joint], links: Sequence[Link], sizes: Sequence[Sizes]
+) -> Chain:
+    """Return the chain of an arm; ``sizes`` are those of the disks of each joint."""
+    chain, rigid = Chain(), (STEEPEST, False)
+    for k in range(len(joints) + 1):
+        after = joints[k] if k < len(joints) else None
+        link = links[k - 1] if k else Link(length=max(base_length, _LEAST), mass=0.0)
+        length = link.length if k else base_length
+        start = _start(chain, k, joints[k - 1], link, sizes[k - 1]) if k else 0.0
+        h = after.disk_offset if after else 0.0
+        if link.bending_stiffness is None:
+            chain.mass += link.mass
+            chain.x = length - h - start
+        else:
+            gap = length - h - joints[k - 1].disk_offset
+            chain.run(f"link{k}b", gap, link, link.mass * gap / length, f"link{k}_end", *rigid)
+        if after:
+            chain.disk(k + 1, *sizes[k][:2])
+        if after and after.axes and link.bending_stiffness is None:
+            chain.x = length - start
+        elif after and after.axes:
+            chain.run(f"link{k}c", h, link, link.mass * h / length, f"link{k}_tip", *rigid)
+    chain.end()
+    return chain
+
+
+def _start(chain: Chain, k: int, joint: Joint, link: Link, sizes: Sizes) -> float:
+    """Add joint k with the disk after it; return where x = 0 of its link is behind the joint."""
+    h, (radius, outer, limit), stops = joint.disk_offset, sizes, joint.limit is None
+    chain.at = k
+    bends = link.bending_stiffness is not None
+    if not joint.axes:
+        backbone = min(abs(link.length - h), abs(link.length - 2.0 * h)) < _NEAR
+        stem, name = (f"gap{k}", f"disk{k}") if backbone else (f"joint{k}", f"link{k}")
+        chain.run(stem, 2.0 * h, joint, joint.mass, name, limit, stops)
+        chain.disk(k, radius, outer)
+        return h - chain.x
+    name, child = f"joint{k}", f"link{k}_start" if bends else f"link{k}"
+    ends = limit, stops, joint.stiffness, joint.rest_angle
+    if len(joint.axes) == 2:
+        chain.turn(f"{name}_1", joint.axes[0], f"cross{k}", "cross", *ends)
+        name = f"{name}_2"
+    chain.turn(name, joint.axes[-1], child, "beam" if bends else "link", *ends)
+    if bends:
+        chain.run(f"link{k}a", h, link, link.mass * h / link.length, f"link{k}", STEEPEST, False)
+    else:
+        chain.x = h
+    chain.disk(k, radius, outer)
+    return 0.0

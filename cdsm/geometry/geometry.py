@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from inspect import signature
 from itertools import count
 from pathlib import Path
@@ -17,6 +18,7 @@ from pydantic import Field, model_validator
 
 from cdsm.errors import GeometryError, listed
 from cdsm.geometry import toml
+from cdsm.geometry.chain import STEEPEST, Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.geometry.uniform import Hinged, Universal, fields_of, same_angle, spread_out
 from cdsm.geometry.units import WIDEST, doubts_about_angle, doubts_about_units
@@ -92,10 +94,12 @@ class Geometry(Printed):
         if len(links) != n:
             yield f"links: {len(links)} given for {n} joints; give one for each"
         offsets = [*(joint.disk_offset for joint in joints), 0.0]
+        necks = [not joint.axes for joint in joints] + [True]  # which may share a disk
+        slack = [1e-9 * (one and other) for one, other in itertools.pairwise(necks)]
         short = [
             f"link {k} is {link.length:g} m long, its disks need more than {needed:g} m"
             for k, link in enumerate(links, start=1)
-            if link.length <= (needed := sum(offsets[k - 1 : k + 1]))
+            if link.length <= (needed := sum(offsets[k - 1 : k + 1])) * (1.0 - slack[k - 1])
         ]
         if short:
             remedy = "lower disk_offset, or lengthen the links"
@@ -114,7 +118,7 @@ class Geometry(Printed):
 
     def _doubts(self) -> Iterator[str]:
         """Yield texts of warnings: lengths look like mm, angles like degrees; holes are shared."""
-        cables, disks, names = self.cables, self.disks, self.cable_names
+        cables, names = self.cables, self.cable_names
         offset = max(joint.disk_offset for joint in self.joints)
         sizes = [("hole_radius", max(self.hole_radii), WIDEST), ("disk_offset", offset, WIDEST)]
         yield from doubts_about_units(self.length, sizes)
@@ -125,7 +129,7 @@ class Geometry(Printed):
         holes = defaultdict(list)
         for i, group in enumerate(same_angle(cables)):
             for c in group:
-                for d, disk in enumerate(disks[: 2 * cables[c].joint]):
+                for d, disk in enumerate(self.disks_of(cables[c])):
                     holes[i, d, disk.radius_of(cables[c])].append(c)
         shared = {tuple(hole) for hole in holes.values() if len(hole) > 1}
         whole = sorted(hole for hole in shared if not any(set(hole) < set(each) for each in shared))
@@ -136,7 +140,7 @@ class Geometry(Printed):
 
     def __str__(self) -> str:
         joints, cables = plural(len(self.joints), "joint"), plural(len(self.cables), "cable")
-        freedom = plural(sum(len(joint.axes) for joint in self.joints), "degree")
+        freedom = plural(len(self._chain.axes), "degree")
         return f"{self.name}: {joints} ({freedom} of freedom), {cables}, {self.length:g} m long"
 
     def __repr__(self) -> str:
@@ -203,28 +207,29 @@ class Geometry(Printed):
         rings = [(cable.joint, cable.radius) for cable in self.cables if cable.radius is not None]
         return [max([R, *(r for j, r in rings if j > k)]) for k, R in enumerate(self.hole_radii)]
 
+    @cached_property
+    def _chain(self) -> Chain:
+        """Bodies, joints and disks, base to tip."""
+        rows = zip(self.joints, self._farthest_holes, strict=True)
+        radii = [joint.disk_radius or 1.1 * farthest for joint, farthest in rows]
+        sizes = [*zip(self.hole_radii, radii, self.joint_limits, strict=True)]
+        return chain_of(self.base_length, self.joints, self.links, sizes)
+
     @property
     def joint_limits(self) -> tuple[float, ...]:
         """Limit of each joint [rad]: the given one, or where disks touch, as in :class:`Joint`."""
         joints = zip(self.joints, self.hole_radii, strict=True)
         touch = [2.0 * math.atan(j.disk_offset / (j.disk_radius or R)) for j, R in joints]
-        most = math.radians(80.0)
-        return tuple(j.limit or min(x, most) for j, x in zip(self.joints, touch, strict=True))
+        return tuple(j.limit or min(x, STEEPEST) for j, x in zip(self.joints, touch, strict=True))
 
     @property
     def disks(self) -> tuple[Disk, ...]:
-        """All disks, base to tip: two per joint, one before and one after it.
+        """All disks, base to tip: two per joint, before and after it; necks may share one."""
+        return tuple(self._chain.disks)
 
-        A cable of joint k passes the first 2k−1 disks and ends on disk 2k.
-        """
-        disks, link, end = [], "base_disk", self.base_length
-        rows = zip(self.joints, self.hole_radii, self._farthest_holes, strict=True)
-        for k, (joint, R, farthest) in enumerate(rows, start=1):
-            radius = joint.disk_radius or 1.1 * farthest
-            disks += [Disk(link, end - joint.disk_offset, k, R, radius)]
-            disks += [Disk(link := f"link{k}", joint.disk_offset, k, R, radius)]
-            end = self.links[k - 1].length
-        return tuple(disks)
+    def disks_of(self, route: CableRoute) -> tuple[Disk, ...]:
+        """Return the disks that a cable passes; it ends on the last one, after its joint."""
+        return tuple(disk for disk in self.disks if disk.joint <= route.joint)
 
     @property
     def cable_names(self) -> tuple[str, ...]:
@@ -233,19 +238,10 @@ class Geometry(Printed):
         return tuple(f"cable{c.joint}_{next(number[c.joint])}" for c in self.cables)
 
     @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Name of each axis in a URDF: ``joint{k}_1``, ``joint{k}_2``; of a hinge ``joint{k}``."""
-        return tuple(
-            f"joint{k}_{i}" if len(joint.axes) == 2 else f"joint{k}"
-            for k, joint in enumerate(self.joints, start=1)
-            for i in range(1, len(joint.axes) + 1)
-        )
-
-    @property
     def springs(self) -> dict[str, tuple[float, float]]:
         """Stiffness [N m/rad] and angle without torque [rad] of each spring, by joint name."""
-        each = [(joint.stiffness, joint.rest_angle) for joint in self.joints for _ in joint.axes]
-        return {name: own for name, own in zip(self.joint_names, each, strict=True) if own[0]}
+        sprung = (axis for axis in self._chain.axes if axis.stiffness)
+        return {axis.name: (axis.stiffness, axis.rest_angle) for axis in sprung}
 
     def to_toml(self) -> str:
         """Return the TOML text from which :meth:`read` builds an equal geometry."""

@@ -10,13 +10,16 @@ from pydantic import Field, model_validator
 
 from cdsm.support import records
 
-MAXIMUM_JOINTS = 100  # many more would overflow the stack of the URDF parsers
+MAXIMUM_JOINTS = 100
 Limit = Annotated[records.Number, Field(gt=0, le=math.pi)]
+Pieces = Annotated[records.Integer, Field(ge=1, le=20)]
 
 
 @records.record
 class Joint:
     """One joint of the arm and the two disks next to it; GeometryError lists every fault.
+
+    It has axes, or it is a flexible neck: a beam of length 2h from one disk to the other.
 
     Attributes:
         axes: One axis (hinge), or the first and the second axis (universal joint), in the frame of
@@ -30,18 +33,29 @@ class Joint:
             hole from the axis.
         stiffness: k of a spring about each axis [N m/rad]; 0: none.
         rest_angle: Angle about each axis at which the spring has no torque [rad].
+        bending_stiffness: EI of a neck [N m²], instead of ``axes``.
+        torsion_stiffness: GJ of the neck [N m²]; None: EI/1.3, as of a tube with Poisson's ratio
+            0.3; inf: it does not twist.
+        pieces: Number of equal pieces of which the neck is made; each has four or five joints.
+        mass: Mass of the neck [kg].
     """
 
-    axes: Annotated[tuple[records.Direction, ...], Field(strict=False, min_length=1, max_length=2)]
+    axes: Annotated[tuple[records.Direction, ...], Field(strict=False, max_length=2)] = ()
     disk_offset: records.Length
     limit: Limit | None = None
     hole_radius: records.Length | None = None
     disk_radius: records.Length | None = None
     stiffness: records.JointSpring = 0.0
     rest_angle: records.Number = 0.0
+    bending_stiffness: records.Bending | None = None
+    torsion_stiffness: records.Torsion | None = None
+    pieces: Pieces = 1
+    mass: records.Mass = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if bool(self.axes) == (self.bending_stiffness is not None):
+            raise records.CrossFaults(["axes: give them, or bending_stiffness, and not both"])
         lengths = [math.hypot(*axis) for axis in self.axes]
         if 0.0 in lengths:
             fault = f"axes[{lengths.index(0.0) + 1}]: has no length; give a direction"
@@ -60,10 +74,18 @@ class Link:
         length: Length [m].
         mass: Mass [kg] of a solid cylinder with the hole radius of its first disk, centred at
             mid-link.
+        bending_stiffness: EI [N m²]; None: the link does not bend. A link that bends is a chain of
+            beams between the places where something acts on it: its joints and disks.
+        torsion_stiffness: GJ [N m²]; None: EI/1.3, as of a tube with Poisson's ratio 0.3; inf: it
+            does not twist.
+        pieces: Number of equal pieces of each of these beams.
     """
 
     length: records.Length
     mass: records.Mass
+    bending_stiffness: records.Bending | None = None
+    torsion_stiffness: records.Torsion | None = None
+    pieces: Pieces = 1
 
 
 @records.record

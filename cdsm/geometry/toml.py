@@ -32,7 +32,7 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
     return geometry, {key: value for key, value in data.items() if key in others}
 
 
-_NONE = "friction = 0.0", "stiffness = 0.0", "rest_angle = 0.0"  # not written
+_NONE = "friction = 0.0", "stiffness = 0.0", "rest_angle = 0.0", "pieces = 1"  # not written
 
 
 @record
@@ -74,5 +74,7 @@ def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
     for key in ("joints", "links", "cables"):
         for part in getattr(geometry, key):
             rows = toml_lines(part)
+            if key == "joints":
+                rows = [row for row in rows if row not in ("mass = 0.0", "axes = []")]
             lines += ["", f"[[{prefix}{key}]]", *(row for row in rows if row not in _NONE)]
     return lines

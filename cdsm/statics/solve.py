@@ -79,8 +79,7 @@ class Balance:
         self.unit = np.where(arm.slides, arm.length, 1.0)
         touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
         if arm.is_serpentine:
-            joints = arm.geometry.joints
-            touching[:] = [joint.limit is None for joint in joints for _ in joint.axes]
+            touching[:] = [axis.stops for axis in arm.geometry._chain.axes]
         apart = np.where(touching, _APART, 0.0)
         # the reference may be nearer to the stop
         self._lower = np.minimum(arm.lower + apart, reference.q) / self.unit

@@ -47,11 +47,11 @@ def _name(value: str) -> str:
     return value
 
 
-def _in_range(kind: str, zero: bool = False) -> AfterValidator:
-    """Refuse values outside ``RANGES[kind]``; ``zero`` also allows 0."""
+def _in_range(kind: str, zero: bool = False, inf: bool = False) -> AfterValidator:
+    """Refuse values outside ``RANGES[kind]``; ``zero`` also allows 0, ``inf`` infinity."""
 
     def check(value: float) -> float:
-        if problem := within(kind, value, zero=zero):
+        if problem := within(kind, value, zero=zero, infinite=inf):
             raise ValueError(problem)
         return value
 
@@ -66,6 +66,13 @@ Friction = Annotated[Number, _in_range("friction", zero=True)]
 Wrap = Annotated[Number, _in_range("wrap", zero=True)]
 Mass = Annotated[Number, _in_range("mass", zero=True)]
 JointSpring = Annotated[Number, _in_range("spring", zero=True)]
+Bending = Annotated[Number, _in_range("bending stiffness")]
+Torsion = Annotated[
+    float,
+    Field(allow_inf_nan=True),
+    BeforeValidator(_plain),
+    _in_range("bending stiffness", inf=True),
+]
 SpringStiffness = Annotated[Number, _in_range("stiffness")]
 Tension = Annotated[Number, _in_range("tension", zero=True)]
 Coordinate = Annotated[Number, Field(ge=-RANGES["length"].high, le=RANGES["length"].high)]

@@ -27,6 +27,7 @@ class Range(NamedTuple):
 
 
 RANGES: Final = {
+    "bending stiffness": Range("N m²", 1e-9, 1e9),
     "diameter": Range("m", 1e-6, 0.5),
     "force": Range("N", 1e-9, 1e9),
     "friction": Range("", 1e-6, 2.0),

@@ -291,7 +291,7 @@ def test_faults_of_the_general_constructor_are_named(changes: dict[str, Any], sa
         (((0.0, 1.0),), "axes[1][3]"),
         (((0.0, math.nan, 1.0),), "axes[1][2]"),
         (((0.0, 0.0, 1.0),) * 3, "at most 2"),
-        ((), "at least 1"),
+        ((), "give them, or bending_stiffness"),
     ],
 )
 def test_joint_axes_must_be_one_or_two_independent_directions(axes: Any, said: str) -> None:
