@@ -34,7 +34,7 @@ SETTINGS: Final = "series_stiffness", "control", "minimum", "maximum"
 """Keys that are attributes of a :class:`Cable` with the same name."""
 
 _ROBOT: Final = ONE  # key of the geometry, of which files have only the parts; no fault prints it
-_FORMS: Final = "universal", "hinged", "sections", "geometry", "joints", "links"
+_FORMS: Final = "universal", "hinged", "backbone", "sections", "geometry", "joints", "links"
 _NO_WIRE: Final = LinearElasticity(1e5)  # of cables whose wire is missing
 
 

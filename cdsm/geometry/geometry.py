@@ -12,12 +12,13 @@ from functools import cached_property, update_wrapper
 from inspect import signature
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Any, ParamSpec, Self
+from typing import Annotated, Any, ParamSpec, Self, TypeVar
 
 from pydantic import Field, model_validator
 
 from cdsm.errors import GeometryError, listed
 from cdsm.geometry import toml
+from cdsm.geometry.beams import Backbone, backbone_fields
 from cdsm.geometry.chain import STEEPEST, Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.geometry.uniform import Hinged, Universal, fields_of, same_angle, spread_out
@@ -30,9 +31,12 @@ from cdsm.support.values import Printed
 from cdsm.support.warning import warn
 
 _Keywords = ParamSpec("_Keywords")
+_Sizes = TypeVar("_Sizes")
 
 
-def _from_sizes(kind: Callable[_Keywords, Universal]) -> Callable[_Keywords, Geometry]:
+def _from_sizes(
+    kind: Callable[_Keywords, _Sizes], fields_of: Callable[[_Sizes], dict[str, Any]]
+) -> Callable[_Keywords, Geometry]:
     """Return a function that builds an arm and has the keywords and the docstring of ``kind``."""
 
     def build(*args: _Keywords.args, **keywords: _Keywords.kwargs) -> Geometry:
@@ -48,7 +52,8 @@ def _from_sizes(kind: Callable[_Keywords, Universal]) -> Callable[_Keywords, Geo
 class Geometry(Printed):
     """A serpentine arm, joint by joint; frozen, checked, all in SI units.
 
-    :meth:`universal` and :meth:`hinged` build arms of similar joints, :meth:`sections` joins arms.
+    :meth:`universal` and :meth:`hinged` build arms of similar joints, :meth:`backbone` one on a
+    flexible rod or tube; :meth:`sections` joins arms.
     Joint 1 is at x = ``base_length``, joint k+1 at the end of link k, and the tip at the end of the
     last link. Every joint has two disks, at the distance ``disk_offset`` before and after it; both
     have the ``hole_radius`` of the joint.
@@ -77,8 +82,9 @@ class Geometry(Printed):
     hole_radius: Length
     name: Name = "arm"
 
-    universal = staticmethod(_from_sizes(Universal))
-    hinged = staticmethod(_from_sizes(Hinged))
+    universal = staticmethod(_from_sizes(Universal, fields_of))
+    hinged = staticmethod(_from_sizes(Hinged, fields_of))
+    backbone = staticmethod(_from_sizes(Backbone, backbone_fields))
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -271,10 +277,10 @@ class Geometry(Printed):
     def read(cls, path: str | os.PathLike[str]) -> Geometry:
         """Read a geometry from a TOML file.
 
-        The file has the full form that :meth:`write` writes, or one table ``[universal]`` or
-        ``[hinged]`` of keywords of these methods. An arm of sections has such a table in each
-        ``[[sections]]``, and at the top ``name`` and ``spread`` of :meth:`sections`. From an
-        ARM.toml (see :meth:`cdsm.Manipulator.read`), only the geometry is read. Raises FileError,
-        or GeometryError, which lists every fault.
+        The file has the full form that :meth:`write` writes, or one table ``[universal]``,
+        ``[hinged]`` or ``[backbone]`` of keywords of these methods. An arm of sections has such a
+        table in each ``[[sections]]``, and at the top ``name`` and ``spread`` of :meth:`sections`.
+        From an ARM.toml (see :meth:`cdsm.Manipulator.read`), only the geometry is read. Raises
+        FileError, or GeometryError, which lists every fault.
         """
         return cls.from_toml(read_text(path), source=os.fspath(path))

@@ -44,10 +44,15 @@ class _Sections:
 
 def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
     """Build a geometry from parsed TOML as :meth:`Geometry.read`; GeometryError lists faults."""
-    kind = next((key for key in ("sections", "universal", "hinged", "geometry") if key in data), "")
+    kind = next(
+        (key for key in ("sections", "universal", "hinged", "backbone", "geometry") if key in data),
+        "",
+    )
     if not kind and not data.keys() & {"joints", "links"}:
         found = ", ".join(data) or "nothing"
-        raise GeometryError([f"holds {found}; give [universal], [hinged], [[sections]] or joints"])
+        raise GeometryError(
+            [f"holds {found}; give [universal], [hinged], [backbone], [[sections]] or joints"]
+        )
     if kind == "sections":
         given = parse(_Sections, data)
         parts, faults = [], []
@@ -65,7 +70,11 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
     table = data[kind] if kind else data
     if not isinstance(table, dict):
         raise GeometryError([f"{kind}: is {table!r}; give a table [{kind}]"])
-    return getattr(cls, kind)(**table) if kind in ("universal", "hinged") else parse(cls, table)
+    return (
+        getattr(cls, kind)(**table)
+        if kind in ("universal", "hinged", "backbone")
+        else parse(cls, table)
+    )
 
 
 def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
+from cdsm.geometry.beams import Beam
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Limit, Link
 from cdsm.support import records
 from cdsm.support.records import EACH, ONE, PerJoint
@@ -38,7 +39,7 @@ _OF_JOINTS = (
 
 
 @records.record
-class Universal:
+class Universal(Beam):
     """Build an arm of n universal joints with m cables each.
 
     Cable j = 0…m−1 of joint k = 1…n has its holes at φ = 2π((k−1) + n j)/(n m) + phase_k, or at
@@ -65,6 +66,13 @@ class Universal:
         rest_angle: Angle about each axis at which its spring has no torque [rad].
         spread: Angle [rad] between the holes of g cables whose angles φ are equal: the hole of
             cable i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: not turned.
+        bending_stiffness: EI of all links [N m²]; None: they do not bend. Or give the diameters.
+        torsion_stiffness: GJ of all links [N m²]; None: EI/(1 + ν); inf: they do not twist.
+        outer_diameter: Outer diameter [m] of links that are tubes or rods.
+        inner_diameter: Inner diameter [m]; 0: a rod.
+        youngs_modulus: E of the links [Pa].
+        poisson: ν, Poisson's ratio [-].
+        pieces: Number of pieces of each beam, from joint to disk to disk to joint; one is enough.
         name: Name of the robot.
     """
 
@@ -98,6 +106,7 @@ class Universal:
         ]
         if (angles is None) == (count is None) and (count or type(self) is Universal):
             faults.append("cables_per_joint: give it, or hole_angles, and not both")
+        faults += self._faults_of_beam()
         if faults:
             raise records.CrossFaults(faults)
         return self
@@ -132,7 +141,7 @@ def fields_of(sizes: Universal) -> dict[str, Any]:
     angles = given if isinstance(given[0], Sequence) else [given] * n
     values = [getattr(sizes, key) for key in _OF_JOINTS]
     each = [value if isinstance(value, Sequence) else [value] * n for value in values]
-    joints, links, cables, common = [], [], [], each[1][0]
+    joints, links, cables, common, beam = [], [], [], each[1][0], sizes.stiffness()
     rows = zip(axes, angles, *each, strict=True)
     for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase, k, rest in rows:
         R = None if common == R else R
@@ -140,7 +149,7 @@ def fields_of(sizes: Universal) -> dict[str, Any]:
         joints += [
             Joint(axes=axis, disk_offset=h, limit=top, hole_radius=R, disk_radius=r, **spring)
         ]
-        links += [Link(length=length, mass=mass)]
+        links += [Link(length=length, mass=mass, **beam)]
         kept = {"joint": len(joints), "lead": lead, "friction": mu, "radius": ring}
         cables += [CableRoute(angle=phi + phase, **kept) for phi in phis]
     whole = {"name": sizes.name, "base_length": sizes.base_length, "hole_radius": common}
