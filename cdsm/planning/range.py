@@ -31,8 +31,10 @@ STARTS: Final = 24
 AT_END: Final = 1e-3
 """Relative distance to the limit of stability, or to a cap, that counts as none."""
 
-_ASCENTS, _DESCENTS = 10, 5  # number of searches for each end
-_SETTINGS: Any = {"precision": 1e-10, "iterations": 100}
+_ASCENTS, _DESCENTS = 10, 5  # largest number of searches for each end
+_AGREED, _SAME = 3, 1e-5  # number of ascents whose ends differ by this part at most, and suffice
+_STEEP, _TANGENT = 10.0, 0.1  # factor of ln(along/start), and along/start below which it is straight
+_SETTINGS: Any = {"precision": 1e-10, "iterations": 50}
 _GAIN = 1e-6  # a smaller relative gain is no reason to search on
 
 
@@ -172,20 +174,37 @@ def ends(space: TensionSpace, starts: int = STARTS) -> tuple[End, End]:
     def value(F: Array) -> float:
         return float(along(F)[0])
 
-    def searched(sign: float, points: Iterable[Array], count: int) -> Array:
-        """Search from the best ``count`` points for the softest (1) or stiffest (−1) tensions."""
-        goal = affine(along, sign / value(anchor))
+    def search(sign: float, F: Array) -> Array:
+        """Search from F for softer (1) or stiffer (−1) tensions; return the best of start and end.
 
-        def search(F: Array) -> Array:
-            found = space.search(F, goal, bounds=space.capped, **_SETTINGS)
-            return F if found is None else space.pulled_back(found)
+        A maximum is sought of ln(along), which is concave where ``along`` is, and of even scale.
+        """
+        unit = value(F)
+
+        def goal(F: Array) -> tuple[Any, Array]:
+            s, slope = along(F)
+            if sign > 0.0:
+                return s / unit, slope / unit
+            tangent = max(s, _TANGENT * unit)  # the logarithm goes on straight below
+            return -_STEEP * (np.log(tangent / unit) + s / tangent), -_STEEP * slope / tangent
+
+        found = space.search(F, goal, bounds=space.capped, **_SETTINGS)
+        return F if found is None else min(F, space.pulled_back(found), key=lambda F: sign * value(F))
+
+    def best(sign: float, points: Iterable[Array], most: int, enough: int) -> Array:
+        """Search from the best ``most`` points, until ``enough`` searches end beside the best."""
 
         def rank(F: Array) -> float:
             return sign * value(F)
 
-        starts = sorted({f"{value(F):.8g}": F for F in points}.values(), key=rank)[:count]
-        best = min([*map(search, [*starts, anchor]), *starts], key=rank)
-        while rank(again := search(best)) < rank(best) - _GAIN * abs(rank(best)):
+        starts = sorted({f"{value(F):.6g}": F for F in points}.values(), key=rank)[:most]
+        found: list[Array] = []
+        for F in starts:
+            found = sorted([*found, search(sign, F)], key=rank)
+            if sum(rank(F) < rank(found[0]) + _SAME * value(found[0]) for F in found) == enough:
+                break
+        best = found[0]
+        while rank(again := search(sign, best)) < rank(best) - _GAIN * value(best):
             best = again
         return best
 
@@ -199,14 +218,15 @@ def ends(space: TensionSpace, starts: int = STARTS) -> tuple[End, End]:
         return F
 
     corners = [anchor, *space.corners(starts)]
-    stiffest = searched(-1.0, corners, _ASCENTS)
-    softest, known = searched(1.0, [*corners, *map(downhill, corners)], _DESCENTS), np.inf
+    inside = [(F + anchor) / 2.0 for F in corners]  # where no constraint stops the first step
+    stiffest = best(-1.0, [*corners, *inside], _ASCENTS, _AGREED)
+    softest, known = best(1.0, [*corners, *map(downhill, corners)], _DESCENTS, _DESCENTS), np.inf
     while value(softest) < (1.0 - _GAIN) * known:
         known, other = value(softest), np.where(2.0 * softest < low + high, high, low)
         beside = np.where(np.eye(len(other)) > 0.0, other, softest)  # one tension far away in each
         found = (space.nearest(F, space.capped) for F in beside)
         points = [space.pulled_back(F, 1e-3) for F in found if F is not None]
-        softest = searched(1.0, [softest, *points, *map(downhill, points)], _DESCENTS)
+        softest = best(1.0, [softest, *points, *map(downhill, points)], _DESCENTS, _DESCENTS)
     unlimited = np.isinf(space.bounds[1])
 
     def end(F: Array, farther: float) -> End:
