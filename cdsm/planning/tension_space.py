@@ -97,14 +97,12 @@ class TensionSpace:
         F = np.clip(F, *self.bounds)
         if self._last and np.array_equal(F, self._last[0]):  # SLSQP asks for value, then gradient
             return self._last[1]
-        pose, laws = self.pose, self.pose.arm._laws
-        k, J = laws.stiffness(pose.cable_lengths, F), pose.length_jacobian
-        slope = laws.stiffness_slope(F, k)
-        K = self._constant + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J
+        pose, (K, k) = self.pose, self._joint_stiffness(F)
+        slope = pose.arm._laws.stiffness_slope(F, k)
         values, vectors = np.linalg.eigh((K + K.T) / 2.0)
         rows = self.directions @ pose.jacobian[:3]
         K = K + 1e-21 * self._size * np.eye(len(K))  # which cannot be singular
-        right, left = (np.linalg.solve(A, rows.T) for A in (K, K.T))
+        right, left = (np.asarray(np.linalg.solve(A, rows.T), np.float64) for A in (K, K.T))
         s = 1.0 / (rows * right.T).sum(axis=1)
         left, right = (np.column_stack([s * M, vectors[:, 0]]) for M in (left, right))
         *slopes, softest = form_by_tension(pose, slope, left, right).diagonal(0, 1, 2).T
@@ -113,7 +111,14 @@ class TensionSpace:
 
     def reserve(self, F: Array) -> float:
         """Return λ/floor − 1 [-] of the smallest eigenvalue λ under F (C,); stable: 0 or more."""
-        return self.at(F).smallest[0] / self.floor - 1.0
+        K = self._joint_stiffness(np.clip(F, *self.bounds))[0]
+        return float(np.linalg.eigvalsh((K + K.T) / 2.0)[0]) / self.floor - 1.0
+
+    def _joint_stiffness(self, F: Array) -> tuple[Array, Array]:
+        """Compute K_θ (nv, nv) and the cable stiffnesses (C,) [N/m] under F (C,) [N]."""
+        pose, J = self.pose, self.pose.length_jacobian
+        k = pose.arm._laws.stiffness(pose.cable_lengths, F)
+        return self._constant + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J, k
 
     def nearest(self, F: Array, bounds: Bounds | None = None) -> Array | None:
         """Return the balanced tensions (C,) [N] nearest to F within the bounds, if any."""
@@ -137,17 +142,19 @@ class TensionSpace:
         objective: Function,
         *rules: tuple[str, Function],
         bounds: Bounds | None = None,
+        unit: float | None = None,
         stable: bool = True,
         precision: float = 1e-12,
         iterations: int = 100,
     ) -> Array | None:
         """Minimise ``objective`` from ``start`` (C,) [N] among the admissible tensions, locally.
 
-        ``rules`` are more constraints: each "eq" or "ineq" (not negative), and a function. Return
+        ``rules`` are more constraints: each "eq" or "ineq" (not negative), and a function. The
+        variables are F over ``unit`` [N], by default that of the space. Return
         tensions (C,) [N] in balance within ``bounds``, or None if there are none. They may miss
         stability and ``rules``.
         """
-        unit, limits = self.unit, bounds or self.bounds
+        unit, limits = unit or self.unit, bounds or self.bounds
         if (limits[0] > limits[1]).any():
             return None
 

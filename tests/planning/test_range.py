@@ -332,8 +332,27 @@ def test_no_sample_is_stiffer_where_the_rigidity_falls_again(law: cdsm.Elasticit
         if K.margin >= found.floor:
             values.append(K.along(u))
     assert len(values) > 100
+    values += [  # where all cables are near the stiffest tension of the law
+        cdsm.stiffness(pose, cdsm.distribute_tension(pose, bound, 400.0)).along(u)
+        for bound in np.linspace(90.0, 130.0, 41)
+    ]
     assert found.low * (1.0 - 1e-9) <= min(values)
     assert max(values) <= found.high * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", [11, 23, 103])
+def test_stiffest_tensions_of_arms_that_their_least_tensions_do_not_hold(seed: int) -> None:
+    """Where λ_min limits the stiffness; the tensions of an independent program are no stiffer."""
+    known = {11: 25106.119, 23: 929.280, 103: 3809.113}  # N/m
+    rng = np.random.default_rng([seed, 90])
+    kind = str(rng.choice(["universal", "hinged"]))
+    rng.uniform()
+    arm = arms.random_arm(seed, int(rng.integers(2, 6)), kind, STRAND)
+    pose, u = arms.random_posture(arm, seed, 0.4), rng.normal(size=3)
+    low, high = float(rng.choice([10.0, 35.0])), float(rng.choice([200.0, 500.0]))
+    found = cdsm.stiffness_range(pose, u, low, high)
+    assert found.high >= known[seed] * (1.0 - 1e-4)
+    assert cdsm.stiffness(pose, found.high_tension).margin >= found.floor * (1.0 - 1e-9)
 
 
 def test_corners_beside_the_softest_one_are_searched() -> None:
