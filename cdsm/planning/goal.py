@@ -61,16 +61,16 @@ class Goal:
             return float(way @ way) / 2.0, way / unit
 
         rule = "ineq" if self.at_least else "eq", self.misses
-        best, known = None, math.inf
+        best, known, missed = None, math.inf, math.inf
         for _ in range(_SEARCHES):
-            F = self.space.search(start, effort, rule, bounds=bounds, unit=unit)
+            F = self.space.search(start, effort, rule, bounds=bounds)
             if F is None or (self.met(F) and effort(F)[0] > (1.0 - REACHED) * known):
                 break
-            if not self.met(F) and self.misfit(F) > 0.5 * self.misfit(start):
-                break
-            start = F
             if self.met(F):
                 best, known = F, effort(F)[0]
+            elif self.misfit(F) > missed / 2.0:
+                break
+            start, missed = F, self.misfit(F)
         return best
 
     def least(self) -> Array:

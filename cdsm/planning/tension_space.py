@@ -142,19 +142,17 @@ class TensionSpace:
         objective: Function,
         *rules: tuple[str, Function],
         bounds: Bounds | None = None,
-        unit: float | None = None,
         stable: bool = True,
         precision: float = 1e-12,
         iterations: int = 100,
     ) -> Array | None:
         """Minimise ``objective`` from ``start`` (C,) [N] among the admissible tensions, locally.
 
-        ``rules`` are more constraints: each "eq" or "ineq" (not negative), and a function. The
-        variables are F over ``unit`` [N], by default that of the space. Return
+        ``rules`` are more constraints: each "eq" or "ineq" (not negative), and a function. Return
         tensions (C,) [N] in balance within ``bounds``, or None if there are none. They may miss
         stability and ``rules``.
         """
-        unit, limits = unit or self.unit, bounds or self.bounds
+        unit, limits = self.unit, bounds or self.bounds
         if (limits[0] > limits[1]).any():
             return None
 
