@@ -116,8 +116,9 @@ def plan_stiffness(
     have the least sum of squared relative misses that was found, and ``reached`` is False.
 
     With ``at_least``, along(u) ≥ target. If EA is constant or levels off, ``along`` is concave in
-    F, and this problem has one optimum. The equation is not convex: its searches are local. In 327
-    random plans, their effort ‖F‖ was never 0.2 % above that of an independent program.
+    F, and this problem has one optimum. The equation is not convex: its searches are local. In
+    326 of 327 random plans, their effort ‖F‖ was at most 0.2 % above that of an independent
+    program, in one by 3 %.
 
     Args:
         pose: The posture.

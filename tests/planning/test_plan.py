@@ -188,6 +188,34 @@ def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: 
     assert tried > 1000
 
 
+KNOWN = [  # seed, target [N/m], effort ‖F‖ [N] of an independent program
+    (2, 110896.076, 76.6403),
+    (6, 2647.397, 264.5468),
+    (10, 7246.608, 177.7846),
+    (14, 10947.014, 212.3807),
+    (18, 1149.346, 425.5580),
+    (22, 8297.864, 364.1637),
+    (26, 7779.646, 308.5537),
+    (30, 5887.553, 388.3994),
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "target", "effort"), KNOWN)
+def test_efforts_are_those_of_an_independent_program(
+    seed: int, target: float, effort: float
+) -> None:
+    rng = np.random.default_rng([seed, 90])
+    kind = str(rng.choice(["universal", "hinged"]))
+    law = cdsm.LinearElasticity(float(10.0 ** rng.uniform(3.7, 5.0)))
+    arm = arms.random_arm(seed, int(rng.integers(2, 6)), kind, law)
+    pose, u = arms.random_posture(arm, seed, 0.4), rng.normal(size=3)
+    low, high = float(rng.choice([10.0, 35.0])), float(rng.choice([200.0, 500.0]))
+    plan = cdsm.plan_stiffness(pose, u, target, low, high)
+    assert plan.achieved == pytest.approx(target, rel=1e-6)
+    assert np.linalg.norm(plan.tension) <= 1.005 * effort
+
+
 # --- out of reach ---------------------------------------------------------------------------
 
 
