@@ -47,10 +47,10 @@ from cdsm.errors import SolverError as SolverError
 from cdsm.errors import UnknownName as UnknownName
 from cdsm.errors import UnreachableStiffness as UnreachableStiffness
 from cdsm.errors import UrdfError as UrdfError
+from cdsm.friction.band import RestBand as RestBand
+from cdsm.friction.band import rest_band as rest_band
 from cdsm.friction.stick import Breakaway as Breakaway
-from cdsm.friction.stick import RestBand as RestBand
 from cdsm.friction.stick import breakaway as breakaway
-from cdsm.friction.stick import rest_band as rest_band
 from cdsm.friction.stick import stuck_stiffness as stuck_stiffness
 from cdsm.geometry import CableRoute as CableRoute
 from cdsm.geometry import Geometry as Geometry

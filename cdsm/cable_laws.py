@@ -117,7 +117,7 @@ class CableLaws:
         for law, of in self.held:
             stretch, EA = self._evaluate(law, of, tension[of])
             share = stiffness[of] * self.series[of]
-            rise = law.rigidity_slope(tension[of]) * stretch + float(self._unstrained)
+            rise = law._slope(tension[of], EA) * stretch + float(self._unstrained)
             slope[of] = stiffness[of] * (share + (1.0 - share) * rise) / (EA * stretch)
         return frozen(slope)
 

@@ -161,8 +161,9 @@ class Variable:
             case "cables_per_joint":
                 joints = [cable.joint for cable in geometry.cables]
                 found = [joints.count(k + 1) for k in range(len(geometry.joints))]
-            case "minimum":
-                found = [minimum]
+            case "minimum":  # where nothing asks for more, the least of the range will do
+                own = max(minimum, min(cable.minimum for cable in arm.cables))
+                found = [max(own, self.low or 0.0)]
             case "wire":
                 laws = {cable.elasticity for cable in arm.cables}
                 found = [each for each in self.choices if {as_wire(each)} == laws][:1]

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdsm.errors import UnreachableStiffness
-from cdsm.planning.range import AT_END, End, ends
+from cdsm.planning.range import AT_END, End, downhill, ends, farther
 from cdsm.planning.tension_space import Bounds, TensionSpace
 from cdsm.support.values import Array
 from cdsm.tension import advice
@@ -19,7 +19,9 @@ REACHED: Final = 1e-6
 """Largest relative miss with which a target counts as hit; most searches come much nearer."""
 
 _CORNERS = 12  # number of random directions in which corners are sought
-_STARTS, _SEARCHES = 5, 3  # number of starts if the first one fails, and of searches from each
+_ENOUGH = 2  # number of lines beyond the corners that hit the target
+_STARTS, _LEAST = 5, 2  # number of starts on lines, and at the least corners, if the first fails
+_SEARCHES = 3  # largest number of searches from each start
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,44 +61,58 @@ class Goal:
             return float(way @ way) / 2.0, way / unit
 
         rule = "ineq" if self.at_least else "eq", self.misses
-        best, known = None, math.inf
+        best, known, missed = None, math.inf, math.inf
         for _ in range(_SEARCHES):
             F = self.space.search(start, effort, rule, bounds=bounds)
             if F is None or (self.met(F) and effort(F)[0] > (1.0 - REACHED) * known):
                 break
-            start = F
             if self.met(F):
                 best, known = F, effort(F)[0]
+            elif self.misfit(F) > missed / 2.0:
+                break
+            start, missed = F, self.misfit(F)
         return best
 
     def least(self) -> Array:
         """Search for the least tensions (C,) [N] that meet the goal, from the anchor at first.
 
-        If that fails, searches begin where lines from the anchor to corners hit the target, or
-        lines from an end of the range. Several directions that no search hits together have the
-        tensions with the least sum of squared misses that was found; a single one raises
-        UnreachableStiffness. SingularStiffness is raised if the arm is stable nowhere.
+        If that fails, searches begin where lines from the anchor to corners hit the target, or to
+        what searches from there find, or to an end of the range; and from the least corners.
+        Several directions that no search hits together have the tensions with the least sum of
+        squared misses that was found; a single one raises UnreachableStiffness. SingularStiffness
+        is raised if the arm is stable nowhere.
         """
         space = self.space
         if (found := self.search(space.anchor)) is not None:
             return found
-        corners = space.corners(_CORNERS)
+        corners = sorted(space.corners(_CORNERS), key=self.misfit)
         if self.targets.size > 1:
-            starts = [space.anchor, *sorted(corners, key=self.misfit)[:_STARTS]]
+            starts = [space.anchor, *corners[:_STARTS]]
             near = [F for F in map(self.nearest, starts) if F is not None]
             best = min([*starts, *near], key=self.misfit)
             found = self.search(best) if self.met(best) else None
             return best if found is None else found
-        found = self._best(self._crossings(space.anchor, corners))
-        if found is None:
-            low, high = ends(space)
-            if not (1.0 - REACHED) * low.value <= self.targets[0] <= (1.0 + REACHED) * high.value:
-                raise self._unreachable(low, high)
+        lines = self._crossings(space.anchor, corners) or self._beyond(corners)
+        found = self._best([*lines[:_STARTS], *sorted(corners, key=_effort)[:_LEAST]])
+        if found is not None:
+            return found
+        low, high = ends(space)
+        if (1.0 - REACHED) * low.value <= self.targets[0] <= (1.0 + REACHED) * high.value:
             both = [low.F, high.F]
             lines = [*self._crossings(low.F, corners), *self._crossings(space.anchor, both)]
             found = self._best([*both, *lines])
         if found is None:
             raise self._unreachable(low, high)
+        return found
+
+    def _beyond(self, corners: list[Array]) -> list[Array]:
+        """Return where lines from the anchor to what searches from corners find hit the target."""
+        sign, found = -float(np.sign(self.misses(self.space.anchor)[0][0])), list[Array]()
+        for F in corners:
+            end = farther(self.space, -sign, downhill(self.space, F) if sign < 0.0 else F)
+            found += self._crossings(self.space.anchor, [end])
+            if len(found) == _ENOUGH:
+                break
         return found
 
     def _unreachable(self, low: End, high: End) -> UnreachableStiffness:
@@ -121,9 +137,14 @@ class Goal:
         return None if F is None else self.space.pulled_back(F)
 
     def _best(self, starts: list[Array]) -> Array | None:
-        starts = starts[:_STARTS]
-        found = [F for F in (*map(self.search, starts), *starts) if F is not None and self.met(F)]
-        return min(found, key=lambda F: float(F @ F), default=None)
+        """Return the least tensions that searches find, until two find the same, or the starts."""
+        ends: list[Array] = []
+        for start in starts:
+            both = [F for F in (self.search(start), start) if F is not None and self.met(F)]
+            ends = sorted([*ends, *sorted(both, key=_effort)[:1]], key=_effort)
+            if len(ends) > 1 and _effort(ends[1]) < (1.0 + REACHED) * _effort(ends[0]):
+                break
+        return ends[0] if ends else None
 
     def _crossings(self, hub: Array, points: list[Array]) -> list[Array]:
         """Return where the lines from ``hub`` to ``points`` hit the only target, least first."""
@@ -135,4 +156,8 @@ class Goal:
         for way in points - hub:
             if miss(0.0, way) * miss(1.0, way) < 0.0:
                 found.append(hub + brentq(miss, 0.0, 1.0, args=(way,), xtol=1e-12) * way)
-        return sorted(found, key=lambda F: float(F @ F))
+        return sorted(found, key=_effort)
+
+
+def _effort(F: Array) -> float:
+    return float(np.linalg.norm(F))

@@ -110,14 +110,15 @@ def plan_stiffness(
 
     The constraints on F are J_Lᵀ F = J_Xᵀ W − g, the bounds, the domains of the elasticities of
     position-controlled cables, and stability: the smallest eigenvalue of K_θ (symmetric part) is at
-    least 1 % of what it is under the least tensions. The target of one direction is hit within 1e-6
-    of its value; otherwise an error is raised. The targets of several directions are hit if
-    possible. If not, the tensions have the least sum of squared relative misses that was found, and
-    ``reached`` is False.
+    least 1 % of what it is under the least tensions, or, if they hardly hold the arm, under the
+    most stable ones. The target of one direction is hit within 1e-6 of its value; otherwise an
+    error is raised. The targets of several directions are hit if possible. If not, the tensions
+    have the least sum of squared relative misses that was found, and ``reached`` is False.
 
     With ``at_least``, along(u) ≥ target. If EA is constant or levels off, ``along`` is concave in
-    F, and this problem has one optimum. The equation is not convex: its searches are local. In 98
-    of 100 plans, their effort ‖F‖ was within 0.5 % of the least one known.
+    F, and this problem has one optimum. The equation is not convex: its searches are local. In
+    326 of 327 random plans, their effort ‖F‖ was at most 0.2 % above that of an independent
+    program, in one by 3 %.
 
     Args:
         pose: The posture.

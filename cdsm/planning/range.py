@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm.errors import InvalidInput
-from cdsm.planning.tension_space import TensionSpace, affine
+from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.directions import Direction, unit_direction
@@ -31,8 +31,13 @@ STARTS: Final = 24
 AT_END: Final = 1e-3
 """Relative distance to the limit of stability, or to a cap, that counts as none."""
 
-_ASCENTS, _DESCENTS = 10, 5  # number of searches for each end
-_SETTINGS: Any = {"precision": 1e-10, "iterations": 100}
+_ASCENTS, _DESCENTS = 10, 5  # largest number of searches for each end
+_AGREED, _SAME = 5, 1e-5  # number of ascents whose ends differ by this part at most, and suffice
+_STEEP, _TANGENT = (
+    10.0,
+    0.1,
+)  # factor of ln(along/start), and along/start below which it is straight
+_SETTINGS: Any = {"precision": 1e-10, "iterations": 50}
 _GAIN = 1e-6  # a smaller relative gain is no reason to search on
 
 
@@ -116,8 +121,9 @@ def stiffness_range(
     corners of the set of admissible tensions. So the search for ``low`` begins at many corners, and
     from the softest one found at all beside it, until none is softer; this does not prove that
     ``low`` is the smallest. If tension can buckle the arm, it is softest just before: ``low`` then
-    depends on ``floor``, 1 % of the smallest eigenvalue of K_θ under the least tensions, and
-    ``print`` says "limited by stability".
+    depends on ``floor``, 1 % of the smallest eigenvalue of K_θ under the least tensions (or, if
+    they hardly hold the arm, under the most stable ones), and ``print`` says "limited by
+    stability".
 
     Args:
         pose: The posture.
@@ -165,48 +171,38 @@ def ends(space: TensionSpace, starts: int = STARTS) -> tuple[End, End]:
     """Find the softest and the stiffest tensions along the only direction of ``space``."""
     (low, high), anchor = space.capped, space.anchor
 
-    def along(F: Array) -> tuple[Any, Array]:
-        values, slopes = space.at(F).along
-        return values[0], slopes[0]
-
     def value(F: Array) -> float:
-        return float(along(F)[0])
+        return float(_along(space, F)[0])
 
-    def searched(sign: float, points: Iterable[Array], count: int) -> Array:
-        """Search from the best ``count`` points for the softest (1) or stiffest (−1) tensions."""
-        goal = affine(along, sign / value(anchor))
-
-        def search(F: Array) -> Array:
-            found = space.search(F, goal, bounds=space.capped, **_SETTINGS)
-            return F if found is None else space.pulled_back(found)
+    def best(sign: float, points: Iterable[Array], most: int, enough: int = -1) -> Array:
+        """Search from the best ``most`` points, until ``enough`` searches end beside the best."""
 
         def rank(F: Array) -> float:
             return sign * value(F)
 
-        starts = sorted({f"{value(F):.8g}": F for F in points}.values(), key=rank)[:count]
-        best = min([*map(search, [*starts, anchor]), *starts], key=rank)
-        while rank(again := search(best)) < rank(best) - _GAIN * abs(rank(best)):
+        starts = sorted({f"{value(F):.6g}": F for F in points}.values(), key=rank)[:most]
+        found: list[Array] = []
+        for F in starts:
+            found = sorted([*found, farther(space, sign, F)], key=rank)
+            if sum(rank(F) < rank(found[0]) + _SAME * value(found[0]) for F in found) == enough:
+                break
+        best = found[0]
+        while rank(again := farther(space, sign, best)) < rank(best) - _GAIN * value(best):
             best = again
         return best
 
-    def downhill(F: Array) -> Array:
-        """Go from corner to corner while the arm becomes softer."""
-        while (corner := space.corner(-along(F)[1])) is not None:
-            softer = space.pulled_back(corner, 1e-3)
-            if value(softer) > (1.0 - _GAIN) * value(F):
-                break
-            F = softer
-        return F
-
     corners = [anchor, *space.corners(starts)]
-    stiffest = searched(-1.0, corners, _ASCENTS)
-    softest, known = searched(1.0, [*corners, *map(downhill, corners)], _DESCENTS), np.inf
+    inside = [(F + anchor) / 2.0 for F in corners]  # where no constraint stops the first step
+    stiffest = best(-1.0, [*corners, *inside], _ASCENTS, _AGREED)
+    down = [downhill(space, F) for F in corners]
+    softest, known = best(1.0, [*corners, *down], _DESCENTS), np.inf
     while value(softest) < (1.0 - _GAIN) * known:
         known, other = value(softest), np.where(2.0 * softest < low + high, high, low)
         beside = np.where(np.eye(len(other)) > 0.0, other, softest)  # one tension far away in each
         found = (space.nearest(F, space.capped) for F in beside)
         points = [space.pulled_back(F, 1e-3) for F in found if F is not None]
-        softest = searched(1.0, [softest, *points, *map(downhill, points)], _DESCENTS)
+        down = [downhill(space, F) for F in points]
+        softest = best(1.0, [softest, *points, *down], _DESCENTS)
     unlimited = np.isinf(space.bounds[1])
 
     def end(F: Array, farther: float) -> End:
@@ -214,3 +210,40 @@ def ends(space: TensionSpace, starts: int = STARTS) -> tuple[End, End]:
         return End(F, farther if beyond else value(F), beyond)
 
     return end(softest, 0.0), end(stiffest, np.inf)
+
+
+def _along(space: TensionSpace, F: Array) -> tuple[Any, Array]:
+    values, slopes = space.at(F).along
+    return values[0], slopes[0]
+
+
+def farther(space: TensionSpace, sign: float, F: Array) -> Array:
+    """Search from F (C,) [N] for softer (``sign`` 1) or stiffer (−1) tensions; F if there are none.
+
+    A maximum is sought of ln(along), which is concave where ``along`` is, and of even scale.
+    """
+    unit = float(_along(space, F)[0])
+
+    def goal(F: Array) -> tuple[Any, Array]:
+        s, slope = _along(space, F)
+        if sign > 0.0:
+            return s / unit, slope / unit
+        tangent = max(s, _TANGENT * unit)  # the logarithm goes on straight below
+        return -_STEEP * (np.log(tangent / unit) + s / tangent), -_STEEP * slope / tangent
+
+    found = space.search(F, goal, bounds=space.capped, **_SETTINGS)
+    if found is None:
+        return F
+    return min(F, space.pulled_back(found), key=lambda F: sign * float(_along(space, F)[0]))
+
+
+def downhill(space: TensionSpace, F: Array) -> Array:
+    """Go from F (C,) [N] from corner to corner while the arm becomes softer; return the last."""
+    value, slope = _along(space, F)
+    while (corner := space.corner(-slope)) is not None:
+        softer = space.pulled_back(corner, 1e-3)
+        known, (value, slope) = value, _along(space, softer)
+        if value > (1.0 - _GAIN) * known:
+            break
+        F = softer
+    return F

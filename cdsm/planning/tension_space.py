@@ -31,12 +31,12 @@ from cdsm.tension import Tension, advice, distribute_tension, too_few_cables
 from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve
 
 MARGIN: Final = 1e-2
-"""An arm counts as stable down to this part of the smallest eigenvalue under the least tensions."""
+"""An arm counts as stable down to this part of the smallest eigenvalue of K_θ at the anchor."""
 
 FAR: Final = 1e3
 """Largest tension of a search without an upper bound, over the largest of the least tensions."""
 
-_REGULAR = 1e-3  # this eigenvalue counts as at least such a part of the smallest diagonal entry
+_REGULAR = 1e-3  # an arm is clearly stable from this part of its smallest diagonal entry on
 _FLAT = 1e-10  # singular values of J_Lᵀ below this part of the largest count as zero
 _DIGITS = 6  # decimal places of tensions, over the largest of the least, in which corners differ
 
@@ -64,7 +64,6 @@ class TensionSpace:
         bounds: Lower and upper bounds (C,) [N], within the domains; inf if there is none.
         capped: The same with finite upper bounds, for searches of the largest tensions.
         unit: Largest of the least tensions [N]; 1 N if all are zero.
-        floor: Smallest eigenvalue of K_θ with which the arm counts as stable [N m/rad].
     """
 
     def __init__(
@@ -83,10 +82,8 @@ class TensionSpace:
         K, J = stiffness(pose, self.least), pose.length_jacobian
         for u in self.directions:
             K._require_mobile(u)
-        parts = sum(
-            abs(each.diagonal()) for each in (K.active, K.passive, K.gravity, K.load, K.springs)
-        )
-        self.floor = MARGIN * max(K.margin, _REGULAR * float(np.min(parts)), SMALLEST)
+        parts = abs(K.active) + abs(K.passive) + abs(K.gravity) + abs(K.load) + K.springs
+        self._size = max(float(parts.diagonal().min()), SMALLEST)
         self._constant = K.gravity + K.load + K.springs
         torque = pose.jacobian.T @ self.least.wrench - pose._own_torque
         self._balance = nondimensional(J, torque, low, high, pose.arm.length)
@@ -100,23 +97,28 @@ class TensionSpace:
         F = np.clip(F, *self.bounds)
         if self._last and np.array_equal(F, self._last[0]):  # SLSQP asks for value, then gradient
             return self._last[1]
-        pose, laws = self.pose, self.pose.arm._laws
-        k, J = laws.stiffness(pose.cable_lengths, F), pose.length_jacobian
-        slope = laws.stiffness_slope(F, k)
-        K = self._constant + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J
+        pose, (K, k) = self.pose, self._joint_stiffness(F)
+        slope = pose.arm._laws.stiffness_slope(F, k)
         values, vectors = np.linalg.eigh((K + K.T) / 2.0)
-        softest = form_by_tension(pose, slope, vectors[:, :1], vectors[:, :1])[:, 0, 0]
         rows = self.directions @ pose.jacobian[:3]
-        K = K + 1e-16 * self.floor * np.eye(len(K))  # which cannot be singular
+        K = K + 1e-21 * self._size * np.eye(len(K))  # which cannot be singular
         right, left = (np.asarray(np.linalg.solve(A, rows.T), np.float64) for A in (K, K.T))
-        s = 1.0 / np.einsum("ni,in->n", rows, right)
-        slopes = s**2 * form_by_tension(pose, slope, left, right).diagonal(0, 1, 2)
-        self._last = F, Point((s, np.asarray(slopes.T)), (float(values[0]), softest))
+        s = 1.0 / (rows * right.T).sum(axis=1)
+        left, right = (np.column_stack([s * M, vectors[:, 0]]) for M in (left, right))
+        *slopes, softest = form_by_tension(pose, slope, left, right).diagonal(0, 1, 2).T
+        self._last = F, Point((s, np.array(slopes)), (float(values[0]), softest))
         return self._last[1]
 
     def reserve(self, F: Array) -> float:
         """Return λ/floor − 1 [-] of the smallest eigenvalue λ under F (C,); stable: 0 or more."""
-        return self.at(F).smallest[0] / self.floor - 1.0
+        K = self._joint_stiffness(np.clip(F, *self.bounds))[0]
+        return float(np.linalg.eigvalsh((K + K.T) / 2.0)[0]) / self.floor - 1.0
+
+    def _joint_stiffness(self, F: Array) -> tuple[Array, Array]:
+        """Compute K_θ (nv, nv) and the cable stiffnesses (C,) [N/m] under F (C,) [N]."""
+        pose, J = self.pose, self.pose.length_jacobian
+        k = pose.arm._laws.stiffness(pose.cable_lengths, F)
+        return self._constant + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J, k
 
     def nearest(self, F: Array, bounds: Bounds | None = None) -> Array | None:
         """Return the balanced tensions (C,) [N] nearest to F within the bounds, if any."""
@@ -161,8 +163,10 @@ class TensionSpace:
         def balance(F: Array) -> tuple[Array, Array]:
             return self._rows @ (F - self.least.values) / unit, self._rows / unit
 
-        reserve = affine(lambda F: self.at(F).smallest, MARGIN / self.floor, -MARGIN)
-        every = [*rules, *[("ineq", reserve)] * stable, *[("eq", balance)] * (len(self._rows) > 0)]
+        every = [*rules, *[("eq", balance)] * (len(self._rows) > 0)]
+        if stable:
+            rule = affine(lambda F: self.at(F).smallest, MARGIN / self.floor, -MARGIN)
+            every.append(("ineq", rule))
         goal = scaled("", objective)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # of iterates beyond the bounds
@@ -179,21 +183,30 @@ class TensionSpace:
 
     @cached_property
     def anchor(self) -> Array:
-        """Tensions (C,) [N] under which the arm is stable: the least ones, if they are.
+        """The least tensions (C,) [N] if the arm is clearly stable; else the most stable found.
 
-        Raises SingularStiffness if none are found.
+        Raises SingularStiffness if the arm is stable under none.
         """
+
+        def smallest(F: Array) -> float:
+            return self.at(F).smallest[0]
+
         best = self.least.values
-        if self.reserve(best) < 0.0:
-            goal = affine(lambda F: self.at(F).smallest, -MARGIN / self.floor)
+        if smallest(best) < _REGULAR * self._size:
+            goal = affine(lambda F: self.at(F).smallest, -1.0 / self._size)
             points = [best, *self._corners(0)]
-            starts = max(points, key=self.reserve), np.mean(points, axis=0)
+            starts = max(points, key=smallest), np.mean(points, axis=0)
             found = [self.search(F, goal, bounds=self.capped, stable=False) for F in starts]
-            best = max([*points, *(F for F in found if F is not None)], key=self.reserve)
-        if self.reserve(best) < 0.0:
+            best = max([*points, *(F for F in found if F is not None)], key=smallest)
+        if smallest(best) <= 0.0:
             K = stiffness(self.pose, best, self.least.wrench)
             raise unstable(K, "admissible tensions", self.bounds)
         return best
+
+    @cached_property
+    def floor(self) -> float:
+        """Smallest eigenvalue of K_θ with which the arm counts as stable [N m/rad]."""
+        return MARGIN * self.at(self.anchor).smallest[0]
 
     def corner(self, way: Array) -> Array | None:
         """Return the balanced tensions (C,) [N] farthest in the direction ``way`` (C,), if any."""

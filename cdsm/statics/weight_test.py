@@ -205,7 +205,7 @@ class WeightTest(Result):
             slides = "under this weight the arm does not slide yet: hang more"
         sliding = np.count_nonzero(self.history.sliding[-1]), len(self.history.holes)
         return [
-            f"below {self.breakaway_load:.4g} N (first order) all cables stick: a weight measures "
+            f"below {self.breakaway_load:.4g} N all cables stick: a weight measures "
             f"{self.stuck / 1e3:.4g} N/mm",
             slides,
             f"this weight, {self.loads[-1]:.4g} N, measures {self.stiffness / 1e3:.4g} N/mm; "

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyint, polyval
+from numpy.polynomial.polynomial import polyint, polyval
 from numpy.typing import ArrayLike, NDArray
 
 import cdsm
@@ -134,9 +134,16 @@ class Elasticity:
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
         """Compute dEA/dF [-] at F [N], any shape; zero below :attr:`rest`."""
-        F = self._inside(number_array("tension", tension))
-        bend = self._polynomial(polyder(self._coefficients, 2), F)
-        return np.where(self.rest > F, 0.0, -bend * self._evaluate(F)[1] ** 2 / self._factor)
+        F = number_array("tension", tension)
+        return self._slope(F, self._evaluate(self._inside(F))[1])
+
+    def _slope(self, F: Array, EA: Array) -> Array:
+        """Compute dEA/dF [-] at tensions F [N] of the law, with EA [N] there: −EA² ε″."""
+        piece, x = self._place(F.clip(self.rest))
+        rows, bend = self._coefficients.take(piece, axis=1), np.zeros_like(x)
+        for i in range(len(rows) - 1, 1, -1):
+            bend = bend * x + i * (i - 1) * rows[i]
+        return np.where(self.rest > F, 0.0, -bend * EA**2 / self._factor)
 
     def energy(self, tension: ArrayLike) -> Array:
         """Compute ∫ F dε [N] = [J/m], from :attr:`rest` to F [N], any shape."""

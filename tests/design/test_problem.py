@@ -322,11 +322,12 @@ def test_no_design_of_the_front_is_beaten() -> None:
 
 
 @pytest.mark.slow
-def test_processes_change_no_bit() -> None:
+def test_processes_change_nothing() -> None:
     task = problem()
     rows = np.array([[0.016, 1.0, 0.0], [0.02, 2.0, 1.0], [0.03, 3.0, 1.0]])
     one, two = (cdsm.evaluate_designs(task, rows, jobs=n) for n in (1, 2))
-    np.testing.assert_array_equal(one.values, two.values)
+    # one process may have compiled the kernels, the others may not
+    np.testing.assert_allclose(one.values, two.values, rtol=1e-12)
 
 
 def test_an_infeasible_problem_is_named() -> None:

@@ -127,6 +127,22 @@ def test_ten_thousand_histories_stay_within_the_band(friction: float, part: int)
     assert 0.6 < farthest(prototype(friction), 60.0, seeds) < 1.02
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("friction", "limit", "beyond"), [(0.1, 1.02, 0.0), (0.2, 1.1, 0.01)])
+def test_random_arms_stay_within_the_band(friction: float, limit: float, beyond: float) -> None:
+    far = []
+    for seed in range(40):
+        plain = arms.random_arm(seed, 1 + seed % 3, ("universal", "hinged")[seed % 2], LAW)
+        pose = arms.random_posture(rough(plain, friction), seed, 0.5)
+        pull = cdsm.distribute_tension(pose, 50.0)
+        bands = [cdsm.rest_band(pose, pull, axis) for axis in "xyz"]
+        if cdsm.stiffness(pose, pull).is_stable and not any(each.warnings for each in bands):
+            largest = 15.0 * max(each.breakaway for each in bands if each.breakaway < 1e6)
+            far += [farthest((pose, pull.values), largest, range(k, k + 1)) for k in range(12)]
+    assert len(far) > 300
+    assert np.mean(np.array(far) > limit) <= beyond
+
+
 def test_print_names_first_order_and_the_breakaway_load() -> None:
     pose, F = prototype(0.1)
     band = cdsm.rest_band(pose, F, "-z")

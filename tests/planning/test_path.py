@@ -67,6 +67,34 @@ def test_several_directions_are_hit_at_every_sample() -> None:
         assert "all targets at once" in part.infeasible[0].reason
 
 
+def test_hung_weight_measures_what_was_planned_while_the_arm_carries_another() -> None:
+    """Soft, stiff with 10 N in the hand, soft; measured up and down with locked motors."""
+    s = np.arange(24)
+    stiff = np.interp(s, [6, 10, 14, 18], [0.0, 1.0, 1.0, 0.0])
+    W = np.zeros((24, 6))
+    W[:, 2] = -10.0 * (stiff == 1.0)
+    plan = cdsm.plan_path(ARM, DOWN, 70e3 + 25e3 * stiff, 50.0, 800.0, W, angles=waving(24))
+    assert plan.complete
+    assert_holds(plan, 50.0, 800.0)
+    for K, load in zip(plan.stiffness, W, strict=True):
+        np.testing.assert_array_equal(K.wrench, load)
+        # torque of cables, weight and load by the joint angles alone: a wrong sign leaves newtons
+        pose = K.posture
+        torque = pose.length_jacobian.T @ K.tension + pose.gravity_torque - pose.jacobian.T @ load
+        assert abs(torque).max() < 1e-9
+    for k in (2, 12, 20):
+        force = 1e-7 * plan.target[k] * np.array(DOWN)
+        load = plan.stiffness[k].wrench
+        soft = [
+            1.0
+            / cdsm.weight_test(
+                ARM.at(plan.angles[k]), plan.tensions[k], sign * force, wrench=load
+            ).stiffness
+            for sign in (1.0, -1.0)
+        ]
+        assert 2.0 / sum(soft) == pytest.approx(plan.target[k], rel=1e-6)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 5, 9])
 def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
@@ -176,6 +204,31 @@ def test_target_that_jumps_is_hit_again_when_the_motors_are_there(rate: float, l
         assert f"{rate:g} N are allowed" in plan.infeasible[0].reason
 
 
+@pytest.mark.parametrize("rate", [math.inf, 121.0, 119.0])
+def test_tensions_that_would_buckle_the_arm_are_not_gone_on_from(rate: float) -> None:
+    """Pushed by P from its tip a straight hinge is softer by P·lever, and buckles."""
+    F, P = np.array([170.0, 50.0]), np.array([0.0, 4.0])
+    stiff = np.array([soft(each) for each in F]) - P * LENGTH
+    assert stiff[0] - P[1] * LENGTH < 0.0
+    W = np.zeros((2, 6))
+    W[:, 0] = -P
+    plan = cdsm.plan_path(
+        soft_hinge(),
+        DOWN,
+        stiff / LENGTH**2,
+        10.0,
+        wrench=W,
+        angles=[[0.0], [0.0]],
+        max_change_per_sample=rate,
+    )
+    assert plan.tensions[0] == pytest.approx(F[0], rel=1e-9)
+    if rate >= 120.0:
+        assert plan.complete
+        assert plan.tensions[1] == pytest.approx(F[1], rel=1e-9)
+    else:
+        assert [each.status for each in plan.infeasible] == ["rate"]
+
+
 def test_balance_that_the_rate_does_not_allow_is_named() -> None:
     """A load of 30 N on the lever asks for 3 N m, 100 N more in one cable than in the other."""
     W = np.zeros((3, 6))
@@ -235,6 +288,15 @@ def test_rest_length_and_elongation_make_the_length() -> None:
                 free = float(next(lengths))
                 assert 0.0 < free < L
                 assert free + float(cable.elongation(F, free)) == pytest.approx(L, rel=1e-14)
+
+
+def test_motors_pay_out_the_unstrained_length_whatever_the_stiffness_takes_for_it() -> None:
+    s = np.linspace(0.0, math.pi, 5)
+    for name in ("unstrained", "stretched"):
+        arm = presets.virtual_prototype(original_length=name)
+        plan = cdsm.plan_path(arm, DOWN, 70e3 + 20e3 * np.sin(s), 50.0, angles=waving(5))
+        lengths = plan.rest_lengths * (1.0 + STRAND.strain(plan.tensions))
+        np.testing.assert_allclose(lengths, plan.cable_lengths, rtol=1e-14)
 
 
 def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> None:

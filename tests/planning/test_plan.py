@@ -13,7 +13,7 @@ from cdsm.support.values import Array
 from tests.planning.test_range import corners
 from tests.support import arms
 from tests.support.differences import central_difference
-from tests.support.locked import LENGTH, STRAND, soft, soft_hinge, some_arm
+from tests.support.locked import LENGTH, STRAND, hinge, soft, soft_hinge, some_arm
 from tests.support.paths import DOWN
 
 ARMS: dict[str, tuple[str, int, int, cdsm.Elasticity, float, float]] = {
@@ -38,8 +38,8 @@ def floor(plan: cdsm.StiffnessPlan, low: float, high: float) -> float:
 
 def assert_admissible(plan: cdsm.StiffnessPlan, low: float, high: float) -> None:
     F, K = plan.tension.values, plan.stiffness
-    assert abs(plan.tension.residual).max() <= 1e-12 * high
-    np.testing.assert_allclose(K.residual, plan.tension.residual, atol=1e-15 * high)
+    assert abs(plan.tension.residual).max() <= 1e-12 * F.max()
+    np.testing.assert_allclose(K.residual, plan.tension.residual, atol=1e-15 * F.max())
     assert (low <= F).all()
     assert (high >= F).all()
     assert K.margin >= floor(plan, low, high) * (1.0 - 1e-9)
@@ -71,6 +71,44 @@ def test_ten_random_targets_are_hit_as_a_hung_weight_measures(name: str) -> None
             for sign in (1.0, -1.0)
         ]
         assert 2.0 / sum(soft) == pytest.approx(target, rel=1e-4)
+
+
+def random_target(seed: int) -> tuple[cdsm.Posture, Array, float] | None:
+    """An arm, a direction and a stiffness that it can have along it; or none if it cannot stand."""
+    rng = np.random.default_rng([seed, 50])
+    kind = str(rng.choice(["universal", "hinged"]))
+    law = STRAND if seed % 2 else cdsm.LinearElasticity(float(10.0 ** rng.uniform(4.0, 5.0)))
+    arm = arms.random_arm(seed, int(rng.integers(2, 6)), kind, law)
+    pose = arms.random_posture(arm, seed, 0.4)
+    u = rng.normal(size=3)
+    try:
+        found = cdsm.stiffness_range(pose, u, 40.0, 500.0, starts=4)
+    except (cdsm.InfeasibleTension, cdsm.SingularStiffness):
+        return None
+    return pose, found.direction, found.low + rng.uniform(0.05, 0.95) * (found.high - found.low)
+
+
+@pytest.mark.slow
+def test_fifty_random_arms_are_as_stiff_as_planned_under_a_hung_weight() -> None:
+    """Measured by the nonlinear equilibrium with locked motors, up and down, within 1e-4."""
+    reached = {"linear": 0, "strand": 0}
+    for seed in range(80):
+        case = random_target(seed)
+        if case is None:
+            continue
+        pose, u, target = case
+        plan = cdsm.plan_stiffness(pose, u, target, 40.0, 500.0)
+        # 50 nm: of the arm nearest to buckling the curvature leaves 4e-5 then
+        force = 5e-8 * target * u
+        soft = [
+            1.0 / cdsm.weight_test(pose, plan.tension, sign * force).stiffness
+            for sign in (1.0, -1.0)
+        ]
+        assert 2.0 / sum(soft) == pytest.approx(target, rel=1e-4), seed
+        reached["strand" if seed % 2 else "linear"] += 1
+        if min(reached.values()) >= 25:
+            break
+    assert min(reached.values()) >= 25
 
 
 @pytest.mark.parametrize("name", ["universal-3-8-all", "hinged-4-0-all", "mixed-3-0-all"])
@@ -121,6 +159,63 @@ def test_tensions_satisfy_the_conditions_of_first_order(name: str, part: float) 
     assert z[at_high].max(initial=0.0) < 1e-6 * np.linalg.norm(F)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("name", [name for name in ARMS if name.startswith("hinged")])
+def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: float) -> None:
+    """They are a convex set, so if along met the target somewhere it would on the way there."""
+    pose, low, high = posture(name)
+    u = np.array([0.2, 0.5, -0.8])
+    found = cdsm.stiffness_range(pose, u, low, high)
+    target = found.low + part * (found.high - found.low)
+    plan = cdsm.plan_stiffness(pose, u, target, low, high)
+    effort = float(np.linalg.norm(plan.tension.values))
+    least = cdsm.distribute_tension(pose, low, high).values
+    side = cdsm.stiffness(pose, least).along(u) - target
+    ends = corners(pose, low, high, np.zeros(6))
+    rng = np.random.default_rng(0)
+    tried = 0
+    for mixture in rng.dirichlet(np.full(len(ends), 0.3), 4000) @ ends:
+        there = mixture
+        if np.linalg.norm(there) > effort:  # back to where the effort is just below
+            way = there - least
+            a, b, c = way @ way, 2.0 * (way @ least), least @ least - effort**2
+            there = least + 0.9999 * (-b + math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a) * way
+        K = cdsm.stiffness(pose, np.clip(there, low, high))
+        if K.margin >= found.floor:
+            assert (K.along(u) - target) * side > 0.0
+            tried += 1
+    assert tried > 1000
+
+
+KNOWN = [  # seed, target [N/m], effort ‖F‖ [N] of an independent program
+    (2, 110896.076, 76.6403),
+    (6, 2647.397, 264.5468),
+    (10, 7246.608, 177.7846),
+    (14, 10947.014, 212.3807),
+    (18, 1149.346, 425.5580),
+    (22, 8297.864, 364.1637),
+    (26, 7779.646, 308.5537),
+    (30, 5887.553, 388.3994),
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "target", "effort"), KNOWN)
+def test_efforts_are_those_of_an_independent_program(
+    seed: int, target: float, effort: float
+) -> None:
+    rng = np.random.default_rng([seed, 90])
+    kind = str(rng.choice(["universal", "hinged"]))
+    law = cdsm.LinearElasticity(float(10.0 ** rng.uniform(3.7, 5.0)))
+    arm = arms.random_arm(seed, int(rng.integers(2, 6)), kind, law)
+    pose, u = arms.random_posture(arm, seed, 0.4), rng.normal(size=3)
+    low, high = float(rng.choice([10.0, 35.0])), float(rng.choice([200.0, 500.0]))
+    plan = cdsm.plan_stiffness(pose, u, target, low, high)
+    assert plan.achieved == pytest.approx(target, rel=1e-6)
+    assert np.linalg.norm(plan.tension) <= 1.005 * effort
+
+
 # --- out of reach ---------------------------------------------------------------------------
 
 
@@ -144,6 +239,17 @@ def test_unreachable_targets_are_refused_with_the_range(name: str) -> None:
         assert plan.achieved == pytest.approx(end, rel=1e-6)
 
 
+def test_every_stiffness_of_a_hinge_beside_its_kinks_is_reached() -> None:
+    """Tensions balance on a line; at 31 N, where Eq. 19 bends, one cable then the other passes."""
+    pose = hinge(law=STRAND, joint_limit=0.5).at([0.2])
+    above, below = pose.length_jacobian[:, 0]
+    kinks = [31.0, -31.0 * below / above]
+    for F in (10.0, 20.0, *np.add.outer(kinks, [-1e-3, 1e-3]).ravel(), 45.0, 80.0):
+        target = cdsm.stiffness(pose, [F, -F * above / below]).along(DOWN)
+        plan = cdsm.plan_stiffness(pose, DOWN, target, 5.0, 100.0)
+        assert plan.tension.values[0] == pytest.approx(F, rel=1e-8)
+
+
 def test_plan_of_a_hinge_has_its_closed_form() -> None:
     target = soft(33.0) / LENGTH**2
     plan = cdsm.plan_stiffness(soft_hinge().at([0.0]), DOWN, target, 10.0)
@@ -151,6 +257,32 @@ def test_plan_of_a_hinge_has_its_closed_form() -> None:
 
 
 # --- next to the ends, and where there is nothing to choose ---------------------------------
+
+
+def strand_case(seed: int) -> tuple[cdsm.Posture, Array, float, float]:
+    """An arm of strands, any direction, and bounds that let tension nearly buckle it."""
+    rng = np.random.default_rng(seed)
+    kind, joints = ("hinged" if seed % 2 else "universal"), int(rng.integers(2, 5))
+    pose = arms.random_posture(arms.random_arm(seed, joints, kind, STRAND), seed, 0.4)
+    low, high = float(rng.choice([3.0, 10.0, 20.0])), float(rng.choice([60.0, 200.0, np.inf]))
+    return pose, rng.normal(size=3), low, high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [111, 113, 127])
+def test_ends_of_the_range_and_all_beside_them_are_reached_and_no_more(seed: int) -> None:
+    """Next to buckling all that is left of the stiffness is a difference, and a piece is thin."""
+    pose, u, low, high = strand_case(seed)
+    found = cdsm.stiffness_range(pose, u, low, high)
+    for target in (found.low, 1.0001 * found.low, found.high):
+        plan = cdsm.plan_stiffness(pose, u, target, low, high)
+        assert cdsm.stiffness(pose, plan.tension).along(u) == pytest.approx(target, rel=1e-6)
+        assert_admissible(plan, low, high)
+    for target in (0.99 * found.low, 1.01 * found.high):
+        with pytest.raises(cdsm.UnreachableStiffness) as caught:
+            cdsm.plan_stiffness(pose, u, target, low, high)
+        assert caught.value.low == pytest.approx(found.low, rel=1e-5)
+        assert caught.value.high == pytest.approx(found.high, rel=1e-9)
 
 
 def test_one_cable_on_one_hinge_has_one_stiffness() -> None:

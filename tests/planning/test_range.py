@@ -16,7 +16,10 @@ from tests.support.locked import (
     BUCKLING,
     EA,
     LENGTH,
+    RISING,
     STRAND,
+    H,
+    R,
     hinge,
     soft,
     soft_hinge,
@@ -104,6 +107,42 @@ def test_brute_force_beats_neither_end_and_comes_near_both(case: str, moment: bo
         np.testing.assert_array_equal(pull.wrench, wrench)
 
 
+def test_where_tension_buckles_the_arm_brute_force_along_rays_beats_neither_end() -> None:
+    """The softest tensions lie where λ_min is just what stability asks for."""
+    arm = arms.random_arm(0, 3, "hinged", cdsm.LinearElasticity(5e3))
+    pose = arms.random_posture(arm, 0, reach=0.4)
+    low, high = 20.0, 300.0
+    u = np.random.default_rng(0).normal(size=3)
+    found = cdsm.stiffness_range(pose, u, low, high)
+    assert cdsm.stiffness(pose, found.low_tension).margin == pytest.approx(found.floor, rel=1e-9)
+    ends = corners(pose, low, high, np.zeros(6))
+    start = cdsm.distribute_tension(pose, low).values
+    K = cdsm.stiffness(pose, start)
+    assert found.floor == pytest.approx(0.01 * K.margin, rel=1e-12)
+    # K_θ is affine in F, so a ray leaves the stable tensions once: where λ_min is the floor
+    values, softest = [K.along(u)], start
+
+    def judge(end: Array) -> None:
+        nonlocal softest
+        rate = cdsm.stiffness(pose, end).joint - K.joint
+        way = np.where(end == start, 1e-300, end - start)
+        a, b = 0.0, float(np.where(way > 0.0, (high - start) / way, (low - start) / way).min())
+        for _ in range(40):
+            middle = (a + b) / 2.0
+            stable = np.linalg.eigvalsh(K.joint + middle * rate)[0] >= found.floor
+            a, b = (middle, b) if stable else (a, middle)
+        values.append(cdsm.stiffness(pose, start + a * (end - start)).along(u))
+        softest = end if values[-1] == min(values) else softest
+
+    rng = np.random.default_rng(2)
+    for reach in (1.0, 0.3, 0.1, 0.03, 0.01, 0.003):
+        centre = softest
+        for end in rng.dirichlet(np.full(len(ends), 0.3), 100) @ ends:
+            judge(centre + reach * (end - centre))
+    assert found.low * (1.0 - 1e-9) <= min(values) <= 1.01 * found.low
+    assert found.high * 0.99 <= max(values) <= found.high * (1.0 + 1e-9)
+
+
 # --- one hinge: the null space is a line ----------------------------------------------------
 
 
@@ -120,6 +159,15 @@ def test_hinge_has_its_closed_form_at_both_ends() -> None:
     np.testing.assert_allclose(found.high_tension.values, 10.0, rtol=1e-12)
     assert straight(40.0) in found
     assert straight(71.0) not in found
+
+
+def test_hinge_without_a_lead_has_its_ends_the_other_way_round() -> None:
+    """K = 2 k R² − F h, with k = (EA + F)/2h: R²/h is more than h, so that tension stiffens."""
+    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, 70.0)
+    ends = [(2.0 * (EA + F) / (2.0 * H) * R**2 - F * H) / LENGTH**2 for F in (10.0, 70.0)]
+    np.testing.assert_allclose([found.low, found.high], ends, rtol=1e-12)
+    np.testing.assert_allclose(found.low_tension.values, 10.0, rtol=1e-12)
+    np.testing.assert_allclose(found.high_tension.values, 70.0, rtol=1e-12)
 
 
 def test_without_a_maximum_buckling_ends_the_range() -> None:
@@ -158,6 +206,27 @@ def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
     assert plan.achieved == pytest.approx(10.0 * found.high, rel=1e-9)
     with pytest.raises(cdsm.UnreachableStiffness, match="to inf N/m"):
         cdsm.plan_stiffness(pose, DOWN, 0.9 * found.low, 10.0)
+
+
+def test_end_of_the_elasticity_bounds_the_tensions() -> None:
+    arm = presets.virtual_prototype(RISING)
+    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
+    found = cdsm.stiffness_range(pose, DOWN, 50.0)
+    assert found.high_tension.values.max() == pytest.approx(810.0, rel=1e-12)
+
+
+def test_strand_whose_rigidity_levels_off_is_stiffest_before_its_end() -> None:
+    """EA of Eq. 19, filled in, has its largest value between 400 N and 810 N."""
+    places = np.linspace(400.0, 810.0, 500)
+    assert 401.0 < places[STRAND.rigidity(places).argmax()] < 809.0
+    arm = presets.virtual_prototype(STRAND)
+    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
+    found = cdsm.stiffness_range(pose, DOWN, 50.0)
+    assert found.high_tension.values.max() < 809.0
+    for bound in np.linspace(50.0, 700.0, 60):
+        pull = cdsm.distribute_tension(pose, bound)
+        if pull.values.max() <= 810.0:
+            assert cdsm.stiffness(pose, pull).along(DOWN) < found.high
 
 
 def test_range_of_an_arm_without_redundancy_is_a_point() -> None:
@@ -236,9 +305,18 @@ def bump(F: Array) -> Array:
 BUMP = cdsm.Elasticity.from_rigidity(bump, 0.0, 500.0)
 
 
-def test_no_sample_is_stiffer_where_the_rigidity_falls_again() -> None:
+def measured_bump() -> cdsm.TabulatedElasticity:
+    """The same as a table of the library."""
+    F = np.array([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0, 220.0, 300.0, 400.0, 500.0])
+    EA = bump(F)
+    strain = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(F) / (EA[1:] + EA[:-1]))])
+    return cdsm.TabulatedElasticity(tuple(F), tuple(strain))
+
+
+@pytest.mark.parametrize("law", [BUMP, measured_bump()], ids=["own", "table"])
+def test_no_sample_is_stiffer_where_the_rigidity_falls_again(law: cdsm.Elasticity) -> None:
     """The stiffest tensions lie inside, and many searches stop at others."""
-    pose = arms.random_posture(arms.random_arm(19, 3, "hinged", BUMP), 19, 0.4)
+    pose = arms.random_posture(arms.random_arm(19, 3, "hinged", law), 19, 0.4)
     u = np.array([1.0, -0.5, 0.3])
     found = cdsm.stiffness_range(pose, u, 10.0, 400.0)
     values = []
@@ -254,8 +332,27 @@ def test_no_sample_is_stiffer_where_the_rigidity_falls_again() -> None:
         if K.margin >= found.floor:
             values.append(K.along(u))
     assert len(values) > 100
+    values += [  # where all cables are near the stiffest tension of the law
+        cdsm.stiffness(pose, cdsm.distribute_tension(pose, bound, 400.0)).along(u)
+        for bound in np.linspace(90.0, 130.0, 41)
+    ]
     assert found.low * (1.0 - 1e-9) <= min(values)
     assert max(values) <= found.high * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", [11, 23, 103])
+def test_stiffest_tensions_of_arms_that_their_least_tensions_do_not_hold(seed: int) -> None:
+    """Where λ_min limits the stiffness; the tensions of an independent program are no stiffer."""
+    known = {11: 25106.119, 23: 929.280, 103: 3809.113}  # N/m
+    rng = np.random.default_rng([seed, 90])
+    kind = str(rng.choice(["universal", "hinged"]))
+    rng.uniform()
+    arm = arms.random_arm(seed, int(rng.integers(2, 6)), kind, STRAND)
+    pose, u = arms.random_posture(arm, seed, 0.4), rng.normal(size=3)
+    low, high = float(rng.choice([10.0, 35.0])), float(rng.choice([200.0, 500.0]))
+    found = cdsm.stiffness_range(pose, u, low, high)
+    assert found.high >= known[seed] * (1.0 - 1e-4)
+    assert cdsm.stiffness(pose, found.high_tension).margin >= found.floor * (1.0 - 1e-9)
 
 
 def test_corners_beside_the_softest_one_are_searched() -> None:

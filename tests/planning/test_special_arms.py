@@ -104,7 +104,17 @@ def test_unstable_least_tensions_do_not_hide_stable_ones() -> None:
     assert found.low < 0.01 * found.high
 
 
-@pytest.mark.parametrize("above", [-1e-3, 1e-3])
+def test_end_of_the_range_that_a_crossing_meets_by_rounding_is_reached() -> None:
+    pose = arms.random_posture(arms.random_arm(3, 3, "hinged", STRAND), 3, 0.3)
+    u = (0.0, 1.0, 0.3)
+    found = cdsm.stiffness_range(pose, u, 10.0)
+    plan = cdsm.plan_stiffness(pose, u, found.low, 10.0)
+    assert plan.achieved == pytest.approx(found.low, rel=1e-6)
+    path = cdsm.plan_path(pose.arm, u, [3.0 * found.low, found.low], 10.0, angles=[pose.q] * 2)
+    assert path.complete
+
+
+@pytest.mark.parametrize("above", [-1e-6, 1e-6])
 def test_arm_is_held_exactly_as_long_as_some_tension_holds_it(above: float) -> None:
     """From the critical tension on no tensions do: all are larger."""
     pose, minimum = soft_hinge().at([0.0]), BUCKLING * (1.0 + above)

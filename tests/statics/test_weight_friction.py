@@ -62,12 +62,12 @@ def test_one_line_says_how_to_measure() -> None:
     pose, pull = prototype(0.1)
     test = cdsm.weight_test(pose, pull, [0.0, 0.0, 4.0], steps=4)
     text = str(test)
-    assert "below 0.7027 N (first order) all cables stick: a weight measures 257.6 N/mm" in text
+    assert "below 0.7063 N all cables stick: a weight measures 257.6 N/mm" in text
     assert f"at {test.sliding_load:.4g} N they slide" in text
     assert "at most 25 % above that of the same load without friction" in text
     assert "take the difference of two weights" in text
     told = test.to_dict()
-    assert told["breakaway_load_N"] == pytest.approx(0.7027, rel=1e-3)
+    assert told["breakaway_load_N"] == pytest.approx(0.7063, rel=1e-3)  # first_slip
     assert told["sliding_load_N"] == test.sliding_load
 
 
