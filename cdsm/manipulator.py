@@ -395,7 +395,7 @@ class Manipulator(Printed):
         self.__dict__.update(original_length=original_length, tolerances=tolerances)
         self.__dict__.update({name: getattr(body, name) for name in _OF_BODY})
         given = geometry.springs if geometry and springs is None else springs or {}
-        self.__dict__.update(springs=springs_of(given, self.joint_names))
+        self.__dict__.update(springs=springs_of(given, body.all_joints, body.coupling))
         self.__dict__.update(_geometry=geometry, _body=body, _routing=Routing.of(body, cables))
         self.__dict__.update(_laws=CableLaws(cables, original_length), _doubts=_doubts(self))
         for doubt in self._doubts:
@@ -407,7 +407,8 @@ class Manipulator(Printed):
         """Return what defines the arm: two arms are equal if these values are equal."""
         names = ("urdf", "cables", "tip_link", "original_length", "joint_names", "tolerances")
         state = {name: getattr(self, name) for name in names}
-        rows = zip(self.joint_names, *(each.tolist() for each in self.springs), strict=True)
+        own = self.springs
+        rows = zip(own.joints, own.stiffness.tolist(), own.angle.tolist(), strict=True)
         state["springs"] = {name: (k, angle) for name, k, angle in rows if k or angle}
         return state | {"geometry": self._geometry, "gravity": tuple(self.gravity.tolist())}
 

@@ -72,7 +72,7 @@ class Posture(ReadOnlyState):
     @property
     def _own_stiffness(self) -> Array:
         """Second derivative of the energy of weight and springs (nv, nv)."""
-        return self.gravity_stiffness + np.diag(self.arm.springs.stiffness)
+        return self.gravity_stiffness + self.arm.springs.matrix
 
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
@@ -194,7 +194,12 @@ class Posture(ReadOnlyState):
 
     def _load(self, wrench: Array) -> Array:
         """Compute the load term −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad] of K_θ for a wrench W (6,)."""
-        return load_stiffness(self.jacobian, wrench, self.arm._body.tip_joints)
+        body = self.arm._body
+        if body.coupling is None:
+            return load_stiffness(self.jacobian, wrench, body.tip_joints)
+        v, z = self._twist[:3], self._twist[3:]
+        every = np.vstack([v + cross(z, self.tip[:3, 3:]), z])
+        return body.coupling.square(load_stiffness(every, wrench, body.tip_joints))
 
 
 def load_stiffness(jacobian: Array, wrench: Array, tip_joints: NDArray[np.intp]) -> Array:

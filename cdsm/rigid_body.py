@@ -9,30 +9,38 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from lxml import etree
 from numpy.typing import NDArray
 
+from cdsm.coupling import coupling_of, limits_of, mimics_of
 from cdsm.errors import InvalidInput, UrdfError, listed
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 
+_ENDLESS = 1e300  # limit of a continuous joint in the text that Pinocchio reads
+
 
 class State(NamedTuple):
-    """What Pinocchio computes at joint angles q; all in base axes, joints in the order of q."""
+    """What Pinocchio computes at joint angles q; all in base axes, joints in the order of q.
+
+    Of n joints, nv are independent.
+    """
 
     tip: Array  # pose of the tip (4, 4), translation in m
     jacobian: Array  # J_X (6, nv) at the tip, linear rows first
-    gravity_torque: Array  # g = ∂V/∂θ (nv,)
-    gravity_stiffness: Array  # ∂g/∂θ (nv, nv)
-    twist: Array  # (v, z) (6, nv): a point x that joint j moves has ∂x/∂θ_j = v_j + z_j × x
+    gravity_torque: Array  # g = ∂V/∂q (nv,)
+    gravity_stiffness: Array  # ∂g/∂q (nv, nv)
+    twist: Array  # (v, z) (6, n): a point x that joint j moves has ∂x/∂θ_j = v_j + z_j × x
     placement: Array  # poses (n, 4, 4) of the bodies that were asked for
 
 
 class TreeArrays(NamedTuple):
-    """The kinematic tree as plain arrays. Row 0 is the base, row i is joint i in the order of q."""
+    """The kinematic tree as plain arrays. Row 0 is the base, row i joint i of all_joints."""
 
     parent: NDArray[np.intp]  # row of the joint before, (nv+1,)
     order: NDArray[np.intp]  # rows, sorted so that each joint comes after its parent (nv,)
@@ -63,22 +71,31 @@ class RigidBody:
     def __init__(
         self, urdf: str, tip: str, gravity: Array, joint_names: Sequence[str] | None = None
     ) -> None:
+        robot = etree.fromstring(urdf.encode())
         try:
-            self._model = model = pin.buildModelFromXML(urdf)
+            self._model = model = pin.buildModelFromXML(_bounded(robot))
         except ValueError as error:
             raise UrdfError(f"Pinocchio does not accept the URDF: {error}") from None
         model.gravity.linear = np.array(gravity)
         names = tuple(model.names)[1:]
-        self.joint_names = names if joint_names is None else _reordered(names, joint_names)
+        mimics = mimics_of(robot)
+        free = tuple(name for name in names if name not in mimics)
+        self.joint_names = free if joint_names is None else _reordered(free, joint_names)
+        self.all_joints = names
+        if joint_names is not None:
+            self.all_joints = (*self.joint_names, *(name for name in names if name in mimics))
+        self.coupling = coupling_of(mimics, self.all_joints)
         # index in Pinocchio's order of each of our coordinates, and the inverse permutation
-        self._theirs = frozen(np.array([names.index(name) for name in self.joint_names]))
+        self._theirs = frozen(np.array([names.index(name) for name in self.all_joints]))
         self._ours = frozen(np.argsort(self._theirs))
-        self._sorted = self.joint_names == names
+        self._sorted = self.all_joints == names
         self._rows = (0, *(1 + self._theirs).tolist())  # Pinocchio's index of each row
-        self.nv: int = model.nv
+        self.nv = len(self.joint_names)
         self.name: str = model.name
-        self.lower: Array = frozen(np.array(model.lowerPositionLimit)[self._theirs])
-        self.upper: Array = frozen(np.array(model.upperPositionLimit)[self._theirs])
+        self.lower: Array = frozen(_unlimited(model.lowerPositionLimit)[self._theirs])
+        self.upper: Array = frozen(_unlimited(model.upperPositionLimit)[self._theirs])
+        if self.coupling:
+            self.lower, self.upper = limits_of(self.coupling, self.lower, self.upper)
         self._frames = {
             frame.name: index
             for index, frame in enumerate(model.frames)
@@ -92,7 +109,8 @@ class RigidBody:
             np.array(self.joints_to(self._row(model.frames[self._tip].parentJoint)), np.intp) - 1
         )
         self._twists = frozen(self._local_twists())
-        self.slides = frozen(np.asarray(~self._twists[1:, 3:].any(axis=1)))
+        slides = np.asarray(~self._twists[1:, 3:].any(axis=1))
+        self.slides = frozen(slides[list(self.coupling.leaders)] if self.coupling else slides)
 
     def state(self, q: Array, rows: Sequence[int] = ()) -> State:
         """Compute everything at joint angles q (nv,), with the poses of the bodies in ``rows``."""
@@ -102,15 +120,18 @@ class RigidBody:
         poses, ids = data.oMi, self._rows
         placement = np.array([poses[ids[row]].homogeneous for row in rows]).reshape(-1, 4, 4)
         # for a model with one joint, Pinocchio returns vectors
-        shape, nv = (6, self.nv), self.nv
-        J, twist = jacobian.reshape(shape), data.J.reshape(shape)
-        torque, slope = data.g, slope.reshape(nv, nv)
+        n = len(self.all_joints)
+        J, twist = jacobian.reshape(6, n), data.J.reshape(6, n)
+        torque, slope = data.g, slope.reshape(n, n)
         if self._sorted:
             J, twist, torque, slope = J.copy(), twist.copy(), torque.copy(), slope.copy()
         else:
             order = self._theirs
             J, twist, torque = J[:, order], twist[:, order], torque[order]
             slope = slope[order[:, None], order]
+        if self.coupling:
+            S = self.coupling.matrix
+            J, torque, slope = J @ S, torque @ S, self.coupling.square(slope)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
         return State(tip, J, torque, slope, twist, placement)
 
@@ -120,7 +141,8 @@ class RigidBody:
         pin.computeJointJacobians(model, data, self._permuted(q))
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         pose: Array = pin.updateFramePlacement(model, data, self._tip).homogeneous
-        return pose, jacobian.reshape(6, self.nv).take(self._theirs, axis=1)
+        J = jacobian.reshape(6, -1).take(self._theirs, axis=1)
+        return pose, J @ self.coupling.matrix if self.coupling else J
 
     def joint_placements(self, q: Array, rows: Sequence[int]) -> Array:
         """Compute the poses (n, 4, 4) of the joints' frames in ``rows``; row 0 is the base."""
@@ -141,8 +163,8 @@ class RigidBody:
     def mass_matrix(self, q: Array) -> Array:
         """Compute the joint-space mass matrix M (nv, nv) [kg m²] at joint angles (nv,) [rad]."""
         M = np.array(pin.crba(self._model, self._data(), self._permuted(q)))
-        ours: Array = M.reshape(self.nv, self.nv)[np.ix_(self._theirs, self._theirs)]
-        return ours
+        ours: Array = M.reshape(2 * (len(self.all_joints),))[np.ix_(self._theirs, self._theirs)]
+        return self.coupling.square(ours) if self.coupling else ours
 
     def locate(self, link: str) -> tuple[int, Array, Array]:
         """Return the row of the joint that carries a link, and the link's frame in the joint's.
@@ -222,6 +244,8 @@ class RigidBody:
         return np.vstack([np.zeros(6), *(J.reshape(6, -1)[:, i] for J, i in columns)])
 
     def _permuted(self, q: Array) -> Array:
+        if self.coupling:
+            q = self.coupling.angles(q)
         return q if self._sorted else q[self._ours]
 
     def _row(self, joint: int) -> int:
@@ -237,6 +261,27 @@ class RigidBody:
         if not hasattr(self._scratch, "data"):
             self._scratch.data = self._model.createData()
         return self._scratch.data
+
+
+def _bounded(robot: etree._Element) -> str:
+    """Return the text of a URDF with continuous joints as revolute ones.
+
+    To Pinocchio, a continuous joint has two coordinates; and it refuses infinite limits.
+    """
+    copy = deepcopy(robot)
+    for joint in copy.iterfind("joint[@type='continuous']"):
+        joint.set("type", "revolute")
+        for limit in joint.findall("limit"):
+            joint.remove(limit)
+        ends = {"lower": -_ENDLESS, "upper": _ENDLESS, "effort": 0, "velocity": 0}
+        etree.SubElement(joint, "limit", {key: str(end) for key, end in ends.items()})
+    return str(etree.tostring(copy, encoding="unicode"))
+
+
+def _unlimited(limits: Array) -> Array:
+    """Return joint limits with ±inf for those of continuous joints, which Pinocchio cannot read."""
+    limits = np.array(limits)
+    return np.where(abs(limits) >= _ENDLESS, np.copysign(np.inf, limits), limits)
 
 
 def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
+from cdsm.coupling import Coupling
 from cdsm.errors import CableError, UnknownName
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
@@ -59,6 +60,7 @@ class Routing:
         path: Joints of each segment (S, m), in the order from a to b; padded by 0.
         sign: −1 or +1 for each of them (S, m); 0 for padding.
         fixed: Length that is in no segment (C,) [m]: leads, and segments within one body.
+        coupling: How the joints follow from the independent ones; None: all are independent.
     """
 
     nv: int
@@ -70,6 +72,7 @@ class Routing:
     path: Indices
     sign: Array
     fixed: Array
+    coupling: Coupling | None = None
 
     @classmethod
     def of(cls, body: RigidBody, cables: Sequence[Cable], *, every: bool = False) -> Self:
@@ -110,8 +113,18 @@ class Routing:
             for i, step in enumerate(way):
                 path[s, i], sign[s, i] = step
         cable_of, end = (np.array([each[i] for each in segments], np.intp) for i in (0, 1))
-        arrays = np.array(row, np.intp), np.array(point), cable_of, end - 1, end, path, sign, fixed
-        return cls(body.nv, *map(frozen, arrays))
+        return cls(
+            nv=len(body.all_joints),
+            row=frozen(np.array(row, np.intp)),
+            point=frozen(np.array(point)),
+            cable=frozen(cable_of),
+            first=frozen(end - 1),
+            second=frozen(end),
+            path=frozen(path),
+            sign=frozen(sign),
+            fixed=frozen(fixed),
+            coupling=body.coupling,
+        )
 
     def sites(self, placement: Array) -> Array:
         """Compute all sites (3, P) [m] from the poses (n, 4, 4) of the bodies in :attr:`used`."""
@@ -152,21 +165,27 @@ class Routing:
         real, to = self._rates
         C = len(self.fixed)
         J = _sum(to, spans.rate[real], C * self.nv)
-        return J.reshape(C, self.nv, *J.shape[1:])
+        return self.reduced(J.reshape(C, self.nv, *J.shape[1:]))
+
+    def reduced(self, J: Array) -> Array:
+        """Return derivatives (n, …) by the independent joints, from those by all of them."""
+        return J @ self.coupling.matrix if self.coupling else J
 
     def hessian(self, spans: Spans, weight: Array) -> Array:
         """Compute Σ weight_s ∂²ℓ_s/∂θ² (nv, nv): H_L·F if the weights (S,) are tensions."""
         _, source, target = self._pairs
         pairs = self._products(spans, weight)
         H = _sum(target, pairs[source], self.nv**2)
-        return H.reshape(self.nv, self.nv, *H.shape[1:])
+        H = H.reshape(self.nv, self.nv, *H.shape[1:])
+        return self.coupling.square(H) if self.coupling else H
 
     def hessians(self, spans: Spans, weight: Array, group: Indices, count: int) -> Array:
         """Compute the same sums for each of ``count`` groups of segments (count, nv, nv)."""
         segment, source, target = self._pairs
         pairs = self._products(spans, weight)[source]
         H = _sum(group[segment] * self.nv**2 + target, pairs, count * self.nv**2)
-        return H.reshape(count, self.nv, self.nv, *H.shape[1:])
+        H = H.reshape(count, self.nv, self.nv, *H.shape[1:])
+        return self.coupling.square(H) if self.coupling else H
 
     def _products(self, spans: Spans, weight: Array) -> Array:
         length, u, axis, d, rate = spans

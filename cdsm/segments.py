@@ -144,7 +144,7 @@ class Segments(ReadOnlyState):
             lengths=frozen(spans.length),
             length_jacobian=frozen(routing.jacobian(spans)),
             wrap=frozen(np.arctan2(sine, dot(u, v)) + chains.wrap),
-            wrap_jacobian=frozen(gradient),
+            wrap_jacobian=frozen(routing.reduced(gradient)),
             _routing=routing,
             _sites=frozen(sites),
             _spans=spans,

@@ -1,12 +1,14 @@
-"""Springs at the joints of an arm: k (q − q_0) turns each joint back to its angle q_0."""
+"""Springs at the joints of an arm: k (θ − q_0) turns each joint back to its angle q_0."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from cdsm.coupling import Coupling
 from cdsm.errors import InvalidInput
 from cdsm.support.validation import one_of, scalar, within
 from cdsm.support.values import Array, frozen
@@ -15,22 +17,46 @@ Spring = float | Sequence[float]
 """Stiffness of a spring [N m/rad], or [N/m] at a prismatic joint; or (stiffness, free angle)."""
 
 
-class Springs(NamedTuple):
-    """Springs of all joints, in the order of q."""
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """Springs of all n joints; nv of them are independent.
 
-    stiffness: Array  # k (nv,) [N m/rad], [N/m] for prismatic joints; 0: none
-    angle: Array  # q_0 (nv,) without torque [rad], [m] for prismatic joints
+    Attributes:
+        joints: Names of the joints, coupled ones included.
+        stiffness: k (n,) [N m/rad], [N/m] for prismatic joints; 0: none.
+        angle: q_0 (n,) without torque [rad], [m] for prismatic joints.
+    """
+
+    joints: tuple[str, ...]
+    stiffness: Array
+    angle: Array
+    _coupling: Coupling | None = None
 
     def torque(self, q: Array) -> Array:
-        """Compute k (q − q_0) (nv,) [N m]."""
-        return self.stiffness * (q - self.angle)
+        """Compute the derivative of the energy ½ Σ k (θ − q_0)² by q (nv,) [N m]."""
+        if self._coupling is None:
+            return self.stiffness * (q - self.angle)
+        pulled = self.stiffness * (self._coupling.angles(q) - self.angle)
+        return np.asarray(pulled @ self._coupling.matrix)
 
-    def energy(self, q: Array) -> float:
-        """Compute ½ Σ k (q − q_0)² [J]."""
-        return float(0.5 * self.stiffness @ (q - self.angle) ** 2)
+    @cached_property
+    def matrix(self) -> Array:
+        """Second derivative of the energy (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S."""
+        K = np.diag(self.stiffness)
+        return frozen(self._coupling.square(K) if self._coupling else K)
+
+    @cached_property
+    def rest(self) -> Array:
+        """Joint angles q (nv,) [rad] where the springs rest; 0 where there are none."""
+        if self._coupling is None:
+            return self.angle
+        S, root = self._coupling.matrix, np.sqrt(self.stiffness)
+        free = root * (self.angle - self._coupling.offset)
+        found = np.linalg.lstsq(S * root[:, None], free, rcond=None)[0]
+        return frozen(np.asarray(found, dtype=np.float64))
 
 
-def springs_of(given: object, joints: Sequence[str]) -> Springs:
+def springs_of(given: object, joints: tuple[str, ...], coupling: Coupling | None) -> Springs:
     """Check springs by the name of their joint, and return those of all ``joints``.
 
     Raises InvalidInput, or UnknownName if there is no such joint.
@@ -47,4 +73,4 @@ def springs_of(given: object, joints: Sequence[str]) -> Springs:
         k[j], angle[j] = (scalar(f"springs[{name!r}]", each) for each in pair)
         if fault := within("spring", k[j], zero=True):
             raise InvalidInput(f"springs[{name!r}]", f"{fault}.")
-    return Springs(frozen(k), frozen(angle))
+    return Springs(joints, frozen(k), frozen(angle), coupling)

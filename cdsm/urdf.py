@@ -157,7 +157,9 @@ def _revolute(of: Axis) -> etree._Element:
     if abs(length - 1.0) >= 1e-15:  # a unit vector keeps its digits
         axis = tuple(a / length for a in axis)
     ends = E.limit(effort=1000.0, velocity=10.0, lower=-of.limit, upper=of.limit)
-    parts = *_at(of.x), E.axis(xyz=axis), ends
+    parts = [*_at(of.x), E.axis(xyz=axis), ends]
+    if of.leader:
+        parts.append(E.mimic(joint=of.leader, multiplier=1.0, offset=0.0))
     return joint("revolute", of.name, of.parent, of.child, *parts)
 
 

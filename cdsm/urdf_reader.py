@@ -27,15 +27,16 @@ from cdsm.support.warning import warn
 from cdsm.support.xml import XmlFault, numbers, parse_xml
 
 _INSTEAD = {
-    "continuous": "write it as revolute with a <limit>; one angle per joint is needed",
     "floating": "fix the base to the world; a floating base has no stiffness",
     "planar": "write it as two prismatic and one revolute joint",
     "spherical": "write it as three revolute joints",
 }
-_ONE = "value ixx ixy ixz iyy iyz izz lower upper effort velocity damping friction radius length"
+_MOVING = "revolute", "prismatic", "continuous"
+_ONE = "value ixx ixy ixz iyy iyz izz lower upper effort velocity damping friction radius length "
+_ONE += "multiplier offset"
 _COUNTS = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(("xyz", "rpy", "size", "scale"), 3)
 _NEEDED = {"mass": "value", "inertia": "ixx ixy ixz iyy iyz izz", "axis": "xyz"}
-_NEEDED |= {"limit": "effort velocity", "parent": "link", "child": "link"}
+_NEEDED |= {"limit": "effort velocity", "parent": "link", "child": "link", "mimic": "joint"}
 _INSIDE = {"joint": ("parent", "child"), "inertial": ("mass", "inertia")}
 _MODEL = ("inertial", "parent", "child", "origin", "axis", "limit", "dynamics", "mimic")
 _MOST_LINKS = 2000  # Pinocchio compares the name of each link with all others
@@ -133,21 +134,23 @@ def _link_faults(links: list[etree._Element], check_inertia: bool) -> Iterator[s
 
 
 def _joint_faults(joints: list[etree._Element]) -> Iterator[str]:
-    moving = [joint for joint in joints if joint.get("type") in ("revolute", "prismatic")]
+    moving = [joint for joint in joints if joint.get("type") in _MOVING]
     if not 0 < len(moving) <= 2 * MAXIMUM_JOINTS:
         yield f"has {len(moving)} joints that move; 1 to {2 * MAXIMUM_JOINTS} are needed"
     for joint in joints:
         where, kind, limit = f"joint {joint.get('name')}", joint.get("type"), joint.find("limit")
         if joint not in moving and kind != "fixed":
-            remedy = _INSTEAD.get(str(kind), "one of revolute, prismatic, fixed is needed")
+            remedy = _INSTEAD.get(
+                str(kind), "one of revolute, continuous, prismatic, fixed is needed"
+            )
             yield f"{where}: type {kind!r} is not supported; {remedy}"
-        if joint.find("mimic") is not None:
-            yield f"{where}: mimics another joint, which is not supported; remove <mimic>"
         if abs(_vector(joint.find("origin"))).max() > RANGES["length"].high:
             yield f"{where}: its origin is further than {RANGES['length'].high:g} m away"
         if joint in moving and np.linalg.norm(_vector(joint.find("axis"), "1 0 0")) < 1e-6:
             yield f"{where}: its axis has no direction"
         low, high = (_number(limit, key) for key in ("lower", "upper"))
+        if kind == "continuous":
+            continue
         if joint in moving and (limit is None or low > high):
             fault = "has no <limit>" if limit is None else f"lower limit {low:g} above {high:g}"
             yield f"{where}: {fault}; a {kind} joint needs both ends"

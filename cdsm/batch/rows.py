@@ -83,9 +83,11 @@ class ArmRows:
 
     def __init__(self, arm: Manipulator) -> None:
         tree, routing = arm._body.arrays(), arm._routing
-        nv, first = arm.nv, tree.order
+        first = tree.order
+        nv = len(first)
         self.order = first - 1
         self.place = np.argsort(self.order)
+        self.coupling = arm._body.coupling
         self.is_sorted = bool((self.order == np.arange(nv)).all())
         frame = np.append(0, 1 + self.place)  # of each row of the tree
         rows = np.append(0, first)
@@ -119,7 +121,7 @@ class ArmRows:
             tip_rotation=frozen(tree.tip_rotation),
             gravity=frozen(np.array(arm.gravity)),
             least=NO_ARM * arm.length,
-            **_blocks(pulls),
+            **(_found([], []) if self.coupling else _blocks(pulls)),
         )
         self.dimensions = Body(
             shift=tree.translation[first],

@@ -135,12 +135,15 @@ class _Chunk:
             low, high = rows.arm.lower - LIMIT_SLACK, rows.arm.upper + LIMIT_SLACK
             beyond = ((self._q < low) | (self._q > high)).any(axis=1)
             status[beyond] = Status.BEYOND_LIMITS
-        W, q = self._lanes(rows.wrench), side_by_side(self._q[:, table.order], self._width)
+        every = table.coupling.angles(self._q) if table.coupling else self._q
+        W, q = self._lanes(rows.wrench), side_by_side(every[:, table.order], self._width)
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
         self._aside(self._kernels.pose, table.arm, self._body(), q, W, at)
         if rows.arm.has_springs:
-            k, free = (each[table.order, None] for each in rows.arm.springs)
+            springs = rows.arm.springs
+            k, free = (each[table.order, None] for each in (springs.stiffness, springs.angle))
             at.torque[...] -= k * (q - free)
+        full, at = at, self._reduced(at)
         short = self._alone(at.shortest) < SHORTEST_SEGMENT
         status[short & (status == Status.OK)] = Status.COINCIDENT_SITES
         found = self._of_posture(at)
@@ -161,8 +164,20 @@ class _Chunk:
             if "residual" in self._names:
                 balance = np.einsum("bcjw,bcw->bjw", at.jacobian, F)
                 found["residual"] = self._alone(balance - at.torque)
-            found |= self._of_stiffness(at, F, side_by_side(k, self._width), W)
+            found |= self._of_stiffness(full, at, F, side_by_side(k, self._width), W)
         return {name: self._finished(name, found[name]) for name in self._names}
+
+    def _reduced(self, at: Pose) -> Pose:
+        """Return derivatives by the independent joints in place of those by all."""
+        if self._table.coupling is None:
+            return at
+        S = self._table.coupling.matrix[self._table.order]
+        return at._replace(
+            jacobian=np.einsum("bcjw,jk->bckw", at.jacobian, S),
+            gravity=np.einsum("bjw,jk->bkw", at.gravity, S),
+            torque=np.einsum("bjw,jk->bkw", at.torque, S),
+            tip_jacobian=np.einsum("bijxw,jk->bikxw", at.tip_jacobian, S),
+        )
 
     def _of_posture(self, at: Pose) -> dict[str, Array]:
         count = len(self._q)
@@ -204,15 +219,20 @@ class _Chunk:
                 F[b, :, w], status[n] = explained(rows.arm, self._q[n], *at_row[2:], wrench)
         return F
 
-    def _of_stiffness(self, at: Pose, F: Array, k: Array, W: Array) -> dict[str, Array]:
+    def _of_stiffness(self, full: Pose, at: Pose, F: Array, k: Array, W: Array) -> dict[str, Array]:
         """Compute K_θ, its terms if they are needed, and what is read off it."""
         names, status, u = self._names, self._status, self._rows.directions
         wanted, fine = names & set(READINGS), np.flatnonzero(status == Status.OK)
         fused = self._kernels.COMPILED and wanted <= {"along"} and names.isdisjoint(TERMS)
-        K, size = self._terms(at, F, k, W, apart=not fused)
+        fused = fused and self._table.coupling is None
+        K, size = self._terms(full, F, k, W, apart=not fused)
         found: dict[str, Array] = {}
         if not fused or "joint" in names:
-            terms = self._with_springs(self._alone(K))
+            terms = self._alone(K)
+            if self._table.coupling is not None:
+                S = self._table.coupling.matrix[self._table.order]
+                terms = S.T @ terms @ S
+            terms = self._with_springs(terms)
             found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
             found["joint"] = terms.sum(axis=1)
         if not wanted:
@@ -258,13 +278,16 @@ class _Chunk:
 
     def _with_springs(self, terms: Array) -> Array:
         """Add the springs to the other terms (n, 4, nv, nv) of K_θ."""
-        springs = np.broadcast_to(np.diag(self._springs), (len(terms), 1, *terms.shape[2:]))
+        matrix, order = self._rows.arm.springs.matrix, self._table.order
+        if self._table.coupling is None:
+            matrix = matrix[order[:, None], order]
+        springs = np.broadcast_to(matrix, (len(terms), 1, *terms.shape[2:]))
         return np.concatenate([terms, springs], axis=1)
 
     def _finished(self, name: str, value: Array) -> Array:
         """Put the joints in the order of q; NaN where the quantity does not exist."""
         status, place = self._status, self._table.place
-        if not self._table.is_sorted:
+        if not self._table.is_sorted and self._table.coupling is None:
             for axis in range(value.ndim - joint_axes(name), value.ndim):
                 value = value.take(place, axis=axis)
         if not status.any():

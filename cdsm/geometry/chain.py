@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from cdsm.geometry.parts import Disk, Joint, Link
 
@@ -51,6 +51,7 @@ class Axis(NamedTuple):
     stops: bool  # whether the limit is where disks touch
     stiffness: float  # k of its spring [N m/rad]; 0: none
     rest_angle: float  # q_0 [rad]
+    leader: str = ""  # joint whose angle it copies
 
 
 @dataclass
@@ -71,14 +72,9 @@ class Chain:
         """End the last body."""
         self.bodies.append(Body(self.link, self.x, self.mass, self.behind, self.kind))
 
-    def turn(
-        self, name: str, axis: tuple[float, ...], child: str, kind: str, *more: float | bool
-    ) -> None:
+    def turn(self, name: str, axis: tuple[float, ...], child: str, kind: str, *more: Any) -> None:
         """End the last body at a joint, and begin the next; ``more`` as the last of an Axis."""
-        limit, stops, *spring = more
-        self.axes.append(
-            Axis(name, self.link, child, self.x, axis, float(limit), bool(stops), *spring)
-        )
+        self.axes.append(Axis(name, self.link, child, self.x, axis, *more))
         self.end()
         self.link, self.kind, self.x, self.mass, self.behind = child, kind, 0.0, 0.0, self.at
 
@@ -169,10 +165,12 @@ def _start(chain: Chain, k: int, joint: Joint, link: Link, sizes: Sizes) -> floa
         return h - chain.x
     name, child = f"joint{k}", f"link{k}_start" if bends else f"link{k}"
     ends = limit, stops, joint.stiffness, joint.rest_angle
+    leader = f"joint{joint.follows}" if joint.follows else ""
     if len(joint.axes) == 2:
-        chain.turn(f"{name}_1", joint.axes[0], f"cross{k}", "cross", *ends)
-        name = f"{name}_2"
-    chain.turn(name, joint.axes[-1], child, "beam" if bends else "link", *ends)
+        first = f"{leader}_1" if leader else ""
+        chain.turn(f"{name}_1", joint.axes[0], f"cross{k}", "cross", *ends, first)
+        name, leader = f"{name}_2", f"{leader}_2" if leader else ""
+    chain.turn(name, joint.axes[-1], child, "beam" if bends else "link", *ends, leader)
     if bends:
         chain.run(f"link{k}a", h, link, link.mass * h / link.length, f"link{k}", STEEPEST, False)
     else:

@@ -114,6 +114,12 @@ class Geometry(Printed):
             if cable.joint > n:
                 said = f"{cable.joint} is past the last joint, {n}; give 1 to {n}"
                 yield f"cables[{c}].joint: {said}"
+        for k, joint in enumerate(joints, start=1):
+            leader = joints[joint.follows - 1] if joint.follows and joint.follows < k else None
+            if joint.follows and (leader is None or leader.follows or not joint.axes):
+                yield f"joints[{k}].follows: {joint.follows} is no free joint before it"
+            elif leader and len(leader.axes) != len(joint.axes):
+                yield f"joints[{k}].follows: joint {joint.follows} has another number of axes"
         small = [
             f"at joint {k} it is {joint.disk_radius:g} m, and the farthest hole is at {hole:g} m"
             for k, (joint, hole) in enumerate(zip(joints, self._farthest_holes, strict=True), 1)
@@ -177,11 +183,16 @@ class Geometry(Printed):
         first, *_ = parts
         joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
         for part in parts:
+            begin = len(joints)
             if links:
                 links[-1] = replace(links[-1], length=links[-1].length + part.base_length)
             cables += [replace(each, joint=each.joint + len(joints)) for each in part.cables]
             joints += [
-                replace(joint, hole_radius=None if first.hole_radius == R else R)
+                replace(
+                    joint,
+                    hole_radius=None if first.hole_radius == R else R,
+                    follows=joint.follows and joint.follows + begin,
+                )
                 for joint, R in zip(part.joints, part.hole_radii, strict=True)
             ]
             links += part.links

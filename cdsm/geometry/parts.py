@@ -38,6 +38,7 @@ class Joint:
             0.3; inf: it does not twist.
         pieces: Number of equal pieces of which the neck is made; each has four or five joints.
         mass: Mass of the neck [kg].
+        follows: Number of a joint before it, from 1, whose angles it copies; None: it is free.
     """
 
     axes: Annotated[tuple[records.Direction, ...], Field(strict=False, max_length=2)] = ()
@@ -51,6 +52,7 @@ class Joint:
     torsion_stiffness: records.Torsion | None = None
     pieces: Pieces = 1
     mass: records.Mass = 0.0
+    follows: Annotated[records.Integer, Field(ge=1)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -64,6 +64,8 @@ class Universal(Beam):
         phase: Added to φ of the cables of each joint [rad].
         joint_stiffness: Stiffness of a spring about each axis of every joint [N m/rad]; 0: none.
         rest_angle: Angle about each axis at which its spring has no torque [rad].
+        coupled: Whether all joints turn by the angles of the first one, as in a section that bends
+            evenly.
         spread: Angle [rad] between the holes of g cables whose angles φ are equal: the hole of
             cable i = 0…g−1, base to tip, is turned by (i − (g−1)/2)·spread. 0: not turned.
         bending_stiffness: EI of all links [N m²]; None: they do not bend. Or give the diameters.
@@ -92,6 +94,7 @@ class Universal(Beam):
     phase: PerJoint[records.Number] = 0.0
     joint_stiffness: PerJoint[records.JointSpring] = 0.0
     rest_angle: PerJoint[records.Number] = 0.0
+    coupled: bool = False
     spread: Turn = 0.0
     name: records.Name = "arm"
 
@@ -141,11 +144,13 @@ def fields_of(sizes: Universal) -> dict[str, Any]:
     angles = given if isinstance(given[0], Sequence) else [given] * n
     values = [getattr(sizes, key) for key in _OF_JOINTS]
     each = [value if isinstance(value, Sequence) else [value] * n for value in values]
-    joints, links, cables, common, beam = [], [], [], each[1][0], sizes.stiffness()
+    joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
+    common, beam = each[1][0], sizes.stiffness()
     rows = zip(axes, angles, *each, strict=True)
     for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase, k, rest in rows:
         R = None if common == R else R
         spring = {"stiffness": k, "rest_angle": rest}
+        spring["follows"] = 1 if sizes.coupled and joints else None
         joints += [
             Joint(axes=axis, disk_offset=h, limit=top, hole_radius=R, disk_radius=r, **spring)
         ]

@@ -71,7 +71,7 @@ def forward_statics(
         said = f"give exactly one of {', '.join(given)}; {' and '.join(named) or 'none'} given."
         raise InvalidInput("forward_statics", said)
     W = wrench_vector("wrench", wrench)
-    free = np.clip(arm.springs.angle, arm.lower, arm.upper)
+    free = np.clip(arm.springs.rest, arm.lower, arm.upper)
     home = arm.at(free)
     begin = home if start is None else arm.at(start)
     value = given[named[0]]

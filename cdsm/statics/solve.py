@@ -79,7 +79,8 @@ class Balance:
         self.unit = np.where(arm.slides, arm.length, 1.0)
         touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
         if arm.is_serpentine:
-            touching[:] = [axis.stops for axis in arm.geometry._chain.axes]
+            stops = {axis.name: axis.stops for axis in arm.geometry._chain.axes}
+            touching[:] = [stops[name] for name in arm.joint_names]
         apart = np.where(touching, _APART, 0.0)
         # the reference may be nearer to the stop
         self._lower = np.minimum(arm.lower + apart, reference.q) / self.unit

@@ -68,7 +68,7 @@ def assemble(
     J, gravity = pose.length_jacobian, pose.gravity_stiffness
     active, load = frozen(pose._active(tension)), frozen(pose._load(wrench))
     passive = frozen((J.T * cable_stiffness) @ J)
-    springs = frozen(np.diag(pose.arm.springs.stiffness))
+    springs = pose.arm.springs.matrix
     return Stiffness(
         posture=pose,
         tension=tension,

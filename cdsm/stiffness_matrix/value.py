@@ -58,7 +58,7 @@ class Stiffness(Result):
             is Σ_j (∂l_j/∂θ)ᵀ ∂T_j/∂θ over the cable segments j, not symmetric if cables slide.
         gravity: ∂g/∂θ (nv, nv) [N m/rad].
         load: −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad]; not symmetric if W has a moment.
-        springs: diag k (nv, nv) [N m/rad] of the joint springs.
+        springs: Of the joint springs (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S of coupled joints.
         joint: K_θ, sum of the five terms (nv, nv) [N m/rad]: row torque, column angle.
         tension: F (C,) [N].
         wrench: W (6,): force [N], then moment [N m].
@@ -181,7 +181,7 @@ class Stiffness(Result):
     def _inverse(self) -> Array:
         """K_θ⁻¹ (nv, nv), or SingularStiffness with the joint motion."""
         P = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
-        P += self.springs
+        P += abs(self.springs)
         D = P.diagonal()
         if not D.min() > 0.0:
             raise _singular("next to nothing holds the arm", np.eye(D.size)[D.argmin()])
