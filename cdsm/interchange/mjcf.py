@@ -22,6 +22,7 @@ import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
+from cdsm.coupling import Coupling
 from cdsm.errors import InvalidInput
 from cdsm.interchange.mjcf_bodies import Carried, add_bodies, mass_matrix, row
 from cdsm.manipulator import Manipulator
@@ -176,8 +177,9 @@ def mujoco_model(
     compiler.set("inertiafromgeom", "false")
     # implicit in velocities only: integrators implicit in positions take energy from springs
     option = etree.SubElement(root, "option", gravity=row(arm.gravity), integrator="implicitfast")
-    angles = [0.0] * arm.nv if pose is None else pose.q.tolist()
-    start = dict(zip(arm.joint_names, angles, strict=True))
+    coupling, q = arm._body.coupling, np.zeros(arm.nv) if pose is None else pose.q
+    angles = coupling.angles(q) if coupling else q
+    start = dict(zip(arm._body.all_joints, angles.tolist(), strict=True))
     masses = add_bodies(root, arm, start)
     of_joints = 0.0 if damping is None else float(damping)
     step, of_cables, said = _motion(arm, K, masses, damping_ratio, damping)
@@ -185,6 +187,8 @@ def mujoco_model(
     joints = list(root.iter("joint"))  # in MuJoCo's order, depth first
     for joint in joints:
         joint.set("damping", repr(of_joints))
+    if coupling:
+        _couple(root, coupling, arm._body.all_joints)
     controls = _cables(root, arm, K, actuators, of_cables)
     if K is not None:
         frame = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose")
@@ -235,6 +239,17 @@ def _motion(
             damped = f"ratio {beta * ratios.min():.2g} to {beta * ratios.max():.2g} of the modes, "
             damped += f"by the cables: {wires.min():.4g} to {wires.max():.4g} N s/m"
     return step, wires, [f"time step  {1e3 * step:g} ms, {of}", f"damping    {damped}"]
+
+
+def _couple(root: etree._Element, coupling: Coupling, names: Sequence[str]) -> None:
+    """Add an equation for each joint that follows another one, from the initial positions."""
+    equations = etree.SubElement(root, "equality")
+    for i, name in enumerate(names):
+        if i not in coupling.leaders:
+            (j,) = np.flatnonzero(coupling.matrix[i])
+            leader, factor = names[coupling.leaders[j]], float(coupling.matrix[i, j])
+            line = {"joint1": name, "joint2": leader, "polycoef": f"0 {factor!r} 0 0 0"}
+            etree.SubElement(equations, "joint", line)
 
 
 def _missing(K: Stiffness) -> Iterator[str]:

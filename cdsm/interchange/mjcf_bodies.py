@@ -37,7 +37,8 @@ def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
     M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω). J_v and J_ω are the Jacobians of the velocity of the centre of
     mass and of the angular velocity of a body.
     """
-    body, M = pose.arm._body, np.zeros((pose.arm.nv, pose.arm.nv))
+    body = pose.arm._body
+    M = np.zeros(2 * (len(body.all_joints),))
     for link, mass, centre, inertia in carried:
         place = pose.link_pose(link)
         joints = np.array(body.joints_to(body.locate(link)[0]), dtype=np.intp) - 1
@@ -45,7 +46,7 @@ def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
         linear = pose._twist[:3, joints] + np.cross(angular.T, R @ centre + place[:3, 3]).T
         turned = angular.T @ R
         M[np.ix_(joints, joints)] += mass * linear.T @ linear + turned @ inertia @ turned.T
-    return M
+    return body.coupling.square(M) if body.coupling else M
 
 
 def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> list[Carried]:
@@ -57,7 +58,9 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
     """
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
-    joints = robot.findall("joint")
+    joints, own = robot.findall("joint"), arm.springs
+    pairs = zip(own.stiffness.tolist(), own.angle.tolist(), strict=True)
+    springs = dict(zip(own.joints, pairs, strict=True))
     (base,) = links.keys() - {joint.find("child").get("link") for joint in joints}
     world = etree.SubElement(root, "worldbody")
     # MuJoCo reserves the name world for its root
@@ -85,7 +88,7 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
         for hole, position in sites:
             etree.SubElement(body, "site", name=hole, pos=row(position), size=repr(_SITE))
         for joint in below:
-            child, turns = joint.find("child").get("link"), joint.get("type") == "revolute"
+            child, turns = joint.find("child").get("link"), joint.get("type") != "prismatic"
             queue.append(child)
             bodies[child] = etree.SubElement(body, "body", name=child)
             place, turn = _place(joint)
@@ -96,9 +99,13 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
                 moved = q * axis / np.linalg.norm(axis)
                 place = place if turns else place + turn.apply(moved)
                 turn = turn * Rotation.from_rotvec(moved) if turns else turn
-                ends = f"{limit.get('lower', '0')} {limit.get('upper', '0')}"
                 of_joint = {"name": joint.get("name"), "type": "hinge" if turns else "slide"}
-                of_joint |= {"axis": row(axis), "range": ends, "ref": repr(q)}
+                of_joint |= {"axis": row(axis), "ref": repr(q)}
+                if joint.get("type") != "continuous":
+                    of_joint["range"] = f"{limit.get('lower', '0')} {limit.get('upper', '0')}"
+                k, free = springs[joint.get("name")]
+                if k:
+                    of_joint |= {"stiffness": repr(k), "springref": repr(free)}
                 etree.SubElement(bodies[child], "joint", of_joint)
             bodies[child].attrib.update(_placed(place, turn))
     return masses
