@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
+from cdsm.errors import GeometryError
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Limit, Link, Pieces
 from cdsm.support import records
 
@@ -72,8 +73,21 @@ class Section:
     disk_radius: records.Length | None = None
 
 
-def _section(given: object) -> object:
-    return Section(**given) if isinstance(given, dict) else given
+def _sections(given: object) -> tuple[Section, ...]:
+    """Return sections that may be given as tables; CrossFaults lists every fault."""
+    if not isinstance(given, (list, tuple)) or not given:
+        raise ValueError("give one or more")
+    sections, faults = list[Section](), list[str]()
+    for i, each in enumerate(given, start=1):
+        try:
+            sections.append(each if isinstance(each, Section) else Section(**each))
+        except GeometryError as error:
+            faults += [f"[{i}].{fault}" for fault in error.faults]
+        except TypeError:
+            faults.append(f"[{i}]: {each!r:.60} given; a table is needed")
+    if faults:
+        raise records.CrossFaults(faults)
+    return tuple(sections)
 
 
 @records.record
@@ -99,10 +113,7 @@ class Backbone(Beam):
         name: Name of the robot.
     """
 
-    sections: Annotated[
-        tuple[Annotated[Section, BeforeValidator(_section)], ...],
-        Field(strict=False, min_length=1),
-    ]
+    sections: Annotated[Sequence[Section | dict[str, Any]], PlainValidator(_sections)]
     mass_per_length: records.Mass = 0.0
     joint_limit: Limit | None = None
     name: records.Name = "arm"
@@ -119,9 +130,10 @@ class Backbone(Beam):
 
 def backbone_fields(of: Backbone) -> dict[str, Any]:
     """Return the fields of the :class:`~cdsm.Geometry` of a backbone by name."""
-    common = of.sections[0].hole_radius
+    sections = _sections(of.sections)
+    common = sections[0].hole_radius
     joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
-    for section in of.sections:
+    for section in sections:
         gap = section.length / section.disks
         own = None if section.hole_radius == common else section.hole_radius
         for _ in range(section.disks):

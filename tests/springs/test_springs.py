@@ -1,0 +1,121 @@
+"""Springs at joints: in the balance, in K_θ, in batches, and in MuJoCo."""
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm.support.values import Array
+
+WRENCH = np.array([1.0, 2.0, -1.0, 0.1, 0.05, -0.02])
+Q = np.array([0.1, -0.2, 0.15, 0.1, -0.1, 0.2])
+
+
+def sprung(**changes: object) -> cdsm.Manipulator:
+    sizes: dict[str, object] = {
+        "joints": 3,
+        "cables_per_joint": 3,
+        "link_length": 0.05,
+        "base_length": 0.02,
+        "disk_offset": 0.01,
+        "hole_radius": 0.02,
+        "link_mass": 0.05,
+        "lead": 0.1,
+        "joint_stiffness": [2.0, 1.0, 0.5],
+        "rest_angle": [0.0, 0.1, 0.0],
+    }
+    return cdsm.Manipulator(
+        cdsm.Geometry.universal(**{**sizes, **changes}),  # type: ignore[arg-type]
+        cdsm.LinearElasticity(5e4),
+    )
+
+
+def potential(arm: cdsm.Manipulator, K: cdsm.Stiffness, q: Array) -> float:
+    """Energy of cables, weight, load and springs: written down here once more."""
+    pose, there = K.posture, arm.at(q, check_limits=False)
+    longer = there.cable_lengths - pose.cable_lengths
+    cables = K.tension @ longer + 0.5 * K.cable_stiffness @ longer**2
+    weight = arm._body.potential_energy(q)
+    work = K.wrench[:3] @ there.tip[:3, 3]
+    k = np.repeat([2.0, 1.0, 0.5], 2)
+    free = np.repeat([0.0, 0.1, 0.0], 2)
+    return float(cables + weight - work + 0.5 * k @ (q - free) ** 2)
+
+
+def test_stiffness_is_the_hessian_of_the_potential() -> None:
+    arm = sprung()
+    W = np.append(WRENCH[:3], np.zeros(3))
+    K = cdsm.stiffness(arm.at(Q), np.linspace(5.0, 20.0, 9), W)
+    errors = []
+    for h in (4e-3, 2e-3):
+        steps = h * np.eye(6)
+        H = np.array(
+            [
+                [
+                    sum(
+                        s * t * potential(arm, K, Q + s * a + t * b)
+                        for s in (1.0, -1.0)
+                        for t in (1.0, -1.0)
+                    )
+                    / (4.0 * h * h)
+                    for b in steps
+                ]
+                for a in steps
+            ]
+        )
+        errors.append(abs(H - K.joint).max() / abs(K.joint).max())
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)  # second order
+    np.testing.assert_array_equal(K.springs, np.diag([2.0, 2.0, 1.0, 1.0, 0.5, 0.5]))
+
+
+def test_springs_add_to_k_and_to_the_balance_what_they_are() -> None:
+    arm = sprung()
+    bare = arm.with_springs({})
+    F = cdsm.distribute_tension(arm.at(Q), 5.0, wrench=WRENCH)
+    with_springs = cdsm.stiffness(arm.at(Q), F)
+    without = cdsm.stiffness(bare.at(Q), F.values, WRENCH)
+    np.testing.assert_allclose(with_springs.joint - without.joint, with_springs.springs, atol=1e-12)
+    assert abs(F.residual).max() < 1e-12
+    k, free = arm.springs.stiffness, arm.springs.angle
+    np.testing.assert_allclose(with_springs.residual - without.residual, k * (Q - free), atol=1e-12)
+    assert "of it springs" in str(with_springs)
+    assert "of it springs" not in str(without)
+    assert "PASS" in str(with_springs.report())
+
+
+def test_batches_have_the_springs() -> None:
+    arm = sprung()
+    F = cdsm.distribute_tension(arm.at(Q), 5.0, wrench=WRENCH)
+    K = cdsm.stiffness(arm.at(Q), F)
+    names = ("tension", "joint", "springs", "margin", "compliance", "residual", "along")
+    rows = cdsm.evaluate(arm, np.tile(Q, (3, 1)), None, WRENCH, names, minimum=5.0, direction="z")
+    for name in ("joint", "springs", "margin", "compliance"):
+        np.testing.assert_allclose(
+            rows[name][0], getattr(K, name), rtol=0, atol=1e-10 * abs(K.joint).max()
+        )
+    np.testing.assert_allclose(rows["along"][0], K.along("z"), rtol=1e-10)
+    assert abs(rows["residual"]).max() < 1e-11
+
+
+def test_springs_are_kept_by_copies_files_and_other_cables(tmp_path: object) -> None:
+    arm = sprung()
+    again = arm.with_friction(0.1).with_gravity("-y")
+    np.testing.assert_array_equal(again.springs.stiffness, arm.springs.stiffness)
+    assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
+    assert arm.with_springs({}) != arm
+
+
+def test_springs_that_cannot_be_are_named() -> None:
+    arm = sprung()
+    for given, said in (
+        ({"joint1_1": -1.0}, r"springs\['joint1_1'\]: -1 N m/rad given"),
+        ({"joint1_1": (1.0, 2.0, 3.0)}, "stiffness, or"),
+        ({"joint1_1": np.nan}, "joint1_1"),
+        ([1.0], "dict of joint names"),
+    ):
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            arm.with_springs(given)  # type: ignore[arg-type]
+    with pytest.raises(cdsm.UnknownName, match="joint9_1"):
+        arm.with_springs({"joint9_1": 1.0})
+    with pytest.raises(cdsm.GeometryError, match="joint_stiffness"):
+        sprung(joint_stiffness=-1.0)
