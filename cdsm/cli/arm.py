@@ -1,281 +1,211 @@
-"""``cdsm urdf | stiffness | check | export``: compute the stiffness of an arm; write its files."""
+"""``cdsm new | export``: write a first ARM.toml; write an arm for other programs."""
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Mapping
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 import cdsm
-from cdsm.cli.files import file_option, out_option
-from cdsm.cli.options import (
-    Angles,
-    ArmOptions,
-    AsJson,
-    LoadOptions,
-    TensionOptions,
-    directions,
-)
-from cdsm.cli.output import Json, answer, by_cable, write
-from cdsm.cli.values import direction_of, misuse
-
-if TYPE_CHECKING:
-    from cdsm.support.directions import Direction
-
-_Given = Annotated[
-    Path | None,
-    typer.Option(
-        "--tolerances",
-        metavar="T.toml",
-        help="Tolerances for the uncertainty of the stiffness; all those in ARM.toml are replaced.",
-    ),
-]
-
-_ALONG: dict[str, Direction] = {"x": "x", "y": "y", "z": "z"}
-"""Directions by name; every answer has the stiffness along them."""
+from cdsm.cli import options
+from cdsm.cli.options import Angles, Arm, AsJson, Changes, Minimum
+from cdsm.cli.output import Json, answer, header, misuse
 
 
-def urdf(
-    geometry: Annotated[
-        Path, typer.Argument(metavar="ARM.toml", help="File with the geometry of the arm.")
+def new(
+    arm: Annotated[
+        Path,
+        options.file_option(declare=typer.Argument, endings=(".toml",), help="File to write."),
     ],
-    out: Annotated[
-        Path, out_option(endings=(".urdf",), metavar="FILE.urdf", help="URDF file to write.")
-    ],
-    as_json: AsJson = False,
-) -> None:
-    """Write the URDF of an arm, checked by reading it back with two parsers."""
-    if geometry.suffix.lower() == ".urdf":
-        raise misuse("ARM.toml", f"{geometry} is a URDF already.")
-    arm = cdsm.Geometry.read(geometry)
-    path = cdsm.write_urdf(arm, out)
-    numbers: Json = {"name": arm.name, "length_m": arm.length, "written": [str(path)]}
-    answer(as_json, lambda: numbers, f"{arm}\nwritten: {path}")
-
-
-def stiffness(
-    arm: ArmOptions,
-    tensions: TensionOptions,
-    load: LoadOptions,
-    angles: Angles = "0",
-    direction: Annotated[
+    joints: Annotated[
         str | None,
         typer.Option(
-            help="One more direction for the stiffness: an axis such as -y, or a vector.",
-            metavar="AXIS|X,Y,Z",
-            autocompletion=directions,
+            metavar="N[,N,...]",
+            help="Number of joints, default 4; several numbers: of sections, base to tip, each a "
+            "quarter narrower than the one before.",
         ),
     ] = None,
-    tolerances: _Given = None,
-    as_json: AsJson = False,
-) -> None:
-    """Compute the least tensions that balance the arm at a posture, and the stiffness under them.
-
-    Exit code 0; 3 if the arm is unstable.
-    """
-    pose = arm.at(angles)
-    tension = tensions.distribute(pose, load.at_tip(pose.arm))
-    K = cdsm.stiffness(pose, tension)
-    parts: list[object] = [tensions.conditions(pose), tension, K]
-    more: Json = {}
-    along = _ALONG
-    if direction is not None:
-        along = along | {direction: (u := direction_of(direction))}
-        more = {"direction": u, "along_direction_N_per_m": K.along(u)}
-        parts += [f"along {direction}: {K.along(u) / 1000.0:.4g} N/mm"]
-    lines, stuck = _sticking(_breakaways(tension, along), along)
-    tables, sure = _uncertainty(tension, tolerances, along)
-    numbers = more | stuck | sure
-    parts += [*lines, *tables]
-    answer(as_json, lambda: K.to_dict() | numbers, *parts, warnings=K.warnings[:1])
-
-
-def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[str, cdsm.Breakaway]:
-    """Compute the load in each direction of ``along`` at which a cable begins to slide in a hole.
-
-    The result is by name of the direction, and empty if the arm has no friction. A direction has
-    no entry in these cases: a cable slides already without a load; none slides at any load; the
-    stuck arm is about to buckle; or a tension is outside the domain of its law.
-    """
-    found = {}
-    if tension.posture.arm.has_friction:
-        for name, u in along.items():
-            with contextlib.suppress(cdsm.CdsmError):
-                first = cdsm.breakaway(tension.posture, tension, u)
-                if 0.0 < first.load < math.inf:
-                    found[name] = first
-    return found
-
-
-def _sticking(
-    breakaways: dict[str, cdsm.Breakaway], along: Mapping[str, Direction]
-) -> tuple[list[str], Json]:
-    """Return the stiffness under small loads, while all cables stick, and the breakaway loads.
-
-    The result is a text, in a list, and the JSON, with both numbers for each direction.
-    ``breakaways`` is the result of :func:`_breakaways`; if it is empty, so are text and JSON.
-    """
-    from cdsm.stiffness_matrix.prints import model_of
-
-    if not breakaways:
-        return [], {}
-    stuck = {name: each.stiffness.along(along[name]) for name, each in breakaways.items()}
-    lines = [
-        f"along {name} {stuck[name] / 1000.0:.4g} N/mm below {each.load:.4g} N"
-        for name, each in breakaways.items()
-    ]
-    numbers = {
-        name: {"stuck_N_per_m": stuck[name], "breakaway_N": each.load}
-        for name, each in breakaways.items()
-    }
-    K = next(iter(breakaways.values())).stiffness
-    head = f"small loads measure ({model_of(K)}):"
-    return ["\n".join([head, *lines])], {"sticking": numbers}
-
-
-def _uncertainty(
-    tension: cdsm.Tension, tolerances: Path | None, along: Mapping[str, Direction] = _ALONG
-) -> tuple[list[str], Json]:
-    """Compute the uncertainty of the stiffness in each direction of ``along``.
-
-    Return a table, as a list of one text, and the JSON. The tolerances are those in the file
-    ``tolerances``, or else those of the arm; without any, table and JSON are empty. A direction in
-    which the tip cannot move is left out.
-    """
-    pose, found = tension.posture, {}
-    given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
-    for name, u in along.items() if given.given else ():
-        with contextlib.suppress(cdsm.SingularStiffness):
-            found[name] = cdsm.uncertainty(pose, tension, given, direction=u)
-    if not found:
-        return [], {}
-    return [_table(found)], {"uncertainty": {name: each.to_dict() for name, each in found.items()}}
-
-
-def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
-    """Format budgets as a table with a column for each direction.
-
-    The rows are the stiffness ± its uncertainty, then the share of each source in it [%].
-    """
-    from cdsm.support.format import aligned
-
-    def percent(source: str) -> list[float]:
-        return [100.0 * b.contributions[source] / abs(b.value) for b in budgets.values()]
-
-    sources = {source for budget in budgets.values() for source in budget.contributions}
-    ranked = sorted(sources, key=lambda source: -max(percent(source)))
-    rows = [
-        ("uncertainty [N/mm]", *budgets),
-        ("along", *(budget.shown for budget in budgets.values())),
-        *(
-            (f"  of it {source.replace('_', ' ')}", *(f"{part:.2g} %" for part in percent(source)))
-            for source in ranked
+    kind: Annotated[
+        Literal["universal", "hinged"],
+        typer.Option("--type", help="Joints: universal, or hinges, each turned 90 degrees."),
+    ] = "universal",
+    wire: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|EA|WIRE.toml",
+            help="Wire of all cables: a name, a constant EA in N, or a file that `cdsm fit` "
+            "writes. Default: 1x19-1.2mm; with --from, that of the cables.",
         ),
-    ]
-    remarks = (f"along {axis}: {each}" for axis, b in budgets.items() for each in b.warnings)
-    return "\n".join([*aligned(rows), *remarks])
-
-
-def check(
-    arm: ArmOptions,
-    tensions: TensionOptions,
-    load: LoadOptions,
-    angles: Angles = "0",
-    out: Annotated[
+    ] = None,
+    source: Annotated[
         Path | None,
-        out_option(
-            endings=(".html", ".htm"), metavar="FILE.html", help="Also write the report as a page."
+        typer.Option(
+            "--from",
+            metavar="ROBOT.urdf|FOLDER",
+            help="A robot, with --cables and --tip; or the folder of a CASPR model, with --wire.",
         ),
     ] = None,
-    tolerances: _Given = None,
+    cables: Annotated[
+        Path | None,
+        typer.Option(metavar="CABLES.toml", help="Cables of the robot, as write_cables() writes."),
+    ] = None,
+    tip: Annotated[
+        str | None, typer.Option(metavar="LINK", help="Link of the robot that is the tip.")
+    ] = None,
+    check_inertia: Annotated[
+        bool,
+        typer.Option(
+            " /--no-check-inertia", help="Accept moments of inertia that no body can have."
+        ),
+    ] = True,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
     as_json: AsJson = False,
-) -> None:
-    """Check a stiffness: is it right, balanced and stable, and how to read it.
+) -> int:
+    """Write a complete ARM.toml, which every command reads, with a comment on every key.
 
-    Exit code 0: it passes; 3: it fails, and the report says why.
+    Sizes, wire and everything else are edited in the file. --from makes an ARM.toml of a robot.
     """
+    from cdsm.arm_file.template import template
     from cdsm.support.files import write_text
+    from cdsm.wires.catalogue import is_file
 
-    pose = arm.at(angles)
-    tension = tensions.distribute(pose, load.at_tip(pose.arm))
-    report = cdsm.stiffness(pose, tension).report()
-    conditions = tensions.conditions(pose)
-    about = f"{arm.arm}\n{conditions}\ncdsm {cdsm.__version__}"
-    write(out, lambda file: write_text(file, report.to_html(about)))
-    warnings = () if report.passed else ("FAIL: the report says why.",)
-    tables, sure = _uncertainty(tension, tolerances)
-    parts = [conditions, report, *tables]
-    answer(as_json, lambda: report.to_dict() | sure, *parts, warnings=warnings)
+    if arm.exists() and not overwrite:
+        raise misuse("ARM.toml", f"{arm} exists; add --overwrite.")
+    if source is not None:
+        if joints is not None:
+            raise misuse("--joints", "are those of the robot; leave it out.")
+        made = _of_robot(source, cables, tip, wire, check_inertia)
+        made.write(arm)
+    else:
+        for option, value in (("--cables", cables), ("--tip", tip)):
+            if value is not None:
+                raise misuse(option, "goes with --from only.")
+        counts = _counts("4" if joints is None else joints)
+        law = "1x19-1.2mm" if wire is None else wire
+        made, parts = _serpentine(kind, counts, _law(law))
+        if is_file(law):  # an ARM.toml names files from its own folder
+            law = os.path.relpath(law, arm.parent)
+        write_text(arm, template(arm.name, _number(law), parts))
+    bent = min([10.0, *(math.degrees(x) / 2.0 for x in made.upper[~made.slides].tolist())])
+    numbers: Json = {"name": made.name, "length_m": made.length, "written": [str(arm)]}
+    tried = f"written: {arm}; try cdsm stiffness {arm} --angles {bent:.3g} --check"
+    return answer(as_json, numbers, made, tried)
+
+
+def _number(wire: str) -> str | float:
+    try:
+        return float(wire)
+    except ValueError:
+        return wire
+
+
+def _law(wire: str) -> cdsm.Elasticity:
+    from cdsm.wires.catalogue import as_wire
+
+    return as_wire(_number(wire))
+
+
+def _counts(text: str) -> list[int]:
+    try:
+        counts = [int(word) for word in text.split(",")]
+    except ValueError:
+        counts = []
+    if not counts or min(counts) < 1:
+        raise misuse("--joints", f"{text!r} given; give a whole number, or several: 4 or 3,3.")
+    return counts
+
+
+def _of_robot(
+    source: Path, cables: Path | None, tip: str | None, wire: str | None, check_inertia: bool
+) -> cdsm.Manipulator:
+    """Read the arm of a URDF, or of the folder of a CASPR model."""
+    law = None if wire is None else _law(wire)
+    if source.is_dir():
+        if law is None:
+            raise misuse("--wire", "give it: the cables of CASPR do not stretch.")
+        return cdsm.read_caspr(source, elasticity=law, check_inertia=check_inertia)
+    if source.suffix.lower() == ".toml":
+        raise misuse("--from", f"{source} is no robot; an ARM.toml can be copied.")
+    if cables is None or tip is None:
+        raise misuse("--cables, --tip", f"give both: {source} does not say what they are.")
+    routed = cdsm.read_cables(cables, law)
+    return cdsm.Manipulator.from_urdf(source, routed, tip=tip, check_inertia=check_inertia)
+
+
+def _serpentine(
+    kind: str, counts: list[int], law: cdsm.Elasticity
+) -> tuple[cdsm.Manipulator, list[tuple[str, dict[str, float]]]]:
+    """Build an arm of sections with these numbers of joints; return it with the sizes of each."""
+    parts = []
+    for i, count in enumerate(counts):
+        sizes = {"joints": count, "twist": math.pi / 2.0, "cables_per_joint": 3}
+        if kind == "hinged":
+            sizes["cables_per_joint"] = 2
+        else:
+            del sizes["twist"]
+        each = sizes["cables_per_joint"]
+        sizes |= {"link_length": 0.06, "base_length": 0.0 if i else 0.03, "disk_offset": 0.012}
+        sizes |= {"hole_radius": 0.025 * 0.75**i, "link_mass": 0.12, "lead": 0.3}
+        if kind == "hinged":
+            # 10 degrees, or less, so that the holes of one plane do not reach those of the next
+            sizes["spread"] = min(math.radians(10.0), math.tau / (count * each))
+        if i:  # between the holes of all sections, wherever those are
+            sizes["phase"] = math.tau / math.lcm(*counts) / each * i / len(counts)
+        parts.append((kind, sizes))
+    built = [getattr(cdsm.Geometry, kind)(**sizes) for _, sizes in parts]
+    return cdsm.Manipulator(cdsm.Geometry.sections(built), law), parts
 
 
 def export(
-    arm: ArmOptions,
-    tensions: TensionOptions,
-    load: LoadOptions,
+    arm: Arm,
     out: Annotated[
-        Path | None,
-        out_option(
-            endings=(".xml",),
-            metavar="FILE.xml",
-            help="MuJoCo model to write, its cables under tension.",
+        Path,
+        options.file_option(
+            declare=typer.Argument,
+            endings=(".urdf", ".xml"),
+            help="URDF of the links and joints, or MuJoCo model with the cables under tension.",
         ),
-    ] = None,
-    cables_out: Annotated[
-        Path | None,
-        file_option(endings=(".toml",), metavar="FILE.toml", help="File to write the cables to."),
-    ] = None,
+    ],
+    changes: Changes = None,
     angles: Angles = "0",
+    minimum: Minimum = 0.0,
     actuators: Annotated[
         Literal["length", "tension", "none"],
         typer.Option(help="What the motors of the MuJoCo model control; none: no motors."),
     ] = "length",
-    damping_ratio: Annotated[
-        float | None,
-        typer.Option(help="Cables damp; damping ratio of the least damped mode. Default 0.05."),
-    ] = None,
-    damping: Annotated[
-        float | None,
-        typer.Option(help="Damping of each joint [N m s/rad], instead of damping by the cables."),
-    ] = None,
     as_json: AsJson = False,
-) -> None:
-    """Write an arm for other programs: a MuJoCo model at a posture, or a file of its cables.
+) -> int:
+    """Write an arm for other programs: its URDF, or a MuJoCo model at a posture.
 
-    The answer states the time step, the damping and the actuators of the model.
+    The answer states the time step, the damping and the actuators of the MuJoCo model.
 
     Exit code 0; 3 if the arm of the MuJoCo model is unstable: it is written all the same.
     """
-    if out is None and cables_out is None:
-        raise misuse("--out", "give --out, --cables-out or both.")
-    pose = arm.at(angles)
-    numbers: Json = {"name": pose.arm.name}
-    conditions = tensions.conditions(pose)
-    lines, files = [str(conditions)], []
-    warnings: list[str] = []
-    if out is not None:
-        from cdsm.interchange.mjcf import mujoco_model
-        from cdsm.support.files import write_text
-        from cdsm.support.format import JointUnits, key
+    from cdsm.support.files import write_text
 
-        tension = tensions.distribute(pose, load.at_tip(pose.arm))
-        model = mujoco_model(pose.arm, pose, tension, actuators, damping_ratio, damping)
-        motion, unit = model.motion, JointUnits(pose.arm.slides).joined("N m s/rad", "N s/m")
-        numbers |= {
-            "stable": model.unstable is None,
-            "time_step_s": motion.time_step,
-            "cable_damping_N_s_per_m": by_cable(pose.arm, motion.wires),
-            key("joint_damping", unit): motion.joints,
-            "actuators": model.actuators,
-        }
-        warnings += filter(None, [model.unstable])
-        lines += model.remarks
-        files.append(str(write_text(out, model.text)))
-    if cables_out is not None:
-        files.append(str(cdsm.write_cables(pose.arm.cables, cables_out)))
-    lines += [f"written: {path}" for path in files]
-    numbers |= conditions.to_dict() | {"written": files}
-    answer(as_json, lambda: numbers, "\n".join(lines), warnings=warnings)
+    pose = options.posture(arm, changes, angles)
+    found = pose.arm
+    numbers: Json = {"name": found.name, "length_m": found.length, "written": [str(out)]}
+    if out.suffix.lower() == ".urdf":
+        if found.is_serpentine:
+            cdsm.write_urdf(found.geometry, out)
+        else:
+            write_text(out, found.urdf)
+        return answer(as_json, numbers, found, f"written: {out}")
+    from cdsm.interchange.mjcf import mujoco_model
+    from cdsm.support.format import JointUnits, key
+
+    model = mujoco_model(found, pose, cdsm.distribute_tension(pose, minimum), actuators)
+    write_text(out, model.text)
+    motion, unit = model.motion, JointUnits(found.slides).joined("N m s/rad", "N s/m")
+    wires = dict(zip(found.cables.names, motion.wires.tolist(), strict=True))
+    head, told = header(pose, [minimum])
+    told |= {"stable": model.unstable is None, "time_step_s": motion.time_step}
+    told |= {"cable_damping_N_s_per_m": wires, key("joint_damping", unit): motion.joints}
+    told |= {"actuators": model.actuators}
+    warnings = [] if model.unstable is None else [model.unstable]
+    lines = "\n".join([*model.remarks, f"written: {out}"])
+    return answer(as_json, told | numbers, head, lines, warnings=warnings)

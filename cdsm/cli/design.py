@@ -2,41 +2,32 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import cdsm
-from cdsm.cli.files import out_folder
 from cdsm.cli.options import AsJson
-from cdsm.cli.output import answer, console
-from cdsm.cli.values import misuse
+from cdsm.cli.output import Json, answer, misuse
 
 
 def design(
     problem: Annotated[
         Path,
         typer.Argument(
-            metavar="PROBLEM.toml", help="The problem; examples/design.toml is one with comments."
+            metavar="PROBLEM.toml",
+            help="Problem and search (generations, population, seed), as examples/design.toml.",
         ),
     ],
-    out: Annotated[Path, out_folder(help="Folder for the results.")],
-    generations: Annotated[
-        int | None, typer.Option(help="Generations; default: those of the file, or 40.", min=1)
-    ] = None,
-    population: Annotated[
-        int | None, typer.Option(help="Designs per generation; default: of the file, or 40.", min=4)
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Seed; default: that of the file, or 0.", min=0)
-    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Folder for the results.")
+    ],
     choose: Annotated[
         int | None,
         typer.Option(
-            help="Number of the design on the front that is written; default: the compromise, the "
-            "nearest to the best of every objective.",
+            help="Number of the design on the front to write; default: the compromise, the nearest "
+            "to the best of every objective.",
             min=0,
         ),
     ] = None,
@@ -44,19 +35,16 @@ def design(
         bool,
         typer.Option(
             "--refine",
-            help="Improve the chosen design by SLSQP: one objective, continuous "
-            "variables. Only designs.csv still has the designs of the search.",
+            help="Improve the chosen design by SLSQP: one objective, continuous variables.",
         ),
     ] = False,
-    jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.", min=1)] = None,
     as_json: AsJson = False,
-) -> None:
+) -> int:
     """Find the best designs of an arm; write the Pareto front, figures and the chosen arm.
 
     The deflection is how far the load moves the tip when the motors are locked before it acts. It
     is computed to first order, with the stiffness under the least tensions without the load.
     """
-    from cdsm.batch.inputs import checked_threads
     from cdsm.design.problem_file import read_problem
     from cdsm.design.refine import require_smooth
     from cdsm.support.files import make_folder, write_text
@@ -69,14 +57,8 @@ def design(
     if refine:
         require_smooth(task)
     folder = make_folder(out)
-    processes = checked_threads(jobs)
     found = cdsm.search_designs(
-        task,
-        generations=generations or file.generations,
-        population=population or file.population,
-        seed=file.seed if seed is None else seed,
-        jobs=processes,
-        report=partial(_tell, task.objectives[0]),
+        task, generations=file.generations, population=file.population, seed=file.seed
     )
     number = found.compromise
     if choose is not None:
@@ -86,35 +68,12 @@ def design(
         found, number = cdsm.refine_design(task, found.design(number)), 0
     paths = [
         write_text(folder / "designs.csv", every),
-        write_text(folder / "front.csv", found.measured(jobs=processes).to_csv()),
+        write_text(folder / "front.csv", found.measured().to_csv()),
         cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
         cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),
         *found.write_arm(folder, number),
     ]
     names = ", ".join(path.name for path in paths)
-    written = {"written": [str(path) for path in paths], "chosen": number}
-    answer(
-        as_json,
-        lambda: {**found.to_dict(), **written},
-        found._text(number),
-        f"design {number} is written to {folder}: {names}",
-    )
-
-
-def _tell(first: cdsm.Objective, step: cdsm.DesignProgress) -> None:
-    """Print a line about a generation of the search, if standard error is a terminal.
-
-    ``first`` is the first objective; the line has its best value so far.
-    """
-    if not console().is_terminal:
-        return
-    best = (
-        f"{first.words} {first.shown(step.best)}"
-        if step.feasible
-        else f"none feasible yet, the nearest misses by {100.0 * step.missed:.3g} %"
-    )
-    console().print(
-        f"generation {step.generation}: {step.designs} designs, {step.feasible} feasible, "
-        f"best: {best}",
-        highlight=False,
-    )
+    written: Json = {"written": [str(path) for path in paths], "chosen": number}
+    said = f"design {number} is written to {folder}: {names}"
+    return answer(as_json, found.to_dict() | written, found._text(number), said)

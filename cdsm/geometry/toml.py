@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 # keys of an ARM.toml that do not belong to the geometry; cables may belong to it
 _ARM_KEYS = (
     *("gravity", "original_length", "wire", "wires", "urdf"),
-    *("series_stiffness", "control", "minimum", "maximum", "tolerances"),
+    *("slack_below", "friction", "series_stiffness", "control", "minimum", "maximum"),
+    "tolerances",
 )
 
 

@@ -1,6 +1,7 @@
-"""Show a progress bar in the terminal, on standard error, if work takes longer than a second.
+"""Show on standard error how far work is that takes longer than a second.
 
-Nothing is shown where there is no terminal: in a pipe, a notebook, a log file.
+In a terminal that is a bar. Where there is none, a command prints a line now and then; in a notebook
+or a program nothing is shown.
 """
 
 from __future__ import annotations
@@ -18,6 +19,12 @@ _Item = TypeVar("_Item")
 
 DELAY = 1.0
 """Time [s] before a bar is shown: shorter work shows nothing."""
+
+_PAUSE = 10.0
+"""Time [s] between two lines where there is no terminal."""
+
+lines_wanted: ContextVar[bool] = ContextVar("lines_wanted", default=False)
+"""Whether lines are printed where there is no terminal."""
 
 _allowed: ContextVar[bool] = ContextVar("_allowed", default=True)
 
@@ -40,9 +47,14 @@ def progress_bar(
     bar also shows how many items are finished per second. A bar that is opened while another one
     is open is never shown, even if the outer one is not ``wanted``.
     """
-    if not (wanted and _allowed.get() and sys.stderr.isatty()):
+    terminal = sys.stderr.isatty()
+    if not (wanted and _allowed.get() and (terminal or lines_wanted.get())):
         with progress_allowed(False):
             yield lambda count: None
+        return
+    if not terminal:
+        with progress_allowed(False):
+            yield _lines(what, total, done)
         return
     from rich import progress  # slow to import
     from rich.console import Console
@@ -69,6 +81,22 @@ def progress_bar(
             yield advance
     finally:
         bar.stop()
+
+
+def _lines(what: str, total: int | None, done: int) -> Callable[[int], None]:
+    """Return a function that counts items, and prints a line if the last one is long ago."""
+    begun, printed, first = monotonic(), monotonic() - _PAUSE + DELAY, done
+
+    def advance(count: int) -> None:
+        nonlocal done, printed
+        done, now = done + count, monotonic()
+        if now - printed < _PAUSE or done == total:
+            return
+        printed, speed = now, (done - first) / (now - begun)
+        left = f", {(total - done) / speed:.0f} s left" if total and speed else ""
+        print(f"{what}: {done}{f' of {total}' if total else ''}{left}", file=sys.stderr, flush=True)
+
+    return advance
 
 
 @contextmanager

@@ -49,15 +49,18 @@ def as_wire(wire: Wire) -> Elasticity:
     """
     if isinstance(wire, Elasticity):
         return wire
-    if isinstance(wire, os.PathLike) or (
-        isinstance(wire, str) and wire.endswith((".toml", *_MEASURED))
-    ):
+    if isinstance(wire, os.PathLike) or is_file(wire):
         return read_law(wire)
     if isinstance(wire, str):
         return WIRES[one_of("wire", wire, WIRES, "Or give EA in N, or a file WIRE.toml.")]
     if isinstance(wire, bool) or not isinstance(wire, (int, float)):
         raise InvalidInput("wire", f"{wire!r} given; give a name, EA in N, or a file.")
     return LinearElasticity(wire)
+
+
+def is_file(wire: object) -> bool:
+    """Return whether the name of a wire is that of a file."""
+    return isinstance(wire, str) and wire.endswith((".toml", *_MEASURED))
 
 
 def read_law(path: str | os.PathLike[str]) -> Elasticity:

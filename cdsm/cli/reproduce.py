@@ -9,20 +9,18 @@ from typing import Annotated, Literal
 import typer
 
 import cdsm
-from cdsm.cli.files import out_folder
 from cdsm.cli.options import AsJson
 
 
 def reproduce(
-    out: Annotated[Path, out_folder(help="Folder for the figures and tables.")] = Path(
-        "reproduction"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Folder for figures and tables.")
+    ] = Path("reproduction"),
     kind: Annotated[
-        Literal["pdf", "svg", "png"],
-        typer.Option("--format", help="Format of the figures; pdf and svg are vectors."),
+        Literal["pdf", "svg", "png"], typer.Option("--format", help="Format of the figures.")
     ] = "png",
     as_json: AsJson = False,
-) -> None:
+) -> int:
     """Recompute Figs. 3 to 8, 10, 12 and 13 of the paper: figures, table and numbers.
 
     Prints every number of the paper beside ours. reproduction.md also has what was assumed, and
@@ -45,8 +43,9 @@ def reproduce(
     written.append(write_text(out / "reproduction.json", numbers + "\n"))
     if as_json:
         typer.echo(numbers)
-        return
+        return 0
     rows = [(f"{row[0]}: {row[1]}", *row[2:5]) for row in paper.to_rows(results)]
     typer.echo("\n".join(aligned([("quantity", *paper.HEADER[2:5]), *rows])))
     typer.echo(f"\nall numbers, and what each is: {out / 'reproduction.md'}")
     typer.echo("written: " + ", ".join(map(str, written)))
+    return 0
