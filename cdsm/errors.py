@@ -92,8 +92,8 @@ class MissingWire(CdsmError, LookupError):
     def __init__(self, path: object, cables: Texts = ()) -> None:
         self.path, self.cables = str(path), tuple(cables)
         whose = f"the cables {listed(self.cables)}" if self.cables else "its cables"
-        said = f"{path}: has no wire for {whose}. Give wire= (--wire, of commands), or write at the"
-        remedy = 'top of an ARM.toml: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
+        said = f"{path}: has no wire for {whose}. Give wire= (commands: --set wire=48e3), or write"
+        remedy = 'at the top of it: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
         super().__init__(f"{said} {remedy}")
 
 

@@ -14,9 +14,9 @@ from typing import Annotated, Any, Final, cast
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WrapValidator
 from pydantic import ValidationInfo as Info
 
+from cdsm.arm_file.tables import read_tables
 from cdsm.cable import Cable, Cables, Control, Site
 from cdsm.cable_laws import OriginalLength
-from cdsm.arm_file.tables import read_tables
 from cdsm.errors import LINES, CdsmError, FileError, GeometryError, MissingWire, listed
 from cdsm.geometry import Geometry, toml
 from cdsm.geometry.cables import serpentine_cables

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from cdsm.errors import FileError, GeometryError, InvalidInput, listed
+from cdsm.errors import FileError, GeometryError, listed
 from cdsm.support.files import read_text
 from cdsm.support.records import read_toml
 from cdsm.wires.catalogue import is_file, read_law, table_of
@@ -17,10 +15,10 @@ from cdsm.wires.catalogue import is_file, read_law, table_of
 _FROM: Final = "Write an ARM.toml of it once, `cdsm new ARM.toml --from {path}"
 _OTHERS: Final = {
     "<mujoco": "is a MuJoCo model (MJCF), no ARM.toml: give the URDF that it was made from.",
-    "xacro": "is a xacro file: run xacro on it first, and give what it prints as a URDF.",
+    "<xacro:": "is a xacro file: run xacro on it first, and give what it prints as a URDF.",
     "<robot": f"is a robot (URDF), no ARM.toml. {_FROM} --cables CABLES.toml --tip LINK`, and give "
     "that; or, in Python, Manipulator.from_urdf().",
-    "<": f"is XML, no ARM.toml. {_FROM}` takes a URDF or the folder of a CASPR model.",
+    "<": "is XML, no ARM.toml. `cdsm new --from` takes a URDF, or the folder of a CASPR model.",
 }
 """What a file of XML is, by a text in it; the first one counts."""
 
@@ -42,25 +40,14 @@ def read_tables(
     if robot and text.lstrip("\ufeff \t\r\n").startswith("<"):
         said = next(said for sign, said in _OTHERS.items() if sign in text)
         raise FileError(path, said.format(path=path))
-    tables = laid_over(read_toml(text), changes or {})
+    tables: dict[str, Any] = laid_over(read_toml(text), changes or {})
     cables = tables.get("cables")
     each = [*cables.values()] if isinstance(cables, dict) else cables
     for table in (tables, *(each if isinstance(each, list) else ())):
-        if isinstance(table, dict) and is_file(wire := table.get("wire")):
+        wire = table.get("wire") if isinstance(table, dict) else None
+        if is_file(wire):
             table["wire"] = table_of(read_law(Path(path).parent / wire))
     return tables
-
-
-def change_of(text: str) -> dict[str, Any]:
-    """Parse ``KEY=VALUE``, a dotted key and a value of TOML; a value that is none is a string."""
-    key, equals, value = text.partition("=")
-    for written in (value, json.dumps(value.strip())):
-        try:
-            if equals and "\n" not in text:
-                return tomllib.loads(f"{key} = {written}")
-        except ValueError:
-            continue
-    raise InvalidInput("set", f"{text!r} given; give KEY=VALUE of an ARM.toml, such as minimum=5.")
 
 
 def laid_over(old: Any, new: Any, where: str = "") -> Any:
@@ -73,7 +60,9 @@ def laid_over(old: Any, new: Any, where: str = "") -> Any:
         return {**known, **laid}
     entries = [each if isinstance(each, dict) else {} for each in old]
     names = [str(each.get("name", i)) for i, each in enumerate(entries, start=1)]
-    unknown = [f"{where}{key}: there is only {listed(names, 12)}" for key in new if key not in names]
+    unknown = [
+        f"{where}{key}: there is only {listed(names, 12)}" for key in new if key not in names
+    ]
     if unknown:
         raise GeometryError(unknown)
     return [

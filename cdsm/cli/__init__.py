@@ -16,7 +16,8 @@ import cdsm
 from cdsm.cli.arm import export, new
 from cdsm.cli.design import design
 from cdsm.cli.identify import identify
-from cdsm.cli.output import Command, debug_wanted, reported
+from cdsm.cli.options import opt
+from cdsm.cli.output import debug_wanted, reported
 from cdsm.cli.plan import plan
 from cdsm.cli.reproduce import reproduce
 from cdsm.cli.stiffness import buckle, stiffness, weigh
@@ -27,7 +28,6 @@ from cdsm.support.progress import lines_wanted
 
 app = typer.Typer(
     name="cdsm",
-    help="Stiffness of cable-driven serpentine manipulators. Lengths are in mm, angles in degrees.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -45,12 +45,13 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def main(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+        bool, opt("Show the version.", None, "--version", callback=_version)
     ] = False,
     debug: Annotated[
-        bool, typer.Option("--debug", help="Show tracebacks; give it before the command.")
+        bool, opt("Show tracebacks; give it before the command.", None, "--debug")
     ] = False,
 ) -> None:
+    """Stiffness of cable-driven serpentine manipulators; lengths in mm, angles in degrees."""
     debug_wanted.set(debug)
     lines_wanted.set(True)
     for stream in (sys.stdout, sys.stderr):
@@ -62,4 +63,4 @@ for command in (
     *(new, stiffness, weigh, buckle, plan, sweep, design),
     *(view, fit, identify, export, reproduce),
 ):
-    app.command(command.__name__, cls=Command, help=inspect.getdoc(command))(reported(command))
+    app.command(command.__name__, help=inspect.getdoc(command))(reported(command))

@@ -11,62 +11,37 @@ import typer
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Angles, Arm, AsJson, Changes, Minimum
+from cdsm.cli.options import Angles, Arm, AsJson, Changes, Minimum, file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse
+
+Kind = Literal["universal", "hinged"]
+
+_JOINTS = (
+    "Number of joints, default 4; several: of sections, each a quarter narrower than the last."
+)
+_WIRE = "Wire of all cables: a name, a constant EA in N, or a file of `cdsm fit`. Default: "
+_WIRE += "1x19-1.2mm; with --from, that of the cables."
+_FROM = "A robot, with --cables and --tip; or the folder of a CASPR model, with --wire."
+_INERTIA = "Accept moments of inertia that no body can have."
 
 
 def new(
-    arm: Annotated[
-        Path,
-        options.file_option(declare=typer.Argument, endings=(".toml",), help="File to write."),
-    ],
-    joints: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N[,N,...]",
-            help="Number of joints, default 4; several numbers: of sections, base to tip, each a "
-            "quarter narrower than the one before.",
-        ),
-    ] = None,
+    arm: Annotated[Path, file_opt("File to write.", "ARM.toml", declare=typer.Argument)],
+    joints: Annotated[str | None, opt(_JOINTS, "N[,N,...]")] = None,
     kind: Annotated[
-        Literal["universal", "hinged"],
-        typer.Option("--type", help="Joints: universal, or hinges, each turned 90 degrees."),
+        Kind, opt("Joints: universal, or hinges 90 degrees apart.", None, "--type")
     ] = "universal",
-    wire: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|EA|WIRE.toml",
-            help="Wire of all cables: a name, a constant EA in N, or a file that `cdsm fit` "
-            "writes. Default: 1x19-1.2mm; with --from, that of the cables.",
-        ),
-    ] = None,
-    source: Annotated[
-        Path | None,
-        typer.Option(
-            "--from",
-            metavar="ROBOT.urdf|FOLDER",
-            help="A robot, with --cables and --tip; or the folder of a CASPR model, with --wire.",
-        ),
-    ] = None,
-    cables: Annotated[
-        Path | None,
-        typer.Option(metavar="CABLES.toml", help="Cables of the robot, as write_cables() writes."),
-    ] = None,
-    tip: Annotated[
-        str | None, typer.Option(metavar="LINK", help="Link of the robot that is the tip.")
-    ] = None,
-    check_inertia: Annotated[
-        bool,
-        typer.Option(
-            " /--no-check-inertia", help="Accept moments of inertia that no body can have."
-        ),
-    ] = True,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+    wire: Annotated[str | None, opt(_WIRE, "NAME|EA|WIRE.toml")] = None,
+    source: Annotated[Path | None, opt(_FROM, "ROBOT.urdf|FOLDER", "--from")] = None,
+    cables: Annotated[Path | None, opt("Cables of the robot.", "CABLES.toml")] = None,
+    tip: Annotated[str | None, opt("Link of the robot that is the tip.", "LINK")] = None,
+    no_check_inertia: Annotated[bool, opt(_INERTIA, None, "--no-check-inertia")] = False,
+    overwrite: Annotated[bool, opt("Replace the file.", None, "--overwrite")] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Write a complete ARM.toml, which every command reads, with a comment on every key.
+    """Write a complete ARM.toml with a comment on every key.
 
-    Sizes, wire and everything else are edited in the file. --from makes an ARM.toml of a robot.
+    Every command reads it; sizes, wire and all else are edited in it. --from makes one of a robot.
     """
     from cdsm.arm_file.template import template
     from cdsm.support.files import write_text
@@ -77,7 +52,7 @@ def new(
     if source is not None:
         if joints is not None:
             raise misuse("--joints", "are those of the robot; leave it out.")
-        made = _of_robot(source, cables, tip, wire, check_inertia)
+        made = _of_robot(source, cables, tip, wire, not no_check_inertia)
         made.write(arm)
     else:
         for option, value in (("--cables", cables), ("--tip", tip)):
@@ -90,9 +65,12 @@ def new(
             law = os.path.relpath(law, arm.parent)
         write_text(arm, template(arm.name, _number(law), parts))
     bent = min([10.0, *(math.degrees(x) / 2.0 for x in made.upper[~made.slides].tolist())])
-    numbers: Json = {"name": made.name, "length_m": made.length, "written": [str(arm)]}
     tried = f"written: {arm}; try cdsm stiffness {arm} --angles {bent:.3g} --check"
-    return answer(as_json, numbers, made, tried)
+    return answer(as_json, _facts(made, arm), made, tried)
+
+
+def _facts(arm: cdsm.Manipulator, written: Path) -> Json:
+    return {"name": arm.name, "length_m": arm.length, "written": [str(written)]}
 
 
 def _number(wire: str) -> str | float:
@@ -124,9 +102,11 @@ def _of_robot(
     """Read the arm of a URDF, or of the folder of a CASPR model."""
     law = None if wire is None else _law(wire)
     if source.is_dir():
-        if law is None:
+        usual = cdsm.presets.ELASTIC_STAGE
+        found = cdsm.read_caspr(source, elasticity=law or usual, check_inertia=check_inertia)
+        if law is None:  # after reading: the folder may hold no model
             raise misuse("--wire", "give it: the cables of CASPR do not stretch.")
-        return cdsm.read_caspr(source, elasticity=law, check_inertia=check_inertia)
+        return found
     if source.suffix.lower() == ".toml":
         raise misuse("--from", f"{source} is no robot; an ARM.toml can be copied.")
     if cables is None or tip is None:
@@ -163,22 +143,17 @@ def export(
     arm: Arm,
     out: Annotated[
         Path,
-        options.file_option(
-            declare=typer.Argument,
-            endings=(".urdf", ".xml"),
-            help="URDF of the links and joints, or MuJoCo model with the cables under tension.",
-        ),
+        file_opt("URDF, or MuJoCo model under tension.", "OUT.urdf|xml", declare=typer.Argument),
     ],
     changes: Changes = None,
     angles: Angles = "0",
     minimum: Minimum = 0.0,
     actuators: Annotated[
-        Literal["length", "tension", "none"],
-        typer.Option(help="What the motors of the MuJoCo model control; none: no motors."),
+        Literal["length", "tension", "none"], opt("What motors of a MuJoCo model control.")
     ] = "length",
     as_json: AsJson = False,
 ) -> int:
-    """Write an arm for other programs: its URDF, or a MuJoCo model at a posture.
+    """Write the URDF of an arm, or a MuJoCo model at a posture.
 
     The answer states the time step, the damping and the actuators of the MuJoCo model.
 
@@ -186,18 +161,18 @@ def export(
     """
     from cdsm.support.files import write_text
 
-    pose = options.posture(arm, changes, angles)
-    found = pose.arm
-    numbers: Json = {"name": found.name, "length_m": found.length, "written": [str(out)]}
-    if out.suffix.lower() == ".urdf":
+    if out.suffix.lower() == ".urdf":  # it has no cables: any wire does
+        found = cdsm.Manipulator.read(arm, 1e5, changes=options.changes_of(changes))
         if found.is_serpentine:
             cdsm.write_urdf(found.geometry, out)
         else:
             write_text(out, found.urdf)
-        return answer(as_json, numbers, found, f"written: {out}")
+        return answer(as_json, _facts(found, out), found, f"written: {out}")
     from cdsm.interchange.mjcf import mujoco_model
     from cdsm.support.format import JointUnits, key
 
+    pose = options.posture(arm, changes, angles)
+    found = pose.arm
     model = mujoco_model(found, pose, cdsm.distribute_tension(pose, minimum), actuators)
     write_text(out, model.text)
     motion, unit = model.motion, JointUnits(found.slides).joined("N m s/rad", "N s/m")
@@ -208,4 +183,4 @@ def export(
     told |= {"actuators": model.actuators}
     warnings = [] if model.unstable is None else [model.unstable]
     lines = "\n".join([*model.remarks, f"written: {out}"])
-    return answer(as_json, told | numbers, head, lines, warnings=warnings)
+    return answer(as_json, told | _facts(found, out), head, lines, warnings=warnings)

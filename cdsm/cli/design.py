@@ -8,8 +8,11 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson
+from cdsm.cli.options import AsJson, opt
 from cdsm.cli.output import Json, answer, misuse
+
+_CHOOSE = "Design of the front to write; default: the compromise, nearest to the best of each goal."
+_REFINE = "Improve the chosen design by SLSQP: one objective, continuous variables."
 
 
 def design(
@@ -20,30 +23,15 @@ def design(
             help="Problem and search (generations, population, seed), as examples/design.toml.",
         ),
     ],
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FOLDER", help="Folder for the results.")
-    ],
-    choose: Annotated[
-        int | None,
-        typer.Option(
-            help="Number of the design on the front to write; default: the compromise, the nearest "
-            "to the best of every objective.",
-            min=0,
-        ),
-    ] = None,
-    refine: Annotated[
-        bool,
-        typer.Option(
-            "--refine",
-            help="Improve the chosen design by SLSQP: one objective, continuous variables.",
-        ),
-    ] = False,
+    out: Annotated[Path, opt("Folder for the results.", "FOLDER")],
+    choose: Annotated[int | None, opt(_CHOOSE, "N", min=0)] = None,
+    refine: Annotated[bool, opt(_REFINE, None, "--refine")] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Find the best designs of an arm; write the Pareto front, figures and the chosen arm.
+    """Find the best designs of an arm, and write the chosen one.
 
-    The deflection is how far the load moves the tip when the motors are locked before it acts. It
-    is computed to first order, with the stiffness under the least tensions without the load.
+    The folder gets the Pareto front as table and figure, and the arm with its files. A deflection
+    is how far the load moves the tip, to first order, with motors that are locked before it acts.
     """
     from cdsm.design.problem_file import read_problem
     from cdsm.design.refine import require_smooth

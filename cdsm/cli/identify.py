@@ -10,52 +10,32 @@ import typer
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Arm, AsJson, Changes, Figure
+from cdsm.cli.options import Arm, AsJson, Changes, Figure, opt
 from cdsm.cli.output import answer, misuse, write_picture
 
 Range = tuple[float, float]
 
+_LOOPS = "A line per reading. Columns: test; joints [deg]; direction (such as -z); force [N]; "
+_LOOPS += "displacement [mm] along it (or x, y, z); minimum [N], or a tension per cable [N]."
+_FREE = "Parameter to find; repeat it: friction; rigidity (factor on EA); spring [N/mm] in series; "
+_FREE += "lead, hole_radius, disk_offset, link_length [mm]; link_mass [g]. Default bounds: half to "
+_FREE += "twice the arm's own value; friction 0 to 1."
+
 
 def identify(
     arm: Arm,
-    loops: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOOPS.csv",
-            help="A line per reading. Columns: test; joints [deg]; direction (an axis such as -z); "
-            "force [N]; displacement [mm] along it, or x, y, z [mm]; and minimum [N] or the tension "
-            "of each cable, cable1_1 [N].",
-        ),
-    ],
-    free: Annotated[
-        list[str],
-        typer.Option(
-            metavar="NAME[@JOINT][=LOW:HIGH]",
-            help="Parameter to find; repeat it: friction; rigidity (a factor on EA); spring [N/mm] "
-            "in series; lead, hole_radius, disk_offset, link_length [mm]; link_mass [g]. Default "
-            "bounds: half to twice the arm's own value; friction 0 to 1.",
-        ),
-    ],
-    displacement_std: Annotated[
-        float, typer.Option(help="Standard deviation of a reading [mm].")
-    ],
+    loops: Annotated[Path, typer.Argument(metavar="LOOPS.csv", help=_LOOPS)],
+    free: Annotated[list[str], opt(_FREE, "NAME[@JOINT][=LOW:HIGH]")],
+    displacement_std: Annotated[float, opt("Standard deviation of a reading.", "MM")],
     changes: Changes = None,
-    minimum: Annotated[
-        float | None,
-        typer.Option(help="Lower bound of all tensions [N], if LOOPS.csv has no tensions."),
-    ] = None,
+    minimum: Annotated[float | None, opt("Least tension, if not in LOOPS.csv.", "N")] = None,
     tests: Annotated[
-        int | None,
-        typer.Option(
-            help="Do not identify, but plan so many tests of those in LOOPS.csv, which needs no "
-            "readings then.",
-            min=1,
-        ),
+        int | None, opt("Plan the best N tests of LOOPS.csv instead.", "N", min=1)
     ] = None,
     figure: Figure = None,
     as_json: AsJson = False,
 ) -> int:
-    """Find friction, rigidity, springs and dimensions from loops of weight tests.
+    """Find friction, rigidity and dimensions from weight tests.
 
     A test applies a force along a direction and removes it, with locked motors. The answer gives
     each parameter with a 95 % interval, and warns of parameters that the tests do not determine.

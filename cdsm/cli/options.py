@@ -16,61 +16,23 @@ from cdsm.cli.output import misuse
 if TYPE_CHECKING:
     from cdsm.support.values import Array
 
-Arm = Annotated[
-    Path, typer.Argument(metavar="ARM.toml", help="The arm, in a file as `cdsm new` writes it.")
-]
-Changes = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Change a key of ARM.toml for this run: wire=48e3, friction=0.1, gravity=-y, "
-        "universal.link_mass=0.06, cables.cable1_1.minimum=20. Repeat it.",
-    ),
-]
-Angles = Annotated[
-    str,
-    typer.Option(
-        metavar="DEG,...",
-        help="Joint angles [degrees, or mm where a joint slides]: by name (joint2_1=10; others 0), "
-        "one for each joint, or one for all. Default: 0.",
-        show_default=False,
-    ),
-]
-Minimum = Annotated[
-    float,
-    typer.Option(
-        help="Lower bound of all tensions [N]. Those of ARM.toml hold, too.", show_default=False
-    ),
-]
-Maximum = Annotated[
-    float,
-    typer.Option(
-        help="Upper bound of all tensions [N]. Those of ARM.toml hold, too.", show_default=False
-    ),
-]
-Load = Annotated[
-    str | None,
-    typer.Option(
-        metavar="FX,FY,FZ[,MX,MY,MZ]", help="Force [N] and moment [N m] at the tip, base axes."
-    ),
-]
-Mass = Annotated[
-    float | None,
-    typer.Option(help="Mass [kg] that hangs at the tip; adds to --load.", min=0.0, max=1e6),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print answer (SI) and errors as JSON.")]
+
+def opt(help: str, metavar: str | None = None, *names: str, **more: Any) -> Any:
+    """Declare an option, whose default the help states where it is worth it."""
+    return typer.Option(*names, help=help, metavar=metavar, show_default=False, **more)
 
 
-def file_option(
-    *names: str, endings: Sequence[str], help: str, declare: Any = typer.Option
-) -> Any:
-    """Declare a file to write, which is checked before the command computes."""
+def file_opt(help: str, metavar: str, *names: str, declare: Any = typer.Option) -> Any:
+    """Declare a file to write, which is checked before the command computes.
+
+    ``metavar`` ends in the endings that are allowed: ``FILE.nc|csv``.
+    """
 
     def checked(path: Path | None) -> Path | None:
         from cdsm.support.files import as_path, require_writable
 
         if path is not None:
+            endings = [f".{ending}" for ending in metavar.rpartition(".")[2].split("|")]
             if path.suffix.lower() not in endings:
                 raise typer.BadParameter(f"{path} does not end in {' or '.join(endings)}.")
             try:
@@ -79,26 +41,40 @@ def file_option(
                 raise typer.BadParameter(str(error)) from None
         return path
 
-    return declare(*names, callback=checked, metavar=f"FILE{'|'.join(endings)}", help=help)
+    return declare(*names, callback=checked, metavar=metavar, help=help)
 
 
-Figure = Annotated[
-    Path | None, file_option(endings=(".pdf", ".svg", ".png"), help="Figure to write.")
+_SET = "Change a key of ARM.toml for this run: minimum=50, wire=48e3, friction=0.1, gravity=-y, "
+_SET += "universal.link_mass=0.06, cables.cable1_1.maximum=90. Repeat it."
+_ANGLES = "Joint angles [deg, or mm where a joint slides]: one for all, one each, or by name "
+_ANGLES += "(joint2_1=10,…; others 0). Default: 0."
+_PATH = "Path, a line per sample. Columns: joints [deg] (mm where they slide; 0 if left out), or "
+_PATH += "x, y, z of the tip [mm]; for plans also target [N/mm]."
+
+Arm = Annotated[Path, typer.Argument(metavar="ARM.toml", help="The arm; `cdsm new` writes one.")]
+Changes = Annotated[list[str] | None, opt(_SET, "KEY=VALUE", "--set")]
+Angles = Annotated[str, opt(_ANGLES, "DEG,...")]
+PathFile = Annotated[Path | None, opt(_PATH, "PATH.csv", "--path")]
+Minimum = Annotated[float, opt("Lower bound of all tensions [N], besides those of ARM.toml.", "N")]
+Maximum = Annotated[float, opt("Upper bound of all tensions [N], besides those of ARM.toml.", "N")]
+Load = Annotated[
+    str | None, opt("Force [N], moment [N m] at the tip, base axes.", "FX,FY,FZ[,MX,MY,MZ]")
 ]
-PATH_COLUMNS = "columns are joints [deg] (mm where they slide; 0 if left out), or x, y, z of the "
-PATH_COLUMNS += "tip [mm]"
+Mass = Annotated[float | None, opt("Mass that hangs at the tip; adds to --load.", "KG", min=0.0)]
+Figure = Annotated[Path | None, file_opt("Figure to write.", "FILE.pdf|svg|png", "--figure")]
+AsJson = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, "--json")]
 
 
 def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
-    """Parse the texts of --set; a value that is not TOML is a string."""
+    """Parse the texts of --set; a value that is no TOML is a number such as .5, or a string."""
     from cdsm.arm_file.tables import laid_over
 
     changes: dict[str, Any] = {}
     for text in texts or ():
         key, _, value = text.partition("=")
-        for written in (value, json.dumps(value.strip())):
+        for form in (str, lambda given: str(float(given)), json.dumps):
             try:
-                changes = laid_over(changes, tomllib.loads(f"{key} = {written}"))
+                changes = laid_over(changes, tomllib.loads(f"{key} = {form(value.strip())}"))
                 break
             except ValueError:
                 continue
@@ -115,7 +91,7 @@ def read(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
 def posture(arm: Path, changes: Iterable[str] | None, angles: str) -> cdsm.Posture:
     """Read an arm and return its posture at --angles."""
     found = read(arm, changes)
-    return found.at(coordinates(angles, found) * joint_scales(found))
+    return found.at(coordinates(angles, found))
 
 
 def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = None) -> Array:
@@ -130,7 +106,7 @@ def load_at_tip(arm: cdsm.Manipulator, load: str | None, mass: float | None = No
     wrench[: len(given)] = number_array("--load", given, "force")
     if mass and not arm.gravity.any():
         raise misuse("--mass", "has no weight without gravity.")
-    wrench[:3] += (mass or 0.0) * arm.gravity
+    wrench[:3] += number_array("--mass", mass or 0.0, "mass") * arm.gravity
     return wrench
 
 
@@ -143,16 +119,15 @@ def joint_scales(arm: cdsm.Manipulator) -> Array:
     return np.array([scale for _, scale in JointUnits(arm.slides).shown])
 
 
-def coordinates(text: str, arm: cdsm.Manipulator) -> list[float]:
-    """Return the joint coordinates of --angles (nv,) [degrees, or mm if prismatic]."""
-    names = arm.joint_names
+def coordinates(text: str, arm: cdsm.Manipulator) -> Array:
+    """Return the joint coordinates of --angles (nv,) in SI."""
+    names, form = arm.joint_names, "an angle"
     if "=" in text:
         named = by_joint("--angles", text, arm, "JOINT=DEG,...")
-        each = {name: numbers("--angles", value, (1,), "an angle") for name, value in named.items()}
-        return [each.get(name, [0.0])[0] for name in names]
+        each = {name: numbers("--angles", value, (1,), form)[0] for name, value in named.items()}
+        return joint_scales(arm) * [each.get(name, 0.0) for name in names]
     form = f"one angle, one for each of {', '.join(names)}, or some by name: {names[-1]}=10"
-    given = numbers("--angles", text, (1, arm.nv), form)
-    return given * arm.nv if len(given) == 1 else given
+    return joint_scales(arm) * numbers("--angles", text, (1, arm.nv), form)
 
 
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:
@@ -177,7 +152,7 @@ def direction_of(text: str) -> Sequence[float]:
     return AXES.get(text) or numbers("--direction", text, (3,), "an axis such as -y, or X,Y,Z")
 
 
-def numbers(option: str, text: str, counts: Sequence[int] = (), form: str = "N,N,...") -> list[float]:
+def numbers(option: str, text: str, counts: Sequence[int] = (), form: str = "N,...") -> list[float]:
     """Return the numbers in the text of an option; ``form`` is for the message."""
     try:
         values = [float(word) for word in text.split(",")]

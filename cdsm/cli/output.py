@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
-from functools import partial, wraps
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
 import typer
-import typer.core
 
 import cdsm
 
@@ -24,8 +23,8 @@ Json = dict[str, object]
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether the running command shows tracebacks."""
 
-FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
-"""Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
+FAILED, UNMET, INTERRUPTED = 1, 3, 130
+"""Exit codes: an error; the arm does not do what was asked; Ctrl-C. A wrong option has 2.
 
 UNMET is the exit code of every answer with a warning, such as that of an unstable arm, and of
 errors that say what the arm cannot do.
@@ -34,8 +33,6 @@ errors that say what the arm cannot do.
 _CANNOT: Final = (
     *("InfeasibleDesign", "InfeasibleTension", "EquilibriumError", "UnreachableStiffness"),
 )
-_UsageError: Final = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
-"""Base class of errors of usage, of which typer has no public name."""
 
 
 def misuse(option: str, problem: str) -> typer.BadParameter:
@@ -43,13 +40,12 @@ def misuse(option: str, problem: str) -> typer.BadParameter:
     return typer.BadParameter(problem, param_hint=option)
 
 
-def answer(
-    as_json: bool, numbers: Json, *parts: object, warnings: Sequence[str] = ()
-) -> int:
+def answer(as_json: bool, numbers: Json, *parts: object, warnings: Iterable[str] = ()) -> int:
     """Print an answer, its warnings first: ``parts`` as text, or ``numbers`` as strict JSON.
 
     Return the exit code: UNMET if there are warnings, else 0.
     """
+    warnings = tuple(warnings)
     if as_json:
         print_json({"warnings": warnings, **numbers})
     else:
@@ -109,50 +105,22 @@ def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
     write(path, lambda file: cdsm.plots.save_figure(draw(), file))
 
 
-def _show(
-    usual: Callable[..., None], message: Warning, category: type[Warning], *where: Any
-) -> None:
-    """Print a warning of cdsm in one line, and other warnings by ``usual``, Python's function."""
-    if issubclass(category, cdsm.CdsmWarning):
-        typer.secho(f"warning: {message}", fg="yellow", err=True)
-    else:
-        usual(message, category, *where)
-
-
-class Command(typer.core.TyperCommand):
-    """A typer command that prints errors of usage as JSON with --json."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the words of ``args``."""
-        try:
-            return super().parse_args(ctx, args)
-        except _UsageError as error:
-            _misused(error, "--json" in args)
-            raise
-
-
-def _misused(error: typer.BadParameter, as_json: bool) -> None:
-    """Print an error of usage as JSON and exit with 2; without ``as_json`` typer prints it."""
-    if as_json and not debug_wanted.get():
-        print_json({"error": "UsageError", "message": error.format_message(), "data": {}})
-        raise typer.Exit(MISUSED) from None
+def _show(message: Warning | str, *_: object, **__: object) -> None:
+    typer.secho(f"warning: {message}", fg="yellow", err=True)
 
 
 def reported(function: Callable[..., int]) -> Callable[..., None]:
     """Wrap a command, which returns its exit code: turn errors into a message (JSON with --json).
 
-    With --debug, the error is raised. A warning of cdsm is printed in one line.
+    With --debug, the error is raised. Warnings are printed in one line.
     """
 
     @wraps(function)
     def command(**given: Any) -> None:
         try:
             with warnings.catch_warnings():
-                warnings.showwarning = partial(_show, warnings.showwarning)
+                warnings.showwarning = _show
                 code = function(**given)
-        except _UsageError as error:
-            _misused(error, given["as_json"])
-            raise
         except (KeyboardInterrupt, SystemError) as error:
             # Ctrl-C within a compiled kernel raises SystemError from KeyboardInterrupt
             if debug_wanted.get() or not isinstance(error.__cause__ or error, KeyboardInterrupt):

@@ -6,11 +6,20 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Arm, AsJson, Changes, Figure, Load, Mass, Maximum, Minimum
+from cdsm.cli.options import (
+    Arm,
+    AsJson,
+    Changes,
+    Figure,
+    Load,
+    Mass,
+    Maximum,
+    Minimum,
+    file_opt,
+    opt,
+)
 from cdsm.cli.output import answer, header, misuse, write, write_picture
 
 if TYPE_CHECKING:
@@ -19,43 +28,23 @@ if TYPE_CHECKING:
 
 def plan(
     arm: Arm,
-    direction: Annotated[
-        str,
-        typer.Option(
-            metavar="AXIS|X,Y,Z", help="Direction of the stiffness: an axis such as -y, or a vector."
-        ),
-    ],
+    direction: Annotated[str, opt("Direction of the stiffness, such as -y.", "AXIS|X,Y,Z")],
     changes: Changes = None,
-    target: Annotated[
-        float | None,
-        typer.Option(help="Wanted stiffness [N/mm]; PATH.csv can have it in a column.", min=0.0),
-    ] = None,
+    target: Annotated[float | None, opt("Wanted stiffness.", "N/mm", min=0.0)] = None,
     angles: options.Angles = "",
-    path: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PATH.csv",
-            help="Path instead of --angles, a line per sample: "
-            f"{options.PATH_COLUMNS}; and, if wanted, target [N/mm].",
-        ),
-    ] = None,
-    max_change_per_sample: Annotated[
-        float, typer.Option(help="Largest change of a tension along --path [N].", show_default=False)
-    ] = math.inf,
+    path: options.PathFile = None,
+    max_change_per_sample: Annotated[float, opt("Of a tension, along --path.", "N")] = math.inf,
     minimum: Minimum = 0.0,
     maximum: Maximum = math.inf,
     load: Load = None,
     mass: Mass = None,
-    out: Annotated[
-        Path | None,
-        options.file_option(
-            "--out", endings=(".csv",), help="Table of tensions, lengths, stiffness to write."
-        ),
-    ] = None,
+    out: Annotated[Path | None, file_opt("Tensions and lengths.", "FILE.csv", "--out")] = None,
     figure: Figure = None,
     as_json: AsJson = False,
 ) -> int:
-    """Find the least tensions with a wanted stiffness, at a posture or along a path.
+    """Find the least tensions that give a wanted stiffness.
+
+    At a posture the answer also has the range of stiffness, along a path the tensions of each line.
 
     Exit code 0; 3 if no tensions reach the target at the posture, or at some samples of the path.
     The plan of the other samples is still written.

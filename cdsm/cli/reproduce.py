@@ -9,22 +9,18 @@ from typing import Annotated, Literal
 import typer
 
 import cdsm
-from cdsm.cli.options import AsJson
+from cdsm.cli.options import AsJson, opt
 
 
 def reproduce(
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FOLDER", help="Folder for figures and tables.")
-    ] = Path("reproduction"),
-    kind: Annotated[
-        Literal["pdf", "svg", "png"], typer.Option("--format", help="Format of the figures.")
-    ] = "png",
+    out: Annotated[Path, opt("Folder; default: reproduction.", "FOLDER")] = Path("reproduction"),
+    kind: Annotated[Literal["pdf", "svg", "png"], opt("Of the figures.", None, "--format")] = "png",
     as_json: AsJson = False,
 ) -> int:
-    """Recompute Figs. 3 to 8, 10, 12 and 13 of the paper: figures, table and numbers.
+    """Recompute the figures and numbers of the paper.
 
-    Prints every number of the paper beside ours. reproduction.md also has what was assumed, and
-    what other interpretations of the paper's text give.
+    Writes Figs. 3 to 8, 10, 12 and 13, and prints every number of the paper beside ours.
+    reproduction.md also has what was assumed, and what other readings of the paper give.
     """
     from cdsm.support.files import make_folder, write_text
     from cdsm.support.format import aligned

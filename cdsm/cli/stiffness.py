@@ -8,11 +8,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Angles, Arm, AsJson, Changes, Figure, Load, Mass, Maximum, Minimum
+from cdsm.cli.options import (
+    Angles,
+    Arm,
+    AsJson,
+    Changes,
+    Figure,
+    Load,
+    Mass,
+    Maximum,
+    Minimum,
+    file_opt,
+    opt,
+)
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
 
 if TYPE_CHECKING:
@@ -27,21 +37,16 @@ def stiffness(
     maximum: Maximum = math.inf,
     load: Load = None,
     mass: Mass = None,
-    direction: Annotated[
-        str | None,
-        typer.Option(metavar="AXIS|X,Y,Z", help="One more direction for the stiffness."),
-    ] = None,
+    direction: Annotated[str | None, opt("One more direction for it.", "AXIS|X,Y,Z")] = None,
     check: Annotated[
-        bool,
-        typer.Option("--check", help="Check it: is it right, in balance, stable? Print a report."),
+        bool, opt("Print a report: right, in balance, stable?", None, "--check")
     ] = False,
     out: Annotated[
-        Path | None,
-        options.file_option("--out", endings=(".html",), help="Page of the report to write."),
+        Path | None, file_opt("Page of the report to write.", "FILE.html", "--out")
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Compute the least tensions that balance the arm at a posture, and the stiffness under them.
+    """Compute the least tensions at a posture, and the stiffness.
 
     With [tolerances] in ARM.toml it also says how sure the numbers are; with friction, which
     stiffness small loads measure.
@@ -74,9 +79,7 @@ def stiffness(
     return answer(as_json, told, *parts, warnings=K.warnings[:1])
 
 
-def _sticking(
-    tension: cdsm.Tension, axes: dict[str, Sequence[float]]
-) -> tuple[list[str], Json]:
+def _sticking(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tuple[list[str], Json]:
     """Return the stiffness under small loads, while all cables stick, and where sliding begins.
 
     The result is a text, in a list, and JSON; both are empty without friction, or if no load in a
@@ -96,9 +99,7 @@ def _sticking(
     return ["\n".join([head, *lines])], {"sticking": numbers}
 
 
-def _uncertainty(
-    tension: cdsm.Tension, axes: dict[str, Sequence[float]]
-) -> tuple[list[str], Json]:
+def _uncertainty(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tuple[list[str], Json]:
     """Return the uncertainty of the stiffness along each axis, as a table and for JSON.
 
     Without tolerances both are empty. A direction in which the tip cannot move is left out.
@@ -137,27 +138,17 @@ def weigh(
     maximum: Maximum = math.inf,
     load: Load = None,
     mass: Mass = None,
-    steps: Annotated[
-        int | None,
-        typer.Option(help="Steps to the full load; default 5, with --cycles 12.", min=1, max=1000),
-    ] = None,
-    cycles: Annotated[
-        int | None,
-        typer.Option(help="Load, unload and reverse so many times.", min=1, max=100),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        options.file_option(
-            "--out", endings=(".nc", ".csv"), help="Table of --cycles to write, SI units."
-        ),
-    ] = None,
+    steps: Annotated[int | None, opt("Steps to the full load.", "N", min=1, max=1000)] = None,
+    cycles: Annotated[int | None, opt("Load and unload N times.", "N", min=1, max=100)] = None,
+    out: Annotated[Path | None, file_opt("Table of --cycles.", "FILE.nc|csv", "--out")] = None,
     figure: Figure = None,
     as_json: AsJson = False,
 ) -> int:
-    """Hang a weight at the tip with the motors locked; print the displacement (Eq. 20).
+    """Hang a weight at the tip, and find how far it moves.
 
-    --load and --mass are the weight. With friction in the holes, small and large weights measure
-    different stiffness, and --cycles shows the hysteresis.
+    The motors are locked (Eq. 20); --load and --mass are the weight, in 5 steps (12 in each
+    quarter of --cycles). With friction in the holes, small and large weights measure different
+    stiffness, and --cycles, to the load and its opposite, show the hysteresis.
 
     Exit code 0; 3 if the arm does not stay at its posture without the weight, buckles under it, or
     snaps through.
@@ -168,16 +159,20 @@ def weigh(
     weight = _weight(pose.arm, load, mass)
     tension = cdsm.distribute_tension(pose, minimum, maximum)
     head, numbers = header(pose, [minimum], "included")
+    result: cdsm.WeightTest | cdsm.LoadHistory
     if cycles is not None:
-        return _cycle(tension, weight, cycles, steps or 12, out, figure, as_json, head, numbers)
-    if weight[3:].any():
+        result, more, note = _cycles(tension, weight, cycles, steps or 12)
+        write(out, result.write)
+    elif weight[3:].any():
         raise misuse("--load", "has a moment, but a weight is a force: FX,FY,FZ.")
-    test = cdsm.weight_test(pose, tension, weight[:3], steps=steps or 5)
-    write_picture(figure, test.plot)
-    without = " without friction" if pose.arm.has_friction else ""
-    loaded = f"at the full load{without}:\n{test.states[-1]}"
-    warnings = (*cdsm.stiffness(pose, tension).warnings, *test.warnings)
-    return answer(as_json, numbers | test.to_dict(), head, test, loaded, warnings=warnings)
+    else:
+        more, result = {}, cdsm.weight_test(pose, tension, weight[:3], steps=steps or 5)
+        without = " without friction" if pose.arm.has_friction else ""
+        note = f"at the full load{without}:\n{result.states[-1]}"
+    write_picture(figure, result.plot)
+    warnings = (*cdsm.stiffness(pose, tension).warnings, *result.warnings)
+    told = numbers | result.to_dict() | more
+    return answer(as_json, told, head, result, note, warnings=dict.fromkeys(warnings))
 
 
 def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Array:
@@ -191,18 +186,10 @@ def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Arra
     return weight
 
 
-def _cycle(
-    tension: cdsm.Tension,
-    weight: Array,
-    cycles: int,
-    steps: int,
-    out: Path | None,
-    figure: Path | None,
-    as_json: bool,
-    head: str,
-    numbers: Json,
-) -> int:
-    """Load and unload the tip; print the hysteresis due to friction in the holes."""
+def _cycles(
+    tension: cdsm.Tension, weight: Array, cycles: int, steps: int
+) -> tuple[cdsm.LoadHistory, Json, str]:
+    """Load and unload the tip; return the history, and what the last cycle loses."""
     import numpy as np
 
     from cdsm.support.format import without_rounding
@@ -210,18 +197,15 @@ def _cycle(
     up = np.arange(1, steps + 1) / steps
     hump = np.concatenate([up, up[-2::-1] if steps > 1 else [], [0.0]])
     factors = np.concatenate([hump, -hump])
-    history = cdsm.load_cycle(tension.posture, tension, np.outer(np.tile(factors, cycles), weight))
-    write(out, history.write)
-    write_picture(figure, history.plot)
+    wrenches = np.outer(np.tile(factors, cycles), weight) + 0.0  # no -0
+    history = cdsm.load_cycle(tension.posture, tension, wrenches)
     lost = float(history.dissipated[-len(factors) :].sum())
     far = np.linalg.norm(history.displacement, axis=1)
     left = 1e6 * without_rounding(far)[-1]
     note = f"the last cycle loses {1e3 * lost:.4g} mJ; residual displacement {left:.4g} µm"
     if not tension.posture.arm.has_friction:
         note = "the holes have no friction, so there is no loop: --set friction=0.1, for example"
-    told = numbers | history.to_dict()
-    told |= {"lost_in_last_cycle_J": lost, "left_over_m": float(far[-1])}
-    return answer(as_json, told, head, history, note, warnings=history.warnings)
+    return history, {"lost_in_last_cycle_J": lost, "left_over_m": float(far[-1])}, note
 
 
 def buckle(
@@ -235,9 +219,9 @@ def buckle(
     figure: Figure = None,
     as_json: AsJson = False,
 ) -> int:
-    """Find the tension at which the arm buckles, and the largest multiple of a load it can carry.
+    """Find the tension and the load at which the arm buckles.
 
-    --load and --mass are the load that is multiplied, --minimum and --maximum the bounds under it.
+    Of a load by --load and --mass it is the largest multiple, within --minimum and --maximum.
 
     Exit code 0; 3 if the arm is unstable at every tension, or already without the load.
     """

@@ -6,11 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Arm, AsJson, Changes, Figure, Load, Maximum
+from cdsm.cli.options import Arm, AsJson, Changes, Figure, Load, Maximum, file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write_picture
 
 if TYPE_CHECKING:
@@ -18,60 +16,31 @@ if TYPE_CHECKING:
 
     from cdsm.support.values import Array
 
+_GRID = "Grid of joint angles [deg, or mm where they slide]: first, last and number, or one angle; "
+_GRID += "other joints stay at 0."
+_OUTPUTS = "Quantities of the table, such as along, tension, margin, softest, stiffest, isotropy, "
+_OUTPUTS += "tip_position, cable_lengths, payload, force_radius, tension_factor, disk_clearance."
+
 
 def sweep(
     arm: Arm,
-    out: Annotated[
-        Path | None,
-        options.file_option("--out", endings=(".nc", ".csv"), help="Table to write, SI units."),
-    ] = None,
+    out: Annotated[Path | None, file_opt("Table to write, SI.", "FILE.nc|csv", "--out")] = None,
     changes: Changes = None,
-    grid: Annotated[
-        str | None,
-        typer.Option(
-            metavar="JOINT=LOW:HIGH:N,...",
-            help="Grid of joint angles [degrees, or mm where they slide]: first, last and number, "
-            "or one angle. Other joints stay at 0.",
-        ),
-    ] = None,
-    path: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PATH.csv", help="Postures, a line each: a column per joint, joint1_1 [deg]."
-        ),
-    ] = None,
-    random: Annotated[
-        int | None, typer.Option(help="Number of Sobol points within the joint limits.", min=1)
-    ] = None,
-    minimum: Annotated[
-        str,
-        typer.Option(
-            metavar="N,N,...",
-            help="Lower bound of all tensions [N], or several. Those of ARM.toml hold, too.",
-            show_default=False,
-        ),
-    ] = "0",
+    grid: Annotated[str | None, opt(_GRID, "JOINT=LOW:HIGH:N,...")] = None,
+    path: options.PathFile = None,
+    random: Annotated[int | None, opt("Sobol points within the joint limits.", "N", min=1)] = None,
+    minimum: Annotated[str, opt("Lower bounds of all tensions [N], a case each.", "N,...")] = "0",
     maximum: Maximum = math.inf,
     load: Load = None,
-    outputs: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...",
-            help="Quantities of the table, such as along, tension, margin, softest, payload; an "
-            "unknown name lists all.",
-        ),
-    ] = None,
+    outputs: Annotated[str | None, opt(_OUTPUTS, "NAME,...")] = None,
     store: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Keep what is done; a stopped sweep resumes from it."),
+        Path | None, opt("Keeps what is done; a stopped sweep resumes.", "FOLDER")
     ] = None,
     figure: Figure = None,
-    quantity: Annotated[
-        str, typer.Option(help="Quantity that colours the workspace in --figure.")
-    ] = "softest",
+    quantity: Annotated[str, opt("Colour of the workspace in --figure.", "NAME")] = "softest",
     as_json: AsJson = False,
 ) -> int:
-    """Compute the stiffness over a grid, a path or random postures; write a table and a map.
+    """Compute the stiffness over many postures; write a table, a map.
 
     The table has an entry with a status for each posture and each lower bound of the tensions.
 
@@ -79,19 +48,21 @@ def sweep(
     """
     if out is None and figure is None and store is None:
         raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
+    from cdsm.sweeps.quantities import DEFAULT
+
     robot = options.read(arm, changes)
     low = options.numbers("--minimum", minimum)
-    names = None if outputs is None else [name.strip() for name in outputs.split(",")]
-    if names is not None and figure is not None and quantity not in names:
-        names.append(quantity)
+    names = [*DEFAULT] if outputs is None else [name.strip() for name in outputs.split(",")]
+    if figure is not None:
+        names = [*dict.fromkeys([*names, "tip_position", quantity])]
     dataset = cdsm.sweep(
         robot,
         _postures(robot, grid, path, random),
         minimum=low[0] if len(low) == 1 else low,
         maximum=maximum,
         wrench=options.load_at_tip(robot, load),
+        outputs=names,
         store=store,
-        **({} if names is None else {"outputs": names}),
     )
     head, numbers = header(robot, low)
     written = [] if out is None else [str(cdsm.write_sweep(dataset, out))]

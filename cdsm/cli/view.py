@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import math
-from pathlib import Path
 from typing import Annotated
-
-import typer
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Arm, AsJson, Changes, Load, Minimum
+from cdsm.cli.options import Arm, AsJson, Changes, Load, Minimum, opt
 from cdsm.cli.output import Json, answer, header, misuse
 
 
@@ -19,24 +16,18 @@ def view(
     arm: Arm,
     changes: Changes = None,
     angles: options.Angles = "",
-    path: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PATH.csv",
-            help=f"A path to play, a line per sample: {options.PATH_COLUMNS}.",
-        ),
-    ] = None,
+    path: options.PathFile = None,
     minimum: Minimum = 0.0,
     load: Load = None,
-    port: Annotated[int, typer.Option(help="Port to listen at; 0 for any free one.")] = 8080,
+    port: Annotated[int, opt("Port to listen at, default 8080; 0 for any.", "N")] = 8080,
     as_json: AsJson = False,
 ) -> int:
-    """Show an arm in the browser: move joints, tip, tension and load, and see its stiffness."""
+    """Show an arm in the browser, with sliders, and its stiffness."""
     from cdsm.cli.path_file import PathFile, read_path
 
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
         robot = options.read(arm, changes)
-        start = options.coordinates(angles, robot) * options.joint_scales(robot) if angles else None
+        start = options.coordinates(angles, robot) if angles else None
         force = options.load_at_tip(robot, load)
         if force[3:].any():
             raise misuse("--load", "has a moment, but the view has forces only: FX,FY,FZ.")

@@ -11,44 +11,25 @@ import typer
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import AsJson, Figure
+from cdsm.cli.options import AsJson, Figure, file_opt, opt
 from cdsm.cli.output import answer, misuse, write, write_picture
 
 
 def fit(
     test: Annotated[Path, typer.Argument(metavar="TEST.csv", help="Tensile test to read.")],
     gauge_length: Annotated[
-        float | None,
-        typer.Option(help="Length of the tested wire [mm]; default: that of the file.", min=0.0),
+        float | None, opt("Length of the wire, if not in the file.", "MM")
     ] = None,
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME",
-            help="Columns of displacement (or strain) and force; default: by names in English.",
-        ),
-    ] = None,
-    units: Annotated[
-        str | None,
-        typer.Option(metavar="UNIT,UNIT", help="Their units if the file has none, such as mm,N."),
-    ] = None,
-    between: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LOW,HIGH",
-            help="Smallest and largest force to fit [N], on the last rise that reaches it.",
-        ),
-    ] = None,
+    columns: Annotated[str | None, opt("Of displacement (or strain), force.", "NAME,NAME")] = None,
+    units: Annotated[str | None, opt("Of both, if the file has none: mm,N.", "UNIT,UNIT")] = None,
+    between: Annotated[str | None, opt("Forces to fit [N], on the last rise.", "LOW,HIGH")] = None,
     out: Annotated[
-        Path | None,
-        options.file_option(
-            "--out", endings=(".toml",), help="Law to write, for wire= in ARM.toml."
-        ),
+        Path | None, file_opt("Law, for wire= in ARM.toml.", "FILE.toml", "--out")
     ] = None,
     figure: Figure = None,
     as_json: AsJson = False,
 ) -> int:
-    """Fit the rigidity EA(F) of a wire to its tensile test; print a report, write its law.
+    """Fit the law EA(F) of a wire to its tensile test.
 
     TEST.csv may be the text file of a testing machine: with lines of titles, decimal commas, or a
     line of units.
@@ -78,7 +59,7 @@ def fit(
 
 
 def _pair(option: str, text: str | None) -> list[str] | None:
-    """Split the text of an option at its comma into two entries; an entry with a comma has quotes."""
+    """Split the text of an option at its comma; an entry with a comma has quotes."""
     if text is None:
         return None
     entries = [entry.strip() for entry in next(csv.reader([text], skipinitialspace=True), [])]

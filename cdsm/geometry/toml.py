@@ -59,7 +59,10 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
         return cls.sections(parts, spread=given.spread, name=given.name)
     if kind and len(data) > 1:
         outside = [(key, did_you_mean(key, _ARM_KEYS)) for key in data if key != kind]
-        raise GeometryError([f"{key}: stands outside [{kind}]{meant}" for key, meant in outside])
+        inside = f"; if it belongs there, write it below [{kind}]"
+        raise GeometryError(
+            [f"{key}: stands outside [{kind}]{hint or inside}" for key, hint in outside]
+        )
     table = data[kind] if kind else data
     if not isinstance(table, dict):
         raise GeometryError([f"{kind}: is {table!r}; give a table [{kind}]"])

@@ -1,7 +1,7 @@
 """Show on standard error how far work is that takes longer than a second.
 
-In a terminal that is a bar. Where there is none, a command prints a line now and then; in a notebook
-or a program nothing is shown.
+In a terminal that is a bar. Where there is none, a command prints a line now and then; in a
+notebook or a program nothing is shown.
 """
 
 from __future__ import annotations

@@ -184,12 +184,13 @@ def _homes(kind: Any, name: str = "") -> dict[str, str]:
     return homes | dict.fromkeys(hints, place)
 
 
-def _meant(key: str, inner: bool, kind: Any) -> str:
-    """Return where an unknown key of a record, or of an ``inner`` table of it, belongs."""
-    homes = _homes(kind)
-    if homes.get(key) == "" and inner:
+def _meant(place: Sequence[object], kind: Any) -> str:
+    """Return where the unknown key at a ``place`` of a record belongs."""
+    homes, key = _homes(kind), str(place[-1])
+    home = homes.get(key, str(place[0]))
+    if home == "" and len(place) > 1:
         return "; it belongs at the top of the file"
-    return f"; it belongs {homes[key]}" if homes.get(key) else did_you_mean(key, homes)
+    return did_you_mean(key, homes) if str(place[0]) in home else f"; it belongs {home}"
 
 
 def _faults(error: ValidationError, kind: Any) -> list[str]:
@@ -198,14 +199,14 @@ def _faults(error: ValidationError, kind: Any) -> list[str]:
         # joints[2].limit counts from 1 like the names of joints and cables
         parts = (each for each in fault["loc"] if each not in (ONE, EACH, "[key]"))
         shown = (f"[{each + 1}]" if isinstance(each, int) else f".{each}" for each in parts)
-        where, key = "".join(shown).lstrip("."), str(fault["loc"][-1] if fault["loc"] else "")
+        where = "".join(shown).lstrip(".")
         cause = fault.get("ctx", {}).get("error")
         if isinstance(cause, ValueError):
             listed += faults_at(where, cause)
         elif fault["type"].startswith("missing"):
             listed.append(f"{where}: is missing")
         elif fault["type"] == "unexpected_keyword_argument":
-            hint = _meant(key, len(fault["loc"]) > 1, kind)
+            hint = _meant(fault["loc"], kind)
             listed.append(f"{where}: is not a key that is known here{hint}")
         elif fault["type"] == "unexpected_positional_argument":
             listed.append(f"{fault['input']!r} is given without its name; give it as a keyword")

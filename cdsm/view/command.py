@@ -44,11 +44,9 @@ def command_line(arm: Manipulator, setting: Setting, arm_arguments: Sequence[str
     weighs, units = setting.sag and bool(setting.force.any()), JointUnits(arm.slides).shown
     options = {
         "angles": _joined(x / unit for x, (_, unit) in zip(setting.q.tolist(), units, strict=True)),
-        "min-tension": f"{setting.minimum:.12g}",
-        "max-tension": f"{setting.maximum:.12g}" if math.isfinite(setting.maximum) else "",
-        "force": _joined(setting.force.tolist()) if weighs else "",
-        "wrench": "" if weighs or not setting.force.any() else _joined(_wrench(setting)),
-        "solver": "" if setting.solver == DEFAULT_SOLVER else setting.solver,
+        "minimum": f"{setting.minimum:.12g}",
+        "maximum": f"{setting.maximum:.12g}" if math.isfinite(setting.maximum) else "",
+        "load": _joined(setting.force.tolist()) if setting.force.any() else "",
     }
     given = [f"--{name}={value}" for name, value in options.items() if value]
     return shlex.join(["cdsm", "weigh" if weighs else "stiffness", *arm_arguments, *given])

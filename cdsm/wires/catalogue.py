@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeGuard
 
 from cdsm.errors import FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
@@ -49,7 +49,7 @@ def as_wire(wire: Wire) -> Elasticity:
     """
     if isinstance(wire, Elasticity):
         return wire
-    if isinstance(wire, os.PathLike) or is_file(wire):
+    if is_file(wire) or isinstance(wire, os.PathLike):
         return read_law(wire)
     if isinstance(wire, str):
         return WIRES[one_of("wire", wire, WIRES, "Or give EA in N, or a file WIRE.toml.")]
@@ -58,7 +58,7 @@ def as_wire(wire: Wire) -> Elasticity:
     return LinearElasticity(wire)
 
 
-def is_file(wire: object) -> bool:
+def is_file(wire: object) -> TypeGuard[str]:
     """Return whether the name of a wire is that of a file."""
     return isinstance(wire, str) and wire.endswith((".toml", *_MEASURED))
 

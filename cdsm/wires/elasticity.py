@@ -186,10 +186,12 @@ class Elasticity:
         """Return the tensions F [N], or raise ElasticityRangeError."""
         if F.size and not (F.min() >= self.low and F.max() <= self.high):
             outside = (self.low > F) | (self.high < F)
-            below = "; slack_below() continues one to 0 N" if F.min() < self.low else ""
+            few, many = bool(F.min() < self.low), bool(F.max() > self.high)
+            bounds = [f"minimum={self.low:g} or more"] * few + [f"maximum={self.high:g}"] * many
+            slack = "; slack_below() (in ARM.toml: slack_below = true) continues one to 0 N" * few
             raise ElasticityRangeError(
-                f"outside the domain {self._span} of the elasticity. Keep the tension inside it "
-                f"(minimum=, maximum=), or use an elasticity that covers it{below}.",
+                f"outside the domain {self._span} of the elasticity. Give {' and '.join(bounds)}, "
+                f"or an elasticity that covers it{slack}.",
                 F[outside].tolist(),
                 np.flatnonzero(outside).tolist(),
             )
