@@ -56,7 +56,7 @@ def test_the_command_prints_what_the_page_shows(file: Path, changes: dict[str, A
     arm = soft_arm()
     at = replace(Setting(q=setting(arm).q, minimum=STABLE, force=np.zeros(3)), **changes)
     shown = show(arm, at)
-    line = command_line(arm, at, [str(file), "--wire=2e5", "--spring=8"])
+    line = command_line(arm, at, [str(file), "--set=wire=2e5", "--set=series_stiffness=8e3"])
     words = shlex.split(line)
     assert words[0] == "cdsm"
     assert shown.tensions is not None
