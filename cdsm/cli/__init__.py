@@ -24,7 +24,6 @@ from cdsm.cli.stiffness import buckle, stiffness, weigh
 from cdsm.cli.sweep import sweep
 from cdsm.cli.view import view
 from cdsm.cli.wire import fit
-from cdsm.support.progress import lines_wanted
 
 app = typer.Typer(
     name="cdsm",
@@ -53,7 +52,6 @@ def main(
 ) -> None:
     """Stiffness of cable-driven serpentine manipulators; lengths in mm, angles in degrees."""
     debug_wanted.set(debug)
-    lines_wanted.set(True)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal without Greek letters shows "?"
             stream.reconfigure(errors="replace")

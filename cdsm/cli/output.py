@@ -117,6 +117,9 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
 
     @wraps(function)
     def command(**given: Any) -> None:
+        from cdsm.support.progress import lines_wanted
+
+        lines_wanted.set(True)
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = _show
