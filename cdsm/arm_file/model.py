@@ -98,7 +98,8 @@ def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
         return as_wire(wire)
     # with faulty tables of wires, any name is right
     laws: dict[str, Elasticity] = WIRES | known.get("wires", {wire: _NO_WIRE})
-    return laws[_one_of("wire", wire, laws, "Or give EA in N, a file WIRE.toml, or a table [wires.NAME].")]
+    remedy = "Or give EA in N, a file WIRE.toml, or a table [wires.NAME]."
+    return laws[_one_of("wire", wire, laws, remedy)]
 
 
 _Gravity = Annotated[

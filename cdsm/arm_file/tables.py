@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from cdsm.errors import FileError, GeometryError, listed
+from cdsm.errors import FileError
 from cdsm.support.files import read_text
 from cdsm.support.records import read_toml
+from cdsm.support.toml import laid_over
 from cdsm.wires.catalogue import is_file, read_law, table_of
 
 _FROM: Final = "Write an ARM.toml of it once, `cdsm new ARM.toml --from {path}"
@@ -48,24 +49,3 @@ def read_tables(
         if is_file(wire):
             table["wire"] = table_of(read_law(Path(path).parent / wire))
     return tables
-
-
-def laid_over(old: Any, new: Any, where: str = "") -> Any:
-    """Lay tables ``new`` over ``old``; keys of a list are names of its tables or count from 1."""
-    if not isinstance(new, Mapping):
-        return new
-    if not isinstance(old, list):
-        known = old if isinstance(old, dict) else {}
-        laid = {k: laid_over(known.get(k), value, f"{where}{k}.") for k, value in new.items()}
-        return {**known, **laid}
-    entries = [each if isinstance(each, dict) else {} for each in old]
-    names = [str(each.get("name", i)) for i, each in enumerate(entries, start=1)]
-    unknown = [
-        f"{where}{key}: there is only {listed(names, 12)}" for key in new if key not in names
-    ]
-    if unknown:
-        raise GeometryError(unknown)
-    return [
-        laid_over(each, new[name], f"{where}{name}.") if name in new else each
-        for name, each in zip(names, old, strict=True)
-    ]

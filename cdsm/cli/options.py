@@ -67,7 +67,7 @@ AsJson = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, "--j
 
 def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
     """Parse the texts of --set; a value that is no TOML is a number such as .5, or a string."""
-    from cdsm.arm_file.tables import laid_over
+    from cdsm.support.toml import laid_over
 
     changes: dict[str, Any] = {}
     for text in texts or ():

@@ -88,6 +88,8 @@ def test_an_interrupted_command_says_so_in_one_line_and_goes_on(tmp_path: Path) 
         arm,
         "--set",
         "wire=1x19-1.2mm",
+        "--minimum",
+        10,
         "--random",
         100_000,
         "--out",
