@@ -11,7 +11,7 @@ import typer
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Angles, Arm, AsJson, Changes, Minimum, file_opt, opt
+from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse
 
 Kind = Literal["universal", "hinged"]
@@ -37,7 +37,7 @@ def new(
     tip: Annotated[str | None, opt("Link of the robot that is the tip.", "LINK")] = None,
     no_check_inertia: Annotated[bool, opt(_INERTIA, None, "--no-check-inertia")] = False,
     overwrite: Annotated[bool, opt("Replace the file.", None, "--overwrite")] = False,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> int:
     """Write a complete ARM.toml with a comment on every key.
 
@@ -119,18 +119,14 @@ def _serpentine(
     kind: str, counts: list[int], law: cdsm.Elasticity
 ) -> tuple[cdsm.Manipulator, list[tuple[str, dict[str, float]]]]:
     """Build an arm of sections with these numbers of joints; return it with the sizes of each."""
-    parts = []
+    hinged, parts = kind == "hinged", []
     for i, count in enumerate(counts):
-        sizes = {"joints": count, "twist": math.pi / 2.0, "cables_per_joint": 3}
-        if kind == "hinged":
-            sizes["cables_per_joint"] = 2
-        else:
-            del sizes["twist"]
-        each = sizes["cables_per_joint"]
-        sizes |= {"link_length": 0.06, "base_length": 0.0 if i else 0.03, "disk_offset": 0.012}
-        sizes |= {"hole_radius": 0.025 * 0.75**i, "link_mass": 0.12, "lead": 0.3}
-        if kind == "hinged":
-            # 10 degrees, or less, so that the holes of one plane do not reach those of the next
+        each = 2 if hinged else 3
+        sizes = {"joints": count} | ({"twist": math.pi / 2.0} if hinged else {})
+        sizes |= {"cables_per_joint": each, "link_length": 0.06, "base_length": 0.0 if i else 0.03}
+        sizes |= {"disk_offset": 0.012, "hole_radius": 0.025 * 0.75**i, "link_mass": 0.12}
+        sizes["lead"] = 0.3
+        if hinged:  # 10 degrees, or less: holes of one plane must not reach those of the next
             sizes["spread"] = min(math.radians(10.0), math.tau / (count * each))
         if i:  # between the holes of all sections, wherever those are
             sizes["phase"] = math.tau / math.lcm(*counts) / each * i / len(counts)
@@ -140,18 +136,18 @@ def _serpentine(
 
 
 def export(
-    arm: Arm,
+    arm: options.Arm,
     out: Annotated[
         Path,
         file_opt("URDF, or MuJoCo model under tension.", "OUT.urdf|xml", declare=typer.Argument),
     ],
-    changes: Changes = None,
-    angles: Angles = "0",
-    minimum: Minimum = 0.0,
+    changes: options.Changes = None,
+    angles: options.Angles = "0",
+    minimum: options.Minimum = 0.0,
     actuators: Annotated[
         Literal["length", "tension", "none"], opt("What motors of a MuJoCo model control.")
     ] = "length",
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> int:
     """Write the URDF of an arm, or a MuJoCo model at a posture.
 

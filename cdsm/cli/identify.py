@@ -10,7 +10,7 @@ import typer
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Arm, AsJson, Changes, Figure, opt
+from cdsm.cli.options import opt
 from cdsm.cli.output import answer, misuse, write_picture
 
 Range = tuple[float, float]
@@ -23,17 +23,17 @@ _FREE += "twice the arm's own value; friction 0 to 1."
 
 
 def identify(
-    arm: Arm,
+    arm: options.Arm,
     loops: Annotated[Path, typer.Argument(metavar="LOOPS.csv", help=_LOOPS)],
     free: Annotated[list[str], opt(_FREE, "NAME[@JOINT][=LOW:HIGH]")],
     displacement_std: Annotated[float, opt("Standard deviation of a reading.", "MM")],
-    changes: Changes = None,
+    changes: options.Changes = None,
     minimum: Annotated[float | None, opt("Least tension, if not in LOOPS.csv.", "N")] = None,
     tests: Annotated[
         int | None, opt("Plan the best N tests of LOOPS.csv instead.", "N", min=1)
     ] = None,
-    figure: Figure = None,
-    as_json: AsJson = False,
+    figure: options.Figure = None,
+    as_json: options.AsJson = False,
 ) -> int:
     """Find friction, rigidity and dimensions from weight tests.
 

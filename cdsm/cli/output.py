@@ -89,7 +89,11 @@ def header(
         joints = ", ".join(map(place, of.q.tolist(), arm.joint_units))
         lines.append(f"at {joints}; tip at {coordinates(1e3 * of.tip[:3, 3])} mm")
     told = {"wire": wires_text(arm.cables), "gravity_m_per_s2": arm.gravity}
-    told |= {"least_tension_N": least, "original_length": arm.original_length, "friction": rough}
+    told |= {
+        "least_tension_N": [low for low, _ in least],
+        "original_length": arm.original_length,
+        "friction": rough,
+    }
     return "\n".join(lines), {"computed_with": told}
 
 

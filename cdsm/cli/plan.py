@@ -8,18 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import (
-    Arm,
-    AsJson,
-    Changes,
-    Figure,
-    Load,
-    Mass,
-    Maximum,
-    Minimum,
-    file_opt,
-    opt,
-)
+from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import answer, header, misuse, write, write_picture
 
 if TYPE_CHECKING:
@@ -27,20 +16,20 @@ if TYPE_CHECKING:
 
 
 def plan(
-    arm: Arm,
+    arm: options.Arm,
     direction: Annotated[str, opt("Direction of the stiffness, such as -y.", "AXIS|X,Y,Z")],
-    changes: Changes = None,
+    changes: options.Changes = None,
     target: Annotated[float | None, opt("Wanted stiffness.", "N/mm", min=0.0)] = None,
     angles: options.Angles = "",
     path: options.PathFile = None,
     max_change_per_sample: Annotated[float, opt("Of a tension, along --path.", "N")] = math.inf,
-    minimum: Minimum = 0.0,
-    maximum: Maximum = math.inf,
-    load: Load = None,
-    mass: Mass = None,
+    minimum: options.Minimum = 0.0,
+    maximum: options.Maximum = math.inf,
+    load: options.Load = None,
+    mass: options.Mass = None,
     out: Annotated[Path | None, file_opt("Tensions and lengths.", "FILE.csv", "--out")] = None,
-    figure: Figure = None,
-    as_json: AsJson = False,
+    figure: options.Figure = None,
+    as_json: options.AsJson = False,
 ) -> int:
     """Find the least tensions that give a wanted stiffness.
 

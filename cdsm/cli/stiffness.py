@@ -10,19 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import (
-    Angles,
-    Arm,
-    AsJson,
-    Changes,
-    Figure,
-    Load,
-    Mass,
-    Maximum,
-    Minimum,
-    file_opt,
-    opt,
-)
+from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
 
 if TYPE_CHECKING:
@@ -30,13 +18,13 @@ if TYPE_CHECKING:
 
 
 def stiffness(
-    arm: Arm,
-    changes: Changes = None,
-    angles: Angles = "0",
-    minimum: Minimum = 0.0,
-    maximum: Maximum = math.inf,
-    load: Load = None,
-    mass: Mass = None,
+    arm: options.Arm,
+    changes: options.Changes = None,
+    angles: options.Angles = "0",
+    minimum: options.Minimum = 0.0,
+    maximum: options.Maximum = math.inf,
+    load: options.Load = None,
+    mass: options.Mass = None,
     direction: Annotated[str | None, opt("One more direction for it.", "AXIS|X,Y,Z")] = None,
     check: Annotated[
         bool, opt("Print a report: right, in balance, stable?", None, "--check")
@@ -44,7 +32,7 @@ def stiffness(
     out: Annotated[
         Path | None, file_opt("Page of the report to write.", "FILE.html", "--out")
     ] = None,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> int:
     """Compute the least tensions at a posture, and the stiffness.
 
@@ -131,18 +119,18 @@ def _uncertainty(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tup
 
 
 def weigh(
-    arm: Arm,
-    changes: Changes = None,
-    angles: Angles = "0",
-    minimum: Minimum = 0.0,
-    maximum: Maximum = math.inf,
-    load: Load = None,
-    mass: Mass = None,
+    arm: options.Arm,
+    changes: options.Changes = None,
+    angles: options.Angles = "0",
+    minimum: options.Minimum = 0.0,
+    maximum: options.Maximum = math.inf,
+    load: options.Load = None,
+    mass: options.Mass = None,
     steps: Annotated[int | None, opt("Steps to the full load.", "N", min=1, max=1000)] = None,
     cycles: Annotated[int | None, opt("Load and unload N times.", "N", min=1, max=100)] = None,
     out: Annotated[Path | None, file_opt("Table of --cycles.", "FILE.nc|csv", "--out")] = None,
-    figure: Figure = None,
-    as_json: AsJson = False,
+    figure: options.Figure = None,
+    as_json: options.AsJson = False,
 ) -> int:
     """Hang a weight at the tip, and find how far it moves.
 
@@ -209,15 +197,15 @@ def _cycles(
 
 
 def buckle(
-    arm: Arm,
-    changes: Changes = None,
-    angles: Angles = "0",
-    minimum: Minimum = 0.0,
-    maximum: Maximum = math.inf,
-    load: Load = None,
-    mass: Mass = None,
-    figure: Figure = None,
-    as_json: AsJson = False,
+    arm: options.Arm,
+    changes: options.Changes = None,
+    angles: options.Angles = "0",
+    minimum: options.Minimum = 0.0,
+    maximum: options.Maximum = math.inf,
+    load: options.Load = None,
+    mass: options.Mass = None,
+    figure: options.Figure = None,
+    as_json: options.AsJson = False,
 ) -> int:
     """Find the tension and the load at which the arm buckles.
 

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Arm, AsJson, Changes, Figure, Load, Maximum, file_opt, opt
+from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write_picture
 
 if TYPE_CHECKING:
-    import xarray
-
     from cdsm.support.values import Array
 
 _GRID = "Grid of joint angles [deg, or mm where they slide]: first, last and number, or one angle; "
@@ -23,22 +21,22 @@ _OUTPUTS += "tip_position, cable_lengths, payload, force_radius, tension_factor,
 
 
 def sweep(
-    arm: Arm,
+    arm: options.Arm,
     out: Annotated[Path | None, file_opt("Table to write, SI.", "FILE.nc|csv", "--out")] = None,
-    changes: Changes = None,
+    changes: options.Changes = None,
     grid: Annotated[str | None, opt(_GRID, "JOINT=LOW:HIGH:N,...")] = None,
     path: options.PathFile = None,
     random: Annotated[int | None, opt("Sobol points within the joint limits.", "N", min=1)] = None,
     minimum: Annotated[str, opt("Lower bounds of all tensions [N], a case each.", "N,...")] = "0",
-    maximum: Maximum = math.inf,
-    load: Load = None,
+    maximum: options.Maximum = math.inf,
+    load: options.Load = None,
     outputs: Annotated[str | None, opt(_OUTPUTS, "NAME,...")] = None,
     store: Annotated[
         Path | None, opt("Keeps what is done; a stopped sweep resumes.", "FOLDER")
     ] = None,
-    figure: Figure = None,
+    figure: options.Figure = None,
     quantity: Annotated[str, opt("Colour of the workspace in --figure.", "NAME")] = "softest",
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> int:
     """Compute the stiffness over many postures; write a table, a map.
 
@@ -48,6 +46,7 @@ def sweep(
     """
     if out is None and figure is None and store is None:
         raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
+    from cdsm.support.tidy import status_names
     from cdsm.sweeps.quantities import DEFAULT
 
     robot = options.read(arm, changes)
@@ -66,7 +65,8 @@ def sweep(
     )
     head, numbers = header(robot, low)
     written = [] if out is None else [str(cdsm.write_sweep(dataset, out))]
-    counts = _counts(dataset)
+    status = dataset["status"].values
+    counts = {word: int((status == value).sum()) for value, word in status_names(dataset).items()}
     listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     lines = [f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {listed}"]
     warnings, entries = [], sum(counts.values())
@@ -119,11 +119,3 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
     if not angles:
         raise misuse("--grid", "has no joint with several angles, JOINT=LOW:HIGH:N.")
     return cdsm.GridPoses(angles, rest)
-
-
-def _counts(dataset: xarray.Dataset) -> dict[str, int]:
-    """Return the number of entries of each status."""
-    from cdsm.support.tidy import status_names
-
-    status = dataset["status"].values
-    return {word: int((status == value).sum()) for value, word in status_names(dataset).items()}

@@ -8,19 +8,19 @@ from typing import Annotated
 
 import cdsm
 from cdsm.cli import options
-from cdsm.cli.options import Arm, AsJson, Changes, Load, Minimum, opt
+from cdsm.cli.options import opt
 from cdsm.cli.output import Json, answer, header, misuse
 
 
 def view(
-    arm: Arm,
-    changes: Changes = None,
+    arm: options.Arm,
+    changes: options.Changes = None,
     angles: options.Angles = "",
     path: options.PathFile = None,
-    minimum: Minimum = 0.0,
-    load: Load = None,
+    minimum: options.Minimum = 0.0,
+    load: options.Load = None,
     port: Annotated[int, opt("Port to listen at, default 8080; 0 for any.", "N")] = 8080,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> int:
     """Show an arm in the browser, with sliders, and its stiffness."""
     from cdsm.cli.path_file import PathFile, read_path
