@@ -186,9 +186,9 @@ class InfeasibleTension(CdsmError):
             wider, at = math.ceil(relaxation / step) * step, ", ".join(binding) or "none"
             advice = f"Widening every bound by {wider:.4g} N would be enough (cables at a bound: "
             advice += f"{at}). Reduce the load{hint and f', or {hint}'}."
-        said = f"no tension within the bounds balances the arm: {abs(missing).sum():.4g} {units[0]}"
-        said += f" are missing, most of it ({abs(missing).max():.4g} {units[1]}) at {joint}. "
-        super().__init__(said + advice)
+        most = f"largest at {joint} ({abs(missing).max():.4g} {units[1]})"
+        said = f"torque deficit {abs(missing).sum():.4g} {units[0]}, {most}. {advice}"
+        super().__init__(f"no tension within the bounds balances the arm: {said}")
 
 
 class SolverError(CdsmError):
