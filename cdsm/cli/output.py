@@ -121,11 +121,10 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
 
     @wraps(function)
     def command(**given: Any) -> None:
-        from cdsm.support.progress import lines_wanted
+        from cdsm.support.progress import lines_allowed
 
-        lines_wanted.set(True)
         try:
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), lines_allowed():
                 warnings.showwarning = _show
                 code = function(**given)
         except (KeyboardInterrupt, SystemError) as error:

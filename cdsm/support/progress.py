@@ -23,10 +23,8 @@ DELAY = 1.0
 _PAUSE = 10.0
 """Time [s] between two lines where there is no terminal."""
 
-lines_wanted: ContextVar[bool] = ContextVar("lines_wanted", default=False)
-"""Whether lines are printed where there is no terminal."""
-
 _allowed: ContextVar[bool] = ContextVar("_allowed", default=True)
+_lines_wanted: ContextVar[bool] = ContextVar("_lines_wanted", default=False)
 
 
 def track(items: Collection[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:
@@ -48,7 +46,7 @@ def progress_bar(
     is open is never shown, even if the outer one is not ``wanted``.
     """
     terminal = sys.stderr.isatty()
-    if not (wanted and _allowed.get() and (terminal or lines_wanted.get())):
+    if not (wanted and _allowed.get() and (terminal or _lines_wanted.get())):
         with progress_allowed(False):
             yield lambda count: None
         return
@@ -110,3 +108,13 @@ def progress_allowed(progress: bool) -> Iterator[None]:
         yield
     finally:
         _allowed.reset(token)
+
+
+@contextmanager
+def lines_allowed() -> Iterator[None]:
+    """Print lines inside this context where there is no terminal."""
+    token = _lines_wanted.set(True)
+    try:
+        yield
+    finally:
+        _lines_wanted.reset(token)
