@@ -37,6 +37,7 @@ SETTINGS: Final = "series_stiffness", "control", "minimum", "maximum"
 _GIVEN: Final = *SETTINGS, "friction", "slack_below"  # keys of all cables or of each
 
 _ROBOT: Final = ONE  # key of the geometry, of which files have only the parts; no fault prints it
+_NO_ROBOT: Final = "describes no robot; give [universal], [hinged], [[sections]] or [urdf]"
 _FORMS: Final = "universal", "hinged", "sections", "geometry", "joints", "links"
 _NO_WIRE: Final = LinearElasticity(1e5)  # of cables whose wire is missing
 
@@ -62,6 +63,8 @@ def _alone(urdf: object, info: Info) -> object:
 
 def _described(tables: dict[str, Any]) -> Geometry:
     """Build the geometry; a key of the whole file that stands in one of its tables is told so."""
+    if not tables:
+        raise CrossFaults([_NO_ROBOT])
     try:
         return toml.build(Geometry, tables)
     except GeometryError as error:

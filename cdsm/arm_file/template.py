@@ -12,12 +12,16 @@ from cdsm.wires.catalogue import WIRES
 
 
 def template(
-    name: str, wire: str | float, sections: Sequence[tuple[str, Mapping[str, float]]]
+    name: str,
+    wire: str | float,
+    minimum: float,
+    sections: Sequence[tuple[str, Mapping[str, float]]],
 ) -> str:
     """Return the text of an ARM.toml called ``name``: ``template.toml`` beside this file, filled.
 
-    Each of ``sections``, base to tip, is a constructor of :class:`Geometry` by name and its
-    keywords; lines of the file with other keywords are left out.
+    ``minimum`` is the lower bound of all tensions [N]. Each of ``sections``, base to tip, is a
+    constructor of :class:`Geometry` by name and its keywords; lines of the file with other keywords
+    are left out.
     """
     text = files("cdsm.arm_file").joinpath("template.toml").read_text("utf-8")
     section = next(each for each in text.split("\n\n") if each.startswith("[[sections]]"))
@@ -33,5 +37,5 @@ def template(
         own = [line for line in lines if line[0] in "#[" or line.split(" = ")[0] in sizes]
         robot.append(Template("\n".join([header][: len(sections) - 1] + own)).substitute(values))
     return Template(text.replace(section, "\n\n".join(robot))).substitute(
-        name=name, wire=json.dumps(wire), wires=", ".join(WIRES)
+        name=name, wire=json.dumps(wire), wires=", ".join(WIRES), minimum=minimum
     )

@@ -63,7 +63,9 @@ def new(
         made, parts = _serpentine(kind, counts, _law(law))
         if is_file(law):  # an ARM.toml names files from its own folder
             law = os.path.relpath(law, arm.parent)
-        write_text(arm, template(arm.name, _number(law), parts))
+        first = max(cable.elasticity.low for cable in made.cables)  # where the law begins
+        least = max(10.0, float(f"{1.05 * first:.4g}"))
+        write_text(arm, template(arm.name, _number(law), least, parts))
     bent = min([10.0, *(math.degrees(x) / 2.0 for x in made.upper[~made.slides].tolist())])
     tried = f"written: {arm}; try cdsm stiffness {arm} --angles {bent:.3g} --check"
     return answer(as_json, _facts(made, arm), made, tried)
