@@ -215,16 +215,16 @@ def closed_loop(nb: Shown) -> None:
 
 def design_of_an_arm(nb: Shown) -> None:
     assert nb.held.limit == "deflection"
-    np.testing.assert_allclose(nb.held.force, 1.241, atol=2e-3)  # 500 g is 4.9 N
-    np.testing.assert_allclose(nb.held.limits["tension"], 72.4, atol=0.1)
-    np.testing.assert_allclose(nb.polytope.radius, 63.95, atol=0.01)
+    np.testing.assert_allclose(nb.held.force, 1.403, atol=2e-3)  # 500 g is 4.9 N
+    np.testing.assert_allclose(nb.held.limits["tension"], 71.8, atol=0.1)
+    np.testing.assert_allclose(nb.polytope.radius, 44.93, atol=0.01)
     best = nb.found.values(0)
-    np.testing.assert_allclose(best["motor_force"], 50.67, atol=0.5)
+    np.testing.assert_allclose(best["motor_force"], 122.6, atol=1.0)
     assert best["deflection"] <= 1e-3
     assert abs(max(nb.sag) / best["deflection"] - 1.0) < 0.05  # what first order leaves out
     assert best["disk_clearance"] >= 0.5e-3
     assert len(nb.found.front) > 20
-    assert 0.8e-3 < max(nb.sag) < 1e-3  # the real weight, with all nonlinearity
+    assert 0.75e-3 < max(nb.sag) < 1e-3  # the real weight, with all nonlinearity
     assert nb.missed.constraints == ("deflection",)
 
 
