@@ -80,8 +80,8 @@ class MissingWire(CdsmError, LookupError):
     def __init__(self, path: object, cables: Texts = ()) -> None:
         self.path, self.cables = str(path), tuple(cables)
         whose = f"the cables {listed(self.cables)}" if self.cables else "its cables"
-        said = f"{path}: has no wire for {whose}. Give wire= (--wire, of commands), or write at the"
-        remedy = 'top of an ARM.toml: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
+        said = f"{path}: has no wire for {whose}. Give wire= (commands: --set wire=48e3), or write"
+        remedy = 'at the top of it: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
         super().__init__(f"{said} {remedy}")
 
 
@@ -174,9 +174,9 @@ class InfeasibleTension(CdsmError):
             wider, at = math.ceil(relaxation / step) * step, ", ".join(binding) or "none"
             advice = f"Widening every bound by {wider:.4g} N would be enough (cables at a bound: "
             advice += f"{at}). Reduce the load{hint and f', or {hint}'}."
-        said = f"no tension within the bounds balances the arm: {abs(missing).sum():.4g} {units[0]}"
-        said += f" are missing, most of it ({abs(missing).max():.4g} {units[1]}) at {joint}. "
-        super().__init__(said + advice)
+        most = f"largest at {joint} ({abs(missing).max():.4g} {units[1]})"
+        said = f"torque deficit {abs(missing).sum():.4g} {units[0]}, {most}. {advice}"
+        super().__init__(f"no tension within the bounds balances the arm: {said}")
 
 
 class SolverError(CdsmError):

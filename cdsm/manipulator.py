@@ -195,7 +195,13 @@ class Manipulator(Printed):
         return made if springs is None else made.with_springs(springs)
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], wire: Wire | None = None) -> Manipulator:
+    def read(
+        cls,
+        path: str | os.PathLike[str],
+        wire: Wire | None = None,
+        *,
+        changes: Mapping[str, Any] | None = None,
+    ) -> Manipulator:
         """Read an arm from an ARM.toml: robot, cables, wires, gravity, tolerances.
 
         The robot is a geometry in a form of :meth:`Geometry.read`, or a table ``[urdf]`` with
@@ -206,6 +212,8 @@ class Manipulator(Printed):
             path: The file; :meth:`write` writes one.
             wire: Wire of all cables, instead of the wires in the file: a law, a name, EA [N], or
                 the path of a file of :meth:`Elasticity.write`.
+            changes: Values to lay over the keys of the file: ``{"minimum": 5.0, "universal":
+                {"link_mass": 0.06}}``. Cables and sections of a list go by name, or number from 1.
 
         Raises:
             FileError: The file cannot be read or does not describe an arm. Every fault is listed.
@@ -214,7 +222,7 @@ class Manipulator(Printed):
         """
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
 
-        return cls.__new__(cls)._define(**read_arm(path, wire))
+        return cls.__new__(cls)._define(**read_arm(path, wire, changes))
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write an ARM.toml from which :meth:`read` builds an equal arm; return its path.

@@ -129,7 +129,8 @@ def _link_faults(links: list[etree._Element], check_inertia: bool) -> Iterator[s
             yield (
                 f"link {name}: principal moments of inertia {least:g}, {mid:g}, {most:g} kg m², "
                 "which no body has: none is negative, nor larger than the sum of the others. "
-                "Stiffness does not need them: check_inertia=False lets them pass"
+                "Stiffness does not need them: accept them by check_inertia=False in Python, "
+                "check_inertia = false in [urdf] of ARM.toml, or cdsm new --no-check-inertia"
             )
 
 

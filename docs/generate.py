@@ -169,14 +169,12 @@ def commands() -> dict[str, str]:
         "",
         "`cdsm COMMAND --help` prints the same. Lengths are in mm, angles in degrees, stiffness in "
         "N/mm, forces in N. Every command takes `--json`; before the command, `--debug` shows "
-        "where an error comes from and `--verbose` the log.",
+        "where an error comes from.",
         "",
     ]
     for name, command in found.items():
         rows += [f"(command-{name})=", f"## cdsm {name}", "", _plain(command.help or ""), ""]
         for option in command.params:
-            if option.hidden:
-                continue
             kind = (
                 ""
                 if getattr(option, "is_flag", False)
@@ -185,7 +183,7 @@ def commands() -> dict[str, str]:
             words = [] if option.param_type_name == "argument" else option.opts
             rows.append(" ".join(f"`{word}`" for word in (*words, kind) if word))
             meaning = _plain(option.help or "")
-            if not option.required and option.default not in (None, False, ()):
+            if option.show_default and option.default not in (None, False, ()):
                 meaning += f" Default: `{option.default}`."
             rows += [f": {meaning}", ""]
     return {"commands.md": "\n".join(rows)}

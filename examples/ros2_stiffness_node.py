@@ -1,6 +1,6 @@
 """ROS 2 node: joint states in; cable tensions, stiffness margin and an ellipsoid for RViz out.
 
-    cdsm urdf ARM.toml --out arm.urdf      # for robot_state_publisher
+    cdsm export ARM.toml arm.urdf          # for robot_state_publisher
     python ros2_stiffness_node.py --ros-args -p arm:=ARM.toml -p least_tension:=10.0
 
 It runs in a shell with ROS 2 sourced, in an environment that sees rclpy (`python -m venv

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +29,11 @@ _HEAD = (
 _ESCAPED = re.compile(r"'''|'$|[^\t\n -~\x80-\U0010ffff]")  # what a literal string cannot hold
 
 
-def read_arm(path: str | os.PathLike[str], wire: Wire | None) -> dict[str, Any]:
+def read_arm(
+    path: str | os.PathLike[str], wire: Wire | None, changes: Mapping[str, Any] | None
+) -> dict[str, Any]:
     """Read what defines an arm. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
-    file, cables = read_model(path, wire, robot=True)
+    file, cables = read_model(path, wire, changes, robot=True)
     keys = ("gravity", "original_length", "tolerances", "geometry")
     arm = {"cables": cables} | {key: getattr(file, key) for key in keys}
     if (robot := file.urdf) is None:

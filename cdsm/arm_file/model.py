@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final, cast
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WrapValidator
 from pydantic import ValidationInfo as Info
 
+from cdsm.arm_file.tables import read_tables
 from cdsm.cable import Cable, Cables, Control, Site
 from cdsm.cable_laws import OriginalLength
 from cdsm.errors import LINES, CdsmError, FileError, GeometryError, MissingWire, listed
@@ -21,9 +22,9 @@ from cdsm.geometry import Geometry, toml
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import GRAVITY
 from cdsm.support import records
-from cdsm.support.files import read_text
+from cdsm.support.directions import Axis, gravity_vector
 from cdsm.support.records import EACH, ONE, CrossFaults, record
-from cdsm.support.validation import RANGES, one_of
+from cdsm.support.validation import one_of
 from cdsm.tolerances import Tolerances
 from cdsm.tolerances import from_table as read_tolerances
 from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table
@@ -33,7 +34,12 @@ from cdsm.wires.laws import LinearElasticity
 SETTINGS: Final = "series_stiffness", "control", "minimum", "maximum"
 """Keys that are attributes of a :class:`Cable` with the same name."""
 
+_GIVEN: Final = *SETTINGS, "friction", "slack_below"  # keys of all cables or of each
+
 _ROBOT: Final = ONE  # key of the geometry, of which files have only the parts; no fault prints it
+_NO_ROBOT: Final = (
+    "describes no robot; give [universal], [hinged], [backbone], [[sections]] or [urdf]"
+)
 _FORMS: Final = "universal", "hinged", "backbone", "sections", "geometry", "joints", "links"
 _NO_WIRE: Final = LinearElasticity(1e5)  # of cables whose wire is missing
 
@@ -59,6 +65,8 @@ def _alone(urdf: object, info: Info) -> object:
 
 def _described(tables: dict[str, Any]) -> Geometry:
     """Build the geometry; a key of the whole file that stands in one of its tables is told so."""
+    if not tables:
+        raise CrossFaults([_NO_ROBOT])
     try:
         return toml.build(Geometry, tables)
     except GeometryError as error:
@@ -95,10 +103,15 @@ def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
         return as_wire(wire)
     # with faulty tables of wires, any name is right
     laws: dict[str, Elasticity] = WIRES | known.get("wires", {wire: _NO_WIRE})
-    return laws[_one_of("wire", wire, laws, "Or give EA in N, or a table [wires.NAME].")]
+    remedy = "Or give EA in N, a file WIRE.toml, or a table [wires.NAME]."
+    return laws[_one_of("wire", wire, laws, remedy)]
 
 
-_G = Annotated[records.Number, Field(ge=-RANGES["gravity"].high, le=RANGES["gravity"].high)]
+_Gravity = Annotated[
+    Annotated[Axis, Tag(ONE)] | Annotated[records.Direction, Tag(EACH)],
+    Discriminator(records.one_or_each),
+    AfterValidator(lambda given: gravity_vector("gravity", given)),
+]
 _Label = Annotated[str, Field(min_length=1, max_length=200)]
 _Law = Annotated[Any, PlainValidator(from_table)]
 
@@ -106,6 +119,8 @@ _Law = Annotated[Any, PlainValidator(from_table)]
 @record
 class _Settings:
     wire: Any = None
+    slack_below: bool | None = None
+    friction: records.Friction | None = None
     series_stiffness: records.SpringStiffness | None = None
     control: Control | None = None
     minimum: records.Tension | None = None
@@ -124,16 +139,15 @@ class _Site:
 class _Routed(_Settings):
     name: _Label
     lead: records.LengthOrZero = 0.0
-    friction: records.Friction = 0.0
     sites: Annotated[tuple[_Site, ...], Field(strict=False, min_length=2)]
 
-    def built(self) -> Cable:
-        """Return the cable; a hole without ``friction`` has that of the cable."""
-        first, last = 0 if self.lead else 1, len(self.sites) - 1
-        usual = [self.friction * (first <= i < last) for i in range(len(self.sites))]
+    def built(self, friction: float) -> Cable:
+        """Return the cable; ``friction`` is that of holes without one of their own."""
+        holes = range(0 if self.lead else 1, len(self.sites) - 1)
         sites = [
-            Site(each.link, each.xyz, mu if each.friction is None else each.friction, each.wrap)
-            for each, mu in zip(self.sites, usual, strict=True)
+            Site(each.link, each.xyz, friction * (i in holes) if mu is None else mu, each.wrap)
+            for i, each in enumerate(self.sites)
+            for mu in [each.friction]
         ]
         return Cable(self.name, tuple(sites), _NO_WIRE, self.lead)
 
@@ -177,8 +191,14 @@ def _built(given: Any, check: Callable[[Any], Any], info: Info) -> Cables:
         place = f"{where}.wire"
         try:
             law = known.get("wire") if own.wire is None else _law_of(own.wire, known)
-            place, cable = where, route.built() if own is route else route
-            cables.append(replace(cable, elasticity=law or _NO_WIRE, **shared | _given(vars(own))))
+            place, given = where, shared | _given(vars(own))
+            mu, slack = given.pop("friction", None), given.pop("slack_below", False)
+            law = law.slack_below() if law and slack else law or _NO_WIRE
+            if isinstance(route, _Routed):
+                route = route.built(mu or 0.0)
+            elif mu is not None:
+                route = route.with_friction(mu)
+            cables.append(replace(route, elasticity=law, **given))
         except ValueError as error:
             faults += records.faults_at(place, error)
     if faults:
@@ -187,7 +207,7 @@ def _built(given: Any, check: Callable[[Any], Any], info: Info) -> Cables:
 
 
 def _given(known: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: known[key] for key in SETTINGS if known.get(key) is not None}
+    return {key: known[key] for key in _GIVEN if known.get(key) is not None}
 
 
 @record
@@ -202,7 +222,7 @@ class ArmFile(_Settings, _Wires):
     """The keys of an ARM.toml, or of a file of cables; bases give ``wires`` and ``wire`` first."""
 
     wire: Annotated[Any, AfterValidator(lambda wire, info: _law_of(wire, info.data))] = None
-    gravity: Annotated[tuple[_G, _G, _G], Field(strict=False)] = GRAVITY
+    gravity: _Gravity = GRAVITY
     original_length: OriginalLength = "unstrained"
     tolerances: Annotated[Tolerances, PlainValidator(read_tolerances)] = Tolerances()
     geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None
@@ -211,24 +231,23 @@ class ArmFile(_Settings, _Wires):
 
 
 def read_model(
-    path: str | os.PathLike[str], wire: Wire | None, *, robot: bool
+    path: str | os.PathLike[str],
+    wire: Wire | None,
+    changes: Mapping[str, Any] | None = None,
+    *,
+    robot: bool,
 ) -> tuple[ArmFile, Cables]:
     """Read a file of cables, or of an arm (``robot``); all cables get the ``wire`` if it is given.
 
     Raises FileError, which lists every fault, or MissingWire.
     """
-    text, forced = read_text(path), None if wire is None else as_wire(wire)
-    if robot and text.lstrip().startswith("<"):
-        why = (
-            "is XML, no ARM.toml. Give a URDF to Manipulator.from_urdf, with a tip and cables, or "
-        )
-        raise FileError(path, f"{why}name it in the table [urdf] of an ARM.toml.")
+    forced, faults = None if wire is None else as_wire(wire), ""
     try:
-        data = records.read_toml(text)
+        data = read_tables(path, changes, robot)
         described, rest = toml.split_geometry(data)
         if robot and ("urdf" not in rest or any(key in described for key in _FORMS)):
             data = {_ROBOT: described, **rest}
-        file, faults = records.parse(ArmFile, data), ""
+        file = records.parse(ArmFile, data)
     except GeometryError as error:
         faults = listed(error.faults, 20, LINES)
     if faults:  # not inside except: its context could not be pickled

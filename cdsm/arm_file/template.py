@@ -14,14 +14,14 @@ from cdsm.wires.catalogue import WIRES
 def template(
     name: str,
     wire: str | float,
-    gravity: tuple[float, ...],
+    minimum: float,
     sections: Sequence[tuple[str, Mapping[str, float]]],
 ) -> str:
     """Return the text of an ARM.toml called ``name``: ``template.toml`` beside this file, filled.
 
-    ``wire`` is a name or EA [N], ``gravity`` is in base axes [m/s²]. Each of ``sections``, base to
-    tip, is a constructor of :class:`Geometry` by name (``"universal"``, ``"hinged"``) and its
-    keywords; lines of the file with other keywords are left out.
+    ``minimum`` is the lower bound of all tensions [N]. Each of ``sections``, base to tip, is a
+    constructor of :class:`Geometry` by name and its keywords; lines of the file with other keywords
+    are left out.
     """
     text = files("cdsm.arm_file").joinpath("template.toml").read_text("utf-8")
     section = next(each for each in text.split("\n\n") if each.startswith("[[sections]]"))
@@ -31,17 +31,11 @@ def template(
         values: dict[str, object] = dict(sizes)
         values |= {f"{key}_degrees": f"{math.degrees(x):.4g}" for key, x in sizes.items()}
         values["kind"] = kind if len(sections) == 1 else f"sections.{kind}"
-        values["start"] = (
-            "end of the section before to its first joint" if i else "base frame to joint 1"
-        )
-        values["disk_radius"] = 1.2 * sizes["hole_radius"]
-        values["cable_radius"] = sizes["hole_radius"] / 2.0
+        values["start"] = "end of the section before" if i else "base frame"
+        values["disk_radius"] = f"{1.2 * sizes['hole_radius']:.4g}"
+        values["cable_radius"] = f"{sizes['hole_radius'] / 2.0:.4g}"
         own = [line for line in lines if line[0] in "#[" or line.split(" = ")[0] in sizes]
         robot.append(Template("\n".join([header][: len(sections) - 1] + own)).substitute(values))
     return Template(text.replace(section, "\n\n".join(robot))).substitute(
-        name=name,
-        wire=json.dumps(wire),
-        wires=", ".join(WIRES),
-        gravity=list(gravity),
-        mass_error=f"{0.05 * sections[0][1]['link_mass']:.3g}",
+        name=name, wire=json.dumps(wire), wires=", ".join(WIRES), minimum=minimum
     )

@@ -1,281 +1,184 @@
-"""``cdsm urdf | stiffness | check | export``: compute the stiffness of an arm; write its files."""
+"""``cdsm new | export``: write a first ARM.toml; write an arm for other programs."""
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Mapping
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 import cdsm
-from cdsm.cli.files import file_option, out_option
-from cdsm.cli.options import (
-    Angles,
-    ArmOptions,
-    AsJson,
-    LoadOptions,
-    TensionOptions,
-    directions,
+from cdsm.cli import options
+from cdsm.cli.options import file_opt, opt
+from cdsm.cli.output import Json, answer, header, misuse
+
+Kind = Literal["universal", "hinged"]
+
+_JOINTS = (
+    "Number of joints, default 4; several: of sections, each a quarter narrower than the last."
 )
-from cdsm.cli.output import Json, answer, by_cable, write
-from cdsm.cli.values import direction_of, misuse
-
-if TYPE_CHECKING:
-    from cdsm.support.directions import Direction
-
-_Given = Annotated[
-    Path | None,
-    typer.Option(
-        "--tolerances",
-        metavar="T.toml",
-        help="Tolerances for the uncertainty of the stiffness; all those in ARM.toml are replaced.",
-    ),
-]
-
-_ALONG: dict[str, Direction] = {"x": "x", "y": "y", "z": "z"}
-"""Directions by name; every answer has the stiffness along them."""
+_WIRE = "Wire of all cables: a name, a constant EA in N, or a file of `cdsm fit`. Default: "
+_WIRE += "1x19-1.2mm; with --from, that of the cables."
+_FROM = "A robot, with --cables and --tip; or the folder of a CASPR model, with --wire."
+_INERTIA = "Accept moments of inertia that no body can have."
 
 
-def urdf(
-    geometry: Annotated[
-        Path, typer.Argument(metavar="ARM.toml", help="File with the geometry of the arm.")
-    ],
-    out: Annotated[
-        Path, out_option(endings=(".urdf",), metavar="FILE.urdf", help="URDF file to write.")
-    ],
-    as_json: AsJson = False,
-) -> None:
-    """Write the URDF of an arm, checked by reading it back with two parsers."""
-    if geometry.suffix.lower() == ".urdf":
-        raise misuse("ARM.toml", f"{geometry} is a URDF already.")
-    arm = cdsm.Geometry.read(geometry)
-    path = cdsm.write_urdf(arm, out)
-    numbers: Json = {"name": arm.name, "length_m": arm.length, "written": [str(path)]}
-    answer(as_json, lambda: numbers, f"{arm}\nwritten: {path}")
+def new(
+    arm: Annotated[Path, file_opt("File to write.", "ARM.toml", declare=typer.Argument)],
+    joints: Annotated[str | None, opt(_JOINTS, "N[,N,...]")] = None,
+    kind: Annotated[
+        Kind, opt("Joints: universal, or hinges 90 degrees apart.", None, "--type")
+    ] = "universal",
+    wire: Annotated[str | None, opt(_WIRE, "NAME|EA|WIRE.toml")] = None,
+    source: Annotated[Path | None, opt(_FROM, "ROBOT.urdf|FOLDER", "--from")] = None,
+    cables: Annotated[Path | None, opt("Cables of the robot.", "CABLES.toml")] = None,
+    tip: Annotated[str | None, opt("Link of the robot that is the tip.", "LINK")] = None,
+    no_check_inertia: Annotated[bool, opt(_INERTIA, None, "--no-check-inertia")] = False,
+    overwrite: Annotated[bool, opt("Replace the file.", None, "--overwrite")] = False,
+    as_json: options.AsJson = False,
+) -> int:
+    """Write a complete ARM.toml with a comment on every key.
 
-
-def stiffness(
-    arm: ArmOptions,
-    tensions: TensionOptions,
-    load: LoadOptions,
-    angles: Angles = "0",
-    direction: Annotated[
-        str | None,
-        typer.Option(
-            help="One more direction for the stiffness: an axis such as -y, or a vector.",
-            metavar="AXIS|X,Y,Z",
-            autocompletion=directions,
-        ),
-    ] = None,
-    tolerances: _Given = None,
-    as_json: AsJson = False,
-) -> None:
-    """Compute the least tensions that balance the arm at a posture, and the stiffness under them.
-
-    Exit code 0; 3 if the arm is unstable.
+    Every command reads it; sizes, wire and all else are edited in it. --from makes one of a robot.
     """
-    pose = arm.at(angles)
-    tension = tensions.distribute(pose, load.at_tip(pose.arm))
-    K = cdsm.stiffness(pose, tension)
-    parts: list[object] = [tensions.conditions(pose), tension, K]
-    more: Json = {}
-    along = _ALONG
-    if direction is not None:
-        along = along | {direction: (u := direction_of(direction))}
-        more = {"direction": u, "along_direction_N_per_m": K.along(u)}
-        parts += [f"along {direction}: {K.along(u) / 1000.0:.4g} N/mm"]
-    lines, stuck = _sticking(_breakaways(tension, along), along)
-    tables, sure = _uncertainty(tension, tolerances, along)
-    numbers = more | stuck | sure
-    parts += [*lines, *tables]
-    answer(as_json, lambda: K.to_dict() | numbers, *parts, warnings=K.warnings[:1])
-
-
-def _breakaways(tension: cdsm.Tension, along: Mapping[str, Direction]) -> dict[str, cdsm.Breakaway]:
-    """Compute the load in each direction of ``along`` at which a cable begins to slide in a hole.
-
-    The result is by name of the direction, and empty if the arm has no friction. A direction has
-    no entry in these cases: a cable slides already without a load; none slides at any load; the
-    stuck arm is about to buckle; or a tension is outside the domain of its law.
-    """
-    found = {}
-    if tension.posture.arm.has_friction:
-        for name, u in along.items():
-            with contextlib.suppress(cdsm.CdsmError):
-                first = cdsm.breakaway(tension.posture, tension, u)
-                if 0.0 < first.load < math.inf:
-                    found[name] = first
-    return found
-
-
-def _sticking(
-    breakaways: dict[str, cdsm.Breakaway], along: Mapping[str, Direction]
-) -> tuple[list[str], Json]:
-    """Return the stiffness under small loads, while all cables stick, and the breakaway loads.
-
-    The result is a text, in a list, and the JSON, with both numbers for each direction.
-    ``breakaways`` is the result of :func:`_breakaways`; if it is empty, so are text and JSON.
-    """
-    from cdsm.stiffness_matrix.prints import model_of
-
-    if not breakaways:
-        return [], {}
-    stuck = {name: each.stiffness.along(along[name]) for name, each in breakaways.items()}
-    lines = [
-        f"along {name} {stuck[name] / 1000.0:.4g} N/mm below {each.load:.4g} N"
-        for name, each in breakaways.items()
-    ]
-    numbers = {
-        name: {"stuck_N_per_m": stuck[name], "breakaway_N": each.load}
-        for name, each in breakaways.items()
-    }
-    K = next(iter(breakaways.values())).stiffness
-    head = f"small loads measure ({model_of(K)}):"
-    return ["\n".join([head, *lines])], {"sticking": numbers}
-
-
-def _uncertainty(
-    tension: cdsm.Tension, tolerances: Path | None, along: Mapping[str, Direction] = _ALONG
-) -> tuple[list[str], Json]:
-    """Compute the uncertainty of the stiffness in each direction of ``along``.
-
-    Return a table, as a list of one text, and the JSON. The tolerances are those in the file
-    ``tolerances``, or else those of the arm; without any, table and JSON are empty. A direction in
-    which the tip cannot move is left out.
-    """
-    pose, found = tension.posture, {}
-    given = pose.arm.tolerances if tolerances is None else cdsm.Tolerances.read(tolerances)
-    for name, u in along.items() if given.given else ():
-        with contextlib.suppress(cdsm.SingularStiffness):
-            found[name] = cdsm.uncertainty(pose, tension, given, direction=u)
-    if not found:
-        return [], {}
-    return [_table(found)], {"uncertainty": {name: each.to_dict() for name, each in found.items()}}
-
-
-def _table(budgets: dict[str, cdsm.Uncertainty]) -> str:
-    """Format budgets as a table with a column for each direction.
-
-    The rows are the stiffness ± its uncertainty, then the share of each source in it [%].
-    """
-    from cdsm.support.format import aligned
-
-    def percent(source: str) -> list[float]:
-        return [100.0 * b.contributions[source] / abs(b.value) for b in budgets.values()]
-
-    sources = {source for budget in budgets.values() for source in budget.contributions}
-    ranked = sorted(sources, key=lambda source: -max(percent(source)))
-    rows = [
-        ("uncertainty [N/mm]", *budgets),
-        ("along", *(budget.shown for budget in budgets.values())),
-        *(
-            (f"  of it {source.replace('_', ' ')}", *(f"{part:.2g} %" for part in percent(source)))
-            for source in ranked
-        ),
-    ]
-    remarks = (f"along {axis}: {each}" for axis, b in budgets.items() for each in b.warnings)
-    return "\n".join([*aligned(rows), *remarks])
-
-
-def check(
-    arm: ArmOptions,
-    tensions: TensionOptions,
-    load: LoadOptions,
-    angles: Angles = "0",
-    out: Annotated[
-        Path | None,
-        out_option(
-            endings=(".html", ".htm"), metavar="FILE.html", help="Also write the report as a page."
-        ),
-    ] = None,
-    tolerances: _Given = None,
-    as_json: AsJson = False,
-) -> None:
-    """Check a stiffness: is it right, balanced and stable, and how to read it.
-
-    Exit code 0: it passes; 3: it fails, and the report says why.
-    """
+    from cdsm.arm_file.template import template
     from cdsm.support.files import write_text
+    from cdsm.wires.catalogue import is_file
 
-    pose = arm.at(angles)
-    tension = tensions.distribute(pose, load.at_tip(pose.arm))
-    report = cdsm.stiffness(pose, tension).report()
-    conditions = tensions.conditions(pose)
-    about = f"{arm.arm}\n{conditions}\ncdsm {cdsm.__version__}"
-    write(out, lambda file: write_text(file, report.to_html(about)))
-    warnings = () if report.passed else ("FAIL: the report says why.",)
-    tables, sure = _uncertainty(tension, tolerances)
-    parts = [conditions, report, *tables]
-    answer(as_json, lambda: report.to_dict() | sure, *parts, warnings=warnings)
+    if arm.exists() and not overwrite:
+        raise misuse("ARM.toml", f"{arm} exists; add --overwrite.")
+    if source is not None:
+        if joints is not None:
+            raise misuse("--joints", "are those of the robot; leave it out.")
+        made = _of_robot(source, cables, tip, wire, not no_check_inertia)
+        made.write(arm)
+    else:
+        for option, value in (("--cables", cables), ("--tip", tip)):
+            if value is not None:
+                raise misuse(option, "goes with --from only.")
+        counts = _counts("4" if joints is None else joints)
+        law = "1x19-1.2mm" if wire is None else wire
+        made, parts = _serpentine(kind, counts, _law(law))
+        if is_file(law):  # an ARM.toml names files from its own folder
+            law = os.path.relpath(law, arm.parent)
+        first = max(cable.elasticity.low for cable in made.cables)  # where the law begins
+        least = max(10.0, float(f"{1.05 * first:.4g}"))
+        write_text(arm, template(arm.name, _number(law), least, parts))
+    bent = min([10.0, *(math.degrees(x) / 2.0 for x in made.upper[~made.slides].tolist())])
+    tried = f"written: {arm}; try cdsm stiffness {arm} --angles {bent:.3g} --check"
+    return answer(as_json, _facts(made, arm), made, tried)
+
+
+def _facts(arm: cdsm.Manipulator, written: Path) -> Json:
+    return {"name": arm.name, "length_m": arm.length, "written": [str(written)]}
+
+
+def _number(wire: str) -> str | float:
+    try:
+        return float(wire)
+    except ValueError:
+        return wire
+
+
+def _law(wire: str) -> cdsm.Elasticity:
+    from cdsm.wires.catalogue import as_wire
+
+    return as_wire(_number(wire))
+
+
+def _counts(text: str) -> list[int]:
+    try:
+        counts = [int(word) for word in text.split(",")]
+    except ValueError:
+        counts = []
+    if not counts or min(counts) < 1:
+        raise misuse("--joints", f"{text!r} given; give a whole number, or several: 4 or 3,3.")
+    return counts
+
+
+def _of_robot(
+    source: Path, cables: Path | None, tip: str | None, wire: str | None, check_inertia: bool
+) -> cdsm.Manipulator:
+    """Read the arm of a URDF, or of the folder of a CASPR model."""
+    law = None if wire is None else _law(wire)
+    if source.is_dir():
+        usual = cdsm.presets.ELASTIC_STAGE
+        found = cdsm.read_caspr(source, elasticity=law or usual, check_inertia=check_inertia)
+        if law is None:  # after reading: the folder may hold no model
+            raise misuse("--wire", "give it: the cables of CASPR do not stretch.")
+        return found
+    if source.suffix.lower() == ".toml":
+        raise misuse("--from", f"{source} is no robot; an ARM.toml can be copied.")
+    if cables is None or tip is None:
+        raise misuse("--cables, --tip", f"give both: {source} does not say what they are.")
+    routed = cdsm.read_cables(cables, law)
+    return cdsm.Manipulator.from_urdf(source, routed, tip=tip, check_inertia=check_inertia)
+
+
+def _serpentine(
+    kind: str, counts: list[int], law: cdsm.Elasticity
+) -> tuple[cdsm.Manipulator, list[tuple[str, dict[str, float]]]]:
+    """Build an arm of sections with these numbers of joints; return it with the sizes of each."""
+    hinged, parts = kind == "hinged", []
+    for i, count in enumerate(counts):
+        each = 2 if hinged else 3
+        sizes = {"joints": count} | ({"twist": math.pi / 2.0} if hinged else {})
+        sizes |= {"cables_per_joint": each, "link_length": 0.06, "base_length": 0.0 if i else 0.03}
+        sizes |= {"disk_offset": 0.012, "hole_radius": 0.025 * 0.75**i, "link_mass": 0.12}
+        sizes["lead"] = 0.3
+        if hinged:  # 10 degrees, or less: holes of one plane must not reach those of the next
+            sizes["spread"] = min(math.radians(10.0), math.tau / (count * each))
+        if i:  # between the holes of all sections, wherever those are
+            sizes["phase"] = math.tau / math.lcm(*counts) / each * i / len(counts)
+        parts.append((kind, sizes))
+    built = [getattr(cdsm.Geometry, kind)(**sizes) for _, sizes in parts]
+    return cdsm.Manipulator(cdsm.Geometry.sections(built), law), parts
 
 
 def export(
-    arm: ArmOptions,
-    tensions: TensionOptions,
-    load: LoadOptions,
+    arm: options.Arm,
     out: Annotated[
-        Path | None,
-        out_option(
-            endings=(".xml",),
-            metavar="FILE.xml",
-            help="MuJoCo model to write, its cables under tension.",
-        ),
-    ] = None,
-    cables_out: Annotated[
-        Path | None,
-        file_option(endings=(".toml",), metavar="FILE.toml", help="File to write the cables to."),
-    ] = None,
-    angles: Angles = "0",
+        Path,
+        file_opt("URDF, or MuJoCo model under tension.", "OUT.urdf|xml", declare=typer.Argument),
+    ],
+    changes: options.Changes = None,
+    angles: options.Angles = "0",
+    minimum: options.Minimum = 0.0,
     actuators: Annotated[
-        Literal["length", "tension", "none"],
-        typer.Option(help="What the motors of the MuJoCo model control; none: no motors."),
+        Literal["length", "tension", "none"], opt("What motors of a MuJoCo model control.")
     ] = "length",
-    damping_ratio: Annotated[
-        float | None,
-        typer.Option(help="Cables damp; damping ratio of the least damped mode. Default 0.05."),
-    ] = None,
-    damping: Annotated[
-        float | None,
-        typer.Option(help="Damping of each joint [N m s/rad], instead of damping by the cables."),
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Write an arm for other programs: a MuJoCo model at a posture, or a file of its cables.
+    as_json: options.AsJson = False,
+) -> int:
+    """Write the URDF of an arm, or a MuJoCo model at a posture.
 
-    The answer states the time step, the damping and the actuators of the model.
+    The answer states the time step, the damping and the actuators of the MuJoCo model.
 
     Exit code 0; 3 if the arm of the MuJoCo model is unstable: it is written all the same.
     """
-    if out is None and cables_out is None:
-        raise misuse("--out", "give --out, --cables-out or both.")
-    pose = arm.at(angles)
-    numbers: Json = {"name": pose.arm.name}
-    conditions = tensions.conditions(pose)
-    lines, files = [str(conditions)], []
-    warnings: list[str] = []
-    if out is not None:
-        from cdsm.interchange.mjcf import mujoco_model
-        from cdsm.support.files import write_text
-        from cdsm.support.format import JointUnits, key
+    from cdsm.support.files import write_text
 
-        tension = tensions.distribute(pose, load.at_tip(pose.arm))
-        model = mujoco_model(pose.arm, pose, tension, actuators, damping_ratio, damping)
-        unit = JointUnits(pose.arm.slides).joined("N m s/rad", "N s/m")
-        numbers |= {
-            "stable": model.unstable is None,
-            "time_step_s": model.time_step,
-            "cable_damping_N_s_per_m": by_cable(pose.arm, model.cable_damping),
-            key("joint_damping", unit): model.joint_damping,
-            "actuators": model.actuators,
-        }
-        warnings += filter(None, [model.unstable])
-        lines += model.remarks
-        files.append(str(write_text(out, model.text)))
-    if cables_out is not None:
-        files.append(str(cdsm.write_cables(pose.arm.cables, cables_out)))
-    lines += [f"written: {path}" for path in files]
-    numbers |= conditions.to_dict() | {"written": files}
-    answer(as_json, lambda: numbers, "\n".join(lines), warnings=warnings)
+    if out.suffix.lower() == ".urdf":  # it has no cables: any wire does
+        found = cdsm.Manipulator.read(arm, 1e5, changes=options.changes_of(changes))
+        if found.is_serpentine:
+            cdsm.write_urdf(found.geometry, out)
+        else:
+            write_text(out, found.urdf)
+        return answer(as_json, _facts(found, out), found, f"written: {out}")
+    from cdsm.interchange.mjcf import mujoco_model
+    from cdsm.support.format import JointUnits, key
+
+    pose = options.posture(arm, changes, angles)
+    found = pose.arm
+    model = mujoco_model(found, pose, cdsm.distribute_tension(pose, minimum), actuators)
+    write_text(out, model.text)
+    unit = JointUnits(found.slides).joined("N m s/rad", "N s/m")
+    wires = dict(zip(found.cables.names, model.cable_damping.tolist(), strict=True))
+    head, told = header(pose, [minimum])
+    told |= {"stable": model.unstable is None, "time_step_s": model.time_step}
+    told |= {"cable_damping_N_s_per_m": wires, key("joint_damping", unit): model.joint_damping}
+    told |= {"actuators": model.actuators}
+    warnings = [] if model.unstable is None else [model.unstable]
+    lines = "\n".join([*model.remarks, f"written: {out}"])
+    return answer(as_json, told | _facts(found, out), head, lines, warnings=warnings)

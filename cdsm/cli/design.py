@@ -8,52 +8,30 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.files import out_folder
-from cdsm.cli.options import AsJson
-from cdsm.cli.output import answer
-from cdsm.cli.values import misuse
+from cdsm.cli.options import AsJson, opt
+from cdsm.cli.output import Json, answer, misuse
+
+_CHOOSE = "Design of the front to write; default: the compromise, nearest to the best of each goal."
+_REFINE = "Improve the chosen design by SLSQP: one objective, continuous variables."
 
 
 def design(
     problem: Annotated[
         Path,
         typer.Argument(
-            metavar="PROBLEM.toml", help="The problem; examples/design.toml is one with comments."
+            metavar="PROBLEM.toml",
+            help="Problem and search (generations, population, seed), as examples/design.toml.",
         ),
     ],
-    out: Annotated[Path, out_folder(help="Folder for the results.")],
-    generations: Annotated[
-        int | None, typer.Option(help="Generations; default: those of the file, or 40.", min=1)
-    ] = None,
-    population: Annotated[
-        int | None, typer.Option(help="Designs per generation; default: of the file, or 40.", min=4)
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Seed; default: that of the file, or 0.", min=0)
-    ] = None,
-    choose: Annotated[
-        int | None,
-        typer.Option(
-            help="Number of the design on the front that is written; default: the compromise, the "
-            "nearest to the best of every objective.",
-            min=0,
-        ),
-    ] = None,
-    refine: Annotated[
-        bool,
-        typer.Option(
-            "--refine",
-            help="Improve the chosen design by SLSQP: one objective, continuous "
-            "variables. Only designs.csv still has the designs of the search.",
-        ),
-    ] = False,
-    jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.", min=1)] = None,
+    out: Annotated[Path, opt("Folder for the results.", "FOLDER")],
+    choose: Annotated[int | None, opt(_CHOOSE, "N", min=0)] = None,
+    refine: Annotated[bool, opt(_REFINE, None, "--refine")] = False,
     as_json: AsJson = False,
-) -> None:
-    """Find the best designs of an arm; write the Pareto front, figures and the chosen arm.
+) -> int:
+    """Find the best designs of an arm, and write the chosen one.
 
-    The deflection is how far the load moves the tip when the motors are locked before it acts. It
-    is computed to first order, with the stiffness under the least tensions without the load.
+    The folder gets the Pareto front as table and figure, and the arm with its files. A deflection
+    is how far the load moves the tip, to first order, with motors that are locked before it acts.
     """
     from cdsm.batch.inputs import checked_threads
     from cdsm.design.problem_file import read_problem
@@ -67,13 +45,12 @@ def design(
     if refine:
         require_smooth(task)
     folder = make_folder(out)
-    processes = checked_threads(jobs)
     found = cdsm.search_designs(
         task,
-        generations=generations or search.generations,
-        population=population or search.population,
-        seed=search.seed if seed is None else seed,
-        jobs=processes,
+        generations=search.generations,
+        population=search.population,
+        seed=search.seed,
+        jobs=checked_threads(None),
     )
     number = found.compromise
     if choose is not None:
@@ -89,10 +66,6 @@ def design(
         *found.write_arm(folder, number),
     ]
     names = ", ".join(path.name for path in paths)
-    written = {"written": [str(path) for path in paths], "chosen": number}
-    answer(
-        as_json,
-        lambda: {**found.to_dict(), **written},
-        found._text(number),
-        f"design {number} is written to {folder}: {names}",
-    )
+    written: Json = {"written": [str(path) for path in paths], "chosen": number}
+    said = f"design {number} is written to {folder}: {names}"
+    return answer(as_json, found.to_dict() | written, found._text(number), said)

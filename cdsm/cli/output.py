@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import json
-import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
-from functools import cache, partial
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
 import cdsm
-from cdsm.cli.conditions import Conditions
-from cdsm.cli.words import in_options
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.console import Console
-
-    from cdsm.support.values import Array
 
 Json = dict[str, object]
 """Answer for JSON: numbers in SI, units in the keys. Arrays and infinite numbers are allowed."""
@@ -30,63 +23,78 @@ Json = dict[str, object]
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether the running command shows tracebacks."""
 
-FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
-"""Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
+FAILED, UNMET, INTERRUPTED = 1, 3, 130
+"""Exit codes: an error; the arm does not do what was asked; Ctrl-C. A wrong option has 2.
 
-UNMET is the exit code of every answer with a warning: the arm is unstable or has left its
-reference, some samples cannot be planned, no entry of a sweep is ok, or a report
-fails. It is also the exit code of errors that say what the arm cannot do.
+UNMET is the exit code of every answer with a warning, such as that of an unstable arm, and of
+errors that say what the arm cannot do.
 """
 
-_LIST = re.compile(r"(?<=\[)\n[^][{}\"]*\n\s*(?=\])")
-"""Pattern of a JSON list of numbers with a line for each number; it is printed in one line."""
-
-_UsageError = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
-"""Base class of errors of usage, of which typer has no public name."""
+_CANNOT: Final = (
+    *("InfeasibleDesign", "InfeasibleTension", "EquilibriumError", "UnreachableStiffness"),
+)
 
 
-@cache
-def console() -> Console:
-    """Return the console for progress and errors. Answers go to standard output."""
-    from rich.console import Console
-
-    return Console(stderr=True)
+def misuse(option: str, problem: str) -> typer.BadParameter:
+    """Return the error to raise for a wrong value of ``option``."""
+    return typer.BadParameter(problem, param_hint=option)
 
 
-def answer(
-    as_json: bool, as_dict: Callable[[], Json], *parts: object, warnings: Sequence[str] = ()
-) -> None:
-    """Print an answer, its warnings first: ``parts`` as text, or ``as_dict()`` as strict JSON.
+def answer(as_json: bool, numbers: Json, *parts: object, warnings: Iterable[str] = ()) -> int:
+    """Print an answer, its warnings first: ``parts`` as text, or ``numbers`` as strict JSON.
 
-    If there are warnings, the command ends here with exit code 3. So a command must write its files
-    before it calls this function.
+    Return the exit code: UNMET if there are warnings, else 0.
     """
+    warnings = tuple(warnings)
     if as_json:
-        numbers: Json = {"warnings": warnings}
-        for part in parts:
-            if isinstance(part, Conditions):
-                numbers |= part.to_dict()
-        _print_json(numbers | as_dict())
+        print_json({"warnings": warnings, **numbers})
     else:
         texts = (
-            "\n".join(line for line in in_options(str(part)).splitlines() if line not in warnings)
+            "\n".join(line for line in str(part).splitlines() if line not in warnings)
             for part in parts
         )
         typer.echo("\n".join([*warnings, "\n\n".join(texts)]))
-    if warnings:
-        raise typer.Exit(UNMET)
+    return UNMET if warnings else 0
 
 
-def _print_json(numbers: Json) -> None:
+def print_json(numbers: Json) -> None:
+    """Print numbers, arrays and results as strict JSON."""
     from cdsm.support.format import plain
 
-    text = json.dumps(plain(numbers), indent=1, allow_nan=False, default=str)
-    typer.echo(_LIST.sub(lambda found: re.sub(r"\s+", " ", found[0]).strip(), text))
+    typer.echo(json.dumps(plain(numbers), indent=1, allow_nan=False, default=str))
 
 
-def by_cable(arm: cdsm.Manipulator, values: Array) -> Json:
-    """Return ``values``, one per cable (C,), by the name of the cable, for JSON."""
-    return dict(zip(arm.cables.names, values.tolist(), strict=True))
+def header(
+    of: cdsm.Manipulator | cdsm.Posture, minimum: Sequence[float] = (), friction: str = "ignored"
+) -> tuple[str, Json]:
+    """Return what a result assumes of its arm, or of its only posture, as text and for JSON.
+
+    ``minimum`` is the bound that was given, one for each case; ``friction`` says what becomes of
+    the arm's friction.
+    """
+    from cdsm.support.format import coordinates, place
+    from cdsm.wires.catalogue import wires_text
+
+    arm = of.arm if isinstance(of, cdsm.Posture) else of
+    own = [cable.minimum for cable in arm.cables]
+    least = [(max(low, min(own)), max(low, *own)) for low in minimum]
+    shown = ", ".join(f"{a:g}" if a == b else f"{a:g} to {b:g}" for a, b in least)
+    rough = friction if arm.has_friction else "none"
+    x, y, z = arm.gravity.tolist()
+    words = [f"wire {wires_text(arm.cables)}", f"gravity {x:g}, {y:g}, {z:g} m/s²"]
+    words += [f"least tension {shown} N"] if minimum else []
+    words += [] if arm.original_length == "unstrained" else ["stretched lengths"]
+    lines = [f"with {'; '.join(words)}; friction {rough}", str(arm)]
+    if isinstance(of, cdsm.Posture):
+        joints = ", ".join(map(place, of.q.tolist(), arm.joint_units))
+        lines.append(f"at {joints}; tip at {coordinates(1e3 * of.tip[:3, 3])} mm")
+    told = {"wire": wires_text(arm.cables), "gravity_m_per_s2": arm.gravity}
+    told |= {
+        "least_tension_N": [low for low, _ in least],
+        "original_length": arm.original_length,
+        "friction": rough,
+    }
+    return "\n".join(lines), {"computed_with": told}
 
 
 def write(path: Path | None, fill: Callable[[Path], object]) -> None:
@@ -101,60 +109,39 @@ def write_picture(path: Path | None, draw: Callable[[], Figure]) -> None:
     write(path, lambda file: cdsm.plots.save_figure(draw(), file))
 
 
-def _show(
-    usual: Callable[..., None], message: Warning, category: type[Warning], *where: Any
-) -> None:
-    """Print a warning of cdsm in one line, and other warnings by ``usual``, Python's function."""
-    if not issubclass(category, cdsm.CdsmWarning):
-        return usual(message, category, *where)
-    text = f"warning: {message}"
-    return console().print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)
+def _show(message: Warning | str, *_: object, **__: object) -> None:
+    typer.secho(f"warning: {message}", fg="yellow", err=True)
 
 
-@contextmanager
-def misuse_reported(as_json: bool) -> Iterator[None]:
-    """If ``as_json``, print an error of usage as JSON and exit with 2; else typer reports it."""
-    try:
-        yield
-    except _UsageError as error:
-        if debug_wanted.get() or not as_json:
-            raise
-        _print_json({"error": "UsageError", "message": error.format_message(), "data": {}})
-        raise typer.Exit(MISUSED) from None
+def reported(function: Callable[..., int]) -> Callable[..., None]:
+    """Wrap a command, which returns its exit code: turn errors into a message (JSON with --json).
 
-
-@contextmanager
-def reported(as_json: bool) -> Iterator[None]:
-    """Turn an error into a message (JSON if ``as_json``) and an exit code.
-
-    With --debug, the error is raised. A warning of cdsm is printed in one line.
+    With --debug, the error is raised. Warnings are printed in one line.
     """
-    try:
-        with misuse_reported(as_json), warnings.catch_warnings():
-            warnings.showwarning = partial(_show, warnings.showwarning)
-            yield
-    except (KeyboardInterrupt, SystemError) as error:
-        # Ctrl-C within a compiled kernel raises SystemError from KeyboardInterrupt
-        if debug_wanted.get() or not isinstance(error.__cause__ or error, KeyboardInterrupt):
-            raise
-        console().print("interrupted: no file is half-written; what was saved stays")
-        raise typer.Exit(INTERRUPTED) from None
-    # OSError: of the terminal or pipe
-    except (cdsm.CdsmError, OSError) as error:
-        if debug_wanted.get():
-            raise
-        message = in_options(str(error))
-        if as_json:
+
+    @wraps(function)
+    def command(**given: Any) -> None:
+        from cdsm.support.progress import lines_allowed
+
+        try:
+            with warnings.catch_warnings(), lines_allowed():
+                warnings.showwarning = _show
+                code = function(**given)
+        except (KeyboardInterrupt, SystemError) as error:
+            # Ctrl-C within a compiled kernel raises SystemError from KeyboardInterrupt
+            if debug_wanted.get() or not isinstance(error.__cause__ or error, KeyboardInterrupt):
+                raise
+            typer.echo("interrupted: no file is half-written; what was saved stays", err=True)
+            code = INTERRUPTED
+        except (cdsm.CdsmError, OSError) as error:  # OSError: of the terminal or pipe
+            if debug_wanted.get():
+                raise
             kind = type(error).__name__
-            _print_json({"error": kind, "message": message, "data": vars(error)})
-        else:
-            console().print(
-                f"error: {message}", style="red", markup=False, highlight=False, soft_wrap=True
-            )
-        cannot = (
-            cdsm.InfeasibleDesign,
-            cdsm.InfeasibleTension,
-            cdsm.EquilibriumError,
-            cdsm.UnreachableStiffness,
-        )
-        raise typer.Exit(UNMET if isinstance(error, cannot) else FAILED) from None
+            if given["as_json"]:
+                print_json({"error": kind, "message": str(error), "data": vars(error)})
+            else:
+                typer.secho(f"error: {error}", fg="red", err=True)
+            code = UNMET if kind in _CANNOT else FAILED
+        raise typer.Exit(code)
+
+    return command

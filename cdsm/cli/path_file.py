@@ -7,7 +7,6 @@ from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
-from cdsm.cli.values import misuse
 from cdsm.errors import FileError
 from cdsm.manipulator import Manipulator
 from cdsm.support.tables import ANGLE, column_in, named_columns, read_table
@@ -69,19 +68,3 @@ def read_path(path: Path, arm: Manipulator) -> PathFile:
             "…) and tip positions (x [mm], y [mm], z [mm]); give one of them"
         )
     return PathFile(angles, tips, None if target is None else target[:, 0])
-
-
-def one_target(given: float | None, of_file: Array | None, option: str) -> float | Array:
-    """Return the wanted stiffness [N/m]: ``given`` by an option, or ``of_file`` (S,) of the path.
-
-    Raises BadParameter, which names ``option``, if both or neither are given.
-    """
-    if given is not None and of_file is None:
-        return given
-    if given is None and of_file is not None:
-        return of_file
-    raise misuse(
-        option,
-        "give it, or a column target [N/mm] in the file of the path; "
-        f"{'neither was' if given is None else 'both were'} given.",
-    )

@@ -3,79 +3,50 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import cdsm
-from cdsm.cli.files import Picture, out_option
-from cdsm.cli.options import AsJson
-from cdsm.cli.output import answer, write, write_picture
-from cdsm.cli.values import misuse
+from cdsm.cli import options
+from cdsm.cli.options import AsJson, Figure, file_opt, opt
+from cdsm.cli.output import answer, misuse, write, write_picture
 
 
 def fit(
     test: Annotated[Path, typer.Argument(metavar="TEST.csv", help="Tensile test to read.")],
     gauge_length: Annotated[
-        float | None,
-        typer.Option(
-            help="Length of the tested wire in mm; default: that of the file. A strain needs none.",
-            min=0.0,
-        ),
+        float | None, opt("Length of the wire, if not in the file.", "MM")
     ] = None,
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME",
-            help="Columns of displacement (or strain) and force; default: by names in English.",
-        ),
-    ] = None,
-    units: Annotated[
-        str | None,
-        typer.Option(
-            metavar="UNIT,UNIT",
-            help="Units of displacement and force if the file has none, such as mm,N.",
-        ),
-    ] = None,
-    decimal: Annotated[
-        str | None,
-        typer.Option(metavar=".|,", help="Decimal mark; the other mark then separates thousands."),
-    ] = None,
-    between: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LOW,HIGH",
-            help="Smallest and largest force in N to fit, on the last rise that reaches it.",
-        ),
-    ] = None,
+    columns: Annotated[str | None, opt("Of displacement (or strain), force.", "NAME,NAME")] = None,
+    units: Annotated[str | None, opt("Of both, if the file has none: mm,N.", "UNIT,UNIT")] = None,
+    between: Annotated[str | None, opt("Forces to fit [N], on the last rise.", "LOW,HIGH")] = None,
     out: Annotated[
-        Path | None,
-        out_option(endings=(".toml",), metavar="WIRE.toml", help="Law of rigidity to write."),
+        Path | None, file_opt("Law, for wire= in ARM.toml.", "FILE.toml", "--out")
     ] = None,
-    figure: Picture = None,
+    figure: Figure = None,
     as_json: AsJson = False,
-) -> None:
-    """Fit the rigidity of a wire to its tensile test; print a report, write its law and a figure.
+) -> int:
+    """Fit the law EA(F) of a wire to its tensile test.
 
     TEST.csv may be the text file of a testing machine: with lines of titles, decimal commas, or a
     line of units.
     """
-    try:
-        low, high = map(float, _pair("--between", between) or ("-inf", "inf"))
-    except ValueError:
-        raise misuse("--between", f"{between!r} given; give two numbers in N.") from None
+    limits = [-math.inf, math.inf]
+    if between is not None:
+        limits = options.numbers("--between", between, (2,), "LOW,HIGH in N")
     data = cdsm.read_tensile_csv(
         test,
         columns=_pair("--columns", columns),
         units=_pair("--units", units),
-        decimal=decimal,
         gauge_length=None if gauge_length is None else gauge_length / 1000.0,
     )
     fitted = cdsm.fit_tensile_test(
-        data.displacement, data.force, data.gauge_length, between=(low, high)
+        data.displacement, data.force, data.gauge_length, between=(limits[0], limits[1])
     )
-    write(out, lambda file: fitted.elasticity.write(file))
+    write(out, fitted.elasticity.write)
     write_picture(figure, fitted.plot)
     read = {
         "read": data.source,
@@ -84,14 +55,11 @@ def fit(
         "stages_N": {stage.name: [stage.low, stage.high] for stage in fitted.stages},
         "notes": fitted.notes,
     }
-    answer(as_json, lambda: read | fitted.to_dict(), f"{test}: {data.source}\n{fitted}")
+    return answer(as_json, read | fitted.to_dict(), f"{test}: {data.source}\n{fitted}")
 
 
 def _pair(option: str, text: str | None) -> list[str] | None:
-    """Split the text of an option at its comma into two entries; an entry with a comma has quotes.
-
-    Return None if ``text`` is None.
-    """
+    """Split the text of an option at its comma; an entry with a comma has quotes."""
     if text is None:
         return None
     entries = [entry.strip() for entry in next(csv.reader([text], skipinitialspace=True), [])]

@@ -107,12 +107,20 @@ def require_smooth(problem: DesignProblem) -> None:
     """Raise InvalidInput if :func:`refine_design` cannot treat a problem."""
     for variable in problem.variables:
         if not variable.is_continuous:
-            raise InvalidInput("problem", f"{variable.of} is not continuous; use search_designs.")
+            raise InvalidInput(
+                "problem",
+                f"{variable.of} is not continuous; use search_designs (without --refine).",
+            )
     if len(problem.objectives) != 1:
-        raise InvalidInput("problem", "has several objectives; leave one, or use search_designs.")
+        raise InvalidInput(
+            "problem",
+            "has several objectives; leave one, or use search_designs (without --refine).",
+        )
     objective = problem.objectives[0]
     if objective.goal != KINDS[objective.of].best:
         raise InvalidInput("problem", f"{objective.of} at its {objective.goal} is not smooth.")
     for each in (*problem.objectives, *problem.constraints):
         if each.of not in SMOOTH:
-            raise InvalidInput("problem", f"{each.of} is not smooth; use search_designs.")
+            raise InvalidInput(
+                "problem", f"{each.of} is not smooth; use search_designs (without --refine)."
+            )

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 # keys of an ARM.toml that do not belong to the geometry; cables may belong to it
 _ARM_KEYS = (
     *("gravity", "original_length", "wire", "wires", "urdf"),
-    *("series_stiffness", "control", "minimum", "maximum", "tolerances"),
+    *("slack_below", "friction", "series_stiffness", "control", "minimum", "maximum"),
+    "tolerances",
 )
 
 
@@ -66,7 +67,10 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
         return cls.sections(parts, spread=given.spread, name=given.name)
     if kind and len(data) > 1:
         outside = [(key, did_you_mean(key, _ARM_KEYS)) for key in data if key != kind]
-        raise GeometryError([f"{key}: stands outside [{kind}]{meant}" for key, meant in outside])
+        inside = f"; if it belongs there, write it below [{kind}]"
+        raise GeometryError(
+            [f"{key}: stands outside [{kind}]{hint or inside}" for key, hint in outside]
+        )
     table = data[kind] if kind else data
     if not isinstance(table, dict):
         raise GeometryError([f"{kind}: is {table!r}; give a table [{kind}]"])

@@ -43,7 +43,7 @@ def require(
         raise InvalidInput(
             "worst_friction",
             f"{arm.name} has no friction in its holes; leave it out, or give them a coefficient: "
-            "friction = in ARM.toml, --friction, Manipulator.with_friction.",
+            "friction = in ARM.toml, --set friction=0.1, Manipulator.with_friction.",
         )
     quantity("diameter", diameter, "diameter", zero=True)
     if "force_radius" in names and math.isinf(checked_bounds(arm, 0.0, maximum)[1].max()):

@@ -134,7 +134,7 @@ def _angles(arm: Manipulator, tip: Array, near: ArrayLike | None) -> Array:
     if solved.reachable:
         return solved.angles
     near = f"{coordinates(1e3 * tip)} mm than {1e3 * solved.position_error:.3g} mm"
-    remedy = "Ask for a place within reach, or start from a guess= nearer to it."
+    remedy = "Ask for a place within reach, or, in Python, start from a guess= nearer to it."
     raise _Infeasible("posture", f"the tip comes no nearer to {near}. {remedy}")
 
 

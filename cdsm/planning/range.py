@@ -31,7 +31,7 @@ STARTS: Final = 24
 AT_END: Final = 1e-3
 """Relative distance to the limit of stability, or to a cap, that counts as none."""
 
-_ASCENTS, _DESCENTS = 10, 5  # largest number of searches for each end
+_ASCENTS, _DESCENTS = 16, 5  # largest number of searches for each end
 _AGREED, _SAME = 5, 1e-5  # number of ascents whose ends differ by this part at most, and suffice
 _STEEP, _TANGENT = (
     10.0,

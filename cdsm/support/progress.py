@@ -1,6 +1,7 @@
-"""Show a progress bar in the terminal, on standard error, if work takes longer than a second.
+"""Show on standard error how far work is that takes longer than a second.
 
-Nothing is shown where there is no terminal: in a pipe, a notebook, a log file.
+In a terminal that is a bar. Where there is none, a command prints a line now and then; in a
+notebook or a program nothing is shown.
 """
 
 from __future__ import annotations
@@ -19,7 +20,11 @@ _Item = TypeVar("_Item")
 DELAY = 1.0
 """Time [s] before a bar is shown: shorter work shows nothing."""
 
+_PAUSE = 10.0
+"""Time [s] between two lines where there is no terminal."""
+
 _allowed: ContextVar[bool] = ContextVar("_allowed", default=True)
+_lines_wanted: ContextVar[bool] = ContextVar("_lines_wanted", default=False)
 
 
 def track(items: Collection[_Item], what: str, *, wanted: bool = True) -> Iterator[_Item]:
@@ -40,9 +45,14 @@ def progress_bar(
     bar also shows how many items are finished per second. A bar that is opened while another one
     is open is never shown, even if the outer one is not ``wanted``.
     """
-    if not (wanted and _allowed.get() and sys.stderr.isatty()):
+    terminal = sys.stderr.isatty()
+    if not (wanted and _allowed.get() and (terminal or _lines_wanted.get())):
         with progress_allowed(False):
             yield lambda count: None
+        return
+    if not terminal:
+        with progress_allowed(False):
+            yield _lines(what, total, done)
         return
     from rich import progress  # slow to import
     from rich.console import Console
@@ -71,6 +81,22 @@ def progress_bar(
         bar.stop()
 
 
+def _lines(what: str, total: int | None, done: int) -> Callable[[int], None]:
+    """Return a function that counts items, and prints a line if the last one is long ago."""
+    begun, printed, first = monotonic(), monotonic() - _PAUSE + DELAY, done
+
+    def advance(count: int) -> None:
+        nonlocal done, printed
+        done, now = done + count, monotonic()
+        if now - printed < _PAUSE or done == total:
+            return
+        printed, speed = now, (done - first) / (now - begun)
+        left = f", {(total - done) / speed:.0f} s left" if total and speed else ""
+        print(f"{what}: {done}{f' of {total}' if total else ''}{left}", file=sys.stderr, flush=True)
+
+    return advance
+
+
 @contextmanager
 def progress_allowed(progress: bool) -> Iterator[None]:
     """Hide all bars that are opened inside this context, unless ``progress`` is True.
@@ -82,3 +108,13 @@ def progress_allowed(progress: bool) -> Iterator[None]:
         yield
     finally:
         _allowed.reset(token)
+
+
+@contextmanager
+def lines_allowed() -> Iterator[None]:
+    """Print lines inside this context where there is no terminal."""
+    token = _lines_wanted.set(True)
+    try:
+        yield
+    finally:
+        _lines_wanted.reset(token)

@@ -9,7 +9,16 @@ import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
 from functools import wraps
-from typing import Annotated, Any, TypeVar, cast, dataclass_transform, get_args, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    TypeVar,
+    cast,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 from pydantic import (
@@ -170,10 +179,26 @@ def faults_at(where: str, error: ValueError) -> list[str]:
     return [f"{where}: {str(error).removeprefix(own)}"]
 
 
-def _keys(kind: Any) -> set[str]:
-    """Return the fields of a record and of its parts."""
-    hints = get_type_hints(kind) if is_pydantic_dataclass(kind) else {}
-    return set(hints).union(*map(_keys, [*hints.values(), *get_args(kind)]))
+def _homes(kind: Any, name: str = "") -> dict[str, str]:
+    """Return where the keys of a record and its parts belong; "": at the top of the record."""
+    if not is_pydantic_dataclass(kind):
+        inner = f"[{name}]" if get_origin(kind) is tuple else name
+        parts = [_homes(part, inner) for part in get_args(kind)]
+        return {key: place for homes in parts for key, place in homes.items()}
+    hints, homes = get_type_hints(kind), dict[str, str]()
+    for field, hint in () if name else hints.items():
+        homes |= _homes(hint, field)
+    place = f"{'to each' if name.startswith('[') else 'in'} [{name}]" if name else ""
+    return homes | dict.fromkeys(hints, place)
+
+
+def _meant(place: Sequence[object], kind: Any) -> str:
+    """Return where the unknown key at a ``place`` of a record belongs."""
+    homes, key = _homes(kind), str(place[-1])
+    home = homes.get(key, str(place[0]))
+    if home == "" and len(place) > 1:
+        return "; it belongs at the top of the file"
+    return did_you_mean(key, homes) if str(place[0]) in home else f"; it belongs {home}"
 
 
 def _faults(error: ValidationError, kind: Any) -> list[str]:
@@ -182,14 +207,14 @@ def _faults(error: ValidationError, kind: Any) -> list[str]:
         # joints[2].limit counts from 1 like the names of joints and cables
         parts = (each for each in fault["loc"] if each not in (ONE, EACH, "[key]"))
         shown = (f"[{each + 1}]" if isinstance(each, int) else f".{each}" for each in parts)
-        where, key = "".join(shown).lstrip("."), str(fault["loc"][-1] if fault["loc"] else "")
+        where = "".join(shown).lstrip(".")
         cause = fault.get("ctx", {}).get("error")
         if isinstance(cause, ValueError):
             listed += faults_at(where, cause)
         elif fault["type"].startswith("missing"):
             listed.append(f"{where}: is missing")
         elif fault["type"] == "unexpected_keyword_argument":
-            hint = did_you_mean(key, _keys(kind))
+            hint = _meant(fault["loc"], kind)
             listed.append(f"{where}: is not a key that is known here{hint}")
         elif fault["type"] == "unexpected_positional_argument":
             listed.append(f"{fault['input']!r} is given without its name; give it as a keyword")

@@ -1,4 +1,4 @@
-"""Write TOML by tomli-w, with rows of numbers in one line."""
+"""Write TOML by tomli-w, with rows of numbers in one line; lay tables over others."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import tomli_w
+
+from cdsm.errors import GeometryError, listed
 
 
 class _Verbatim(float):
@@ -43,3 +45,24 @@ def _written(value: Any) -> Any:
     entries = [_written(each) for each in value]
     numbers = entries and all(isinstance(each, (int, float)) for each in entries)
     return verbatim(f"[{', '.join(map(str, entries))}]") if numbers else entries
+
+
+def laid_over(old: Any, new: Any, where: str = "") -> Any:
+    """Lay tables ``new`` over ``old``; keys of a list are names of its tables or count from 1."""
+    if not isinstance(new, Mapping):
+        return new
+    if not isinstance(old, list):
+        known = old if isinstance(old, dict) else {}
+        laid = {k: laid_over(known.get(k), value, f"{where}{k}.") for k, value in new.items()}
+        return {**known, **laid}
+    entries = [each if isinstance(each, dict) else {} for each in old]
+    names = [str(each.get("name", i)) for i, each in enumerate(entries, start=1)]
+    unknown = [
+        f"{where}{key}: there is only {listed(names, 12)}" for key in new if key not in names
+    ]
+    if unknown:
+        raise GeometryError(unknown)
+    return [
+        laid_over(each, new[name], f"{where}{name}.") if name in new else each
+        for name, each in zip(names, old, strict=True)
+    ]

@@ -30,7 +30,7 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     q: ArrayLike | None = None,
-    minimum: float = 10.0,
+    minimum: float = 0.0,
     maximum: float = math.inf,
     force: ArrayLike = (0.0, 0.0, 0.0),
     sag: bool = False,

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeGuard
 
 from cdsm.errors import FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
@@ -49,15 +49,18 @@ def as_wire(wire: Wire) -> Elasticity:
     """
     if isinstance(wire, Elasticity):
         return wire
-    if isinstance(wire, os.PathLike) or (
-        isinstance(wire, str) and wire.endswith((".toml", *_MEASURED))
-    ):
+    if is_file(wire) or isinstance(wire, os.PathLike):
         return read_law(wire)
     if isinstance(wire, str):
         return WIRES[one_of("wire", wire, WIRES, "Or give EA in N, or a file WIRE.toml.")]
     if isinstance(wire, bool) or not isinstance(wire, (int, float)):
         raise InvalidInput("wire", f"{wire!r} given; give a name, EA in N, or a file.")
     return LinearElasticity(wire)
+
+
+def is_file(wire: object) -> TypeGuard[str]:
+    """Return whether the name of a wire is that of a file."""
+    return isinstance(wire, str) and wire.endswith((".toml", *_MEASURED))
 
 
 def read_law(path: str | os.PathLike[str]) -> Elasticity:

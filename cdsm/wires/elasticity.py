@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import cdsm
 from cdsm.errors import ElasticityRangeError, InvalidInput
+from cdsm.support.format import rounded
 from cdsm.support.validation import number_array, scalar
 from cdsm.support.values import Array
 
@@ -193,10 +194,13 @@ class Elasticity:
         """Return the tensions F [N], or raise ElasticityRangeError."""
         if F.size and not (F.min() >= self.low and F.max() <= self.high):
             outside = (self.low > F) | (self.high < F)
-            below = "; slack_below() continues one to 0 N" if F.min() < self.low else ""
+            few, many = bool(F.min() < self.low), bool(F.max() > self.high)
+            bounds = [f"minimum={rounded(self.low, up=True)} or more"] if few else []
+            bounds += [f"maximum={rounded(self.high, up=False)} or less"] if many else []
+            slack = "; slack_below() (in ARM.toml: slack_below = true) continues one to 0 N" * few
             raise ElasticityRangeError(
-                f"outside the domain {self._span} of the elasticity. Keep the tension inside it "
-                f"(minimum=, maximum=), or use an elasticity that covers it{below}.",
+                f"outside the domain {self._span} of the elasticity. Give {' and '.join(bounds)}, "
+                f"or an elasticity that covers it{slack}.",
                 F[outside].tolist(),
                 np.flatnonzero(outside).tolist(),
             )

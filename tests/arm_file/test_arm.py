@@ -137,7 +137,7 @@ def test_urdf_that_needs_no_check_of_its_inertias_says_so(tmp_path: Path) -> Non
 def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
     text = SHORT.replace('wire = "1x19-1.2mm"\n', "")
     with pytest.raises(
-        cdsm.MissingWire, match=r"has no wire for the cables cable1_1, .*--wire"
+        cdsm.MissingWire, match=r"has no wire for the cables cable1_1, .*--set wire="
     ) as e:
         read(tmp_path, text)
     assert e.value.cables == ("cable1_1", "cable1_2", "cable1_3", "cable2_1", "cable2_2")
@@ -258,7 +258,7 @@ def test_cables_may_be_given_by_their_file(tmp_path: Path) -> None:
 
 
 def test_a_urdf_is_neither_an_arm_file_nor_a_geometry(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match=r"is XML, no ARM\.toml"):
+    with pytest.raises(cdsm.FileError, match=r"is a robot \(URDF\), no ARM\.toml"):
         read(tmp_path, FINGER)
     text = f"wire = 48e3\n[urdf]\ntip = 'tip'\ntext = '''{FINGER}'''\n{CABLES}"
     assert read(tmp_path, text).nv == 1

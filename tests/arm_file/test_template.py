@@ -1,6 +1,5 @@
 """``cdsm new`` writes arms that every command takes at once; so are the files of examples/."""
 
-import json
 import re
 from pathlib import Path
 
@@ -12,9 +11,9 @@ from tests.cli.test_commands import call
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 KINDS = {
-    "arm.toml": ("--universal", 4),
-    "alternating_hinges.toml": ("--hinged", 6),
-    "two_sections.toml": ("--sections", "3,2"),
+    "arm.toml": (),
+    "alternating_hinges.toml": ("--type", "hinged", "--joints", 6),
+    "two_sections.toml": ("--joints", "3,2"),
 }
 
 
@@ -32,7 +31,7 @@ def test_new_writes_the_examples_and_they_run(name: str, tmp_path: Path) -> None
     for angles in (0.0, 8.0):
         pose = arm.at(np.full(arm.nv, np.deg2rad(angles)))
         assert cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0)).is_stable
-    assert call("check", path, "--angles", 5).exit_code == 0
+    assert call("stiffness", path, "--angles", 5, "--check").exit_code == 0
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -54,62 +53,6 @@ def test_every_key_behind_a_hash_may_be_used(name: str, tmp_path: Path) -> None:
     used = cdsm.Manipulator.read(path)
     assert used.cables[0].minimum == 20.0
     assert len(used.tolerances.given) == 8
-
-
-def test_new_takes_sizes_in_mm_and_degrees(tmp_path: Path) -> None:
-    path = tmp_path / "arm.toml"
-    sizes = ("--link-length", 50, "--base-length", 20, "--disk-offset", 4, "--hole-radius", 15)
-    more = ("--link-mass", 0.2, "--lead", 0, "--wire", 48e3, "--gravity", "0,-9.81,0")
-    told = call("new", path, "--hinged", 3, "--twist", 30, *sizes, *more, "--json")
-    assert json.loads(told.stdout)["written"] == [str(path)]
-    geometry = cdsm.Geometry.hinged(
-        joints=3,
-        twist=np.deg2rad(30.0),
-        spread=np.deg2rad(10.0),
-        link_length=0.05,
-        base_length=0.02,
-        disk_offset=0.004,
-        hole_radius=0.015,
-        link_mass=0.2,
-    )
-    expected = cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3), gravity=(0.0, -9.81, 0.0))
-    assert cdsm.Manipulator.read(path) == expected
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        ((), 2, "give one of --universal, --hinged and --sections"),
-        (("--universal", 3, "--hinged", 2), 2, "give one of --universal, --hinged and --sections"),
-        (("--universal", 3, "--twist", 30), 2, "goes with --hinged only"),
-        (("--universal", 0), 2, "'--universal': Input should be greater than or equal to 1"),
-        (("--universal", 3, "--disk-offset", 40), 2, "--disk-offset: too large"),
-        (("--universal", 3, "--link-length", 0.06), 2, "Options take mm and degrees."),
-        (("--universal", 3, "--hole-radius", 0), 2, "--hole-radius: 0 m given"),
-        (("--universal", 3, "--wire", "1x9-1.2mm"), 1, "did you mean '1x19-1.2mm'"),
-        (("--universal", 3, "--gravity", "1,2"), 2, "give 3"),
-        (("--sections", "3,x"), 2, "'x' is no number"),
-        (("--sections", "3,0"), 2, "joints: input should be greater than or equal to 1"),
-    ],
-)
-def test_bad_options_are_named_and_write_nothing(
-    arguments: tuple[object, ...], code: int, said: str, tmp_path: Path
-) -> None:
-    told = call("new", tmp_path / "arm.toml", *arguments)
-    assert told.exit_code == code
-    assert said in " ".join(told.stderr.replace("│", " ").split())
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_file_is_not_overwritten_unasked(tmp_path: Path) -> None:
-    path = tmp_path / "arm.toml"
-    path.write_text("mine", encoding="utf-8")
-    told = call("new", path, "--universal", 2)
-    assert told.exit_code == 2
-    assert "--overwrite" in told.stderr
-    assert path.read_text(encoding="utf-8") == "mine"
-    assert call("new", path, "--universal", 2, "--overwrite").exit_code == 0
-    assert cdsm.Manipulator.read(path).nv == 4
 
 
 @pytest.mark.filterwarnings("default::cdsm.CdsmWarning")

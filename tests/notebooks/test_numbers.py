@@ -152,7 +152,7 @@ def weights_with_friction(nb: Shown) -> None:
         assert 1.0 < secant[-1] / nb.frictionless < 1.0 + friction + 0.1
     assert abs(1e3 * nb.lost - 0.535) < 2e-3
     assert abs(1e6 * nb.left - 29.2) < 0.2
-    assert abs(nb.test.breakaway.load - 0.7027) < 1e-3
+    assert abs(nb.test.breakaway.load - 0.7063) < 1e-3
     assert abs(nb.test.stiffness / 1e3 - 51.75) < 0.05
     assert nb.band.low < min(nb.rests) < 0.7 * nb.band.low
     assert 0.7 * nb.band.high < max(nb.rests) < nb.band.high
@@ -167,9 +167,7 @@ def weights_with_friction(nb: Shown) -> None:
     assert 1.05 < nb.plateau.min() < nb.plateau.max() < 1.15
     tangents = np.array([tangent for _, tangent in nb.tangents.values()])
     np.testing.assert_allclose(tangents[0], tangents[1], rtol=0.05)
-    np.testing.assert_allclose(tangents[2, 5:], tangents[1, 5:], rtol=0.05)
-    # the breakaway load is first order in the friction: at 0.2 a hole lets go a per cent later
-    np.testing.assert_allclose(tangents[2], tangents[1], rtol=0.2)
+    np.testing.assert_allclose(tangents[2], tangents[1], rtol=0.05)
 
 
 def is_it_true(nb: Shown) -> None:
@@ -215,16 +213,16 @@ def closed_loop(nb: Shown) -> None:
 
 def design_of_an_arm(nb: Shown) -> None:
     assert nb.held.limit == "deflection"
-    np.testing.assert_allclose(nb.held.force, 1.241, atol=2e-3)  # 500 g is 4.9 N
-    np.testing.assert_allclose(nb.held.limits["tension"], 72.4, atol=0.1)
-    np.testing.assert_allclose(nb.polytope.radius, 63.95, atol=0.01)
+    np.testing.assert_allclose(nb.held.force, 1.403, atol=2e-3)  # 500 g is 4.9 N
+    np.testing.assert_allclose(nb.held.limits["tension"], 71.8, atol=0.1)
+    np.testing.assert_allclose(nb.polytope.radius, 44.93, atol=0.01)
     best = nb.found.values(0)
-    np.testing.assert_allclose(best["motor_force"], 50.67, atol=0.5)
+    np.testing.assert_allclose(best["motor_force"], 122.6, atol=1.0)
     assert best["deflection"] <= 1e-3
     assert abs(max(nb.sag) / best["deflection"] - 1.0) < 0.05  # what first order leaves out
     assert best["disk_clearance"] >= 0.5e-3
     assert len(nb.found.front) > 20
-    assert 0.8e-3 < max(nb.sag) < 1e-3  # the real weight, with all nonlinearity
+    assert 0.75e-3 < max(nb.sag) < 1e-3  # the real weight, with all nonlinearity
     assert nb.missed.constraints == ("deflection",)
 
 

@@ -223,7 +223,7 @@ def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
     lines = [f"{name} = {value}" for name, value in GEOMETRY.items()]
     file = tmp_path / "probe.toml"
     file.write_text("\n".join(["[universal]", 'name = "probe"', *lines]), encoding="utf-8")
-    command = [sys.executable, "-m", "cdsm", "view", str(file), "--port", "0", "--wire", "2e5"]
+    command = [sys.executable, "-m", "cdsm", "view", str(file), "--port", "0", "--set=wire=2e5"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:

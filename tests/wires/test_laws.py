@@ -124,7 +124,7 @@ def test_tension_outside_the_law_is_an_error_with_data(method: str) -> None:
         "2.1 N, 900 N",
         "[2.2 N, 810 N]",
         "minimum=",
-        "slack_below() continues one to 0 N",
+        "slack_below() (in ARM.toml: slack_below = true) continues one to 0 N",
     ):
         assert part in str(caught.value)
     with pytest.raises(cdsm.ElasticityRangeError, match=r"\[0 N, inf N\)"):

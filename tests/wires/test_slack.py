@@ -148,14 +148,15 @@ def test_files_hold_the_branch(name: str, tmp_path: Path) -> None:
 
 def test_command_line_says_that_the_branch_is_there(tmp_path: Path) -> None:
     arm = cdsm.Manipulator(GEOMETRY, STRAND).write(tmp_path / "arm.toml")
-    asked = ["stiffness", str(arm), "--min-tension", "1"]
+    asked = ["stiffness", str(arm), "--minimum", "1"]
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 1
     assert "2.2 N" in ended.stderr
-    assert "--slack-below continues one to 0 N" in ended.stderr
-    found = CliRunner().invoke(app, [*asked, "--slack-below"])
+    assert "(in ARM.toml: slack_below = true) continues one to 0 N" in ended.stderr
+    asked += ["--set", "slack_below=true"]
+    found = CliRunner().invoke(app, asked)
     assert "1x19-1.2mm, with a slack branch of EA 16.37 N below 2.2 N" in found.stdout
-    numbers = json.loads(CliRunner().invoke(app, [*asked, "--slack-below", "--json"]).stdout)
+    numbers = json.loads(CliRunner().invoke(app, [*asked, "--json"]).stdout)
     assert min(numbers["tension_N"].values()) == pytest.approx(1.0)
 
 

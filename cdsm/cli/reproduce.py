@@ -9,24 +9,18 @@ from typing import Annotated, Literal
 import typer
 
 import cdsm
-from cdsm.cli.files import out_folder
-from cdsm.cli.options import AsJson
+from cdsm.cli.options import AsJson, opt
 
 
 def reproduce(
-    out: Annotated[Path, out_folder(help="Folder for the figures and tables.")] = Path(
-        "reproduction"
-    ),
-    kind: Annotated[
-        Literal["pdf", "svg", "png"],
-        typer.Option("--format", help="Format of the figures; pdf and svg are vectors."),
-    ] = "png",
+    out: Annotated[Path, opt("Folder; default: reproduction.", "FOLDER")] = Path("reproduction"),
+    kind: Annotated[Literal["pdf", "svg", "png"], opt("Of the figures.", None, "--format")] = "png",
     as_json: AsJson = False,
-) -> None:
-    """Recompute Figs. 3 to 8, 10, 12 and 13 of the paper: figures, table and numbers.
+) -> int:
+    """Recompute the figures and numbers of the paper.
 
-    Prints every number of the paper beside ours. reproduction.md also has what was assumed, and
-    what other interpretations of the paper's text give.
+    Writes Figs. 3 to 8, 10, 12 and 13, and prints every number of the paper beside ours.
+    reproduction.md also has what was assumed, and what other readings of the paper give.
     """
     from cdsm.support.files import make_folder, write_text
     from cdsm.support.format import aligned
@@ -44,8 +38,9 @@ def reproduce(
     written.append(write_text(out / "reproduction.json", numbers + "\n"))
     if as_json:
         typer.echo(numbers)
-        return
+        return 0
     rows = [(f"{row[0]}: {row[1]}", *row[2:5]) for row in paper.to_rows(results)]
     typer.echo("\n".join(aligned([("quantity", *paper.HEADER[2:5]), *rows])))
     typer.echo(f"\nall numbers, and what each is: {out / 'reproduction.md'}")
     typer.echo("written: " + ", ".join(map(str, written)))
+    return 0

@@ -1,0 +1,228 @@
+"""``cdsm stiffness | weigh | buckle``: an arm at one posture under a load."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import cdsm
+from cdsm.cli import options
+from cdsm.cli.options import file_opt, opt
+from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
+
+if TYPE_CHECKING:
+    from cdsm.support.values import Array
+
+
+def stiffness(
+    arm: options.Arm,
+    changes: options.Changes = None,
+    angles: options.Angles = "0",
+    minimum: options.Minimum = 0.0,
+    maximum: options.Maximum = math.inf,
+    load: options.Load = None,
+    mass: options.Mass = None,
+    direction: Annotated[str | None, opt("One more direction for it.", "AXIS|X,Y,Z")] = None,
+    check: Annotated[
+        bool, opt("Print a report: right, in balance, stable?", None, "--check")
+    ] = False,
+    out: Annotated[
+        Path | None, file_opt("Page of the report to write.", "FILE.html", "--out")
+    ] = None,
+    as_json: options.AsJson = False,
+) -> int:
+    """Compute the least tensions at a posture, and the stiffness.
+
+    With [tolerances] in ARM.toml it also says how sure the numbers are; with friction, which
+    stiffness small loads measure.
+
+    Exit code 0; 3 if the arm is unstable, or the report of --check fails.
+    """
+    from cdsm.support.files import write_text
+
+    pose = options.posture(arm, changes, angles)
+    wrench = options.load_at_tip(pose.arm, load, mass)
+    tension = cdsm.distribute_tension(pose, minimum, maximum, wrench)
+    K = cdsm.stiffness(pose, tension)
+    head, numbers = header(pose, [minimum])
+    axes = {axis: options.direction_of(axis) for axis in ("x", "y", "z")}
+    if direction is not None:
+        axes[direction] = u = options.direction_of(direction)
+        numbers |= {"direction": u, "along_direction_N_per_m": K.along(u)}
+    sure, uncertainty = _uncertainty(tension, axes)
+    if check or out is not None:
+        report = K.report()
+        about = f"{arm}\n{head}\ncdsm {cdsm.__version__}"
+        write(out, lambda file: write_text(file, report.to_html(about)))
+        warnings = () if report.passed else ("FAIL: the report says why.",)
+        told = numbers | report.to_dict() | uncertainty
+        return answer(as_json, told, head, report, *sure, warnings=warnings)
+    lines = [] if direction is None else [f"along {direction}: {K.along(u) / 1e3:.4g} N/mm"]
+    stuck, sticking = _sticking(tension, axes)
+    parts = [head, tension, K, *lines, *stuck, *sure]
+    told = numbers | K.to_dict() | sticking | uncertainty
+    return answer(as_json, told, *parts, warnings=K.warnings[:1])
+
+
+def _sticking(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tuple[list[str], Json]:
+    """Return the stiffness under small loads, while all cables stick, and where sliding begins.
+
+    The result is a text, in a list, and JSON; both are empty without friction, or if no load in a
+    direction has this limit.
+    """
+    lines, numbers = list[str](), Json()
+    for name, u in axes.items() if tension.posture.arm.has_friction else ():
+        with contextlib.suppress(cdsm.CdsmError):
+            first = cdsm.breakaway(tension.posture, tension, u)
+            if 0.0 < first.load < math.inf:
+                k = first.stiffness.along(u)
+                lines.append(f"along {name} {k / 1e3:.4g} N/mm below {first.load:.4g} N")
+                numbers[name] = {"stuck_N_per_m": k, "breakaway_N": first.load}
+    if not lines:
+        return [], {}
+    head = "small loads measure (all cables stick in their holes, rigid links, tangent):"
+    return ["\n".join([head, *lines])], {"sticking": numbers}
+
+
+def _uncertainty(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tuple[list[str], Json]:
+    """Return the uncertainty of the stiffness along each axis, as a table and for JSON.
+
+    Without tolerances both are empty. A direction in which the tip cannot move is left out.
+    """
+    from cdsm.support.format import aligned
+
+    pose, found = tension.posture, dict[str, cdsm.Uncertainty]()
+    for name, u in axes.items() if pose.arm.tolerances.given else ():
+        with contextlib.suppress(cdsm.SingularStiffness):
+            found[name] = cdsm.uncertainty(pose, tension, pose.arm.tolerances, direction=u)
+    if not found:
+        return [], {}
+
+    def percent(source: str) -> list[float]:
+        return [100.0 * each.contributions[source] / abs(each.value) for each in found.values()]
+
+    sources = {source for each in found.values() for source in each.contributions}
+    rows = [
+        ("uncertainty [N/mm]", *found),
+        ("along", *(each.shown for each in found.values())),
+        *(
+            (f"  {source.replace('_', ' ')}", *(f"{part:.2g} %" for part in percent(source)))
+            for source in sorted(sources, key=lambda source: -max(percent(source)))
+        ),
+    ]
+    remarks = [f"along {name}: {each}" for name, of in found.items() for each in of.warnings]
+    numbers: Json = {name: each.to_dict() for name, each in found.items()}
+    return ["\n".join([*aligned(rows), *remarks])], {"uncertainty": numbers}
+
+
+def weigh(
+    arm: options.Arm,
+    changes: options.Changes = None,
+    angles: options.Angles = "0",
+    minimum: options.Minimum = 0.0,
+    maximum: options.Maximum = math.inf,
+    load: options.Load = None,
+    mass: options.Mass = None,
+    steps: Annotated[int | None, opt("Steps to the full load.", "N", min=1, max=1000)] = None,
+    cycles: Annotated[int | None, opt("Load and unload N times.", "N", min=1, max=100)] = None,
+    out: Annotated[Path | None, file_opt("Table of --cycles.", "FILE.nc|csv", "--out")] = None,
+    figure: options.Figure = None,
+    as_json: options.AsJson = False,
+) -> int:
+    """Hang a weight at the tip, and find how far it moves.
+
+    The motors are locked (Eq. 20); --load and --mass are the weight, in 5 steps (12 in each
+    quarter of --cycles). With friction in the holes, small and large weights measure different
+    stiffness, and --cycles, to the load and its opposite, show the hysteresis.
+
+    Exit code 0; 3 if the arm does not stay at its posture without the weight, buckles under it, or
+    snaps through.
+    """
+    if out is not None and cycles is None:
+        raise misuse("--out", "is the table of --cycles; give both.")
+    pose = options.posture(arm, changes, angles)
+    weight = _weight(pose.arm, load, mass)
+    tension = cdsm.distribute_tension(pose, minimum, maximum)
+    head, numbers = header(pose, [minimum], "included")
+    result: cdsm.WeightTest | cdsm.LoadHistory
+    if cycles is not None:
+        result, more, note = _cycles(tension, weight, cycles, steps or 12)
+        write(out, result.write)
+    elif weight[3:].any():
+        raise misuse("--load", "has a moment, but a weight is a force: FX,FY,FZ.")
+    else:
+        more, result = {}, cdsm.weight_test(pose, tension, weight[:3], steps=steps or 5)
+        without = " without friction" if pose.arm.has_friction else ""
+        note = f"at the full load{without}:\n{result.states[-1]}"
+    write_picture(figure, result.plot)
+    warnings = (*cdsm.stiffness(pose, tension).warnings, *result.warnings)
+    told = numbers | result.to_dict() | more
+    return answer(as_json, told, head, result, note, warnings=dict.fromkeys(warnings))
+
+
+def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Array:
+    """Return the wrench (6,) of a load that must not be zero."""
+    if load is None and mass is None:
+        raise misuse("--load", "give it or --mass: the load.")
+    weight = options.load_at_tip(arm, load, mass)
+    if not weight.any():
+        name = "--load" if mass is None else "--mass"
+        raise cdsm.InvalidInput(name, "is zero; nothing moves, and there is nothing to measure.")
+    return weight
+
+
+def _cycles(
+    tension: cdsm.Tension, weight: Array, cycles: int, steps: int
+) -> tuple[cdsm.LoadHistory, Json, str]:
+    """Load and unload the tip; return the history, and what the last cycle loses."""
+    import numpy as np
+
+    from cdsm.support.format import without_rounding
+
+    up = np.arange(1, steps + 1) / steps
+    hump = np.concatenate([up, up[-2::-1] if steps > 1 else [], [0.0]])
+    factors = np.concatenate([hump, -hump])
+    wrenches = np.outer(np.tile(factors, cycles), weight) + 0.0  # no -0
+    history = cdsm.load_cycle(tension.posture, tension, wrenches)
+    lost = float(history.dissipated[-len(factors) :].sum())
+    far = np.linalg.norm(history.displacement, axis=1)
+    left = 1e6 * without_rounding(far)[-1]
+    note = f"the last cycle loses {1e3 * lost:.4g} mJ; residual displacement {left:.4g} µm"
+    if not tension.posture.arm.has_friction:
+        note = "the holes have no friction, so there is no loop: --set friction=0.1, for example"
+    return history, {"lost_in_last_cycle_J": lost, "left_over_m": float(far[-1])}, note
+
+
+def buckle(
+    arm: options.Arm,
+    changes: options.Changes = None,
+    angles: options.Angles = "0",
+    minimum: options.Minimum = 0.0,
+    maximum: options.Maximum = math.inf,
+    load: options.Load = None,
+    mass: options.Mass = None,
+    figure: options.Figure = None,
+    as_json: options.AsJson = False,
+) -> int:
+    """Find the tension and the load at which the arm buckles.
+
+    Of a load by --load and --mass it is the largest multiple, within --minimum and --maximum.
+
+    Exit code 0; 3 if the arm is unstable at every tension, or already without the load.
+    """
+    loaded = load is not None or mass is not None
+    if not loaded and (minimum or maximum < math.inf):
+        raise misuse("--minimum, --maximum", "bound the tensions under --load or --mass: give one.")
+    pose = options.posture(arm, changes, angles)
+    tension = cdsm.critical_tension(pose)
+    found: dict[str, cdsm.CriticalTension | cdsm.CriticalLoad] = {"critical_tension": tension}
+    if loaded:
+        wrench = _weight(pose.arm, load, mass)
+        found["critical_load"] = cdsm.critical_load(pose, wrench, minimum, maximum)
+    write_picture(figure, tension.plot)
+    head, numbers = header(pose, [minimum] if loaded else [])
+    warnings = [warning for each in found.values() for warning in each.warnings]
+    return answer(as_json, numbers | found, head, *found.values(), warnings=warnings)

@@ -1,0 +1,126 @@
+"""Exit codes and messages of the command line, --set, help and progress."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer.main
+from typer.testing import CliRunner
+
+import cdsm
+from cdsm.cli import app
+from tests.cli.test_commands import EXAMPLES, call, probe, told
+
+__all__ = ["probe"]  # a fixture
+
+COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ("stiffness PROBE --set wire=1e9 --set series_stiffness=200 --minimum 60", 3, "UNSTABLE"),
+        ("stiffness PROBE --load 0,0,-1 --set wire=48e3 --angles 5", 0, "along"),
+        ("stiffness PROBE --maximum 2 --load 0,0,-50", 3, "no tension within the bounds"),
+        ("stiffness PROBE --minimum 2.21 --angles 5 --check", 3, "FAIL"),
+        ("stiffness PROBE --angles 5", 1, "Give minimum=2.2 or more"),
+        ("stiffness PROBE --angles 80", 1, "joint1_1 = 80° is outside"),
+        ("stiffness PROBE --angles 1,2", 2, "one for each of joint1_1"),
+        ("stiffness PROBE --angles joint9_1=2", 1, "no joint is called 'joint9_1'"),
+        ("stiffness PROBE --angles joint1_1=2,joint1_1=3", 2, "joint1_1 is given twice"),
+        ("stiffness PROBE --load 1,2", 2, "give FX,FY,FZ or"),
+        ("stiffness PROBE --load 1,2,x", 2, "'1,2,x' given"),
+        ("stiffness PROBE --load 1,2,nan", 1, "--load: "),
+        ("stiffness PROBE --mass 1 --set gravity=[0,0,0]", 2, "has no weight without gravity"),
+        ("stiffness PROBE --minimum 50 --maximum 20", 1, "maximum: 20 N"),
+        ("stiffness PROBE --out report.txt", 2, "does not end in .html"),
+        ("stiffness PROBE --out absent/report.html", 2, "the folder absent does not exist"),
+        ("stiffness absent.toml", 1, "does not exist"),
+        ("stiffness sweep.nc", 1, "is a sweep or a table, no arm"),
+        ("weigh PROBE", 2, "give it or --mass"),
+        ("weigh PROBE --load 0,0,0", 1, "is zero"),
+        ("weigh PROBE --minimum 30 --load 0,0,1,0,1,0", 2, "a weight is a force"),
+        ("buckle PROBE --minimum 5", 2, "--load or --mass"),
+        ("plan PROBE --direction z", 2, "give it, or --path"),
+        ("plan PROBE --direction z --target 3 --max-change-per-sample 1", 2, "needs --path"),
+        ("sweep PROBE --random 5", 2, "where the answer goes"),
+        ("sweep PROBE --out s.csv", 2, "give one of them"),
+        ("sweep PROBE --grid joint1_1=-9:9:1 --out s.csv", 2, "2 or more angles"),
+        ("sweep PROBE --random 5 --out s.csv", 3, "no posture could be evaluated"),
+        ("new arm.toml --from PROBE", 2, "is no robot"),
+    ],
+)
+def test_exit_codes_and_messages(
+    words: str, code: int, said: str, probe: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(probe.parent)
+    result = call(*words.replace("PROBE", "probe.toml").split())
+    assert result.exit_code == code, result.output
+    assert said in " ".join(result.output.split())
+    if code == 1:
+        error = told(*words.replace("PROBE", "probe.toml").split(), code=1)
+        assert said in error["message"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("minimum=a", "minimum: input should be a valid number, but is 'a'"),
+        ("wire=1x9-1.2mm", "did you mean '1x19-1.2mm'"),
+        ("universal.link_mas=1", "link_mas: is not a key that is known here; did you mean"),
+        ("cables.cable9_1.wire=3", "no cable is called 'cable9_1'"),
+        ("cables.cable1_1.lead=3", "lead: is not a key that is known here"),
+        ("universal.minimum=3", "minimum: is not a key that is known here; it belongs at the top"),
+        ("lead=3", "write it below [universal]"),
+        ("maximum=-1", "maximum: "),
+        ("no key", "give KEY=VALUE, such as minimum=5"),
+    ],
+)
+def test_set_reports_the_faults_of_the_file(change: str, said: str, probe: Path) -> None:
+    assert said in call("stiffness", probe, "--set", change).stderr
+
+
+def test_set_is_what_stands_in_the_file(tmp_path: Path) -> None:
+    path, file = EXAMPLES / "two_sections.toml", tmp_path / "arm.toml"
+    changes: dict[str, Any] = {
+        "wire": 48e3,
+        "gravity": "-y",
+        "slack_below": False,
+        "friction": 0.1,
+        "sections": {"2": {"universal": {"hole_radius": 0.02}}},
+        "cables": {"cable1_1": {"minimum": 20.0, "friction": 0.3}},
+    }
+    words = "wire=48e3 gravity=-y slack_below=false friction=.1 cables.cable1_1.minimum=20.0"
+    words += " sections.2.universal.hole_radius=0.02 cables.cable1_1.friction=0.3"
+    expected = cdsm.Manipulator.read(path, changes=changes)
+    assert expected.cables[0].friction[0] == 0.3
+    assert {*expected.cables[1].friction} == {0.1}
+    assert expected.gravity.tolist() == [0.0, -9.81, 0.0]
+    expected.write(file)
+    sets = [word for each in words.split() for word in ("--set", each)]
+    changed = told("stiffness", path, *sets, "--angles", 5)
+    assert changed == told("stiffness", file, "--angles", 5)
+
+
+def test_commands_and_their_options_are_few() -> None:
+    wanted = "new stiffness weigh buckle plan sweep design view fit identify export reproduce"
+    assert [*COMMANDS] == wanted.split()
+    assert sum(len(command.params) for command in COMMANDS.values()) <= 110
+    for name in COMMANDS:
+        page = CliRunner().invoke(app, [name, "--help"], terminal_width=80).output.splitlines()
+        assert len(page) <= 80
+        assert max(map(len, page)) <= 80
+
+
+def test_long_work_tells_how_far_it_is_where_there_is_no_terminal(probe: Path) -> None:
+    words = ["weigh", str(probe), "--angles", "8", "--load", "0,0,-1", "--minimum", "30"]
+    code = "import cdsm.support.progress as p; p.DELAY = 0.0; from cdsm.cli import app; app()"
+    command = [sys.executable, "-c", code, *words, "--cycles", "2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr.startswith("loads: 1 of 96, ")
+    assert math.isfinite(float(done.stderr.split()[4]))
