@@ -71,11 +71,14 @@ def missing_leads(K: Stiffness) -> tuple[str, ...]:
 
 def model_of(K: Stiffness) -> str:
     """Return the assumptions behind the stiffness ``K`` in words, such as locked motors."""
+    arm, model = K.posture.arm, MODEL
+    if arm.is_serpentine and any(link.bending_stiffness for link in arm.geometry.links):
+        model = MODEL.replace("rigid links", "links that bend")
     if K.friction == "frictionless":
-        return MODEL
+        return model
     mu = K.posture.segments.chains.friction
     said = span(mu, "{:g}".format) if mu.size else "0"
-    return MODEL.replace("frictionless", f"cables {K.friction}, μ = {said}")
+    return model.replace("frictionless", f"cables {K.friction}, μ = {said}")
 
 
 def axis_of(u: Array) -> str:
