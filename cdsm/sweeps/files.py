@@ -87,6 +87,9 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
         given = "give the .nc of a sweep, or the folder of its store"
         raise FileError(path, f"cannot be read as NetCDF or Zarr: {error}; {given}.") from None
     rank = {name: i for i, name in enumerate((*QUANTITIES, "status"))}  # a folder has no order
+    # what zarr makes of names, some versions of xarray cannot write to NetCDF
+    names = {name: each for name, each in found.coords.items() if each.dtype.kind == "T"}
+    found = found.assign_coords({name: each.astype(object) for name, each in names.items()})
     variables = sorted(found.data_vars, key=lambda name: rank.get(str(name), -1))
     return xarray.Dataset({name: found[name] for name in variables}, found.coords, found.attrs)
 
