@@ -89,10 +89,15 @@ def advice(
 
 
 def too_few_cables(arm: Manipulator) -> str:
-    """Return a sentence if the arm has too few cables to hold its joints, else nothing."""
+    """Return a sentence if the cables are too few to hold all joints at any posture, else nothing."""
     count, joints = len(arm.cables), arm.nv
     if count > joints:
         return ""
+    if arm.has_springs:
+        said = (
+            f"{plural(count, 'cable')} and springs hold {plural(joints, 'joint')} only where they"
+        )
+        return f"{said} come to rest: forward_statics(arm, tension=...) finds it. "
     needed = f"cables only pull, so at least {joints + 1} are needed"
     return f"{plural(count, 'cable')} alone cannot hold {plural(joints, 'joint')}: {needed}. "
 

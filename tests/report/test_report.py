@@ -36,9 +36,10 @@ def with_one(pose: cdsm.Posture, tension: float) -> cdsm.Stiffness:
 
 
 def hybrid(seed: int, reach: float = 0.6) -> cdsm.Stiffness:
-    """A random arm of all laws, springs and drives, its tensions not in balance."""
+    """A random arm of all laws, springs, drives and joint springs, its tensions not in balance."""
     kind = ("universal", "hinged")[seed % 2]
     arm = locked.hybrid(arms.random_arm(seed, 1 + seed % 4, kind), list(locked.LAWS.values()))
+    arm = arm.with_springs({name: (1.0 + i, 0.1) for i, name in enumerate(arm.joint_names)})
     pose = arms.random_posture(arm, seed, reach)
     wrench = arms.random_wrench(seed, moment=seed % 3 == 0)
     return cdsm.stiffness(pose, arms.random_tension(arm, seed), wrench=wrench)

@@ -354,7 +354,12 @@ CASES |= {
     "unknown term": (
         lambda: K.pseudoinverse("activ"),  # type: ignore[arg-type]
         cdsm.UnknownName,
-        ("stiffness term", "'activ'", "did you mean 'active'?", "passive, gravity, load, joint"),
+        (
+            "stiffness term",
+            "'activ'",
+            "did you mean 'active'?",
+            "passive, gravity, load, springs, joint",
+        ),
     ),
 }
 
