@@ -89,7 +89,7 @@ def advice(
 
 
 def too_few_cables(arm: Manipulator) -> str:
-    """Return a sentence if the cables are too few to hold all joints at any posture, else nothing."""
+    """Return a sentence if the cables are too few to hold all joints anywhere, else nothing."""
     count, joints = len(arm.cables), arm.nv
     if count > joints:
         return ""
