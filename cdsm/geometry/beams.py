@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, cast
 
 from pydantic import Field, PlainValidator, model_validator
 
@@ -130,7 +130,7 @@ class Backbone(Beam):
 
 def backbone_fields(of: Backbone) -> dict[str, Any]:
     """Return the fields of the :class:`~cdsm.Geometry` of a backbone by name."""
-    sections = _sections(of.sections)
+    sections = cast("tuple[Section, ...]", of.sections)  # see _sections
     common = sections[0].hole_radius
     joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
     for section in sections:

@@ -14,7 +14,15 @@ import cdsm
 from cdsm.errors import SingularStiffness
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import FLAT, Balance, Point, equilibrium_error, settle
+from cdsm.statics.solve import (
+    FLAT,
+    Balance,
+    Point,
+    continued,
+    equilibrium_error,
+    settle,
+    stable_between,
+)
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import aligned, coordinates, without_rounding
@@ -231,6 +239,18 @@ def locked_equilibrium(arm: LockedArm) -> Equilibrium:
     if not converged:
         raise equilibrium_error(arm.reference, found, 0.0)
     return as_equilibrium(arm, found)
+
+
+def followed(arm: LockedArm, before: Posture, stop_torque: Array) -> Point | None:
+    """Follow a stable equilibrium while load or motors change a little, without a jump.
+
+    It is at the posture ``before``, where the stops push with ``stop_torque`` (nv,) [N m].
+    """
+    f = Balance(arm.at, arm.reference, arm.at_pose(before))
+    found = continued(f, (before.q / f.unit - stop_torque * f.unit / f.k,), before.q)
+    if found is not None and stable_between(arm.at, before.q, found.state.pose.q):
+        return found
+    return None
 
 
 def as_equilibrium(arm: LockedArm, found: Point, branch: float = 1.0) -> Equilibrium:

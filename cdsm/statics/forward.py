@@ -10,16 +10,15 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium, as_equilibrium
-from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import (
-    Balance,
-    Point,
-    continued,
-    equilibrium_error,
-    settle,
-    stable_between,
+from cdsm.statics.equilibrium import (
+    Equilibrium,
+    as_equilibrium,
+    followed,
+    locked_equilibrium,
 )
+from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.solve import Balance, equilibrium_error, settle
+from cdsm.stiffness_matrix import checked_tension
 from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
 from cdsm.support.values import Array
 
@@ -78,11 +77,7 @@ def forward_statics(
     assert value is not None
     model = _model(arm, named[0], value, home, begin, W)
     if start is not None:
-        f = _balance(model(1.0), begin)
-        found, converged = settle(f, begin.q)
-        if not converged:
-            raise equilibrium_error(begin, found, 0.0)
-        return as_equilibrium(model(1.0), found)
+        return locked_equilibrium(model(1.0))
     _require_held(model(0.0), home)
     return _raised(model, home)
 
@@ -92,12 +87,7 @@ def _model(
 ) -> Model:
     count = len(arm.cables)
     if name == "tension":
-        F = vector("tension", value, count, "one tension [N] per cable", "tension")
-        if F.min() < 0.0:
-            c = int(F.argmin())
-            raise InvalidInput(
-                "tension", f"{F[c]:g} N given for {arm.cables[c].name}; cables only pull."
-            )
+        F, _ = checked_tension(home, value, wrench)
         return lambda share: LockedArm(begin, share * F, share * wrench, tension_held=True)
     if arm.original_length != "unstrained":
         said = "l_0 of this arm changes with the tension; use original_length='unstrained'."
@@ -147,7 +137,7 @@ def _raised(model: Model, home: Posture) -> Equilibrium:
     share, step, branch = 0.0, 1.0, 1.0
     while share < 1.0:
         goal, before = min(1.0, share + step), here.state.pose
-        found = _next(model(goal), here, before)
+        found = followed(model(goal), before, here.stop_torque)
         if found is not None:
             here, share, step = found, goal, 2.0 * step
         elif step > _SHORTEST:
@@ -158,11 +148,3 @@ def _raised(model: Model, home: Posture) -> Equilibrium:
             if not converged:
                 raise equilibrium_error(home, here, branch)
     return as_equilibrium(model(1.0), here, branch)
-
-
-def _next(arm: LockedArm, here: Point, before: Posture) -> Point | None:
-    f = _balance(arm, before)
-    x = before.q / f.unit - here.stop_torque * f.unit / f.k
-    found = continued(f, (x,), before.q)
-    stable = found is not None and stable_between(arm.at, before.q, found.state.pose.q)
-    return found if stable else None

@@ -13,10 +13,9 @@ import cdsm
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium
+from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium, followed
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import Balance, continued, stable_between
 from cdsm.support.directions import unit_direction
 from cdsm.support.format import MODEL, coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
@@ -283,12 +282,11 @@ def _follow(
     """
     step = goal - reached
     while reached < goal:
-        part, q = min(goal, reached + step), before.pose.q
+        part = min(goal, reached + step)
         W = frozen(wrench + part * added)
         arm = LockedArm(before.reference, before.reference_tension, W)
-        f = Balance(arm.at, arm.reference, arm.at_pose(before.pose))
-        found = continued(f, (q / f.unit - before.stop_torque * f.unit / f.k,), q)
-        if found is not None and stable_between(arm.at, q, found.state.pose.q):
+        found = followed(arm, before.pose, before.stop_torque)
+        if found is not None:
             before, reached, step = as_equilibrium(arm, found), part, 2.0 * step
         elif step > _FINEST * max(reached, 1e-9):
             step /= 2.0
