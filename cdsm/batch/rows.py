@@ -76,6 +76,11 @@ class ArmRows:
     Attributes:
         order: Joint of q in each place of the kernels (nv,).
         place: Place of each joint of q, the inverse permutation (nv,).
+        coupling: How the n joints follow from those of q; None: they are those of q.
+        reduction: S (n, nv) of the coupling, or None; its rows are in the kernels' order.
+        spring: Stiffness of the spring of each joint (n,).
+        free: Angle of each joint at which its spring has no torque (n,).
+        springs: Their part of K_θ (nv, nv), in the order in which the kernels give the others.
         arm: What all variants of the arm share.
         shapes: Of the arrays of :class:`Pose`, for one posture.
         dimensions: Those of the arm: a :class:`Body` without axes of blocks and postures.
@@ -87,7 +92,13 @@ class ArmRows:
         nv = len(first)
         self.order = first - 1
         self.place = np.argsort(self.order)
-        self.coupling = arm._body.coupling
+        self.coupling, springs = arm._body.coupling, arm.springs
+        self.spring, self.free = springs.stiffness[self.order], springs.angle[self.order]
+        matrix = springs.matrix
+        self.reduction = None if self.coupling is None else self.coupling.matrix[self.order]
+        if self.reduction is None:
+            matrix = matrix[self.order[:, None], self.order]
+        self.springs = frozen(matrix)
         self.is_sorted = bool((self.order == np.arange(nv)).all())
         frame = np.append(0, 1 + self.place)  # of each row of the tree
         rows = np.append(0, first)

@@ -1,4 +1,4 @@
-"""The pipeline of a batch: pose → tensions → cable stiffness → K_θ → readings, in chunks of rows.
+"""Rows of a batch, computed in chunks by several threads.
 
 The arguments are already checked. A row is a posture, possibly of a variant of the arm.
 """
@@ -10,41 +10,21 @@ from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from types import ModuleType
-from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cdsm.batch.choice import kernels_for
-from cdsm.batch.quantities import (
-    OF_POSTURE,
-    OF_TENSION,
-    READINGS,
-    TERMS,
-    Codes,
-    joint_axes,
-    shapes_of,
-)
-from cdsm.batch.readings import read
-from cdsm.batch.rows import Body, Pose, one_by_one, rows_of, side_by_side
-from cdsm.batch.search import explained, search
-from cdsm.manipulator import LIMIT_SLACK, Manipulator
-from cdsm.routing import SHORTEST_SEGMENT
-from cdsm.support.status import Status
-from cdsm.support.values import Array, frozen
+from cdsm.batch.chunk import Chunk
+from cdsm.batch.quantities import Codes, shapes_of
+from cdsm.batch.rows import Body, rows_of
+from cdsm.manipulator import Manipulator
+from cdsm.support.values import Array
 
-_Scalar = TypeVar("_Scalar", np.float64, np.bool_)
-_Result = TypeVar("_Result")
 Springs = Callable[[Array, Array, slice], Array]
 
 # numbers of the poses of a chunk, compiled and by numpy, where a chunk has one block; 64 postures
 # side by side are fastest, or 32 of long arms
 _CACHE, _WIDE = 2**19, 2**21
-_LOST = (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES)
-_NO_TENSION = (*_LOST, Status.INFEASIBLE, Status.SOLVER_FAILED)
-_NO_STIFFNESS = (*_NO_TENSION, Status.OUTSIDE_ELASTICITY)
-_PIVOT = 1e-4  # smallest relative pivot with which K_θ is regular, and needs no exchange of rows
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -95,7 +75,7 @@ class Rows:
         def fill(part: slice) -> None:
             memory = scratch.__dict__.setdefault("of", {})
             with turn, np.errstate(all="ignore"):
-                found = _Chunk(self, kernels, part, width, status[part], memory, turn).quantities()
+                found = Chunk(self, kernels, part, width, status[part], memory, turn).quantities()
             for name in self.names:
                 values[name][part] = found[name]
 
@@ -107,234 +87,3 @@ class Rows:
             for _ in pool.map(fill, parts):  # an error cancels the chunks that have not begun
                 pass
         return values
-
-
-class _Chunk:
-    """Some of the rows, in blocks of postures side by side."""
-
-    def __init__(
-        self,
-        rows: Rows,
-        kernels: ModuleType,
-        part: slice,
-        width: int,
-        status: Codes,
-        memory: dict[str, Array],
-        turn: threading.Lock,
-    ) -> None:
-        self._rows, self._kernels, self._part, self._status = rows, kernels, part, status
-        self._memory, self._turn = memory, turn
-        self._table, self._names = rows_of(rows.arm), set(rows.names)
-        self._q = rows.q[part]
-        self._width = width if kernels.COMPILED else len(self._q)
-
-    def quantities(self) -> dict[str, Array]:
-        """Compute the quantities (n, …); NaN where one does not exist, as the status says."""
-        table, rows, status = self._table, self._rows, self._status
-        if rows.check_limits:
-            low, high = rows.arm.lower - LIMIT_SLACK, rows.arm.upper + LIMIT_SLACK
-            beyond = ((self._q < low) | (self._q > high)).any(axis=1)
-            status[beyond] = Status.BEYOND_LIMITS
-        every = table.coupling.angles(self._q) if table.coupling else self._q
-        W, q = self._lanes(rows.wrench), side_by_side(every[:, table.order], self._width)
-        at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
-        self._aside(self._kernels.pose, table.arm, self._body(), q, W, at)
-        if rows.arm.has_springs:
-            springs = rows.arm.springs
-            k, free = (each[table.order, None] for each in (springs.stiffness, springs.angle))
-            at.torque[...] -= k * (q - free)
-        full, at = at, self._reduced(at)
-        short = self._alone(at.shortest) < SHORTEST_SEGMENT
-        status[short & (status == Status.OK)] = Status.COINCIDENT_SITES
-        found = self._of_posture(at)
-        if not self._names <= found.keys():
-            F = self._tensions(at)
-            L, pull = self._alone(at.length), self._alone(F)
-            laws = rows.arm._laws
-            if self._names <= {*OF_POSTURE, *OF_TENSION}:
-                k = np.zeros_like(pull)
-            elif rows.springs is not None:
-                k = rows.springs(L, pull, self._part)
-            else:
-                k = laws.stiffness_of(L, pull, laws.rigidities(pull))
-            if k.min(initial=0.0) < 0.0:
-                outside = (k < 0.0).any(axis=1) & (status == Status.OK)
-                status[outside] = Status.OUTSIDE_ELASTICITY
-            found |= {"tension": pull, "cable_stiffness": k}
-            if "residual" in self._names:
-                balance = np.einsum("bcjw,bcw->bjw", at.jacobian, F)
-                found["residual"] = self._alone(balance - at.torque)
-            found |= self._of_stiffness(full, at, F, side_by_side(k, self._width), W)
-        return {name: self._finished(name, found[name]) for name in self._names}
-
-    def _reduced(self, at: Pose) -> Pose:
-        """Return derivatives by the independent joints in place of those by all."""
-        if self._table.coupling is None:
-            return at
-        S = self._table.coupling.matrix[self._table.order]
-        return at._replace(
-            jacobian=np.einsum("bcjw,jk->bckw", at.jacobian, S),
-            gravity=np.einsum("bjw,jk->bkw", at.gravity, S),
-            torque=np.einsum("bjw,jk->bkw", at.torque, S),
-            tip_jacobian=np.einsum("bijxw,jk->bikxw", at.tip_jacobian, S),
-        )
-
-    def _of_posture(self, at: Pose) -> dict[str, Array]:
-        count = len(self._q)
-
-        def tip() -> Array:  # from the columns of the rotation, and the position
-            pose = np.zeros((count, 4, 4))
-            pose[:, :3], pose[:, 3, 3] = self._alone(at.tip).swapaxes(1, 2), 1.0
-            return pose
-
-        makers: dict[str, Callable[[], Array]] = {
-            "tip": tip,
-            "jacobian": lambda: _jacobian(at, np.arange(count)),
-            "cable_lengths": lambda: self._alone(at.length),
-            "length_jacobian": lambda: self._alone(at.jacobian),
-            "gravity_torque": lambda: self._alone(at.gravity),
-        }
-        return {name: make() for name, make in makers.items() if name in self._names}
-
-    def _tensions(self, at: Pose) -> Array:
-        """Return F (B, C, W): given, distributed, or 0 if nothing that is asked for depends on it.
-
-        Rows without tensions get some number, which is not used.
-        """
-        rows, status, shape = self._rows, self._status, at.length.shape
-        if rows.tension is not None:
-            return np.nan_to_num(self._lanes(rows.tension))
-        if rows.bounds is None:
-            return np.zeros(shape)
-        low, high = map(self._lanes, rows.bounds)
-        F, good = np.empty(shape), np.zeros((shape[0], shape[2]), dtype=np.bool_)
-        if len(self._table.arm.pairs):
-            self._aside(self._kernels.guess, self._table.arm, at, low, high, F, good)
-        for n in np.flatnonzero(~self._alone(good) & (status == Status.OK)):
-            b, w = divmod(int(n), self._width)
-            at_row = at.jacobian[b, ..., w], at.torque[b, :, w], low[b, :, w], high[b, :, w]
-            F[b, :, w], status[n] = search(rows.arm, *at_row)
-            if status[n] == Status.SOLVER_FAILED and rows.body is None:
-                wrench = rows.wrench[(self._part.start + n) % len(rows.wrench)]
-                F[b, :, w], status[n] = explained(rows.arm, self._q[n], *at_row[2:], wrench)
-        return F
-
-    def _of_stiffness(self, full: Pose, at: Pose, F: Array, k: Array, W: Array) -> dict[str, Array]:
-        """Compute K_θ, its terms if they are needed, and what is read off it."""
-        names, status, u = self._names, self._status, self._rows.directions
-        wanted, fine = names & set(READINGS), np.flatnonzero(status == Status.OK)
-        fused = self._kernels.COMPILED and wanted <= {"along"} and names.isdisjoint(TERMS)
-        fused = fused and self._table.coupling is None
-        K, size = self._terms(full, F, k, W, apart=not fused)
-        found: dict[str, Array] = {}
-        if not fused or "joint" in names:
-            terms = self._alone(K)
-            if self._table.coupling is not None:
-                S = self._table.coupling.matrix[self._table.order]
-                terms = S.T @ terms @ S
-            terms = self._with_springs(terms)
-            found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
-            found["joint"] = terms.sum(axis=1)
-        if not wanted:
-            return found
-        if not fused:
-            of_tip = _jacobian(at, fine)
-            read_off, status[fine] = self._aside(read, wanted, terms[fine], of_tip, u)
-            for name, value in read_off.items():
-                found[name] = np.full((len(status), *value.shape[1:]), np.nan)
-                found[name][fine] = value
-            return found
-        shape = len(F), len(u), self._width
-        along, pivot, moment = np.empty(shape), np.empty(shape[::2]), bool(W[:, 3:].any())
-        # a copy is writable, whatever u is: the kernel compiles once
-        kernel = self._kernels.along
-        self._aside(kernel, K, size, at.tip_jacobian, u.copy(), moment, along, pivot)
-        found["along"] = self._alone(along)
-        doubtful = fine[~(self._alone(pivot)[fine] > _PIVOT)]
-        if doubtful.size:
-            *pose, F, k, W = (self._picked(x, doubtful) for x in (*at, F, k, W))
-            some = Pose(*pose)
-            terms = one_by_one(self._terms(some, F, k, W, apart=True)[0], doubtful.size)
-            terms = self._with_springs(terms)
-            of_tip = _jacobian(some, np.arange(doubtful.size))
-            read_off, status[doubtful] = read({"along"}, terms, of_tip, u)
-            found["along"][doubtful] = read_off["along"]
-        return found
-
-    def _terms(self, at: Pose, F: Array, k: Array, W: Array, *, apart: bool) -> tuple[Array, Array]:
-        B, nv, _ = at.gravity.shape
-        K = self._empty("K", B, 4 if apart else 1, nv, nv)
-        size = self._empty("size", B, nv)
-        self._aside(self._kernels.stiffness, self._table.arm, at, F, k, W, K, size)
-        if self._rows.arm.has_springs and not apart:
-            K[:, 0, range(nv), range(nv)] += self._springs[:, None]
-            size += self._springs[:, None]
-        return K, size
-
-    @property
-    def _springs(self) -> Array:
-        """Stiffness of the joint springs (nv,) in the kernels' order."""
-        return self._rows.arm.springs.stiffness[self._table.order]
-
-    def _with_springs(self, terms: Array) -> Array:
-        """Add the springs to the other terms (n, 4, nv, nv) of K_θ."""
-        matrix, order = self._rows.arm.springs.matrix, self._table.order
-        if self._table.coupling is None:
-            matrix = matrix[order[:, None], order]
-        springs = np.broadcast_to(matrix, (len(terms), 1, *terms.shape[2:]))
-        return np.concatenate([terms, springs], axis=1)
-
-    def _finished(self, name: str, value: Array) -> Array:
-        """Put the joints in the order of q; NaN where the quantity does not exist."""
-        status, place = self._status, self._table.place
-        if not self._table.is_sorted and self._table.coupling is None:
-            for axis in range(value.ndim - joint_axes(name), value.ndim):
-                value = value.take(place, axis=axis)
-        if not status.any():
-            return value
-        kinds = (
-            _LOST if name in OF_POSTURE else _NO_TENSION if name in OF_TENSION else _NO_STIFFNESS
-        )
-        lost = np.isin(status, kinds)
-        return np.where(lost.reshape(-1, *[1] * (value.ndim - 1)), np.nan, value)
-
-    def _aside(self, function: Callable[..., _Result], *arguments: object) -> _Result:
-        """Compute while another thread has its turn at the small calls of numpy in between."""
-        self._turn.release()
-        try:
-            return function(*arguments)
-        finally:
-            self._turn.acquire()
-
-    def _empty(self, name: str, blocks: int, *shape: int) -> Array:
-        """Return memory that the next chunk uses again: fresh pages cost as much as kernels."""
-        kept = self._memory.get(name)
-        if kept is None or len(kept) < blocks or kept.shape[1:] != (*shape, self._width):
-            kept = self._memory[name] = np.empty((blocks, *shape, self._width))
-        return kept[:blocks]
-
-    def _body(self) -> Body:
-        if self._rows.body is None:
-            return self._table.body(self._width if self._kernels.COMPILED else 1)
-        rows = (side_by_side(x[self._part], self._width) for x in self._rows.body)
-        return Body(*map(frozen, rows))  # as those of the arm: kernels compile once
-
-    def _lanes(self, x: Array) -> Array:
-        """Put the rows of an array side by side, or repeat its only row."""
-        shared = len(x) == 1 < len(self._rows.q)
-        some = np.broadcast_to(x, (len(self._q), *x.shape[1:])) if shared else x[self._part]
-        return side_by_side(some, self._width)
-
-    def _alone(self, x: NDArray[_Scalar]) -> NDArray[_Scalar]:
-        return one_by_one(x, len(self._q))
-
-    def _picked(self, x: Array, rows: NDArray[np.intp]) -> Array:
-        b, w = np.divmod(rows, self._width)
-        return side_by_side(x[b, ..., w], self._width)
-
-
-def _jacobian(at: Pose, rows: NDArray[np.intp]) -> Array:
-    """Return J_X (n, 6, nv) of some rows, in the kernels' order of joints."""
-    b, w = np.divmod(rows, at.shortest.shape[1])
-    both = np.ascontiguousarray(at.tip_jacobian[b, ..., w].swapaxes(2, 3))
-    return both.reshape(len(rows), 6, at.gravity.shape[1])

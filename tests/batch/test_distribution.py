@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import search, solution
+from cdsm.batch import chunk, search
 from cdsm.batch.rows import rows_of
 from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm, one_hinge
@@ -198,7 +198,7 @@ def test_rows_that_the_solver_leaves_open_go_to_the_single_posture(
     def open_(arm: object, J: object, torque: object, low: Array, *_: Any) -> Any:
         return low, cdsm.Status.SOLVER_FAILED
 
-    monkeypatch.setattr(solution, "search", open_)
+    monkeypatch.setattr(chunk, "search", open_)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     np.testing.assert_array_equal(found.status, expected.status)
     scale = np.nanmax(expected.values)
