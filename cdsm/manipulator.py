@@ -191,8 +191,8 @@ class Manipulator(Printed):
             CableError: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
-        made = cls.__new__(cls)._define(text, cables, tip, gravity, original_length, joint_names)
-        return made if springs is None else made.with_springs(springs)
+        more: Any = {"joint_names": joint_names, "springs": springs}
+        return cls.__new__(cls)._define(text, cables, tip, gravity, original_length, **more)
 
     @classmethod
     def read(
@@ -433,6 +433,19 @@ class Manipulator(Printed):
         """Return the same robot with other cables, gravity or tolerances."""
         state = {**self.__getstate__(), **changes}
         return Manipulator.__new__(Manipulator)._define(**state, like=self)
+
+    @property
+    def _own_springs(self) -> dict[str, tuple[float, float]] | None:
+        """Springs that :meth:`with_springs` gave; None if they are those of the geometry."""
+        usual = self._geometry.springs if self._geometry else {}
+        given: dict[str, tuple[float, float]] = self.__getstate__()["springs"]
+        return None if given == usual else dict.fromkeys(usual, (0.0, 0.0)) | given
+
+    def _with_geometry(self, geometry: Geometry, cables: Sequence[Cable]) -> Manipulator:
+        """Return the arm of another geometry with these cables, otherwise like this one."""
+        state = {**self.__getstate__(), "geometry": geometry, "cables": cables}
+        state |= {"urdf": to_urdf(geometry), "joint_names": None, "springs": self._own_springs}
+        return Manipulator.__new__(Manipulator)._define(**state)
 
     def with_cables(self, cables: CablesOrFile) -> Manipulator:
         """Return an arm with the same robot and other cables, given as for :class:`Manipulator`."""

@@ -140,12 +140,8 @@ class ArmParameters:
         laws = dict[tuple[Elasticity, float], Elasticity]()
         routed = serpentine_cables(geometry, self.arm.cables[0].elasticity)
         rows = zip(self.arm.cables, routed, changes, strict=True)
-        return Manipulator(
-            geometry,
-            cables=[_changed(old, new, own, laws) for old, new, own in rows],
-            gravity=self.arm.gravity,
-            original_length=self.arm.original_length,
-        ).with_tolerances(self.arm.tolerances)
+        cables = [_changed(old, new, own, laws) for old, new, own in rows]
+        return self.arm._with_geometry(geometry, cables)
 
     def _place(self, name: str) -> tuple[str, list[int]]:
         """Split a name such as ``hole_radius@2`` into its kind, and the indices in its part."""

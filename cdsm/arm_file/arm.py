@@ -34,7 +34,7 @@ def read_arm(
 ) -> dict[str, Any]:
     """Read what defines an arm. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
     file, cables = read_model(path, wire, changes, robot=True)
-    keys = ("gravity", "original_length", "tolerances", "geometry")
+    keys = ("gravity", "original_length", "tolerances", "geometry", "springs")
     arm = {"cables": cables} | {key: getattr(file, key) for key in keys}
     if (robot := file.urdf) is None:
         return {**arm, "urdf": to_urdf(file.geometry), "tip_link": TIP}
@@ -55,6 +55,7 @@ def arm_text(arm: Manipulator) -> str:
     shared = {key: x for key, x in owns[0].items() if all(own.get(key) == x for own in owns)}
     owns = [{key: x for key, x in own.items() if key not in shared} for own in owns]
     data: dict[str, Any] = {"gravity": arm.gravity.tolist(), "original_length": arm.original_length}
+    data |= {"springs": arm._own_springs}
     data |= {**shared, "wires": tables, "tolerances": tolerance_table(arm.tolerances)}
     plain: tuple[Cable, ...] = ()
     if geometry is None:

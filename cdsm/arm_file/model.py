@@ -225,6 +225,7 @@ class ArmFile(_Settings, _Wires):
     gravity: _Gravity = GRAVITY
     original_length: OriginalLength = "unstrained"
     tolerances: Annotated[Tolerances, PlainValidator(read_tolerances)] = Tolerances()
+    springs: dict[str, records.PerJoint[records.Number]] | None = None
     geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None
     urdf: Annotated[_Urdf | None, AfterValidator(_alone)] = None
     cables: Annotated[_Tables, WrapValidator(_built), Field(validate_default=True)] = None  # type: ignore[assignment]

@@ -243,10 +243,7 @@ def _rerouted(arm: Manipulator, values: tuple[tuple[Variable, Value], ...]) -> M
         )
         for cable, kept in zip(routed, like, strict=True)
     ]
-    made = Manipulator(
-        geometry, cables=cables, gravity=arm.gravity, original_length=arm.original_length
-    )
-    return made.with_tolerances(arm.tolerances)
+    return arm._with_geometry(geometry, cables)
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:

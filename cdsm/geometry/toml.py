@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # keys of an ARM.toml that do not belong to the geometry; cables may belong to it
 _ARM_KEYS = (
-    *("gravity", "original_length", "wire", "wires", "urdf"),
+    *("gravity", "original_length", "wire", "wires", "urdf", "springs"),
     *("slack_below", "friction", "series_stiffness", "control", "minimum", "maximum"),
     "tolerances",
 )

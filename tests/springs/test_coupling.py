@@ -1,5 +1,6 @@
 """Joints that follow others: θ = S φ + θ_0."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -140,6 +141,10 @@ def test_sections_turn_alike() -> None:
     )
     every = np.concatenate([np.tile(q[:2], 4), np.tile(q[2:], 4)])
     np.testing.assert_allclose(arm.at(q).tip, free.at(every).tip, atol=1e-14)
+
+
+def test_files_hold_followers_and_springs(tmp_path: Path) -> None:
+    assert cdsm.Manipulator.read(ARM.write(tmp_path / "ARM.toml")) == ARM
 
 
 @pytest.mark.parametrize(

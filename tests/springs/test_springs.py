@@ -1,5 +1,8 @@
 """Springs at joints: in the balance, in K_θ, in batches, and in MuJoCo."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -97,12 +100,24 @@ def test_batches_have_the_springs() -> None:
     assert abs(rows["residual"]).max() < 1e-11
 
 
-def test_springs_are_kept_by_copies_files_and_other_cables(tmp_path: object) -> None:
+OVERRIDDEN: tuple[dict[str, Any], ...] = ({"joint1_1": 3.0, "joint2_2": (1.0, 0.2)}, {})
+
+
+def test_springs_are_kept_by_other_cables_and_dimensions() -> None:
     arm = sprung()
     again = arm.with_friction(0.1).with_gravity("-y")
     np.testing.assert_array_equal(again.springs.stiffness, arm.springs.stiffness)
     assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
     assert arm.with_springs({}) != arm
+    for each in (arm, *map(arm.with_springs, OVERRIDDEN)):
+        wider = cdsm.ArmParameters(each, ("hole_radius",))(hole_radius=0.021)
+        np.testing.assert_array_equal(wider.springs.stiffness, each.springs.stiffness)
+        np.testing.assert_array_equal(wider.springs.angle, each.springs.angle)
+
+
+@pytest.mark.parametrize("arm", [sprung(), *map(sprung().with_springs, OVERRIDDEN)])
+def test_springs_are_kept_by_files(arm: cdsm.Manipulator, tmp_path: Path) -> None:
+    assert cdsm.Manipulator.read(arm.write(tmp_path / "ARM.toml")) == arm
 
 
 def test_springs_that_cannot_be_are_named() -> None:
