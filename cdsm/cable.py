@@ -9,7 +9,7 @@ from typing import Literal, SupportsIndex, final, get_args, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.errors import CableError, CdsmError, InvalidInput, listed
+from cdsm.errors import CdsmError, InvalidInput, listed
 from cdsm.support.format import plural
 from cdsm.support.validation import number_array, one_of, quantity, sequence_of, text, vector
 from cdsm.support.values import Array
@@ -68,7 +68,7 @@ class Cable:
         minimum: Smallest allowed tension [N]; every tension distribution respects both bounds.
         maximum: Largest allowed tension [N]; inf: no limit.
 
-    Raises CableError, which names the cable and the fault. Its methods take F [N], any shape, and
+    Raises InvalidInput, which names the cable and the fault. Its methods take F [N], any shape, and
     l_0 [m], ``free_length``: InvalidInput if it is not positive, ElasticityRangeError if a tension
     is outside the law, or no tension gives an elongation.
     """
@@ -97,14 +97,14 @@ class Cable:
             if least > most:
                 raise CdsmError(f"tensions from {least:g} to {most:g} N; give minimum <= maximum.")
         except CdsmError as error:
-            raise CableError(str(self.name), str(error)) from None
+            raise InvalidInput(f"cable {self.name!r}", str(error)) from None
         self.__dict__.update(sites=sites, lead=lead, series_stiffness=series)
         self.__dict__.update(minimum=least, maximum=most)
         for i in {0, len(sites) - 1}.difference(self._holes):
             if sites[i].friction or sites[i].wrap:
                 why = "ends there; only" if i else "starts there. Give a lead; only"
                 said = f"site {i + 1} has friction or wrap, but the cable {why} holes have them."
-                raise CableError(self.name, said)
+                raise InvalidInput(f"cable {self.name!r}", said)
 
     @property
     def _holes(self) -> range:

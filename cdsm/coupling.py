@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from lxml import etree
 
-from cdsm.errors import UrdfError
+from cdsm.errors import GeometryError
 from cdsm.support.values import Array, frozen
 
 
@@ -56,7 +56,7 @@ _DEFAULTS = {"multiplier": 1.0, "offset": 0.0}
 def coupling_of(mimics: Mapping[str, Mimic], names: Sequence[str]) -> Coupling | None:
     """Multiply chains of followers out; None if no joint follows.
 
-    Raises UrdfError if joints follow each other in a circle, or one that does not move.
+    Raises GeometryError if joints follow each other in a circle, or one that does not move.
     """
     if not mimics:
         return None
@@ -68,10 +68,10 @@ def coupling_of(mimics: Mapping[str, Mimic], names: Sequence[str]) -> Coupling |
             offset[i] += factor * mimic.offset
             factor *= mimic.multiplier
             if mimic.leader in way:
-                raise UrdfError(f"joints mimic each other in a circle: {' → '.join(way)}.")
+                raise GeometryError(f"joints mimic each other in a circle: {' → '.join(way)}.")
             if mimic.leader not in names:
                 said = f"joint {way[-1]}: mimics {mimic.leader!r}, which is no joint that moves."
-                raise UrdfError(said)
+                raise GeometryError(said)
             way.append(mimic.leader)
         S[i, leaders.index(way[-1])] = factor
     return Coupling(frozen(S), frozen(offset), tuple(names.index(name) for name in leaders))

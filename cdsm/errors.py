@@ -28,11 +28,26 @@ def listed(texts: Texts, most: int = 4, between: str = ", ") -> str:
 
 
 class CdsmError(Exception):
-    """Base class of all errors raised by cdsm."""
+    """Base class of all errors raised by cdsm.
+
+    ``status`` names the entry of :class:`~cdsm.Status` that a batch has in its place, if any.
+    """
+
+    status: str = ""
+
+    def __init__(self, message: str = "", status: str = "") -> None:
+        super().__init__(message)
+        if status:
+            self.status = status
 
     def __reduce__(self) -> tuple[object, ...]:
         # Exception would call the constructor with the message alone
         return type(self).__new__, (type(self),), {"args": self.args, **self.__dict__}
+
+
+def solver_failed(solver: str, problem: str) -> CdsmError:
+    """Return the error for a ``solver`` whose result is not the optimum."""
+    return CdsmError(f"solver {solver!r} {problem}", "SOLVER_FAILED")
 
 
 class CdsmWarning(UserWarning):
@@ -40,22 +55,22 @@ class CdsmWarning(UserWarning):
 
 
 class InvalidInput(CdsmError, ValueError):
-    """An argument, called ``name``, with a wrong type, shape or value."""
+    """An argument, a cable or a thing called ``name`` with a wrong type, shape or value."""
 
-    def __init__(self, name: str, problem: str) -> None:
-        super().__init__(f"{name}: {problem}")
+    def __init__(self, name: str, problem: str, status: str = "") -> None:
+        super().__init__(f"{name}: {problem}", status)
         self.name = name
 
 
-class UnknownName(CdsmError, LookupError, ValueError):
-    """A ``name``, e.g. of a link, a solver or a stiffness term, that is not among ``known``."""
-
-    def __init__(self, kind: str, name: object, known: Iterable[str], remedy: str = "") -> None:
-        self.name, self.known = name, tuple(known)
-        near = difflib.get_close_matches(str(name), self.known)
-        hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else "."
-        message = f"no {kind} is called {name!r}{hint} Known: {listed(self.known, 12)}. {remedy}"
-        super().__init__(message.rstrip())
+def unknown(kind: str, name: object, known: Iterable[str], remedy: str = "") -> InvalidInput:
+    """Return the error for a ``kind``, e.g. a link, called ``name`` that is not among ``known``."""
+    known = tuple(known)
+    near = difflib.get_close_matches(str(name), known)
+    hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else "."
+    error = InvalidInput(kind, "unknown")
+    said = f"no {kind} is called {name!r}{hint} Known: {listed(known, 12)}. {remedy}"
+    error.args = (said.rstrip(),)
+    return error
 
 
 class FileError(CdsmError, OSError):
@@ -66,60 +81,17 @@ class FileError(CdsmError, OSError):
         self.path = str(path)
 
 
-class MissingExtra(CdsmError, ImportError):
-    """A ``package`` that is not installed; ``extra`` of ``cdsm-stiffness`` installs it."""
-
-    def __init__(self, package: str, extra: str) -> None:
-        super().__init__(f"{package} is missing; run pip install -e '.[{extra}]' in cdsm's clone.")
-        self.package, self.extra = package, extra
-
-
-class MissingWire(CdsmError, LookupError):
-    """A file at ``path`` without a wire for ``cables`` (names; none if no cable has a wire)."""
-
-    def __init__(self, path: object, cables: Texts = ()) -> None:
-        self.path, self.cables = str(path), tuple(cables)
-        whose = f"the cables {listed(self.cables)}" if self.cables else "its cables"
-        said = f"{path}: has no wire for {whose}. Give wire= (commands: --set wire=48e3), or write"
-        remedy = 'at the top of it: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
-        super().__init__(f"{said} {remedy}")
-
-
 class GeometryError(CdsmError, ValueError):
-    """A geometry with ``faults``, one sentence each, of the file ``source`` (or None)."""
+    """A geometry with ``faults``, a sentence each, or a URDF that is no arm, told in a text.
 
-    def __init__(self, faults: Texts, source: str | None = None) -> None:
-        self.faults, self.source = tuple(faults), source
-        said = f"invalid geometry:{listed(self.faults, 20, LINES)}"
-        super().__init__(f"{source}: {said}" if source else said)
-
-
-class UrdfError(CdsmError, ValueError):
-    """A URDF that cdsm cannot use, or that two parsers read differently."""
-
-
-class CableError(CdsmError, ValueError):
-    """A ``cable`` with an invalid attribute, a name used twice, or sites where it cannot run."""
-
-    def __init__(self, cable: str, problem: str) -> None:
-        super().__init__(f"cable {cable!r}: {problem}")
-        self.cable = cable
-
-
-class JointLimitError(CdsmError, ValueError):
-    """Angles beyond the joint limits, of which the text ``problem`` names the first few.
-
-    ``joints`` are all their names, ``angles`` the values [rad] or [m], ``limits`` the (low, high).
+    ``source`` is the file of the geometry, or None.
     """
 
-    def __init__(
-        self, problems: Texts, joints: Texts, angles: Numbers, limits: Sequence[tuple[float, float]]
-    ) -> None:
-        self.problem = listed(problems, 4, "; ")
-        self.joints, self.angles, self.limits = tuple(joints), tuple(angles), tuple(limits)
-        stay = "Stay inside, or widen joint_limit in the geometry (limit of a joint, or in a URDF)"
-        beyond = "or, in Python, pass check_limits=False to compute beyond them."
-        super().__init__(f"{self.problem}. {stay}, {beyond}")
+    def __init__(self, faults: Texts | str, source: str | None = None) -> None:
+        self.faults, self.source = (faults,) if isinstance(faults, str) else tuple(faults), source
+        said = f"invalid geometry:{listed(self.faults, 20, LINES)}"
+        said = faults if isinstance(faults, str) else said
+        super().__init__(f"{source}: {said}" if source else said)
 
 
 class ElasticityRangeError(CdsmError, ValueError):
@@ -128,6 +100,8 @@ class ElasticityRangeError(CdsmError, ValueError):
     ``tension`` are the invalid tensions [N], none if no tension gives a strain or an elongation;
     ``indices`` those of the invalid entries of the input; ``cables`` the names, as far as known.
     """
+
+    status = "OUTSIDE_ELASTICITY"
 
     def __init__(
         self, problem: str, tension: Numbers = (), indices: Sequence[int] = (), cables: Texts = ()
@@ -150,6 +124,8 @@ class InfeasibleTension(CdsmError):
     of all bounds that helps, or inf. ``fixed`` names the cables if their fixed tensions prevent it.
     ``hint`` becomes part of the message.
     """
+
+    status = "INFEASIBLE"
 
     def __init__(
         self,
@@ -179,28 +155,14 @@ class InfeasibleTension(CdsmError):
         super().__init__(f"no tension within the bounds balances the arm: {said}")
 
 
-class SolverError(CdsmError):
-    """A quadratic-programming ``solver`` returned a result that is not the optimum."""
-
-    def __init__(self, solver: str, problem: str) -> None:
-        super().__init__(f"solver {solver!r} {problem}")
-        self.solver = solver
-
-
 class SingularStiffness(CdsmError, ArithmeticError):
-    """A stiffness or compliance matrix that does not exist at this posture.
+    """A stiffness, compliance or mass matrix that is singular at this posture.
 
-    ``direction`` is the joint motion (nv,) with the least stiffness, or the direction (3,) in base
-    axes in which the tip cannot move; of unit length.
+    ``direction`` is the joint motion (nv,) with the least stiffness or without mass,
+    or the direction (3,) in base axes in which the tip cannot move; of unit length.
     """
 
-    def __init__(self, problem: str, direction: Array) -> None:
-        super().__init__(problem)
-        self.direction = direction
-
-
-class SingularMass(CdsmError, ArithmeticError):
-    """A joint motion, the unit vector ``direction`` (nv,), that moves no mass."""
+    status = "SINGULAR"
 
     def __init__(self, problem: str, direction: Array) -> None:
         super().__init__(problem)
@@ -253,18 +215,6 @@ class UnreachableStiffness(CdsmError):
         along = f"({', '.join(f'{each:.4g}' for each in direction)})"
         said = f"no admissible tensions give {wanted} N/mm along {along}: the range is "
         super().__init__(f"{said}{least} to {most} N/mm{remedy}")
-
-
-class InfeasibleDesign(CdsmError):
-    """No design that a search tried meets all constraints of its problem.
-
-    ``design`` has the smallest sum of violations, one number for each variable (none if no arm was
-    valid); ``constraints`` names what it violates, ``held``: it is not balanced, or unstable.
-    """
-
-    def __init__(self, message: str, constraints: Texts, design: Numbers) -> None:
-        super().__init__(message)
-        self.constraints, self.design = tuple(constraints), tuple(design)
 
 
 def _distinct(values: Numbers) -> list[str]:

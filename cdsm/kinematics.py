@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from cdsm.errors import CableError, InvalidInput
+from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.rigid_body import rotation_vector
 from cdsm.support.format import aligned, beyond, place
 from cdsm.support.result import Result, quantity, unit
+from cdsm.support.status import Status
 from cdsm.support.validation import instance, number_array, scalar, vector
 from cdsm.support.values import Array, frozen
 
@@ -172,7 +173,7 @@ def solve_joint_angles(
 
     Raises:
         InvalidInput: The lengths are not (C,) positive numbers; guess and tolerance as there.
-        CableError: Two sites of a cable coincide at a posture of the search.
+        InvalidInput: Two sites of a cable coincide at a posture of the search.
     """
     cables = instance("arm", arm, Manipulator).cables
     wanted = vector("cable_lengths", cable_lengths, len(cables), "one length [m] per cable")
@@ -198,7 +199,10 @@ def _solve(
     lower, upper = arm.lower, np.maximum(arm.upper, arm.lower + 1e-12)  # a joint may be locked
     try:
         pose = arm.at(search(lower, upper))
-    except CableError:  # disks touch at a limit, so a cable has no direction there
+    except InvalidInput as error:
+        if error.status != Status.COINCIDENT_SITES.name:
+            raise
+        # disks touch at a limit, so a cable has no direction there
         margin = _TOUCHING * (upper - lower)
         pose = arm.at(search(lower + margin, upper - margin))
     return KinematicSolution(posture=pose, of=of, target=target, guess=near, tolerance=tolerance)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import CableLaws, OriginalLength
-from cdsm.errors import CableError, InvalidInput, JointLimitError
+from cdsm.errors import InvalidInput, listed
 from cdsm.geometry import LONGEST, Geometry, doubts_about_units
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.posture import Posture
@@ -31,6 +31,7 @@ from cdsm.springs import Spring, Springs, springs_of
 from cdsm.support.directions import Direction, gravity_vector
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
+from cdsm.support.status import Status
 from cdsm.support.validation import flag, instance, one_of, sequence_of, vector
 from cdsm.support.values import Array, Printed, frozen
 from cdsm.support.warning import warn
@@ -52,6 +53,11 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 LIMIT_SLACK = 1e-9
 """Angle [rad] beyond a limit that is accepted as rounding, e.g. of a conversion from degrees."""
+
+_STAY = "Stay inside, or widen joint_limit in the geometry (limit of a joint, or in a URDF)"
+
+UNCHECKED = ", or, in Python, pass check_limits=False to compute beyond them"
+"""What the error of angles beyond their limits advises besides, where that can be done."""
 
 _FARTHEST = 5.0  # longest plausible lead and distance of a site [m]; or ten arm lengths, if more
 
@@ -101,10 +107,10 @@ class Manipulator(Printed):
     Raises:
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
             not three numbers.
-        CableError: Two cables have the same name, or a cable is on an unknown link.
-        UnknownName: ``original_length`` is unknown.
+        InvalidInput: Two cables have the same name, or a cable is on an unknown link.
+        InvalidInput: ``original_length`` is unknown.
         FileError: The file of the cables cannot be read.
-        MissingWire: The file of the cables names no wire for some of them.
+        FileError: The file of the cables names no wire for some of them.
     """
 
     name: str
@@ -183,12 +189,12 @@ class Manipulator(Printed):
 
         Raises:
             FileError: The file of the URDF or of the cables cannot be read.
-            MissingWire: The file of the cables names no wire for some of them.
-            UrdfError: The URDF is not a supported robot; lists every fault.
-            UnknownName: No link is called ``tip``, or ``original_length`` is unknown.
+            FileError: The file of the cables names no wire for some of them.
+            GeometryError: The URDF is not a supported robot; lists every fault.
+            InvalidInput: No link is called ``tip``, or ``original_length`` is unknown.
             InvalidInput: ``urdf`` is neither a path nor a text, or ``joint_names`` does not name
                 each moving joint once.
-            CableError: Two cables have the same name, or a cable is on an unknown link.
+            InvalidInput: Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
         more: Any = {"joint_names": joint_names, "springs": springs}
@@ -217,8 +223,8 @@ class Manipulator(Printed):
 
         Raises:
             FileError: The file cannot be read or does not describe an arm. Every fault is listed.
-            MissingWire: The file has no wire for some cables, and ``wire`` is not given.
-            UrdfError, CableError, UnknownName, InvalidInput: As :meth:`from_urdf`.
+            FileError: The file has no wire for some cables, and ``wire`` is not given.
+            GeometryError, InvalidInput: As :meth:`from_urdf`.
         """
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
 
@@ -240,7 +246,7 @@ class Manipulator(Printed):
     def plot(self, q: ArrayLike | None = None) -> Figure:
         """Plot the arm in mm at q (nv,) [rad]; None: each angle is 0, or the limit nearest to 0.
 
-        Raises InvalidInput and JointLimitError as :meth:`at`.
+        Raises InvalidInput as :meth:`at`.
         """
         return self.at(np.clip(0.0, self.lower, self.upper) if q is None else q).plot()
 
@@ -255,8 +261,8 @@ class Manipulator(Printed):
 
         Raises:
             InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` is not a bool.
-            JointLimitError: An angle is beyond its limit, and ``check_limits`` is True.
-            CableError: Two neighbouring sites of a cable coincide at this posture.
+            InvalidInput: An angle is beyond its limit, and ``check_limits`` is True.
+            InvalidInput: Two neighbouring sites of a cable coincide at this posture.
         """
         q = self._angles(q, check_limits)
         routing = self._routing
@@ -297,7 +303,8 @@ class Manipulator(Printed):
             names, units = ([of[i] for i in at] for of in (self.joint_names, self.joint_units))
             angles, low, high = (of[at].tolist() for of in (q, self.lower, self.upper))
             texts = list(map(beyond, names, angles, low, high, units))
-            raise JointLimitError(texts, names, angles, [*zip(low, high, strict=True)])
+            said = f"{listed(texts, 4, '; ')}. {_STAY}{UNCHECKED}."
+            raise InvalidInput("q", said, Status.BEYOND_LIMITS.name)
         return q
 
     @cached_property
@@ -310,12 +317,12 @@ class Manipulator(Printed):
         return np.asarray((q < self.lower - LIMIT_SLACK) | (q > self.upper + LIMIT_SLACK))
 
     def _require_apart(self, length: Array, q: Array) -> None:
-        """Raise CableError if a segment, of the ``length`` (S,) [m], has no direction."""
+        """Raise InvalidInput if a segment, of the ``length`` (S,) [m], has no direction."""
         if length.min(initial=math.inf) < SHORTEST_SEGMENT:
             cable = self.cables[int(self._routing.cable[length.argmin()])]
             said = f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
             said += "direction there. Move a site, or change the posture."
-            raise CableError(cable.name, said)
+            raise InvalidInput(f"cable {cable.name!r}", said, Status.COINCIDENT_SITES.name)
 
     @property
     def geometry(self) -> Geometry:
@@ -468,7 +475,7 @@ class Manipulator(Printed):
 
         Raises:
             InvalidInput: A stiffness is negative, or no number.
-            UnknownName: There is no such joint.
+            InvalidInput: There is no such joint.
         """
         return self._replace(springs=springs)
 
@@ -504,7 +511,7 @@ def _checked(cables: CablesOrFile) -> Cables:
         raise InvalidInput("cables", "none given; an arm needs at least one.")
     name, count = Counter(cables.names).most_common(1)[0]
     if count > 1:
-        raise CableError(name, "the name is used twice; every cable needs its own.")
+        raise InvalidInput(f"cable {name!r}", "the name is used twice; every cable needs its own.")
     return cables
 
 

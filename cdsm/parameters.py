@@ -63,7 +63,7 @@ class ArmParameters:
         names: Names of the parameters, in any order.
 
     Raises:
-        UnknownName: There is no such parameter or cable.
+        InvalidInput: There is no such parameter or cable.
         InvalidInput: The arm has no such joint, no geometry, or other cables, leads or holes than
             its geometry; or two names change the same number.
     """
@@ -105,9 +105,9 @@ class ArmParameters:
 
         Raises:
             GeometryError: No valid arm has these values.
-            UnknownName: A parameter is not among :attr:`names`.
+            InvalidInput: A parameter is not among :attr:`names`.
             InvalidInput: A rigidity is not positive, or a value is not a number.
-            CableError: A spring is not positive.
+            InvalidInput: A spring is not positive.
         """
         geometry = self._geometry
         parts: dict[str, list[Any]] = {

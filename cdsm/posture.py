@@ -154,7 +154,7 @@ class Posture(ReadOnlyState):
         return [bone for row, bone in self._bones if row not in without], brackets
 
     def link_pose(self, link: str) -> Array:
-        """Compute the pose (4, 4) [m] of a link's frame in base axes, or raise UnknownName."""
+        """Compute the pose (4, 4) [m] of a link's frame in base axes, or raise InvalidInput."""
         poses = self.arm._body.link_placements(self.q)
         return frozen(poses[one_of("link", link, poses)])
 
@@ -237,7 +237,7 @@ class MomentArms(Result):
     values: Array = field(metadata=unit("m", "cable", "joint", name="moment_arm"))
 
     def __getitem__(self, names: tuple[str, str]) -> float:
-        """Return the moment arm of a cable about a joint; InvalidInput or UnknownName if wrong."""
+        """Return the moment arm of a cable about a joint."""
         cables, joints = self.posture.arm.cables.names, self.posture.arm.joint_names
         said = f'give a cable and a joint, such as moment_arms["{cables[0]}", "{joints[0]}"].'
         if not isinstance(names, tuple) or len(names) != 2:

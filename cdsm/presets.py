@@ -160,7 +160,7 @@ def fitted_prototype(hybrid_stiffness: float | None = None) -> Manipulator:
 
     ``hybrid_stiffness`` is that of every cable [N/m], where a spring replaces the elasticity of the
     strand (Figs. 12 and 13). None: the strand, with a drive of 10 kN/mm behind it. Raises
-    CableError if it is not a positive number.
+    InvalidInput if it is not a positive number.
     """
     strand = hybrid_stiffness is None
     return experimental_prototype(

@@ -18,7 +18,7 @@ from lxml import etree
 from numpy.typing import NDArray
 
 from cdsm.coupling import coupling_of, limits_of, mimics_of
-from cdsm.errors import InvalidInput, UrdfError, listed
+from cdsm.errors import GeometryError, InvalidInput, listed
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 
@@ -75,7 +75,7 @@ class RigidBody:
         try:
             self._model = model = pin.buildModelFromXML(_bounded(robot))
         except ValueError as error:
-            raise UrdfError(f"Pinocchio does not accept the URDF: {error}") from None
+            raise GeometryError(f"Pinocchio does not accept the URDF: {error}") from None
         model.gravity.linear = np.array(gravity)
         names = tuple(model.names)[1:]
         mimics = mimics_of(robot)
@@ -169,8 +169,8 @@ class RigidBody:
     def locate(self, link: str) -> tuple[int, Array, Array]:
         """Return the row of the joint that carries a link, and the link's frame in the joint's.
 
-        The frame is a rotation (3, 3) and a translation (3,) [m]. Raises UnknownName if the arm has
-        no such link.
+        The frame is a rotation (3, 3) and a translation (3,) [m]. InvalidInput if there is no
+        such link.
         """
         frame = self._model.frames[self._frame(link)]
         place = frame.placement
@@ -213,7 +213,7 @@ class RigidBody:
     def visualizer(self, urdf: str, server: object, node: str) -> Shapes | None:
         """Draw the visual shapes of a URDF below a node of a viser server, and return them.
 
-        Returns None if the URDF has no shapes. Raises UrdfError, and draws nothing, if a shape
+        Returns None if the URDF has no shapes. Raises GeometryError, and draws nothing, if a shape
         cannot be read.
         """
         from pinocchio.visualize import ViserVisualizer
@@ -228,7 +228,7 @@ class RigidBody:
             drawn.loadViewerModel(node)
         except Exception as error:  # mesh loaders raise many types of errors
             server.scene.remove_by_name(node)  # type: ignore[attr-defined]
-            raise UrdfError(
+            raise GeometryError(
                 f"the shapes of the URDF cannot be drawn: {str(error).strip().rstrip('.')}. Meshes "
                 "of a package:// are looked for in the folders of ROS_PACKAGE_PATH."
             ) from None

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from cdsm.cable import Cable
 from cdsm.coupling import Coupling
-from cdsm.errors import CableError, UnknownName
+from cdsm.errors import InvalidInput
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
 
@@ -78,7 +78,7 @@ class Routing:
     def of(cls, body: RigidBody, cables: Sequence[Cable], *, every: bool = False) -> Self:
         """Route cables over a body. With ``every``, segments within one body count as segments.
 
-        Raises CableError for an unknown link, or if two neighbouring sites of a link coincide.
+        Raises InvalidInput for an unknown link, or if two neighbouring sites of a link coincide.
         """
         row: list[int] = []
         point: list[Array] = []
@@ -88,8 +88,8 @@ class Routing:
             for i, site in enumerate(cable.sites):
                 try:
                     joint, rotation, translation = body.locate(site.link)
-                except UnknownName as error:
-                    raise CableError(cable.name, str(error)) from None
+                except InvalidInput as error:
+                    raise InvalidInput(f"cable {cable.name!r}", str(error)) from None
                 row.append(joint)
                 point.append(translation + rotation @ np.array(site.position))
                 if i == 0:
@@ -98,7 +98,7 @@ class Routing:
                     length = math.dist(point[-2], point[-1])
                     if length < SHORTEST_SEGMENT:
                         said = f"sites {i} and {i + 1} coincide; leave one out."
-                        raise CableError(cable.name, said)
+                        raise InvalidInput(f"cable {cable.name!r}", said)
                     if not every:
                         fixed[c] += length
                         continue

@@ -59,7 +59,7 @@ class Springs:
 def springs_of(given: object, joints: tuple[str, ...], coupling: Coupling | None) -> Springs:
     """Check springs by the name of their joint, and return those of all ``joints``.
 
-    Raises InvalidInput, or UnknownName if there is no such joint.
+    Raises InvalidInput, also if there is no such joint.
     """
     if not isinstance(given, Mapping):
         said = f"{given!r} given; give a dict of joint names and stiffnesses [N m/rad]."

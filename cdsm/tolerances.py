@@ -34,7 +34,7 @@ class Tolerance:
             error for all).
         of: Names of the inputs that have this tolerance, as a pattern: ``"cable1_*"``.
 
-    Raises InvalidInput, or UnknownName for an unknown ``distribution``.
+    Raises InvalidInput, also for an unknown ``distribution``.
     """
 
     standard: float

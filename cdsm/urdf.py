@@ -17,7 +17,7 @@ import numpy as np
 from lxml import etree
 from lxml.builder import ElementMaker
 
-from cdsm.errors import UrdfError
+from cdsm.errors import GeometryError
 from cdsm.geometry import Geometry
 from cdsm.geometry.chain import Axis, Body
 from cdsm.rigid_body import RigidBody
@@ -94,7 +94,7 @@ def write_urdf(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
     Raises:
         InvalidInput: ``geometry`` is not a Geometry.
         FileError: The file cannot be written; an existing file stays unchanged.
-        UrdfError: The two parsers disagree.
+        GeometryError: The two parsers disagree.
     """
     text = to_urdf(geometry)
     return write_file(path, lambda aside: _write_and_read_back(aside, text, geometry.length))
@@ -108,7 +108,7 @@ def _write_and_read_back(path: Path, text: str, length: float) -> None:
     theirs = yourdfpy.URDF.load(str(path), load_meshes=False)
     if set(ours.link_names) != set(theirs.link_map):
         named = f"Pinocchio reads the links {ours.link_names}, yourdfpy {list(theirs.link_map)}"
-        raise UrdfError(f"{named}; the URDF is not written.")
+        raise GeometryError(f"{named}; the URDF is not written.")
     random = np.random.default_rng(0).uniform(-1.0, 1.0, (2, ours.nv)) * ours.upper
     for q in (np.zeros(ours.nv), ours.lower, ours.upper, *random):
         theirs.update_cfg(dict(zip(ours.joint_names, q, strict=True)))
@@ -117,7 +117,7 @@ def _write_and_read_back(path: Path, text: str, length: float) -> None:
         # rounding of rotations and lengths adds up over the joints
         if not difference < 1e-13 * (1 + ours.nv) * max(1.0, length):
             doubt = f"Pinocchio and yourdfpy disagree on the pose of the tip by {difference:.3g}"
-            raise UrdfError(f"{doubt} at q = {q.tolist()}; the URDF is not written.")
+            raise GeometryError(f"{doubt} at q = {q.tolist()}; the URDF is not written.")
 
 
 def _body(geometry: Geometry, body: Body) -> etree._Element:

@@ -17,7 +17,7 @@ import numpy as np
 from lxml import etree
 from lxml.builder import E
 
-from cdsm.errors import LINES, InvalidInput, UrdfError, listed
+from cdsm.errors import LINES, GeometryError, InvalidInput, listed
 from cdsm.geometry import MAXIMUM_JOINTS
 from cdsm.rigid_body import RigidBody, accepts
 from cdsm.support.files import read_text
@@ -61,9 +61,11 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
         robot = parse_xml(text, "robot")
     except XmlFault as error:
         mjcf = " It is a MuJoCo model (MJCF): give the URDF that it was made from."
-        raise UrdfError(f"{name}: {error}.{mjcf if '<mujoco>' in str(error) else ''}") from None
+        raise GeometryError(f"{name}: {error}.{mjcf if '<mujoco>' in str(error) else ''}") from None
     if any("xacro" in (etree.QName(each).namespace or "") for each in robot.iter("*")):
-        raise UrdfError(f"{name} is a xacro file; run xacro on it first, and give what it prints.")
+        raise GeometryError(
+            f"{name} is a xacro file; run xacro on it first, and give what it prints."
+        )
     links, joints = robot.findall("link"), robot.findall("joint")
     faults = [] if robot.get("name") else ["<robot> has no name"]
     faults += _text_faults([*links, *joints])
@@ -71,7 +73,7 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
     faults = faults or _tree_faults([str(link.get("name")) for link in links], joints)
     faults = faults or [*_reading_faults(robot)]
     if faults:
-        raise UrdfError(f"{name} is no robot that cdsm takes:{listed(faults, 20, LINES)}")
+        raise GeometryError(f"{name} is no robot that cdsm takes:{listed(faults, 20, LINES)}")
     return str(etree.tostring(robot, encoding="unicode"))
 
 
@@ -198,7 +200,7 @@ def _reading_faults(robot: etree._Element) -> Iterator[str]:
     root = next(link for link in masses if link not in {_ends(joint)[1] for joint in joints})
     try:
         arm = RigidBody(etree.tostring(robot, encoding="unicode"), root, np.zeros(3))
-    except UrdfError as error:
+    except GeometryError as error:
         for joint in joints:
             alone = E.robot(*(E.link(name=end) for end in _ends(joint)), deepcopy(joint), name="r")
             if not accepts(etree.tostring(alone, encoding="unicode")):

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 import cdsm
+from cdsm.statics.equilibrium import Equilibrium
 
 NODES = 1e-3 * np.array(
     [
@@ -93,7 +94,7 @@ def simplex() -> cdsm.Manipulator:
     return cdsm.Manipulator.from_urdf(urdf, [*cables, *struts], tip="head3", check_inertia=False)
 
 
-def at_rest() -> cdsm.Equilibrium:
+def at_rest() -> Equilibrium:
     """Lengthen the struts, all cables just straight, and let the simplex come to rest."""
     pose = simplex().at(np.zeros(12))
     lengths = pose.cable_lengths[9:]
@@ -101,7 +102,7 @@ def at_rest() -> cdsm.Equilibrium:
     return cdsm.equilibrium(pose, np.concatenate([np.zeros(9), pushing]))
 
 
-def active_share(rest: cdsm.Equilibrium) -> float:
+def active_share(rest: Equilibrium) -> float:
     """Compute the part of the stiffness of the lowest mode that is active (geometric)."""
     K, shape = rest.stiffness, cdsm.modes(rest.pose, rest.stiffness).shapes[:, 0]
     active = shape @ (K.active + K.gravity) @ shape

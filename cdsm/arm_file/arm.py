@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 from cdsm.arm_file.cables import routed, settings, wire_tables
 from cdsm.arm_file.model import read_model
 from cdsm.cable import Cable
-from cdsm.errors import FileError, UrdfError
+from cdsm.errors import FileError, GeometryError
 from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
@@ -77,6 +77,6 @@ def _urdf_table(arm: Manipulator) -> dict[str, Any]:
     table = {"tip": arm.tip_link, "joint_names": arm.joint_names, "text": text}
     try:
         read_urdf(arm.urdf)
-    except UrdfError:  # the arm was built without this check
+    except GeometryError:  # the arm was built without this check
         table["check_inertia"] = False
     return table

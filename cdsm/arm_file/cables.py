@@ -53,7 +53,7 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
 
     Raises:
         FileError: The file cannot be read or does not describe cables. Every fault is listed.
-        MissingWire: The file names no wire for some cables, and ``wire`` is not given.
+        FileError: The file names no wire for some cables, and ``wire`` is not given.
     """
     return tuple(read_model(path, wire, robot=False)[1])
 

@@ -17,7 +17,7 @@ from pydantic import ValidationInfo as Info
 from cdsm.arm_file.tables import read_tables
 from cdsm.cable import Cable, Cables, Control, Site
 from cdsm.cable_laws import OriginalLength
-from cdsm.errors import LINES, CdsmError, FileError, GeometryError, MissingWire, listed
+from cdsm.errors import LINES, CdsmError, FileError, GeometryError, listed
 from cdsm.geometry import Geometry, toml
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import GRAVITY
@@ -240,7 +240,7 @@ def read_model(
 ) -> tuple[ArmFile, Cables]:
     """Read a file of cables, or of an arm (``robot``); all cables get the ``wire`` if it is given.
 
-    Raises FileError, which lists every fault, or MissingWire.
+    Raises FileError, which lists every fault or the cables without a wire.
     """
     forced, faults = None if wire is None else as_wire(wire), ""
     try:
@@ -258,5 +258,8 @@ def read_model(
         return file, Cables(replace(cable, elasticity=forced) for cable in cables)
     without = [cable.name for cable in cables if cable.elasticity is _NO_WIRE]
     if without:
-        raise MissingWire(path, without if len(without) < len(cables) else ())
+        whose = f"the cables {listed(without)}" if len(without) < len(cables) else "its cables"
+        remedy = 'write at its top: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
+        said = f"has no wire for {whose}. Give wire= (commands: --set wire=48e3), or {remedy}"
+        raise FileError(path, said)
     return file, cables

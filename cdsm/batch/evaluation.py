@@ -14,7 +14,7 @@ from cdsm.batch.distribution import Tensions
 from cdsm.batch.inputs import checked_threads, given_tension, given_wrench, postures
 from cdsm.batch.quantities import DIMENSIONS, OF_POSTURE, Codes, OfPostures
 from cdsm.batch.solution import Rows
-from cdsm.errors import InvalidInput, UnknownName
+from cdsm.errors import InvalidInput, unknown
 from cdsm.manipulator import ANOTHER_ARM, Manipulator
 from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.format import coordinates
@@ -71,10 +71,10 @@ class Batch(OfPostures, Named):
         """Return a quantity by name, (B, …), in the unit that it has for one posture.
 
         Raises:
-            UnknownName: The quantity was not requested in ``outputs``.
+            InvalidInput: The quantity was not requested in ``outputs``.
         """
         if name not in self.outputs:
-            raise UnknownName("output", name, self.outputs, "Name it in outputs=.")
+            raise unknown("output", name, self.outputs, "Name it in outputs=.")
         return self.values[self.outputs.index(name)]
 
     def keys(self) -> tuple[str, ...]:
@@ -139,7 +139,7 @@ def evaluate(
     Raises:
         InvalidInput: An argument has the wrong shape or is not a number; a tension is negative; or
             two arguments contradict each other or one is missing.
-        UnknownName: An output does not exist.
+        InvalidInput: An output does not exist.
     """
     instance("arm", arm, Manipulator)
     names = _checked_outputs(outputs)

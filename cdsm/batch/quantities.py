@@ -100,7 +100,7 @@ class OfPostures(Result):
         return frozen(self.status == Status.OK)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return all quantities as a labelled Dataset in SI; needs xarray (MissingExtra)."""
+        """Return all quantities as a labelled Dataset in SI; needs xarray (CdsmError)."""
         found = super().to_xarray()
         found["status"].attrs = {
             "flag_values": np.array([int(each) for each in Status], dtype=np.uint8),
@@ -109,7 +109,7 @@ class OfPostures(Result):
         return found
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with a row for each posture; needs pandas (MissingExtra)."""
+        """Return a table with a row for each posture; needs pandas (CdsmError)."""
         table = super().to_pandas()
         table["status"] = [Status(each).name.lower() for each in self.status]
         return table

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.errors import InfeasibleTension, SolverError
+from cdsm.errors import CdsmError
 from cdsm.manipulator import Manipulator
 from cdsm.support.status import Status
 from cdsm.support.values import Array
@@ -27,7 +27,7 @@ def search(
         return low, Status.INFEASIBLE
     try:
         x = solve(problem, DEFAULT_SOLVER)
-    except SolverError:
+    except CdsmError:  # the solver broke down
         return low, Status.SOLVER_FAILED
     if isinstance(x, str):
         return low, Status.SOLVER_FAILED
@@ -40,8 +40,10 @@ def explained(
     """Solve one row as :func:`~cdsm.distribute_tension` does, with its linear programs."""
     try:
         F = distribute_tension(arm.at(q, check_limits=False), low, high, wrench).values
-    except (InfeasibleTension, SolverError) as error:
-        return low, Status.of(error) or Status.SOLVER_FAILED
+    except CdsmError as error:
+        if not error.status:
+            raise
+        return low, Status[error.status]
     return F, Status.OK
 
 

@@ -12,6 +12,10 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
+from cdsm.statics.buckling import CriticalLoad, CriticalTension
+from cdsm.statics.load_cycle import LoadHistory
+from cdsm.statics.weight_test import WeightTest
+from cdsm.tolerancing.budget import Uncertainty
 
 if TYPE_CHECKING:
     from cdsm.support.values import Array
@@ -94,7 +98,7 @@ def _uncertainty(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tup
     """
     from cdsm.support.format import aligned
 
-    pose, found = tension.posture, dict[str, cdsm.Uncertainty]()
+    pose, found = tension.posture, dict[str, Uncertainty]()
     for name, u in axes.items() if pose.arm.tolerances.given else ():
         with contextlib.suppress(cdsm.SingularStiffness):
             found[name] = cdsm.uncertainty(pose, tension, pose.arm.tolerances, direction=u)
@@ -147,7 +151,7 @@ def weigh(
     weight = _weight(pose.arm, load, mass)
     tension = cdsm.distribute_tension(pose, minimum, maximum)
     head, numbers = header(pose, [minimum], "included")
-    result: cdsm.WeightTest | cdsm.LoadHistory
+    result: WeightTest | LoadHistory
     if cycles is not None:
         result, more, note = _cycles(tension, weight, cycles, steps or 12)
         write(out, result.write)
@@ -176,7 +180,7 @@ def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Arra
 
 def _cycles(
     tension: cdsm.Tension, weight: Array, cycles: int, steps: int
-) -> tuple[cdsm.LoadHistory, Json, str]:
+) -> tuple[LoadHistory, Json, str]:
     """Load and unload the tip; return the history, and what the last cycle loses."""
     import numpy as np
 
@@ -218,7 +222,7 @@ def buckle(
         raise misuse("--minimum, --maximum", "bound the tensions under --load or --mass: give one.")
     pose = options.posture(arm, changes, angles)
     tension = cdsm.critical_tension(pose)
-    found: dict[str, cdsm.CriticalTension | cdsm.CriticalLoad] = {"critical_tension": tension}
+    found: dict[str, CriticalTension | CriticalLoad] = {"critical_tension": tension}
     if loaded:
         wrench = _weight(pose.arm, load, mass)
         found["critical_load"] = cdsm.critical_load(pose, wrench, minimum, maximum)

@@ -16,7 +16,7 @@ import numpy as np
 from cdsm.control.laws import Command
 from cdsm.control.plants import require_unstrained, tensions_of
 from cdsm.control.sensors import Measurement
-from cdsm.errors import InvalidInput, SolverError
+from cdsm.errors import InvalidInput, solver_failed
 from cdsm.interchange.mjcf import to_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -49,7 +49,7 @@ class MuJoCoPlant:
         damping_ratio: Damping ratio of the least damped mode [-]; see :func:`~cdsm.to_mjcf`.
 
     Raises:
-        MissingExtra: mujoco is not installed.
+        CdsmError: mujoco is not installed.
         InvalidInput: The arm has friction, ``original_length`` is not ``"unstrained"``, or a number
             is not positive.
     """
@@ -81,7 +81,7 @@ class MuJoCoPlant:
         """Return the state one period after ``state``, under a command and a wrench (6,).
 
         Raises:
-            SolverError: The simulation diverges.
+            CdsmError: The simulation diverges.
             ElasticityRangeError: A tension leaves the domain of its law.
         """
         import mujoco
@@ -103,7 +103,7 @@ class MuJoCoPlant:
             mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], tip, body, data.qfrc_applied)
             mujoco.mj_step(model, data, steps)
         if not np.isfinite(data.qpos).all() or data.warning.number.any():
-            raise SolverError("mujoco", "diverges: the arm moves beyond all bounds")
+            raise solver_failed("mujoco", "diverges: the arm moves beyond all bounds")
         pose = self.arm.at(data.qpos[address].copy(), check_limits=False)
         F = tensions_of(self.arm, pose.cable_lengths, command.paid_out, command.tension)
         true_values = Measurement(command.paid_out, frozen(F))

@@ -202,7 +202,7 @@ class TrackingRun(Result):
         return f"at {len(steps)} of {len(self.time)} steps, from {self.period * steps[0]:.4g} s"
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table over time, which ``cdsm view`` plays; needs pandas (MissingExtra)."""
+        """Return a table over time, which ``cdsm view`` plays; needs pandas (CdsmError)."""
         return super().to_pandas().rename(columns=lambda name: name.removeprefix("angles "))
 
     def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:

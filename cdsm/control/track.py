@@ -92,7 +92,7 @@ def track(
     Raises:
         InvalidInput: The plan is not complete; or another argument is invalid; or a law returns no
             :class:`Command` within the bounds.
-        UnknownName: There is no such law.
+        InvalidInput: There is no such law.
     """
     arm = instance("plan", plan, PathPlan).arm
     if not plan.complete:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.design.goals import KINDS
 from cdsm.design.problem import MISSED, DesignProblem
 from cdsm.design.quantities import Found, measure
-from cdsm.errors import UnknownName
+from cdsm.errors import unknown
 from cdsm.support.progress import progress_bar
 from cdsm.support.tables import csv_text
 from cdsm.support.validation import instance, number_array, whole_number
@@ -46,10 +46,10 @@ class Designs(ReadOnlyState, Named):
         """Return a quantity (D,) by its key, such as ``mass`` or ``stiffness (0, 0, 1)``.
 
         Raises:
-            UnknownName: The quantity is not in ``problem.measures``.
+            InvalidInput: The quantity is not in ``problem.measures``.
         """
         if key not in self.keys():
-            raise UnknownName("quantity of the problem", key, self.keys())
+            raise unknown("quantity of the problem", key, self.keys())
         return np.asarray(self.values[:, self.keys().index(key)])
 
     def keys(self) -> tuple[str, ...]:

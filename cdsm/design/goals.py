@@ -121,7 +121,7 @@ class Objective(Measure):
             stiffness, the least mass.
 
     Raises:
-        UnknownName: ``of`` or ``goal`` is unknown.
+        InvalidInput: ``of`` or ``goal`` is unknown.
         InvalidInput: ``direction`` is missing, or is given for a quantity without a direction.
     """
 
@@ -150,7 +150,7 @@ class Constraint(Measure):
         at_most: Largest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
 
     Raises:
-        UnknownName: ``of`` is unknown.
+        InvalidInput: ``of`` is unknown.
         InvalidInput: No limit is given, or two; or ``direction`` is missing, or is given for a
             quantity without a direction.
     """

@@ -65,7 +65,7 @@ class DesignProblem(ReadOnlyState):
     Raises:
         InvalidInput: An argument is invalid; two variables change the same thing; the arm was made
             from a URDF, or its leads or holes are not those of its geometry.
-        UnknownName: The arm does not have a cable that is named.
+        InvalidInput: The arm does not have a cable that is named.
     """
 
     arm: Manipulator
@@ -240,7 +240,7 @@ class DesignProblem(ReadOnlyState):
 
 
 def _require_compatible(variables: Sequence[Variable], arm: Manipulator) -> None:
-    """Raise InvalidInput or UnknownName unless the arm has what the variables change, each once."""
+    """Raise InvalidInput unless the arm has what the variables change, each once."""
     for each in variables:
         each.require(arm)
     ArmParameters(arm, tuple(each.of for each in variables if each.kind in PARAMETERS))

@@ -103,7 +103,7 @@ class DesignSearch(ReadOnlyState):
         Raises:
             InvalidInput: The front has no such number.
             FileError: A file cannot be written.
-            UrdfError: Two parsers disagree on the URDF.
+            GeometryError: Two parsers disagree on the URDF.
         """
         row = self.design(number)
         arm, into = self.problem.arm_of(row), make_folder(folder)
@@ -121,7 +121,7 @@ class DesignSearch(ReadOnlyState):
         return self.evaluated.some(self.front)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table of the front in SI, a row per design; needs pandas (MissingExtra)."""
+        """Return a table of the front in SI, a row per design; needs pandas (CdsmError)."""
         names = [str(i) for i in range(len(self.front))]
         return data_frame(self.best.columns(), "design", names)
 

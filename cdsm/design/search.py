@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -14,13 +14,27 @@ from cdsm.design.problem import DesignProblem
 from cdsm.design.quantities import Found, quiet_arm
 from cdsm.design.result import DesignSearch
 from cdsm.design.variables import WHOLE
-from cdsm.errors import CdsmError, InfeasibleDesign, JointLimitError
+from cdsm.errors import CdsmError
+from cdsm.manipulator import UNCHECKED
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.extras import need
 from cdsm.support.format import plural
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
+
+
+class InfeasibleDesign(CdsmError):
+    """No design that a search tried meets all constraints of its problem.
+
+    ``design`` has the smallest sum of violations, one number for each variable (none if no arm was
+    valid); ``constraints`` names what it violates, ``held``: it is not balanced, or unstable.
+    """
+
+    def __init__(self, message: str, constraints: Sequence[str], design: Sequence[float]) -> None:
+        super().__init__(message)
+        self.constraints, self.design = tuple(constraints), tuple(design)
+
 
 _FAR = 1e3
 """Number that stands for a violation or an objective that does not exist."""
@@ -53,7 +67,7 @@ def search_designs(
         InfeasibleDesign: No design met all constraints; the error names the nearest one, and which
             constraint it misses by how much.
         InvalidInput: An argument is invalid.
-        MissingExtra: pymoo is not installed.
+        CdsmError: pymoo is not installed.
     """
     instance("problem", problem, DesignProblem)
     steps = whole_number("generations", generations, 1)
@@ -200,6 +214,5 @@ def _first_reason(problem: DesignProblem, row: Array) -> str:
                 if margin <= 0.0:
                     return f"posture {number}: UNSTABLE, least eigenvalue of K {margin:.3g} N m/rad"
     except CdsmError as error:
-        why = error.problem if isinstance(error, JointLimitError) else error
-        return f"posture {number}: {why}"
+        return f"posture {number}: {str(error).replace(UNCHECKED, '')}"
     return "its tensions are at the edge"

@@ -49,7 +49,7 @@ class Variable:
         choices: Values to choose from, instead of a range; always needed for a wire.
 
     Raises:
-        UnknownName: There is no such variable.
+        InvalidInput: There is no such variable.
         InvalidInput: The range is empty or not of numbers; or joint or cable are missing, or given
             for a variable that has one value for the arm.
     """
@@ -143,7 +143,7 @@ class Variable:
         return f"{value / size:.4g} {unit}".rstrip()
 
     def require(self, arm: Manipulator) -> None:
-        """Raise InvalidInput or UnknownName if an arm lacks the joint or the cable of this."""
+        """Raise InvalidInput if an arm lacks the joint or the cable of this."""
         if self.kind == "end":
             one_of("cable", self.at, arm.geometry.cable_names)
             if not self.choices:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.cable import Cable, Site
-from cdsm.errors import CableError, FileError, InvalidInput, UnknownName
+from cdsm.errors import FileError, InvalidInput, unknown
 from cdsm.manipulator import GRAVITY, Manipulator
 from cdsm.support.directions import AXES
 from cdsm.support.files import as_path, read_text
@@ -93,9 +93,9 @@ def read_caspr(
         InvalidInput: ``elasticity`` is not an Elasticity, or ``cables`` is missing.
         FileError: A file cannot be read, is not a CASPR model, or has parts that cannot be mapped:
             other joints, cables that are not ideal, pulleys. The first such part is named.
-        UrdfError: A link has impossible moments of inertia.
-        UnknownName: The set of cables does not exist.
-        CableError: A cable cannot be routed.
+        GeometryError: A link has impossible moments of inertia.
+        InvalidInput: The set of cables does not exist.
+        InvalidInput: A cable cannot be routed.
     """
     if not isinstance(elasticity, Elasticity):
         raise InvalidInput("elasticity", f"{elasticity!r} given; an Elasticity is needed.")
@@ -136,7 +136,7 @@ def _reading(path: Path) -> Iterator[Callable[[str, str], etree._Element]]:
     text = read_text(path)
     try:
         yield lambda tag, dtd: parse_xml(text, tag, rf"(\.\./)*templates/{dtd}\.dtd")
-    except (XmlFault, CableError) as error:
+    except (XmlFault, InvalidInput) as error:
         raise FileError(path, f"cannot be read as a CASPR model: {error}.") from None
 
 
@@ -233,7 +233,7 @@ def _read_cables(
     sets = {str(each.get("id")): each for each in root.findall("cable_set")}
     name = root.get("default_cable_set") if wanted is None else wanted
     if not isinstance(name, str) or name not in sets:
-        raise UnknownName("set of cables", name, tuple(sets))
+        raise unknown("set of cables", name, tuple(sets))
     if not len(sets[name]):
         others = ", ".join(repr(each) for each in sets if len(sets[each])) or "none"
         raise XmlFault(f"the set {name!r} holds no cables; sets with cables are {others}")

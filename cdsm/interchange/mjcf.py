@@ -115,9 +115,9 @@ def to_mjcf(
     Raises:
         InvalidInput: Only one of ``pose`` and ``tension`` is given, the posture is of another arm,
             both dampings are given, or an argument is invalid.
-        UnknownName: ``actuators`` is unknown.
+        InvalidInput: ``actuators`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
-        SingularMass: A motion of the arm moves no link with mass.
+        SingularStiffness: A motion of the arm moves no link with mass.
     """
     model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
     if model.unstable is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.errors import SolverError
+from cdsm.errors import solver_failed
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.principal import principal_stiffness
@@ -19,7 +19,7 @@ def tension_factor(pose: Posture) -> float:
 
     It is 1 if equal tensions cause no joint torque, and 0 without wrench closure
     (:func:`has_wrench_closure`). Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57
-    (2009), use the ratio of one solution, so their factor may be smaller. Raises SolverError if the
+    (2009), use the ratio of one solution, so their factor may be smaller. Raises CdsmError if the
     linear program fails.
     """
     J = instance("pose", pose, Posture).length_jacobian
@@ -35,7 +35,7 @@ def tension_factor(pose: Posture) -> float:
         bounds=(0.0, 1.0),
     )
     if found.status != OPTIMAL:
-        raise SolverError("highs", f"finds no tension factor: {found.message}")
+        raise solver_failed("highs", f"finds no tension factor: {found.message}")
     ratio = float(found.x[-1])
     return ratio if ratio > _CLOSED else 0.0
 
@@ -44,7 +44,7 @@ def has_wrench_closure(pose: Posture) -> bool:
     """Return whether unlimited tensions F ≥ 0 can balance every joint torque.
 
     They can if J_Lᵀ has full rank and some F > 0 has J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE
-    T-RO 22, 2006). For limited tensions, see :func:`force_polytope`. Raises SolverError if the
+    T-RO 22, 2006). For limited tensions, see :func:`force_polytope`. Raises CdsmError if the
     linear program fails.
     """
     return tension_factor(pose) > 0.0

@@ -109,7 +109,7 @@ def payload(
         InfeasibleTension: No tensions balance the arm without the force.
         ElasticityRangeError: A tension without the force is outside the domain of its law.
         SingularStiffness: K_θ without the force is singular.
-        SolverError: A linear program fails.
+        CdsmError: A linear program fails.
     """
     instance("pose", pose, Posture)
     allowed = checked("deflection", deflection, "length", infinite=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import cdsm
-from cdsm.errors import InvalidInput, SolverError
+from cdsm.errors import CdsmError, InvalidInput, solver_failed
 from cdsm.posture import Posture
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
@@ -142,7 +142,7 @@ def force_polytope(
             polytope is unbounded.
         InfeasibleTension: No tensions within the bounds balance any force at the tip, not even
             zero; the error gives the smallest violation.
-        SolverError: A linear program fails.
+        CdsmError: A linear program fails.
     """
     instance("pose", pose, Posture)
     low, high = bounds_at(pose, minimum, maximum, worst_friction)
@@ -153,7 +153,10 @@ def force_polytope(
     found = polytope_of(pose, W, low, high)
     if found is None:
         distribute_tension(pose, minimum, maximum, W, worst_friction=worst_friction)
-        raise SolverError("highs", "finds no force, though tensions balance none. Change a bound.")
+        raise CdsmError(
+            "solver 'highs' finds no force, though tensions balance none. Change a bound.",
+            "SOLVER_FAILED",
+        )
     return found
 
 
@@ -182,7 +185,7 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
                 tried.add(seen)
                 found = farthest(normal)
                 if found is None or math.isinf(found[0]):
-                    raise SolverError("highs", "finds no end of the balanced forces.")
+                    raise solver_failed("highs", "finds no end of the balanced forces.")
                 new += [found[1]] if found[0] > known + least else []
         if not new:
             break
@@ -233,7 +236,7 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
     """Return the function that maximises over the forces along U that a posture balances.
 
     ``low`` and ``high`` (C,) [N] are the bounds of the tensions, ``wrench`` is W (6,). The function
-    raises SolverError if its linear program fails.
+    raises CdsmError if its linear program fails.
     """
     A = np.column_stack([pose.length_jacobian.T, -pose.jacobian[:3].T @ U])
     lever = abs(A).max(axis=1)

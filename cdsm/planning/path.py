@@ -9,10 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm import errors
-from cdsm.errors import CdsmError, InvalidInput
+from cdsm.errors import CdsmError, InvalidInput, UnreachableStiffness
 from cdsm.kinematics import inverse_kinematics
-from cdsm.manipulator import Manipulator
+from cdsm.manipulator import UNCHECKED, Manipulator
 from cdsm.planning.goal import Goal
 from cdsm.planning.path_plan import InfeasibleSample, PathPlan, Status
 from cdsm.planning.plan import achieved, checked_targets, per_sample
@@ -25,16 +24,13 @@ from cdsm.support.validation import NO_WRENCH, bound, instance, number_array
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
-_NO_REMEDY: Final = ", or, in Python, pass check_limits=False to compute beyond them"
-
-_STATUS: Final[dict[type[CdsmError], Status]] = {
-    errors.JointLimitError: "posture",
-    errors.CableError: "posture",
-    errors.InfeasibleTension: "balance",
-    errors.SolverError: "balance",
-    errors.ElasticityRangeError: "elasticity",
-    errors.SingularStiffness: "singular",
-    errors.UnreachableStiffness: "stiffness",
+_STATUS: Final[dict[str, Status]] = {
+    "BEYOND_LIMITS": "posture",
+    "COINCIDENT_SITES": "posture",
+    "INFEASIBLE": "balance",
+    "SOLVER_FAILED": "balance",
+    "OUTSIDE_ELASTICITY": "elasticity",
+    "SINGULAR": "singular",
 }
 
 
@@ -106,9 +102,12 @@ def plan_path(
             found[i] = stiffness(space.pose, F, loads[i])
         except _Infeasible as fault:
             infeasible.append(InfeasibleSample(i, *fault.args))
-        except tuple(_STATUS) as error:
-            status = next(word for kind, word in _STATUS.items() if isinstance(error, kind))
-            reason = str(error).replace(_NO_REMEDY, "")
+        except CdsmError as error:
+            unreachable = isinstance(error, UnreachableStiffness)
+            status = "stiffness" if unreachable else _STATUS.get(error.status)
+            if status is None:
+                raise
+            reason = str(error).replace(UNCHECKED, "")
             infeasible.append(InfeasibleSample(i, status, reason, error))
     values = np.array([achieved(K, directions) for K in found.values()])
     return PathPlan(

@@ -129,7 +129,7 @@ class PathPlan(Result):
         return plain(names) | super().to_dict() | {"infeasible": told}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with a row and the status of each sample; needs pandas (MissingExtra)."""
+        """Return a table with a row and the status of each sample; needs pandas (CdsmError)."""
         failed = {each.index: each for each in self.infeasible}
         table = super().to_pandas().reindex(range(len(self.target))).rename_axis("sample")
         # joints have their own names, as in the files that are read as a path

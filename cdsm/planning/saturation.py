@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.errors import ElasticityRangeError, InfeasibleTension, InvalidInput, SolverError
+from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput
 from cdsm.planning.tension_space import FAR, unstable
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
@@ -147,7 +147,9 @@ def saturation(
             elif stable:
                 limit = "buckling"
                 break
-        except (ElasticityRangeError, InfeasibleTension, SolverError) as error:
+        except CdsmError as error:
+            if not error.status:
+                raise
             limit = "elasticity" if isinstance(error, ElasticityRangeError) else "balance"
             break
     if not stable:

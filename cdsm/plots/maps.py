@@ -99,7 +99,7 @@ def plot_map(
         InvalidInput: ``dataset`` is not a sweep or has too many panels or no such quantity,
             ``quantity`` has more than one number per entry, ``section`` is invalid or contains no
             tip, the statistic is unknown, or ``bins`` is not a whole number from 2 to 500.
-        MissingExtra: xarray is not installed.
+        CdsmError: xarray is not installed.
     """
     check_sweep(dataset)
     remedy = "tip_position and the quantity must be among outputs= of the sweep."

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm.batch.evaluation import evaluate
-from cdsm.errors import ElasticityRangeError, InfeasibleTension, InvalidInput, SolverError
+from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.result import Result, quantity, unit
@@ -285,10 +285,10 @@ def _failure(at: Callable[[float], Stiffness], place: float) -> Limit:
     """Return why the arm fails at a lower bound [N] or load factor."""
     try:
         return "none" if at(float(place)).is_stable else "buckling"
-    except (InfeasibleTension, SolverError, InvalidInput):  # on the very edge, or below 1e-9 N
-        return "infeasible"
     except ElasticityRangeError:
         return "elasticity"
+    except CdsmError:  # no tensions; on the very edge; or below 1e-9 N
+        return "infeasible"
 
 
 def _bisect(true: Callable[[float], bool], a: float, b: float) -> tuple[float, float]:

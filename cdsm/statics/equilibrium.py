@@ -217,7 +217,7 @@ def equilibrium(
 
     Raises:
         InvalidInput: As for :func:`~cdsm.stiffness`.
-        JointLimitError: The posture is beyond a joint limit.
+        InvalidInput: The posture is beyond a joint limit.
         ElasticityRangeError: A tension at the reference or at the equilibrium is outside the domain
             of its law. A law does not say how a cable becomes slack or yields.
         EquilibriumError: No equilibrium was found. If two sites of a cable meet (disks overlap),

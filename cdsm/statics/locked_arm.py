@@ -57,7 +57,7 @@ class LockedArm:
                 raise laws.naming(error, of) from None
 
     def at(self, q: Array) -> ArmState:
-        """Compute the state at joint angles ``q`` (nv,) [rad]; CableError if two sites coincide."""
+        """Compute the state at angles ``q`` (nv,) [rad]; InvalidInput if two sites coincide."""
         return self.at_pose(self.reference.arm.at(q, check_limits=False))
 
     def at_pose(self, pose: Posture) -> ArmState:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 import cdsm
-from cdsm.errors import InvalidInput, SingularMass
+from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import aligned
@@ -99,8 +99,8 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 
     Raises:
         InvalidInput: ``stiffness`` belongs to another posture or arm.
-        SingularMass: A joint moves no mass, or hardly more than the placeholder in the cross of its
-            universal joint.
+        SingularStiffness: A joint moves no mass, or hardly more than the placeholder in the
+            cross of its universal joint.
     """
     arm = instance("pose", pose, Posture).arm
     if not instance("stiffness", stiffness, Stiffness).posture._equals(pose):
@@ -111,7 +111,7 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
         crossed = any(len(joint.axes) == 2 for joint in arm.geometry.joints)
         light = crossed and M[least, least] < _LIGHT * CROSS_INERTIA
         if light or arm.geometry.links[-1].mass == 0.0:
-            raise SingularMass(
+            raise SingularStiffness(
                 f"{arm.joint_names[least]} moves links of no mass, or of hardly any: its frequency "
                 "would be that of placeholders. Give the links their link_mass.",
                 frozen(np.eye(arm.nv)[least]),
@@ -132,8 +132,8 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
 def vibrations(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
     """Solve K_θ φ = ω² M φ: return ω² (nv,) [1/s²], ascending, and the shapes φ (nv, nv).
 
-    The shapes are columns with φᵀMφ = 1. M is (nv, nv). Raises SingularMass if it is not positive
-    definite.
+    The shapes are columns with φᵀMφ = 1. M is (nv, nv). Raises SingularStiffness if it is not
+    positive definite.
     """
     from scipy.linalg import eigh  # slow to import
 
@@ -147,5 +147,5 @@ def vibrations(stiffness: Stiffness, M: Array) -> tuple[Array, Array]:
         joint = stiffness.posture.arm.joint_names[int(abs(motion).argmax())]
         said = f"a motion of {joint} moves no link of any mass. "
         said += "Give the links a mass and moments of inertia."
-        raise SingularMass(said, frozen(motion)) from None
+        raise SingularStiffness(said, frozen(motion)) from None
     return squares, scale[:, None] * shapes

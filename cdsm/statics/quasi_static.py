@@ -63,7 +63,7 @@ class Step(NamedTuple):
 class QuasiStaticArm:
     """Arm with friction whose motors are locked at ``reference``, with tensions F (C,) [N].
 
-    Raises JointLimitError if the posture is beyond a joint limit, and ElasticityRangeError if a
+    Raises InvalidInput if the posture is beyond a joint limit, and ElasticityRangeError if a
     series spring leaves no wire.
     """
 

@@ -78,7 +78,7 @@ class Shares(Result, Named):
         return self.stiffness.posture
 
     def __getitem__(self, cable: str) -> float:
-        """Return passive + active contribution of a cable [N/m], or raise UnknownName."""
+        """Return passive + active contribution of a cable [N/m], or raise InvalidInput."""
         return float(self.cables[self.keys().index(one_of("cable", cable, self.keys()))])
 
     def keys(self) -> tuple[str, ...]:

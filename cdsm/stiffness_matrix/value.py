@@ -171,7 +171,7 @@ class Stiffness(Result):
 
         The paper's figures use it, but J⁺ allows only the joint motion of least norm: the result is
         4 % to over 100 % larger than :attr:`cartesian`. ``term`` is a part of K_θ, or ``"joint"``.
-        UnknownName if it is neither, SingularStiffness if the tip hardly moves in some direction.
+        InvalidInput if it is neither, SingularStiffness if the tip hardly moves in some direction.
         """
         matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
         A, V = self._decompose(np.eye(3))

@@ -87,7 +87,7 @@ class Result(ReadOnlyState):
         return plain(found)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return all numbers as a labelled Dataset in SI; needs xarray (MissingExtra)."""
+        """Return all numbers as a labelled Dataset in SI; needs xarray (CdsmError)."""
         variables, words = {}, {}
         for name, value, of, dims in self._quantities():
             array = _array(value)
@@ -98,7 +98,7 @@ class Result(ReadOnlyState):
         return dataset(variables, self._labels(), **words)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with a unit in the name of each column; needs pandas (MissingExtra)."""
+        """Return a table with a unit in the name of each column; needs pandas (CdsmError)."""
         labels: dict[str, Any] = self._labels()
         columns: dict[str, Any] = {}
         for name, value, of, dims in self._quantities():
@@ -121,7 +121,7 @@ class Result(ReadOnlyState):
 
         Raises:
             InvalidInput: The path ends neither in ``.csv`` nor in ``.nc``.
-            MissingExtra: pandas, xarray or netCDF4 is not installed.
+            CdsmError: pandas, xarray or netCDF4 is not installed.
             FileError: The file cannot be written.
         """
         return write_labelled(path, self.to_pandas, self.to_xarray)

@@ -7,15 +7,6 @@ from enum import IntEnum, unique
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import (
-    CableError,
-    CdsmError,
-    ElasticityRangeError,
-    InfeasibleTension,
-    JointLimitError,
-    SingularStiffness,
-    SolverError,
-)
 from cdsm.support.format import plural
 
 
@@ -24,21 +15,22 @@ class Status(IntEnum):
     """Status of one posture of a batch or sweep. It says which quantities exist; others are NaN.
 
     The status names the first failure. A computation of a single posture raises the error in
-    brackets instead. A negative margin (unstable arm) and an infinite stiffness ``along`` (immobile
-    direction) are not failures; a sweep tells the first apart as UNSTABLE.
+    brackets instead, whose ``status`` is the name. A negative margin (unstable arm) and an infinite
+    stiffness ``along`` (immobile direction) are not failures; a sweep tells the first apart as
+    UNSTABLE.
     """
 
     OK = 0
     """All requested quantities exist."""
     BEYOND_LIMITS = 1
-    """A joint angle is beyond its limit (JointLimitError): no quantity exists."""
+    """A joint angle is beyond its limit (InvalidInput): no quantity exists."""
     COINCIDENT_SITES = 2
-    """Two neighbouring sites of a cable coincide (CableError): no quantity exists."""
+    """Two neighbouring sites of a cable coincide (InvalidInput): no quantity exists."""
     INFEASIBLE = 3
     """No tensions within the bounds balance the arm (InfeasibleTension): only quantities of the
     joint angles alone exist."""
     SOLVER_FAILED = 4
-    """The solver finds no tensions, though some exist (SolverError): only quantities of the joint
+    """The solver finds no tensions, though some exist (CdsmError): only quantities of the joint
     angles alone exist."""
     OUTSIDE_ELASTICITY = 5
     """A tension is outside the domain of its law (ElasticityRangeError): tensions, residual, active
@@ -54,21 +46,6 @@ class Status(IntEnum):
     the tip is also IMMOBILE, cartesian and pseudoinverse do not exist."""
     PENDING = 9
     """Only in stores of sweeps: not computed yet, no quantity exists."""
-
-    @classmethod
-    def of(cls, error: CdsmError) -> Status | None:
-        """Return the status that stands for ``error``; None if no status does."""
-        return next((status for kind, status in _ERRORS.items() if isinstance(error, kind)), None)
-
-
-_ERRORS: dict[type[CdsmError], Status] = {
-    JointLimitError: Status.BEYOND_LIMITS,
-    CableError: Status.COINCIDENT_SITES,
-    InfeasibleTension: Status.INFEASIBLE,
-    SolverError: Status.SOLVER_FAILED,
-    ElasticityRangeError: Status.OUTSIDE_ELASTICITY,
-    SingularStiffness: Status.SINGULAR,
-}
 
 
 def summary(status: NDArray[np.uint8]) -> str:

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.errors import InvalidInput, UnknownName
+from cdsm.errors import InvalidInput, unknown
 from cdsm.support.values import Array, frozen
 
 _Kind = TypeVar("_Kind")
@@ -195,10 +195,10 @@ def text(name: str, value: object) -> str:
 
 
 def one_of(kind: str, name: object, known: Iterable[str], remedy: str = "") -> str:
-    """Return ``name`` if it is a known name of a ``kind``, e.g. a link; else raise UnknownName."""
+    """Return ``name`` if it is a known name of a ``kind``, e.g. a link; else raise InvalidInput."""
     known = tuple(known)
     if not isinstance(name, str) or name not in known:
-        raise UnknownName(kind, name, known, remedy)
+        raise unknown(kind, name, known, remedy)
     return name
 
 

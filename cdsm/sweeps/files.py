@@ -43,7 +43,7 @@ def write_sweep(dataset: xarray.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises:
         InvalidInput: ``dataset`` is not a sweep, or its status has a number without a word; or
             ``path`` ends neither in ``.nc`` nor in ``.csv``.
-        MissingExtra: xarray or netCDF4 is not installed.
+        CdsmError: xarray or netCDF4 is not installed.
         FileError: The file cannot be written.
     """
     check_sweep(dataset)
@@ -63,7 +63,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
             its sweep is running; its numbers are read when needed.
 
     Raises:
-        MissingExtra: xarray, netCDF4 or zarr is needed and not installed.
+        CdsmError: xarray, netCDF4 or zarr is needed and not installed.
         FileError: The file does not exist, cannot be read, or is not a sweep.
     """
     path = as_path(path)

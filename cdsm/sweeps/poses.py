@@ -51,9 +51,9 @@ class PoseSet(ABC):
                 each computed where it is needed. :func:`~cdsm.sweep` then returns a lazy Dataset.
 
         Raises:
-            UnknownName: The arm has no such joint.
+            InvalidInput: The arm has no such joint.
             InvalidInput: The set does not fit the arm, or has more than 2³⁰ postures.
-            MissingExtra: xarray, or dask for chunks, is not installed.
+            CdsmError: xarray, or dask for chunks, is not installed.
         """
         return angles_of(arm, self, None if chunk is None else whole_number("chunk", chunk, 1))
 

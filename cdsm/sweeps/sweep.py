@@ -80,8 +80,8 @@ def sweep(
 
     Raises:
         InvalidInput: An argument is wrong; the error names it and the reason.
-        UnknownName: A joint or an output does not exist.
-        MissingExtra: xarray, dask, or zarr for a store, is not installed.
+        InvalidInput: A joint or an output does not exist.
+        CdsmError: xarray, dask, or zarr for a store, is not installed.
         FileError: The store cannot be created, read or written, or has another sweep.
     """
     need("sweep", "xarray", "dask", *(["zarr"] if store is not None else []))

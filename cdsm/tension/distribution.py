@@ -55,8 +55,8 @@ def distribute_tension(
             maximum, possibly after ``worst_friction`` has narrowed them.
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
             missing torque, and how far the bounds of cables without a fixed tension must widen.
-        UnknownName: The solver is not installed, or a fixed cable does not exist.
-        SolverError: The solver's solution does not meet the optimality conditions.
+        InvalidInput: The solver is not installed, or a fixed cable does not exist.
+        CdsmError: The solver's solution does not meet the optimality conditions.
     """
     cables = instance("pose", pose, Posture).arm.cables
     low, high = bounds_at(pose, minimum, maximum, worst_friction)

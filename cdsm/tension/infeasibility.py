@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import InfeasibleTension, SolverError, listed
+from cdsm.errors import InfeasibleTension, listed, solver_failed
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.format import plural
@@ -23,7 +23,7 @@ def explain(
     """Find by linear programs why ``solver`` did not solve ``problem``; raise that as an error.
 
     ``free`` (C,) marks the cables without a fixed tension; only their bounds may widen. ``fault``
-    says what the solver returned. Raises InfeasibleTension, or SolverError if tensions exist.
+    says what the solver returned. Raises InfeasibleTension, or CdsmError if tensions exist.
     """
     A, b, low, high, arm, force = problem
     nv, count = A.shape
@@ -38,12 +38,12 @@ def explain(
         bounds=[*zip(low * lever, high * lever, strict=True), *[(0.0, None)] * (2 * nv)],
     )
     if nearest.status != OPTIMAL:  # it is feasible and bounded by construction
-        raise SolverError("highs", f"cannot tell whether tensions exist: {nearest.message}")
+        raise solver_failed("highs", f"cannot tell whether tensions exist: {nearest.message}")
     F = nearest.x[:count] / lever
     if nearest.fun <= OPTIMALITY:
         exists = f"{fault}, though one exists with tensions of up to {F.max() * force:.2g} N"
         edge = "the arm may be at the edge of what its cables can balance"
-        raise SolverError(solver, f"{exists}: {edge}. {HINT}")
+        raise solver_failed(solver, f"{exists}: {edge}. {HINT}")
     widening = _widening(problem, free)
     blocked = math.isinf(widening) and _widening(problem, np.ones_like(free)) < math.inf
     names, missing = pose.arm.cables.names, (b - A @ F) * arm * force

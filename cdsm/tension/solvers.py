@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from cdsm.errors import SolverError
+from cdsm.errors import solver_failed
 from cdsm.support import linear_program
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array
@@ -68,7 +68,7 @@ def installed_solvers() -> list[str]:
 def solve(problem: Problem, solver: str) -> Array | str:
     """Return the verified optimum x (C,) [-], or a text that says what the solver found instead.
 
-    Raises UnknownName if the solver is not installed, SolverError if it breaks down.
+    Raises InvalidInput if the solver is not installed, CdsmError if it breaks down.
     """
     import qpsolvers
 
@@ -81,7 +81,7 @@ def solve(problem: Problem, solver: str) -> Array | str:
         with quiet:
             found = qpsolvers.solve_problem(qp, solver, **_SETTINGS.get(solver, {}))
     except Exception as error:  # each solver has its own error types
-        raise SolverError(solver, f"failed: {error}. {HINT}") from error
+        raise solver_failed(solver, f"failed: {error}. {HINT}") from error
     if not found.found or found.x is None or found.y is None:
         return "found no solution with multipliers"
     x, y = np.asarray(found.x), np.asarray(found.y)
@@ -143,6 +143,6 @@ def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[f
     if program.status == linear_program.UNBOUNDED:
         return math.inf, np.full_like(cost, np.nan)
     if program.status != linear_program.OPTIMAL:
-        raise SolverError("highs", f"finds no largest load: {program.message}")
+        raise solver_failed("highs", f"finds no largest load: {program.message}")
     x = program.x / lever
     return float(cost @ x), x

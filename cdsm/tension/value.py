@@ -60,7 +60,7 @@ class Tension(Result, Named):
         return self.posture.arm.cables.names
 
     def __getitem__(self, cable: str) -> float:
-        """Return the tension of a cable [N]; UnknownName if there is no such cable."""
+        """Return the tension of a cable [N]; InvalidInput if there is no such cable."""
         remedy = "" if isinstance(cable, str) else "By index there is the array tension.values."
         return float(self.values[self.keys().index(one_of("cable", cable, self.keys(), remedy))])
 

@@ -212,7 +212,7 @@ def uncertainty(
     Raises:
         InvalidInput: An argument has the wrong type or shape, is missing or not wanted; the arm has
             none of a source; or the measurand does not exist for small errors of an input.
-        UnknownName: ``of`` or ``cable`` is unknown.
+        InvalidInput: ``of`` or ``cable`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The measurand does not exist.
     """

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import UrdfError
+from cdsm.errors import GeometryError
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import ELLIPSOID_GRID
 from cdsm.support.values import Array
@@ -47,7 +47,7 @@ class Scene:
         frames = [self._scene.add_frame(name, show_axes=False) for name in ("/arm", "/cables")]
         try:
             self._shapes = arm._body.visualizer(arm.urdf, server, "/arm")
-        except UrdfError as error:
+        except GeometryError as error:
             _LOG.warning("%s Sticks are drawn instead.", error)
             self._shapes = None
         self._frames = frames if self._shapes else frames[1:]

@@ -128,7 +128,7 @@ def test_urdf_is_a_file_beside_it_or_text_inside(tmp_path: Path, text: str) -> N
 def test_urdf_that_needs_no_check_of_its_inertias_says_so(tmp_path: Path) -> None:
     odd = FINGER.replace('ixx="1e-4"', 'ixx="9.0"').replace("-->", "'''")
     cables = read(tmp_path, f"wire = 48e3\n[urdf]\ntip = 'tip'\ntext = '''{FINGER}'''\n{CABLES}")
-    with pytest.raises(cdsm.UrdfError):
+    with pytest.raises(cdsm.GeometryError):
         cdsm.Manipulator.from_urdf(odd, cables.cables, tip="tip")
     arm = cdsm.Manipulator.from_urdf(odd, cables.cables, tip="tip", check_inertia=False)
     assert cdsm.Manipulator.read(arm.write(tmp_path / "odd.toml")) == arm
@@ -136,13 +136,10 @@ def test_urdf_that_needs_no_check_of_its_inertias_says_so(tmp_path: Path) -> Non
 
 def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
     text = SHORT.replace('wire = "1x19-1.2mm"\n', "")
-    with pytest.raises(
-        cdsm.MissingWire, match=r"has no wire for the cables cable1_1, .*--set wire="
-    ) as e:
+    with pytest.raises(cdsm.FileError, match=r"has no wire for the cables cable1_1, .*--set wire="):
         read(tmp_path, text)
-    assert e.value.cables == ("cable1_1", "cable1_2", "cable1_3", "cable2_1", "cable2_2")
     assert cdsm.Geometry.read(tmp_path / "arm.toml").joints
-    with pytest.raises(cdsm.MissingWire, match="has no wire for its cables"):
+    with pytest.raises(cdsm.FileError, match="has no wire for its cables"):
         read(tmp_path, text.replace("wire = 48e3\n", ""))
     law = cdsm.TabulatedElasticity((0.0, 50.0, 400.0), (0.0, 2e-3, 8e-3))
     file = law.write(tmp_path / "wire.toml")
@@ -155,10 +152,10 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
     ):
         arm = read(tmp_path, text, wire)
         assert {cable.elasticity for cable in arm.cables} == {expected}  # also of cable2_3
-    with pytest.raises(cdsm.UnknownName, match=r"did you mean '1x19-1\.2mm'"):
+    with pytest.raises(cdsm.InvalidInput, match=r"did you mean '1x19-1\.2mm'"):
         read(tmp_path, text, "1x9-1.2mm")
     for wrong in (-1.0, np.nan, True, None):
-        with pytest.raises((cdsm.InvalidInput, cdsm.MissingWire)):
+        with pytest.raises((cdsm.InvalidInput, cdsm.FileError)):
             read(tmp_path, text, wrong)
 
 
@@ -172,7 +169,7 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
         (
             "minimum = 5.0",
             "minimum = 400.0",
-            "cable 'cable2_3': tensions from 400 to",
+            "cables.cable2_3: tensions from 400 to",
         ),
         (
             "minimum = 5.0",

@@ -134,7 +134,7 @@ def test_nothing_and_strange_wires_cannot_be_written(tmp_path: Path) -> None:
 )
 def test_bounds_of_a_cable_that_cannot_be_are_refused(low: float, high: float) -> None:
     cable = presets.virtual_prototype().cables[0]
-    with pytest.raises(cdsm.CableError, match="cable1_1"):
+    with pytest.raises(cdsm.InvalidInput, match="cable1_1"):
         replace(cable, minimum=low, maximum=high)
 
 
@@ -142,7 +142,7 @@ def test_wire_of_all_cables_stands_at_the_top_or_is_given(tmp_path: Path) -> Non
     path = tmp_path / "cables.toml"
     without = ONE.replace('wire = "rope"\n', "")
     path.write_text(without, encoding="utf-8")
-    with pytest.raises(cdsm.MissingWire) as caught:
+    with pytest.raises(cdsm.FileError) as caught:
         cdsm.read_cables(path)
     assert caught.value.path == str(path)
     assert cdsm.read_cables(path, "1x19-1.2mm")[0].elasticity == presets.STRAND_1X19

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import chunk, search
+from cdsm.batch import Tensions, chunk, search
 from cdsm.batch.rows import rows_of
 from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm, one_hinge
@@ -55,7 +55,7 @@ def loads(rows: int, seed: int = 0) -> Array:
     return wrench
 
 
-def assert_same_as_alone(pull: cdsm.Tensions) -> tuple[int, int]:
+def assert_same_as_alone(pull: Tensions) -> tuple[int, int]:
     """Compare with the single posture, row by row; how many are feasible, and how many not."""
     arm, (rows, count) = pull.arm, pull.values.shape
     low, high = (np.broadcast_to(each, (rows, count)) for each in (pull.minimum, pull.maximum))
@@ -205,7 +205,7 @@ def test_rows_that_the_solver_leaves_open_go_to_the_single_posture(
     np.testing.assert_allclose(found.values, expected.values, rtol=0.0, atol=EXACT * scale)
 
     def failing(*_: Any) -> None:
-        raise cdsm.SolverError("daqp", "failed.")
+        raise cdsm.CdsmError("solver failed.", "SOLVER_FAILED")
 
     monkeypatch.setattr(search, "distribute_tension", failing)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import choice, evaluation, solution
+from cdsm.batch import Batch, choice, evaluation, solution
 from cdsm.batch.evaluation import OUTPUTS
 from cdsm.batch.quantities import OF_POSTURE
 from cdsm.presets import STRAND_1X19
@@ -394,14 +394,14 @@ def test_threads_can_call_it_at_the_same_time() -> None:
 # --- statuses -------------------------------------------------------------------------------
 
 
-def only(batch: cdsm.Batch, row: int) -> set[str]:
+def only(batch: Batch, row: int) -> set[str]:
     """Which quantities of a row exist: all of it, or nothing."""
     exists = {name: ~np.isnan(batch[name][row]) for name in batch.outputs}
     assert all(there.all() or not there.any() for there in exists.values())
     return {name for name, there in exists.items() if there.all()}
 
 
-def everything(arm: cdsm.Manipulator, q: Any, tension: Any = None, **more: Any) -> cdsm.Batch:
+def everything(arm: cdsm.Manipulator, q: Any, tension: Any = None, **more: Any) -> Batch:
     wrench = np.array([1.0, -2.0, 0.5, 0.1, 0.2, -0.1])
     return cdsm.evaluate(arm, q, tension, wrench, OUTPUTS, direction=DIRECTIONS, **more)
 
@@ -443,7 +443,7 @@ def test_row_where_sites_coincide_is_empty() -> None:
     # and leaves nothing behind for the next
     for value in batch.values:
         np.testing.assert_array_equal(value[0], value[2])
-    with pytest.raises(cdsm.CableError):
+    with pytest.raises(cdsm.InvalidInput):
         arm.at(q[1])
     pull = cdsm.distribute_tensions(arm, q, 5.0)
     assert pull.status[1] == cdsm.Status.COINCIDENT_SITES
@@ -715,11 +715,10 @@ def test_bad_input_is_named(name: str) -> None:
 
 
 def test_unknown_outputs_are_named_with_those_that_exist() -> None:
-    with pytest.raises(cdsm.UnknownName, match="'compliance'") as caught:
+    with pytest.raises(cdsm.InvalidInput, match="'compliance'"):
         cdsm.evaluate(ARM, Q, F, outputs=("complience",))
-    assert caught.value.known == OUTPUTS
     batch = cdsm.evaluate(ARM, Q, F, outputs=("tip",))
-    with pytest.raises(cdsm.UnknownName, match="outputs="):
+    with pytest.raises(cdsm.InvalidInput, match="outputs="):
         batch["joint"]
 
 

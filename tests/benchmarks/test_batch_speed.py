@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.batch import Batch, Tensions
 from cdsm.presets import STRAND_1X19
 from cdsm.support.values import Array
 from tests.benchmarks.naive import NaiveArm, naive_joint_stiffness
@@ -39,7 +40,7 @@ def test_batch_is_ten_thousand_times_faster_than_differences(clock: Clock | None
     def differences() -> Array:
         return naive_joint_stiffness(naive, q[0], tension[0], wrench[0], RIGIDITY)
 
-    def batch(threads: int = 1, outputs: tuple[str, ...] = ("joint",)) -> cdsm.Batch:
+    def batch(threads: int = 1, outputs: tuple[str, ...] = ("joint",)) -> Batch:
         return cdsm.evaluate(one, q, tension, wrench, outputs, threads=threads)
 
     K = batch()["joint"][0]
@@ -85,7 +86,7 @@ def test_batched_tension_is_six_times_faster_than_one_by_one(clock: Clock | None
     one, q, _, _ = problem(5, rows)
     pose = one.at(q[0])
 
-    def batch() -> cdsm.Tensions:
+    def batch() -> Tensions:
         return cdsm.distribute_tensions(one, q, 5.0, threads=1)
 
     pull = batch()
@@ -113,7 +114,7 @@ def test_sweep_into_a_store_costs_little_more_than_its_batch(
     q = cdsm.sweep(one, poses, outputs="tip_position").q.values
     stores = (tmp_path / f"{number}.zarr" for number in itertools.count())
 
-    def batch() -> cdsm.Batch:
+    def batch() -> Batch:
         outputs = ("tip", "along", "margin", "compliance")
         return cdsm.evaluate(one, q, minimum=50.0, outputs=outputs, direction=np.eye(3))
 

@@ -19,6 +19,7 @@ import numpy as np
 import cdsm
 from cdsm import presets
 from cdsm.cable_laws import OriginalLength
+from cdsm.statics.load_cycle import LoadHistory
 from cdsm.support.values import Array
 
 WIRE = cdsm.LinearElasticity(48e3)
@@ -49,7 +50,7 @@ def along_z(*forces: float) -> Array:
     return np.outer(np.array(forces), np.eye(6)[2])
 
 
-def factor(history: cdsm.LoadHistory) -> float:
+def factor(history: LoadHistory) -> float:
     """Loss factor of the last cycle: loss over 2π times the energy of half its ways [-]."""
     z, force = history.displacement[-2:, 2], history.wrenches[-2:, 2]
     swing = abs(np.diff(z)[0] * np.diff(force)[0]) / 4.0

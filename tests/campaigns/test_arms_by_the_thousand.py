@@ -85,5 +85,5 @@ def test_broken_elasticities_are_refused(broken: Broken) -> None:
 @REPEATABLE
 @given(strategies.broken_cables())
 def test_broken_cables_are_refused(broken: Broken) -> None:
-    with pytest.raises(cdsm.CableError):
+    with pytest.raises(cdsm.InvalidInput):
         cdsm.Cable(**broken.value)

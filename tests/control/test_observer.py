@@ -9,6 +9,7 @@ from cdsm.control.laws import Command
 from cdsm.control.observer import Estimate, Observer
 from cdsm.control.plants import QuasiStaticState
 from cdsm.control.sensors import Measurement
+from cdsm.planning.path_plan import PathPlan
 from tests.support.tracking import paid_out, small_path
 
 Pairs = list[tuple[QuasiStaticState, Estimate]]
@@ -18,7 +19,7 @@ EXACT = cdsm.Sensors(encoder=0.0)
 FORCE = np.array([0.3, -0.5, -1.0, 0.0, 0.0, 0.0])
 
 
-def moved(friction: float, rigidity: float = 0.9) -> tuple[cdsm.PathPlan, list[QuasiStaticState]]:
+def moved(friction: float, rigidity: float = 0.9) -> tuple[PathPlan, list[QuasiStaticState]]:
     """A plan, and states of an arm with another wire that is driven along it and then loaded."""
     plan = small_path(friction)
     plant = cdsm.QuasiStaticPlant(with_rigidity(plan.arm, rigidity))

@@ -5,12 +5,13 @@ import pytest
 
 import cdsm
 from cdsm.control import Command
+from cdsm.planning.path_plan import PathPlan
 from tests.support.tracking import paid_out, small_path
 
 NONE = np.zeros(6)
 
 
-def moved(plan: cdsm.PathPlan, by: float) -> Command:
+def moved(plan: PathPlan, by: float) -> Command:
     wire = paid_out(plan)[0] + by * np.arange(6)
     return Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
 

@@ -11,6 +11,8 @@ import pytest
 import cdsm
 from cdsm import control, presets
 from cdsm.cli.path_file import read_path
+from cdsm.control.run import TrackingRun
+from cdsm.planning.path_plan import PathPlan
 from tests.support.tracking import circle, small_path
 
 BOUNDS: Any = {"minimum": 10.0, "maximum": 250.0}
@@ -29,7 +31,7 @@ def test_feedforward_on_the_arm_it_believes_in_follows_to_rounding() -> None:
     np.testing.assert_allclose(run.tension[::5], plan.tensions, rtol=1e-8)
 
 
-def steep_path() -> cdsm.PathPlan:
+def steep_path() -> PathPlan:
     """Four joints that bend by 5 degrees from sample to sample, 1.7 mm of cable, 34 N at rest."""
     geometry = cdsm.Geometry.universal(
         joints=4, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.005,
@@ -63,7 +65,7 @@ def test_every_law_holds_the_plan_of_the_arm_it_believes_in(law: str, steps: int
 
 
 def test_same_seed_same_bits() -> None:
-    def run(seed: int) -> cdsm.TrackingRun:
+    def run(seed: int) -> TrackingRun:
         sensors = cdsm.Sensors(tension_noise=0.5, seed=seed)
         return cdsm.track(small_path(0.1), sensors=sensors, steps=2, **BOUNDS)
 
@@ -170,7 +172,7 @@ def test_payload_that_is_too_heavy_is_named() -> None:
     assert len(run.time) >= 4  # what came before is kept
 
 
-def tabulated_path(friction: float) -> cdsm.PathPlan:
+def tabulated_path(friction: float) -> PathPlan:
     """The small path with a wire from a table: it can be slack, and ends at 500 N."""
     wire = cdsm.TabulatedElasticity((0.0, 50.0, 200.0, 500.0), (0.0, 0.0015, 0.004, 0.009))
     arm = cdsm.Manipulator(small_path().arm.geometry, wire).with_friction(friction)

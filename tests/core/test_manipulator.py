@@ -22,11 +22,8 @@ _ROOT = Path(__file__).parents[2]
 def test_angles_beyond_their_limits_are_an_error_with_data() -> None:
     arm = mixed_arm()
     q = np.array([0.0, 2.0, 0.0, -0.41, 0.0])
-    with pytest.raises(cdsm.JointLimitError) as caught:
+    with pytest.raises(cdsm.InvalidInput) as caught:
         arm.at(q)
-    assert caught.value.joints == ("joint1_2", "joint3_1")
-    assert caught.value.angles == (2.0, -0.41)
-    assert caught.value.limits == ((arm.lower[1], arm.upper[1]), (-0.4, 0.4))
     for part in (
         "joint1_2 = 114.6°",
         "joint3_1 = -23.49°",
@@ -39,9 +36,8 @@ def test_angles_beyond_their_limits_are_an_error_with_data() -> None:
 
 def test_only_the_first_joints_beyond_their_limits_are_named() -> None:
     q = np.full(ARM.nv, 3.0)
-    with pytest.raises(cdsm.JointLimitError) as caught:
+    with pytest.raises(cdsm.InvalidInput) as caught:
         ARM.at(q)
-    assert len(caught.value.joints) == ARM.nv
     assert str(caught.value).count("is outside") == 4
     assert f"; and {ARM.nv - 4} more." in str(caught.value)
 
@@ -49,7 +45,7 @@ def test_only_the_first_joints_beyond_their_limits_are_named() -> None:
 def test_ways_beyond_their_limits_are_in_metres() -> None:
     q = foreign.POSTURE.copy()
     q[[0, 1]] = 2.0
-    with pytest.raises(cdsm.JointLimitError) as caught:
+    with pytest.raises(cdsm.InvalidInput) as caught:
         foreign.crab().at(q)
     for part in (
         "a = 114.6° is outside -51.57° to 63.03° (2 rad of -0.9 to 1.1 rad)",
@@ -62,7 +58,7 @@ def test_angles_at_their_limits_are_inside_even_through_degrees() -> None:
     for sign in (-1.0, 1.0):
         ARM.at(sign * ARM.upper)
         ARM.at(np.deg2rad(np.rad2deg(sign * ARM.upper)))
-    with pytest.raises(cdsm.JointLimitError):
+    with pytest.raises(cdsm.InvalidInput):
         ARM.at(ARM.upper + 1e-6)
 
 
@@ -80,9 +76,9 @@ def test_sites_that_meet_at_a_posture_are_named_there() -> None:
     )
     arm = cdsm.Manipulator(geometry, cables=[cdsm.Cable("loop", sites, STEEL)])
     assert np.isfinite(arm.at([1.5, 0.0]).length_jacobian).all()
-    with pytest.raises(cdsm.CableError, match=r"coincide at q = \[1\.57.*Move a site") as caught:
+    with pytest.raises(cdsm.InvalidInput, match=r"coincide at q = \[1\.57.*Move a site") as caught:
         arm.at([math.pi / 2.0, 0.0])
-    assert caught.value.cable == "loop"
+    assert caught.value.name == "cable 'loop'"
 
 
 _MASS = (

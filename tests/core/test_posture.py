@@ -44,7 +44,7 @@ def test_brackets_join_each_site_to_the_nearest_point_of_its_bones() -> None:
 
 
 def test_link_that_does_not_exist_is_named() -> None:
-    with pytest.raises(cdsm.UnknownName, match="link9"):
+    with pytest.raises(cdsm.InvalidInput, match="link9"):
         POSE.link_pose("link9")
 
 

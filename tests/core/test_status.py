@@ -1,30 +1,33 @@
 """One status for each error that a posture can raise."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 import cdsm
 from cdsm.support.status import Status, summary
 
-ERRORS: dict[Status, cdsm.CdsmError] = {
-    Status.BEYOND_LIMITS: cdsm.JointLimitError(
-        ["joint1 is at 2 rad"], ["joint1"], [2.0], [(-1.0, 1.0)]
-    ),
-    Status.COINCIDENT_SITES: cdsm.CableError("cable1", "its sites coincide."),
-    Status.INFEASIBLE: cdsm.InfeasibleTension(np.ones(1), "joint1", 1.0, ["cable1"]),
-    Status.SOLVER_FAILED: cdsm.SolverError("daqp", "failed."),
-    Status.OUTSIDE_ELASTICITY: cdsm.ElasticityRangeError("too far.", [900.0]),
-    Status.SINGULAR: cdsm.SingularStiffness("K_θ is singular.", np.ones(1)),
-}
+ARM = cdsm.presets.virtual_prototype()
+POSE = ARM.at(np.zeros(ARM.nv))
 
 
-@pytest.mark.parametrize("status", ERRORS, ids=lambda status: status.name)
-def test_an_error_of_a_posture_has_a_status(status: Status) -> None:
-    assert Status.of(ERRORS[status]) is status
+@pytest.mark.parametrize(
+    ("status", "fails"),
+    [
+        (Status.BEYOND_LIMITS, lambda: ARM.at(np.full(ARM.nv, 3.0))),
+        (Status.INFEASIBLE, lambda: cdsm.distribute_tension(POSE, 1.0, 2.0, [0, 0, 50, 0, 0, 0])),
+        (Status.OUTSIDE_ELASTICITY, lambda: cdsm.stiffness(POSE, np.full(15, 5e3))),
+    ],
+)
+def test_an_error_of_a_posture_has_a_status(status: Status, fails: Callable[[], object]) -> None:
+    with pytest.raises(cdsm.CdsmError) as caught:
+        fails()
+    assert Status[caught.value.status] is status
 
 
 def test_other_errors_have_none() -> None:
-    assert Status.of(cdsm.InvalidInput("q", "is wrong.")) is None
+    assert not cdsm.InvalidInput("q", "is wrong.").status
 
 
 def test_summary_counts_rows() -> None:

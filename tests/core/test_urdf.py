@@ -423,7 +423,7 @@ def test_disagreement_on_reading_back_is_reported_and_nothing_is_written(
     other = tmp_path / "other.urdf"
     other.write_text(cdsm.to_urdf(change(geometry)))
     read_another(monkeypatch, other)
-    with pytest.raises(cdsm.UrdfError, match=said):
+    with pytest.raises(cdsm.GeometryError, match=said):
         cdsm.write_urdf(geometry, path)
     assert [entry.name for entry in folder.iterdir()] == (["arm.urdf"] if existing else [])
     if existing:
@@ -434,7 +434,7 @@ def test_urdf_that_pinocchio_refuses_is_not_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cdsm.urdf, "to_urdf", lambda _: "<robot name='a'/>")
-    with pytest.raises(cdsm.UrdfError, match="Pinocchio does not accept"):
+    with pytest.raises(cdsm.GeometryError, match="Pinocchio does not accept"):
         cdsm.write_urdf(mixed_arm().geometry, tmp_path / "arm.urdf")
     assert list(tmp_path.iterdir()) == []
 

@@ -99,7 +99,7 @@ def test_masses_that_pinocchio_would_read_otherwise_are_errors(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("cdsm.urdf_reader._number_faults", lambda element: iter(()))
-    with pytest.raises(cdsm.UrdfError, match=r"link l2, fl, fr: Pinocchio read 0\.04 kg"):
+    with pytest.raises(cdsm.GeometryError, match=r"link l2, fl, fr: Pinocchio read 0\.04 kg"):
         gripper('<mass value="0.1"/>', '<mass value="0.1 "/>')
 
 
@@ -228,7 +228,7 @@ def test_generated_arms_pass() -> None:
     ],
 )
 def test_faults_are_named(text: str, said: str) -> None:
-    with pytest.raises(cdsm.UrdfError) as caught:
+    with pytest.raises(cdsm.GeometryError) as caught:
         read_urdf(text)
     assert said in str(caught.value)
     assert len(str(caught.value)) < 4000
@@ -245,7 +245,7 @@ def test_billion_laughs_are_not_expanded() -> None:
     entities = '<!ENTITY a "ha">' + "".join(
         f'<!ENTITY {chr(98 + i)} "{f"&{chr(97 + i)};" * 10}">' for i in range(9)
     )
-    with pytest.raises(cdsm.UrdfError):
+    with pytest.raises(cdsm.GeometryError):
         read_urdf(f"<!DOCTYPE robot [{entities}]>" + robot(*chain(), name="&j;"))
 
 
@@ -254,7 +254,7 @@ def test_text_larger_than_any_robot_is_refused(tmp_path: Path) -> None:
     path.write_text(robot(*chain(), f"<!--{'x' * 11_000_000}-->"), encoding="utf-8")
     with pytest.raises(cdsm.CdsmError, match="larger than"):
         read_urdf(path)
-    with pytest.raises(cdsm.UrdfError, match="larger than"):
+    with pytest.raises(cdsm.GeometryError, match="larger than"):
         read_urdf(path.read_text(encoding="utf-8"))
 
 
@@ -262,7 +262,7 @@ def test_all_faults_are_told_at_once() -> None:
     text = changed('<mass value="0.2"/>', '<mass value="-1"/>').replace(
         'xyz="0 1 0"', 'xyz="0 0 0"'
     )
-    with pytest.raises(cdsm.UrdfError) as caught:
+    with pytest.raises(cdsm.GeometryError) as caught:
         read_urdf(text)
     assert str(caught.value).count("\n  - ") == 3
 
@@ -278,7 +278,7 @@ def test_two_hundred_joints_are_too_many_only_above_the_cap() -> None:
         return robot(*links, *(HINGE.format(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(count)))
 
     read_urdf(arm(200))
-    with pytest.raises(cdsm.UrdfError, match="201 joints that move; 1 to 200 are needed"):
+    with pytest.raises(cdsm.GeometryError, match="201 joints that move; 1 to 200 are needed"):
         read_urdf(arm(201))
 
 
@@ -290,5 +290,5 @@ def test_a_chain_that_would_overflow_the_stack_is_refused() -> None:
         joint.format(i, i + 1, "fixed" if i else "revolute", "" if i else limit)
         for i in range(1000)
     )
-    with pytest.raises(cdsm.UrdfError, match="1000 joints one behind the other; 400 are taken"):
+    with pytest.raises(cdsm.GeometryError, match="1000 joints one behind the other; 400 are taken"):
         read_urdf(f'<robot name="r">{links}{joints}</robot>')

@@ -35,7 +35,7 @@ def test_prototype_has_what_the_paper_does_say() -> None:
 
 
 def test_a_stiffness_of_hybrid_cables_that_is_none_is_refused() -> None:
-    with pytest.raises(cdsm.CableError, match="-1 N/m given"):
+    with pytest.raises(cdsm.InvalidInput, match="-1 N/m given"):
         presets.fitted_prototype(-1.0)
 
 

@@ -139,7 +139,7 @@ def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
         4: "balance",
         6: "stiffness",
     }
-    assert isinstance(told[2].error, cdsm.JointLimitError)
+    assert isinstance(told[2].error, cdsm.InvalidInput)
     assert "widen joint_limit" in told[2].reason
     assert "check_limits" not in told[2].reason  # which a path does not have
     assert isinstance(told[4].error, cdsm.InfeasibleTension)

@@ -8,6 +8,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
+from cdsm.planning.plan import StiffnessPlan
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.support.values import Array
 from tests.planning.test_range import corners
@@ -30,13 +31,13 @@ def posture(name: str) -> tuple[cdsm.Posture, float, float]:
     return arms.random_posture(arms.random_arm(seed, joints, kind, law), seed, 0.4), low, high
 
 
-def floor(plan: cdsm.StiffnessPlan, low: float, high: float) -> float:
+def floor(plan: StiffnessPlan, low: float, high: float) -> float:
     """Smallest eigenvalue of K_θ [N m/rad] at which the arm counts as stable."""
     tension = plan.tension
     return TensionSpace(tension.posture, plan.direction, low, high, tension.wrench).floor
 
 
-def assert_admissible(plan: cdsm.StiffnessPlan, low: float, high: float) -> None:
+def assert_admissible(plan: StiffnessPlan, low: float, high: float) -> None:
     F, K = plan.tension.values, plan.stiffness
     assert abs(plan.tension.residual).max() <= 1e-12 * F.max()
     np.testing.assert_allclose(K.residual, plan.tension.residual, atol=1e-15 * F.max())

@@ -137,7 +137,7 @@ CASES |= {
     ),
     "duplicate cable names": (
         lambda: cdsm.Manipulator(GEOMETRY, cables=[cdsm.Cable("a", (BASE, END), STEEL)] * 2),
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("cable 'a'", "used twice", "its own"),
     ),
     "unknown link": (
@@ -145,12 +145,12 @@ CASES |= {
             GEOMETRY,
             cables=[cdsm.Cable("a", (BASE, cdsm.Site("lnk1", (0.0, 0.0, 0.0))), STEEL)],
         ),
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("cable 'a'", "'lnk1'", "did you mean 'link1'", "Known: base_link, base_disk"),
     ),
     "coincident sites on one link": (
         lambda: cdsm.Manipulator(GEOMETRY, cables=[cdsm.Cable("a", (BASE, BASE, END), STEEL)]),
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("cable 'a'", "sites 1 and 2 coincide", "leave one out"),
     ),
     # --- Site and Cable
@@ -171,38 +171,38 @@ CASES |= {
     ),
     "cable without a name": (
         lambda: cdsm.Cable("", (BASE, END), STEEL),
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("name: ", "a name is needed"),
     ),
     "cable of one site": (
         lambda: cdsm.Cable("a", (BASE,), STEEL),
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("cable 'a'", "sites: 1 given", "two or more"),
     ),
     "cable elasticity a number": (
         lambda: cdsm.Cable("a", (BASE, END), 2e5),  # type: ignore[arg-type]
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("cable 'a'", "elasticity: 200000.0", "Elasticity is needed"),
     ),
     "unknown control": (
         lambda: cdsm.Cable("a", (BASE, END), STEEL, control="frce"),  # type: ignore[arg-type]
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("cable 'a'", "'frce'", "did you mean 'force'?"),
     ),
     "series stiffness of none": (
         lambda: cdsm.Cable("a", (BASE, END), STEEL, series_stiffness=0.0),
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("cable 'a'", "series_stiffness: 0 N/m", "or inf is needed"),
     ),
     "series stiffness negative": (
         lambda: cdsm.Cable("a", (BASE, END), STEEL, series_stiffness=-INF),
-        cdsm.CableError,
+        cdsm.InvalidInput,
         ("cable 'a'", "series_stiffness: -inf"),
     ),
     **{
         f"lead {value!r}": (
             lambda v=value: cdsm.Cable("a", (BASE, END), STEEL, lead=v),  # type: ignore[misc]
-            cdsm.CableError,
+            cdsm.InvalidInput,
             ("cable 'a'", "lead"),
         )
         for value in (-1.0, NAN, [1.0, 2.0], "x", None)
@@ -216,10 +216,10 @@ CASES |= {
     # --- Posture
     "pose of an unknown link": (
         lambda: POSE.link_pose("tol0"),
-        cdsm.UnknownName,
+        cdsm.InvalidInput,
         ("no link", "'tol0'", "did you mean 'tool0'?", "Known: base_link"),
     ),
-    "pose of a number": (lambda: POSE.link_pose(3), cdsm.UnknownName, ("no link", "3")),  # type: ignore[arg-type]
+    "pose of a number": (lambda: POSE.link_pose(3), cdsm.InvalidInput, ("no link", "3")),  # type: ignore[arg-type]
     # --- distribute_tension
     "distribute at a number": (
         lambda: cdsm.distribute_tension(3),  # type: ignore[arg-type]
@@ -275,7 +275,7 @@ CASES |= {
     },
     "unknown solver": (
         lambda: cdsm.distribute_tension(POSE, solver="dapq"),
-        cdsm.UnknownName,
+        cdsm.InvalidInput,
         ("solver", "'dapq'", "did you mean 'daqp'?", "Known: "),
     ),
     # --- stiffness
@@ -353,7 +353,7 @@ CASES |= {
     },
     "unknown term": (
         lambda: K.pseudoinverse("activ"),  # type: ignore[arg-type]
-        cdsm.UnknownName,
+        cdsm.InvalidInput,
         (
             "stiffness term",
             "'activ'",

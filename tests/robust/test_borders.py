@@ -27,7 +27,7 @@ UP = (0.0, 0.0, 1.0)
 def test_a_name_that_cannot_be_printed_is_refused() -> None:
     with pytest.raises(cdsm.InvalidInput, match=r"link: .* character 5 cannot be printed"):
         cdsm.Site("link\n", UP)
-    with pytest.raises(cdsm.CableError, match=r"name: .* is not blank"):
+    with pytest.raises(cdsm.InvalidInput, match=r"name: .* is not blank"):
         cdsm.Cable("  ", ARM.cables[0].sites, STEEL)
 
 

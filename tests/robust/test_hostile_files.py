@@ -24,7 +24,7 @@ def test_entities_are_not_expanded(entities: str, tmp_path: Path) -> None:
     start = TREE.index("<robot")
     text = TREE[start:].replace("</robot>", "&c;</robot>")
     path.write_text(f"<!DOCTYPE robot [{entities}]>{text}", encoding="utf-8")
-    with pytest.raises(cdsm.UrdfError, match="DOCTYPE"):
+    with pytest.raises(cdsm.GeometryError, match="DOCTYPE"):
         cdsm.Manipulator.from_urdf(path, crab().cables, tip="tip")
 
 
@@ -130,4 +130,4 @@ def test_robots_that_crash_pinocchio_are_refused() -> None:
         check=False,
     )
     assert done.returncode == 0, f"{done.returncode}\n{done.stdout}\n{done.stderr[-3000:]}"
-    assert "UrdfError 4500 fixed joints" in done.stdout
+    assert "GeometryError 4500 fixed joints" in done.stdout

@@ -157,5 +157,5 @@ def test_files_hold_followers_and_springs(tmp_path: Path) -> None:
     ],
 )
 def test_couplings_that_cannot_be_are_named(follows: dict[str, str], said: str) -> None:
-    with pytest.raises(cdsm.UrdfError, match=said):
+    with pytest.raises(cdsm.GeometryError, match=said):
         robot(follows)

@@ -395,7 +395,7 @@ def test_bad_wrench_beside_a_tension_is_named() -> None:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_reference_beyond_a_stop_is_refused(side: float) -> None:
     pose = hinge(limit=0.2).at([side * 0.25], check_limits=False)
-    with pytest.raises(cdsm.JointLimitError, match=f"joint1 = {side * 14.32}°.*11.46°"):
+    with pytest.raises(cdsm.InvalidInput, match=f"joint1 = {side * 14.32}°.*11.46°"):
         cdsm.equilibrium(pose, [20.0, 20.0])
 
 

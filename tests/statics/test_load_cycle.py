@@ -9,6 +9,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
+from cdsm.statics.load_cycle import LoadHistory
 from cdsm.support.values import Array
 from tests.support.arms import random_arm, random_posture, random_tension
 
@@ -104,7 +105,7 @@ def test_without_friction_every_load_gives_the_equilibrium(
 # --- energies -------------------------------------------------------------------------------
 
 
-def loop(history: cdsm.LoadHistory, since: int) -> tuple[float, float]:
+def loop(history: LoadHistory, since: int) -> tuple[float, float]:
     """Work of the force along z, by trapezoids, and dissipated work [J] of the loads since one."""
     z, f = history.tip[since - 1 :, 2], history.wrenches[since - 1 :, 2]
     return float(np.diff(z) @ (f[1:] + f[:-1]) / 2.0), float(history.dissipated[since:].sum())

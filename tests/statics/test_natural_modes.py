@@ -317,7 +317,7 @@ def test_motion_without_mass_is_an_error_that_names_the_joint(
     arm = massless(*masses, universal=universal)
     pose = random_posture(arm, 1)
     K = cdsm.stiffness(pose, np.full(9, 50.0))
-    with pytest.raises(cdsm.SingularMass, match=r"no mass.*link_mass") as caught:
+    with pytest.raises(cdsm.SingularStiffness, match=r"no mass.*link_mass") as caught:
         cdsm.modes(pose, K)
     direction = caught.value.direction
     assert np.linalg.norm(direction) == pytest.approx(1.0)

@@ -5,6 +5,7 @@ import pytest
 
 import cdsm
 from cdsm import presets
+from cdsm.planning.path_plan import PathPlan
 from cdsm.support.values import Array
 
 DOWN = (0.0, 0.0, 1.0)
@@ -18,7 +19,7 @@ def waving(count: int) -> Array:
     return np.asarray(presets.TEN_DEGREES * (1.0 + 0.3 * np.sin(0.5 * s * np.arange(1, 11))))
 
 
-def assert_holds(plan: cdsm.PathPlan, low: float, high: float) -> None:
+def assert_holds(plan: PathPlan, low: float, high: float) -> None:
     """Every planned sample does what was asked for, judged by the stiffness alone."""
     for k, i in enumerate(plan.planned):
         F, K = plan.tensions[k], plan.stiffness[k]

@@ -285,7 +285,7 @@ def _unless_sites_coincide(
 ) -> cdsm.Manipulator | None:
     try:
         return build()
-    except cdsm.CableError:
+    except cdsm.InvalidInput:
         return None
 
 

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.statics.buckling import CriticalTension
 from tests.support.arms import mixed_arm
 
 
 @pytest.fixture(scope="module")
-def found() -> cdsm.CriticalTension:
+def found() -> CriticalTension:
     return cdsm.critical_tension(mixed_arm().at(np.full(5, 0.1)))
 
 
 def test_json_has_units_in_its_keys_and_names_joints_and_cables(
-    found: cdsm.CriticalTension,
+    found: CriticalTension,
 ) -> None:
     told = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     arm = found.posture.arm
@@ -26,7 +27,7 @@ def test_json_has_units_in_its_keys_and_names_joints_and_cables(
     assert told["wrench_N_and_Nm"] == [0.0] * 6
 
 
-def test_dataset_has_units_and_coordinates(found: cdsm.CriticalTension) -> None:
+def test_dataset_has_units_and_coordinates(found: CriticalTension) -> None:
     data = found.to_xarray()
     assert data["tension"].sel(cable="cable1_2") == found.tension[1]
     assert data["margins"].units == "N m/rad"
@@ -35,7 +36,7 @@ def test_dataset_has_units_and_coordinates(found: cdsm.CriticalTension) -> None:
 
 
 def test_table_has_a_row_for_each_entry_of_its_dimension(
-    found: cdsm.CriticalTension, tmp_path: pytest.TempPathFactory
+    found: CriticalTension, tmp_path: pytest.TempPathFactory
 ) -> None:
     table = found.to_pandas()
     assert list(table.columns) == ["margins [N m/rad]"]
@@ -44,7 +45,7 @@ def test_table_has_a_row_for_each_entry_of_its_dimension(
     assert written.read_text().startswith("bounds,margins [N m/rad]\n")
 
 
-def test_repr_shows_the_headline(found: cdsm.CriticalTension) -> None:
+def test_repr_shows_the_headline(found: CriticalTension) -> None:
     assert repr(found).startswith("<CriticalTension minimum ")
     modes = cdsm.modes(found.posture, cdsm.stiffness(found.posture, np.full(9, 50.0)))
     assert repr(modes) == (

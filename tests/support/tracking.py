@@ -6,13 +6,14 @@ import numpy as np
 
 import cdsm
 from cdsm import presets
+from cdsm.planning.path_plan import PathPlan
 from cdsm.support.values import Array
 
 WANTED = 4000.0
 """Stiffness along z [N/m] of :func:`circle`."""
 
 
-def paid_out(plan: cdsm.PathPlan) -> Array:
+def paid_out(plan: PathPlan) -> Array:
     """Wire that the motors pay out at each sample of a plan (P, C) [m]."""
     pairs = zip(plan.cable_lengths, plan.tensions, strict=True)
     return np.array([plan.arm._laws.original_lengths(L, F) for L, F in pairs])
@@ -21,7 +22,7 @@ def paid_out(plan: cdsm.PathPlan) -> Array:
 @cache
 def small_path(
     friction: float = 0.0, lead: float = 0.1, target: float | tuple[float, ...] = 15e3
-) -> cdsm.PathPlan:
+) -> PathPlan:
     """Two universal joints with the strand of Eq. 19; three samples of a bend."""
     geometry = cdsm.Geometry.universal(
         joints=2,
@@ -39,7 +40,7 @@ def small_path(
 
 
 @cache
-def circle(friction: float, samples: int = 13) -> cdsm.PathPlan:
+def circle(friction: float, samples: int = 13) -> PathPlan:
     """Five universal joints, whose tip draws a circle of 15 mm at 4 N/mm along z."""
     geometry = cdsm.Geometry.universal(
         joints=5,

@@ -14,6 +14,7 @@ import xarray as xr
 from distributed import Client, LocalCluster
 
 import cdsm
+from cdsm.batch import Batch
 from tests.support.patience import HANGS
 from tests.support.sweeps import CASES, EVERYTHING, GRID, short_arm
 
@@ -77,7 +78,7 @@ def test_only_what_is_missing_is_computed(
     calls: list[int] = []
     compute = cdsm.evaluate
 
-    def counted(arm: cdsm.Manipulator, q: Any, **options: Any) -> cdsm.Batch:
+    def counted(arm: cdsm.Manipulator, q: Any, **options: Any) -> Batch:
         calls.append(len(q))
         return compute(arm, q, **options)
 

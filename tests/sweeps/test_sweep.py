@@ -42,7 +42,7 @@ def single(
     found: dict[str, Any] = {}
     try:
         pose = arm.at(q)
-    except cdsm.JointLimitError:
+    except cdsm.InvalidInput:
         return {Status.BEYOND_LIMITS}, found
     found["tip_position"] = pose.tip[:3, 3]
     found["cable_lengths"], found["gravity_torque"] = pose.cable_lengths, pose.gravity_torque

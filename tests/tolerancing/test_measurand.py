@@ -9,6 +9,7 @@ import pytest
 
 import cdsm
 from cdsm.support.status import Status
+from cdsm.tolerancing.budget import Uncertainty
 from cdsm.tolerancing.measurand import Measurand, MeasurandName, measurand_of
 from tests.support import arms
 
@@ -83,7 +84,7 @@ def test_a_drawn_arm_is_the_arm_built_with_these_dimensions(source: str, of: str
 def test_sensitivities_are_the_limits_of_differences(source: str, of: str) -> None:
     """Their error falls with the square of the tolerance, for each source common to its inputs."""
 
-    def budget(part: float) -> cdsm.Uncertainty:
+    def budget(part: float) -> Uncertainty:
         tolerances = cdsm.Tolerances(**{source: cdsm.Tolerance(part * ERRORS[source])})
         return cdsm.uncertainty(**asked(of), tolerances=tolerances)
 

@@ -5,14 +5,15 @@ import pytest
 import tensegrity_simplex as simplex
 
 import cdsm
+from cdsm.statics.equilibrium import Equilibrium
 
 
 @pytest.fixture(scope="module")
-def rest() -> cdsm.Equilibrium:
+def rest() -> Equilibrium:
     return simplex.at_rest()
 
 
-def test_tensions_follow_from_the_lengthened_struts(rest: cdsm.Equilibrium) -> None:
+def test_tensions_follow_from_the_lengthened_struts(rest: Equilibrium) -> None:
     """Feron et al. 2023: −1.5 kN in the struts; an independent program: −1501, 593 and 970 N."""
     np.testing.assert_allclose(rest.tension[:6], 593.0, atol=0.5)
     np.testing.assert_allclose(rest.tension[6:9], 970.0, atol=0.5)
@@ -28,7 +29,7 @@ def test_self_stress_of_the_unloaded_simplex() -> None:
     np.testing.assert_allclose(stress[6:9] / stress[9], 0.681, atol=5e-4)
 
 
-def test_lowest_mode_is_carried_by_tension(rest: cdsm.Equilibrium) -> None:
+def test_lowest_mode_is_carried_by_tension(rest: Equilibrium) -> None:
     """Feron et al. 2023, lumped masses: 2.166 Hz, a twist that sinks; the next mode at 34 Hz."""
     modes = cdsm.modes(rest.pose, rest.stiffness)
     np.testing.assert_allclose(modes.frequencies[0], 2.166, rtol=5e-4)
@@ -36,7 +37,7 @@ def test_lowest_mode_is_carried_by_tension(rest: cdsm.Equilibrium) -> None:
     assert simplex.active_share(rest) == pytest.approx(0.81, abs=5e-3)
 
 
-def test_shape_of_the_lowest_mode(rest: cdsm.Equilibrium) -> None:
+def test_shape_of_the_lowest_mode(rest: Equilibrium) -> None:
     """Theirs: the heads move by (3.3, 0, −1), (−1.7, −2.9, −1) and (−1.7, 2.9, −1)."""
     arm, q = rest.pose.arm, rest.pose.q
     shape = cdsm.modes(rest.pose, rest.stiffness).shapes[:, 0]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.statics.equilibrium import Equilibrium
 from cdsm.support.values import Array
 from cdsm.view.panel import python_text, results_text, tensions_text
 from cdsm.view.scene import Scene
@@ -240,7 +241,7 @@ def test_the_lines_of_python_compute_what_the_page_shows(friction: float, sag: b
     names: dict[str, object] = {"arm": arm, "cdsm": cdsm}
     exec(python_text(arm, at).split("```")[1], names)
     found = names.get("rest", names.get("K"))
-    assert isinstance(found, cdsm.Stiffness | cdsm.Equilibrium)
+    assert isinstance(found, cdsm.Stiffness | Equilibrium)
     shown = show(arm, at)
     assert shown.tensions is not None
     # twelve digits are printed
