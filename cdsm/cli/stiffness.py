@@ -12,13 +12,13 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
-from cdsm.statics.buckling import CriticalLoad, CriticalTension
-from cdsm.statics.load_cycle import LoadHistory
-from cdsm.statics.weight_test import WeightTest
-from cdsm.tolerancing.budget import Uncertainty
 
 if TYPE_CHECKING:
+    from cdsm.statics.buckling import CriticalLoad, CriticalTension
+    from cdsm.statics.load_cycle import LoadHistory
+    from cdsm.statics.weight_test import WeightTest
     from cdsm.support.values import Array
+    from cdsm.tolerancing.budget import Uncertainty
 
 
 def stiffness(

@@ -15,6 +15,7 @@ from cdsm.control.laws import (
 )
 from cdsm.control.observer import with_rigidity
 from cdsm.control.plants import Plant as Plant
+from cdsm.control.run import TrackingRun
 from cdsm.control.sensors import Measurement
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "Law",
     "Measurement",
     "Reference",
+    "TrackingRun",
     "feedforward",
     "limited",
     "mixed",

@@ -6,3 +6,6 @@ holes, no dependence on speed (Stribeck, creep), no wear, no continuous sheaths 
 bending stiffness of the strand, and one coefficient for static and kinetic friction. Use the static
 coefficient to see what may stick, and the kinetic one to see what slides.
 """
+
+from cdsm.friction.band import RestBand as RestBand
+from cdsm.friction.stick import Breakaway as Breakaway

@@ -1,1 +1,5 @@
 """Measures of a posture: loads an arm can carry, cable clearance, wrench closure, wire life."""
+
+from cdsm.measures.clearance import Clearance as Clearance
+from cdsm.measures.payload import Payload as Payload
+from cdsm.measures.polytope import ForcePolytope as ForcePolytope
