@@ -194,9 +194,11 @@ class Chunk:
         return K, size
 
     def _with_springs(self, terms: Array) -> Array:
-        """Return all terms (n, 5, nv, nv) of K_θ, from those of the kernels."""
+        """Return the terms (n, 4 or 5, nv, nv) of K_θ, from the four of the kernels."""
         if (S := self._table.reduction) is not None:
             terms = S.T @ terms @ S
+        if not self._rows.arm.has_springs and "springs" not in self._names:
+            return terms
         springs = np.broadcast_to(self._table.springs, (len(terms), 1, *terms.shape[2:]))
         return np.concatenate([terms, springs], axis=1)
 

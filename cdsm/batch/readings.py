@@ -25,7 +25,7 @@ def read(
 
     Args:
         names: Any of ``margin``, ``along``, ``compliance``, ``cartesian``, ``pseudoinverse``.
-        terms: The terms of K_θ (N, 5, nv, nv).
+        terms: The terms of K_θ (N, n, nv, nv).
         jacobian: J_X (N, 6, nv).
         directions: Unit vectors u (D, 3) of ``along``.
     """
@@ -47,7 +47,7 @@ def read(
         status[singular] = Status.SINGULAR
         if "along" in names:
             torque = directions @ Jv  # (N, D, nv)
-            compliance = np.einsum("ndi,nij,ndj->nd", torque, inverse, torque)
+            compliance = (torque @ inverse * torque).sum(axis=2)
             moves = abs(torque).max(axis=2) > UNMOVED * abs(Jv).max(axis=(1, 2))[:, None]
             with np.errstate(divide="ignore"):
                 found["along"] = np.where(moves, 1.0 / compliance, np.inf)
