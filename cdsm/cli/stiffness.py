@@ -98,7 +98,8 @@ def _uncertainty(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tup
     """
     from cdsm.support.format import aligned
 
-    pose, found = tension.posture, dict[str, Uncertainty]()
+    pose = tension.posture
+    found: dict[str, Uncertainty] = {}
     for name, u in axes.items() if pose.arm.tolerances.given else ():
         with contextlib.suppress(cdsm.SingularStiffness):
             found[name] = cdsm.uncertainty(pose, tension, pose.arm.tolerances, direction=u)
