@@ -58,9 +58,12 @@ from cdsm.geometry import Joint as Joint
 from cdsm.geometry import Link as Link
 from cdsm.geometry.cables import serpentine_cables as serpentine_cables
 from cdsm.identification import ExperimentPlan as ExperimentPlan
+from cdsm.identification import Explanations as Explanations
 from cdsm.identification import Identification as Identification
 from cdsm.identification import Measurement as Measurement
+from cdsm.identification import TipPosition as TipPosition
 from cdsm.identification import WeightLoop as WeightLoop
+from cdsm.identification import compare_explanations as compare_explanations
 from cdsm.identification import identify as identify
 from cdsm.identification import plan_experiment as plan_experiment
 from cdsm.identification import read_loops as read_loops
