@@ -114,7 +114,7 @@ def check_measurements(measurements: object) -> None:
     if not isinstance(measurements, list | tuple) or not all(
         isinstance(each, kinds) for each in measurements
     ):
-        said = "a list or tuple of Measurement, WeightLoop and TipPosition is needed."
+        said = "a list or tuple of Measurement, TipPosition and WeightLoop is needed."
         raise InvalidInput("measurements", f"{measurements!r} given; {said}")
     for i, each in enumerate(measurements):
         if isinstance(each, WeightLoop) and each.displacements is None:
