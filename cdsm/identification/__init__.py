@@ -7,6 +7,7 @@ from cdsm.identification.loops_file import read_loops
 from cdsm.identification.measurement import Measurement, WeightLoop
 from cdsm.identification.result import Identification
 from cdsm.identification.tip_position import TipPosition
+from cdsm.identification.tip_positions_file import read_tip_positions
 
 __all__ = [
     "ExperimentPlan",
@@ -19,4 +20,5 @@ __all__ = [
     "identify",
     "plan_experiment",
     "read_loops",
+    "read_tip_positions",
 ]

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -181,3 +182,29 @@ def test_comparisons_that_cannot_be_made_are_named() -> None:
         cdsm.compare_explanations(model_of, [GOOD], free)
     with pytest.raises(cdsm.InvalidInput, match="model_of"):
         cdsm.compare_explanations(lambda slack, gain: ROD, [GOOD] * 3, free)
+
+
+def test_positions_come_from_files(tmp_path: Path) -> None:
+    def read(text: str) -> tuple[TipPosition, ...]:
+        path = tmp_path / "tips.csv"
+        path.write_text(text, encoding="utf-8")
+        return cdsm.read_tip_positions(path, ROD, std=1e-3)
+
+    head = "label,x [mm],z [mm],cable3_1 [mm],cable3_2 [mm]\n"
+    one, two = read(f"{head}a,90,5,3,\nb,,6,0,2\n")
+    assert one == TipPosition(x=0.09, z=5e-3, pull={"cable3_1": 3e-3}, std=1e-3, label="a")
+    assert two == TipPosition(z=6e-3, pull={"cable3_1": 0.0, "cable3_2": 2e-3}, std=1e-3, label="b")
+    (pulled,) = read("x [m],cable3_3 [N]\n0.09,2\n")
+    assert pulled == TipPosition(x=0.09, tension={"cable3_3": 2.0}, std=1e-3)
+    for text, said in (
+        (f"{head}a,90,5,3 mm,\n", "line 2, column cable3_1: '3 mm' is not a finite number"),
+        (f"{head}a,nan,5,3,\n", "line 2, column x: 'nan'"),
+        (f"{head}a,,,3,\n", "line 2: no coordinate was measured"),
+        ("x [mm],cable3_9 [mm]\n90,3\n", "column cable3_9, which is not known"),
+        ("x [mm]\n90\n", "one of a cable, such as cable3_1"),
+        ("x,cable3_1 [mm]\n90,3\n", "column x has no unit"),
+        ("x [mm],cable3_1 [mm],cable3_2 [N]\n90,3,2\n", r"call it cable3_2 \[mm\]"),
+        (head, "holds no positions"),
+    ):
+        with pytest.raises(cdsm.FileError, match=said):
+            read(text)
