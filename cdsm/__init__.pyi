@@ -41,10 +41,13 @@ from cdsm.geometry import Joint as Joint
 from cdsm.geometry import Link as Link
 from cdsm.geometry.cables import serpentine_cables as serpentine_cables
 from cdsm.identification import Measurement as Measurement
+from cdsm.identification import TipPosition as TipPosition
 from cdsm.identification import WeightLoop as WeightLoop
+from cdsm.identification import compare_explanations as compare_explanations
 from cdsm.identification import identify as identify
 from cdsm.identification import plan_experiment as plan_experiment
 from cdsm.identification import read_loops as read_loops
+from cdsm.identification import read_tip_positions as read_tip_positions
 from cdsm.interchange.caspr import read_caspr as read_caspr
 from cdsm.interchange.mjcf import to_mjcf as to_mjcf
 from cdsm.interchange.mjcf import write_mjcf as write_mjcf

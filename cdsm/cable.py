@@ -67,6 +67,9 @@ class Cable:
         control: What the motor keeps constant, ``"position"``: length; ``"force"``: tension.
         minimum: Smallest allowed tension [N]; every tension distribution respects both bounds.
         maximum: Largest allowed tension [N]; inf: no limit.
+        slack: Wire that the motor takes in from the straight arm before the cable pulls [m].
+        gain: Wire taken in per pull that the motor reports [-], as of a drum of another radius.
+            Slack and gain count where a pull is given (:func:`~cdsm.forward_statics`).
 
     Raises InvalidInput, which names the cable and the fault. Its methods take F [N], any shape, and
     l_0 [m], ``free_length``: InvalidInput if it is not positive, ElasticityRangeError if a tension
@@ -81,6 +84,8 @@ class Cable:
     control: Control = "position"
     minimum: float = 0.0
     maximum: float = math.inf
+    slack: float = 0.0
+    gain: float = 1.0
 
     def __post_init__(self) -> None:
         try:
@@ -92,6 +97,8 @@ class Cable:
             series = quantity("series_stiffness", self.series_stiffness, "stiffness", infinite=True)
             least = quantity("minimum", self.minimum, "tension", zero=True)
             most = quantity("maximum", self.maximum, "tension", zero=True, infinite=True)
+            slack = quantity("slack", self.slack, "slack", zero=True)
+            gain = quantity("gain", self.gain, "gain")
             if len(sites) < 2:
                 raise CdsmError(f"sites: {len(sites)} given; two or more Site are needed.")
             if least > most:
@@ -99,7 +106,7 @@ class Cable:
         except CdsmError as error:
             raise InvalidInput(f"cable {self.name!r}", str(error)) from None
         self.__dict__.update(sites=sites, lead=lead, series_stiffness=series)
-        self.__dict__.update(minimum=least, maximum=most)
+        self.__dict__.update(minimum=least, maximum=most, slack=slack, gain=gain)
         for i in {0, len(sites) - 1}.difference(self._holes):
             if sites[i].friction or sites[i].wrap:
                 why = "ends there; only" if i else "starts there. Give a lead; only"

@@ -523,9 +523,11 @@ def _doubts(arm: Manipulator) -> tuple[str, ...]:
     sizes = []
     for each in arm.cables:
         sizes.append((f"the lead of {each.name}", each.lead, most))
+        if length > 0.0:
+            sizes.append((f"the slack of {each.name}", each.slack, length))
         far = max(math.hypot(*site.position) for site in each.sites)
         sizes.append((f"a site of {each.name}", far, most))
-    largest = max(sizes, key=lambda size: size[1])
+    largest = max(sizes, key=lambda size: size[1] / size[2])
     # a geometry warns of its own length
     found = doubts_about_units(0.0 if arm.is_serpentine else length, [largest])
     if not arm._body.tip_joints.size:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cdsm.cable import Cable, Site
 from cdsm.errors import InvalidInput
-from cdsm.geometry import Geometry
+from cdsm.geometry import Geometry, Joint, Link
 from cdsm.geometry.cables import require_own_cables, serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import instance, one_of, scalar, text
@@ -22,7 +22,8 @@ class Parameter(NamedTuple):
 
     unit: str  # unit shown to people
     size: float  # size of ``unit`` in SI
-    part: Literal["joints", "links", "routes", "cables"]  # of the geometry, or a Cable of the arm
+    # of the geometry, with "beams" for joints and links that bend; or a Cable of the arm
+    part: Literal["joints", "links", "beams", "routes", "cables"]
     attribute: str  # its name there
     neutral: float = math.nan  # of a change of this number: the value that leaves it as it is
 
@@ -32,12 +33,16 @@ PARAMETERS: Final = {
     "disk_offset": Parameter("mm", 1e-3, "joints", "disk_offset"),
     "link_length": Parameter("mm", 1e-3, "links", "length"),
     "link_mass": Parameter("g", 1e-3, "links", "mass"),
+    "joint_stiffness": Parameter("N m/rad", 1.0, "joints", "stiffness"),
+    "bending_stiffness": Parameter("N m²", 1.0, "beams", "bending_stiffness"),
     "lead": Parameter("mm", 1e-3, "routes", "lead"),
     "hole_angle": Parameter("deg", math.pi / 180.0, "routes", "angle"),
     "phase": Parameter("deg", math.pi / 180.0, "routes", "angle", neutral=0.0),
     "friction": Parameter("", 1.0, "cables", "friction"),
     "spring": Parameter("N/mm", 1e3, "cables", "series_stiffness"),
     "rigidity": Parameter("", 1.0, "cables", "elasticity", neutral=1.0),
+    "slack": Parameter("mm", 1e-3, "cables", "slack"),
+    "gain": Parameter("", 1.0, "cables", "gain"),
 }
 """All parameters by name; :class:`ArmParameters` explains them."""
 
@@ -48,10 +53,12 @@ class ArmParameters:
     """Arm as a function of some of its parameters; use it as ``model_of`` of :func:`identify`.
 
     - ``hole_radius``, ``disk_offset`` [m] of a joint; ``link_length`` [m], ``link_mass`` [kg] of
-      the link after it.
+      the link after it; ``joint_stiffness`` [N m/rad] of the springs about its axes.
+    - ``bending_stiffness`` EI [N m²] of a neck, a gap of a backbone or a link that bends; its GJ
+      changes in the same ratio.
     - Of a cable: ``lead`` [m], ``hole_angle`` [rad], ``friction`` μ [-] in its holes, ``spring``
-      [N/m] in series, ``rigidity`` [-], a factor on the EA of its law, and ``phase`` [rad], which
-      is added to its hole angle.
+      [N/m] in series, ``rigidity`` [-], a factor on the EA of its law, ``slack`` [m] and ``gain``
+      [-] of its motor, and ``phase`` [rad], which is added to its hole angle.
 
     ``"hole_radius"`` is that of all joints, ``"hole_radius@2"`` of the second one from the base.
     ``"lead"`` is that of all cables, ``"lead@2"`` of the cables that end at joint 2,
@@ -64,8 +71,8 @@ class ArmParameters:
 
     Raises:
         InvalidInput: There is no such parameter or cable.
-        InvalidInput: The arm has no such joint, no geometry, or other cables, leads or holes than
-            its geometry; or two names change the same number.
+        InvalidInput: The arm has no such joint, no geometry, or other cables, leads, holes or
+            springs than its geometry; or two names change the same number.
     """
 
     arm: Manipulator
@@ -79,6 +86,14 @@ class ArmParameters:
         for name in self.names:
             kind, where = self._place(name)
             numbers = {(PARAMETERS[kind].attribute, i) for i in where}
+            if not numbers:
+                lacks = _LACKS.get(kind, "no cable that ends there")
+                raise InvalidInput(name, f"{self.arm.name} has {lacks}.")
+            if kind in _LACKS and self.arm._own_springs is not None:
+                said = (
+                    "the springs of the arm are not those of its geometry, which alone is varied."
+                )
+                raise InvalidInput(name, f"{said} Give them by joint_stiffness= of the geometry.")
             if taken & numbers:
                 raise InvalidInput(name, f"frees {kind} of a joint twice.")
             taken |= numbers
@@ -126,6 +141,10 @@ class ArmParameters:
             for i in where:
                 if part == "cables":
                     changes[i][kind] = value
+                elif part == "beams":
+                    own_part = "joints" if i < len(geometry.joints) else "links"
+                    i %= len(geometry.joints)
+                    parts[own_part][i] = _bent(parts[own_part][i], value)
                 elif kind == "phase":
                     parts[part][i] = replace(parts[part][i], angle=parts[part][i].angle + value)
                 else:
@@ -141,6 +160,8 @@ class ArmParameters:
         routed = serpentine_cables(geometry, self.arm.cables[0].elasticity)
         rows = zip(self.arm.cables, routed, changes, strict=True)
         cables = [_changed(old, new, own, laws) for old, new, own in rows]
+        if geometry is self._geometry:
+            return self.arm.with_cables(cables)  # keeps the rigid body
         return self.arm._with_geometry(geometry, cables)
 
     def _place(self, name: str) -> tuple[str, list[int]]:
@@ -148,14 +169,25 @@ class ArmParameters:
         kind, at, place = name.partition("@")
         one_of("parameter of an arm", kind, PARAMETERS)
         geometry, count = self._geometry, len(self._geometry.joints)
-        of_cable = PARAMETERS[kind].part in ("routes", "cables")
-        joints = [c.joint for c in geometry.cables] if of_cable else [*range(1, count + 1)]
+        part = PARAMETERS[kind].part
+        of_cable = part in ("routes", "cables")
+        joints = [c.joint for c in geometry.cables] if of_cable else [*range(1, count + 1)] * 2
         if of_cable and place.startswith("cable"):
             one_of("cable", place, geometry.cable_names)
             return kind, [geometry.cable_names.index(place)]
         if at and not (place.isdecimal() and 1 <= int(place) <= count):
             raise InvalidInput(name, f"the arm has the joints 1 to {count}.")
-        return kind, [i for i, k in enumerate(joints) if not at or k == int(place)]
+        where = range(len(joints) if of_cable or part == "beams" else count)
+        own = [i for i in where if not at or joints[i] == int(place)]
+        if kind == "joint_stiffness":
+            own = [i for i in own if geometry.joints[i].axes]
+        elif part == "beams":
+            own = [i for i in own if self._beams[i].bending_stiffness is not None]
+        return kind, own
+
+    @property
+    def _beams(self) -> tuple[Joint | Link, ...]:
+        return (*self._geometry.joints, *self._geometry.links)
 
     def values(self, name: str) -> list[float]:
         """Return the values in SI that the parameter ``name`` has in the joints or cables."""
@@ -167,10 +199,24 @@ class ArmParameters:
             return [self._geometry.hole_radii[i] for i in where]
         if kind == "friction":
             return [max(site.friction for site in self.arm.cables[i].sites) for i in where]
-        owners: Any = self.arm.cables
-        if part != "cables":
+        owners: Any = self._beams if part == "beams" else self.arm.cables
+        if part not in ("cables", "beams"):
             owners = self._geometry.cables if part == "routes" else getattr(self._geometry, part)
         return [getattr(owners[i], attribute) for i in where]
+
+
+_LACKS: Final = {
+    "joint_stiffness": "no joints with axes there; free the bending_stiffness of its beams",
+    "bending_stiffness": "no backbone and no links that bend there",
+}
+
+
+def _bent(beam: Joint | Link, EI: float) -> Joint | Link:
+    """Return a beam with another bending stiffness, and with GJ in the same ratio."""
+    GJ = beam.torsion_stiffness
+    assert beam.bending_stiffness is not None
+    GJ = None if GJ is None else GJ * EI / beam.bending_stiffness
+    return replace(beam, bending_stiffness=EI, torsion_stiffness=GJ)
 
 
 def _changed(
@@ -186,8 +232,9 @@ def _changed(
     cable = replace(old, sites=holes_like(routed, old), lead=routed.lead)
     if "friction" in changes:
         cable = cable.with_friction(changes["friction"])
-    if "spring" in changes:
-        cable = replace(cable, series_stiffness=changes["spring"])
+    names = {name: PARAMETERS[name].attribute for name in ("spring", "slack", "gain")}
+    own: dict[str, Any] = {names[key]: x for key, x in changes.items() if key in names}
+    cable = replace(cable, **own)
     if "rigidity" in changes:
         law, factor = old.elasticity, changes["rigidity"]
         shared = laws.setdefault((law, factor), law.scaled(factor))

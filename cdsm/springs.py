@@ -45,6 +45,11 @@ class Springs:
         K = np.diag(self.stiffness)
         return frozen(self._coupling.square(K) if self._coupling else K)
 
+    @property
+    def sprung(self) -> list[int]:
+        """Indices of the joints that have a spring."""
+        return np.flatnonzero(self.stiffness).tolist()
+
     @cached_property
     def rest(self) -> Array:
         """Joint angles q (nv,) [rad] where the springs rest; 0 where there are none."""

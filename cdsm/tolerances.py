@@ -18,8 +18,15 @@ from cdsm.support.validation import one_of, scalar, sequence_of, text
 Distribution = Literal["normal", "uniform"]
 
 EVERY: Final = "*"  # pattern of the names of all inputs
-_COMMON = ("rigidity", "friction")  # one error for all by default: one spool, one material
-_LARGEST = {"rigidity": 0.5, "spring": 0.5, "friction": 0.5, "joint_angle": 0.3, "hole_angle": 0.3}
+_COMMON = (
+    "rigidity",
+    "joint_stiffness",
+    "friction",
+)  # one error for all by default: one spool, one material
+_LARGEST = {
+    **dict.fromkeys(("rigidity", "spring", "joint_stiffness", "friction"), 0.5),
+    **dict.fromkeys(("joint_angle", "hole_angle"), 0.3),
+}
 
 
 @final
@@ -70,12 +77,14 @@ class Tolerances:
 
     A source is a standard uncertainty (one sigma) as a number, a :class:`Tolerance`, or a list of
     tolerances, each for the inputs that its ``of`` names. It is kept as a tuple of those that are
-    not zero. A number for ``rigidity`` or ``friction`` has the correlation 1, since cables are of
-    one spool and disks of one material; other numbers have the correlation 0.
+    not zero. A number for ``rigidity``, ``joint_stiffness`` or ``friction`` has the correlation 1,
+    since cables are of one spool, a backbone is one rod and disks are of one material; other
+    numbers have the correlation 0.
 
     Attributes:
         rigidity: EA of the law of each cable; relative [-].
         spring: k_series in series with each cable, such as its anchor or drive; relative [-].
+        joint_stiffness: k of the spring of each joint, those of beams included; relative [-].
         joint_angle: Each joint angle [rad]; [m] for prismatic joints.
         tension: Each measured cable tension [N].
         lead: Straight length of each cable before the base disk [m].
@@ -92,6 +101,7 @@ class Tolerances:
 
     rigidity: OneOrMore = 0.0
     spring: OneOrMore = 0.0
+    joint_stiffness: OneOrMore = 0.0
     joint_angle: OneOrMore = 0.0
     tension: OneOrMore = 0.0
     lead: OneOrMore = 0.0
@@ -132,7 +142,7 @@ class Tolerances:
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write a TOML file from which :meth:`read` builds equal tolerances, or FileError."""
-        head = "# Tolerances of an arm, one sigma: rad, m, N, kg; rigidity and spring relative.\n"
+        head = "# Tolerances of an arm, one sigma: rad, m, N, kg; rigidity and springs relative.\n"
         return write_text(path, head + "\n" + toml_text(table_of(self)))
 
 

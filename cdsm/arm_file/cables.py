@@ -23,8 +23,10 @@ _HEAD = """\
 # sites: links of the robot with a point in each one's frame, from the actuator's side to the end.
 # lead: straight cable from the actuator to the first site. series_stiffness: of a spring in series;
 # none if left out. control: what the motor holds, "position" or "force". minimum, maximum: tensions
-# that the cable may carry; 0 and none if left out. friction, wrap (of a site): coefficient, and an
-# angle [rad] that adds to the angle by which the cable turns there; 0 if left out.
+# that the cable may carry; 0 and none if left out. slack: wire that the motor takes in before the
+# cable pulls; 0 if left out. gain: wire taken in per pull that the motor reports; 1 if left out.
+# friction, wrap (of a site): coefficient, and an angle [rad] that adds to the angle by which the
+# cable turns there; 0 if left out.
 
 """
 
@@ -41,8 +43,8 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
     - ``wire``: a name such as ``"1x19-1.2mm"``, a constant rigidity [N], or the NAME of a table
       ``[wires.NAME]`` in the form of :meth:`Elasticity.read`.
     - Optional: ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``),
-      ``minimum`` and ``maximum`` [N]. These keys and ``wire`` may also stand at the top of the
-      file, for all cables without their own.
+      ``minimum`` and ``maximum`` [N], ``slack`` [m] and ``gain``. These keys and ``wire`` may also
+      stand at the top of the file, for all cables without their own.
     - Optional: ``lead`` [m], the straight cable between the actuator and the first site, and
       ``friction``, the coefficient in all holes that the cable passes.
 

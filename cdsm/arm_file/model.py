@@ -31,7 +31,7 @@ from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
 
-SETTINGS: Final = "series_stiffness", "control", "minimum", "maximum"
+SETTINGS: Final = "series_stiffness", "control", "minimum", "maximum", "slack", "gain"
 """Keys that are attributes of a :class:`Cable` with the same name."""
 
 _GIVEN: Final = *SETTINGS, "friction", "slack_below"  # keys of all cables or of each
@@ -125,6 +125,8 @@ class _Settings:
     control: Control | None = None
     minimum: records.Tension | None = None
     maximum: Annotated[records.Tension | None, AfterValidator(_ordered)] = None
+    slack: records.Slack | None = None
+    gain: records.Gain | None = None
 
 
 @record

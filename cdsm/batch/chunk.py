@@ -69,7 +69,7 @@ class Chunk:
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
         self._aside(self._kernels.pose, table.arm, self._body(), q, W, at)
         if rows.arm.has_springs:
-            at.torque[...] -= table.spring[:, None] * (q - table.free[:, None])
+            at.torque[...] -= self._joint_springs() * (q - table.free[:, None])
         full, at = at, self._reduced(at)
         short = self._alone(at.shortest) < SHORTEST_SEGMENT
         status[short & (status == Status.OK)] = Status.COINCIDENT_SITES
@@ -177,7 +177,7 @@ class Chunk:
             *pose, F, k, W = (self._picked(x, doubtful) for x in (*at, F, k, W))
             some = Pose(*pose)
             terms = one_by_one(self._terms(some, F, k, W, apart=True)[0], doubtful.size)
-            terms = self._with_springs(terms)
+            terms = self._with_springs(terms, doubtful)
             of_tip = _jacobian(some, np.arange(doubtful.size))
             read_off, status[doubtful] = read({"along"}, terms, of_tip, u)
             found["along"][doubtful] = read_off["along"]
@@ -189,17 +189,29 @@ class Chunk:
         size = self._empty("size", B, nv)
         self._aside(self._kernels.stiffness, self._table.arm, at, F, k, W, K, size)
         if self._rows.arm.has_springs and not apart:
-            K[:, 0, range(nv), range(nv)] += self._table.spring[:, None]
-            size += self._table.spring[:, None]
+            K[:, 0, range(nv), range(nv)] += self._joint_springs()
+            size += self._joint_springs()
         return K, size
 
-    def _with_springs(self, terms: Array) -> Array:
-        """Return the terms (n, 4 or 5, nv, nv) of K_θ, from the four of the kernels."""
+    def _joint_springs(self) -> Array:
+        """Return the stiffness of springs (n, 1), or (B, n, W) if the rows differ."""
+        if self._rows.joint_springs is None:
+            return self._table.spring[:, None]
+        return side_by_side(self._rows.joint_springs[self._part][:, self._table.order], self._width)
+
+    def _with_springs(self, terms: Array, rows: NDArray[np.intp] | None = None) -> Array:
+        """Return the terms (n, 4 or 5, nv, nv) of K_θ, from the kernels' of some ``rows``."""
         if (S := self._table.reduction) is not None:
             terms = S.T @ terms @ S
         if not self._rows.arm.has_springs and "springs" not in self._names:
             return terms
-        springs = np.broadcast_to(self._table.springs, (len(terms), 1, *terms.shape[2:]))
+        springs = self._table.springs[None]
+        if self._rows.joint_springs is not None:
+            k = self._rows.joint_springs[self._part][:, self._table.order]
+            k = k if rows is None else k[rows]
+            S = np.eye(k.shape[1]) if S is None else S
+            springs = S.T @ (k[:, :, None] * S)
+        springs = np.broadcast_to(springs[:, None], (len(terms), 1, *terms.shape[2:]))
         return np.concatenate([terms, springs], axis=1)
 
     def _finished(self, name: str, value: Array) -> Array:

@@ -18,7 +18,8 @@ Range = tuple[float, float]
 _LOOPS = "A line per reading. Columns: test; joints [deg]; direction (such as -z); force [N]; "
 _LOOPS += "displacement [mm] along it (or x, y, z); minimum [N], or a tension per cable [N]."
 _FREE = "Parameter to find; repeat it: friction; rigidity (factor on EA); spring [N/mm] in series; "
-_FREE += "lead, hole_radius, disk_offset, link_length [mm]; link_mass [g]. Default bounds: half to "
+_FREE += "lead, slack, hole_radius, disk_offset, link_length [mm]; link_mass [g]; joint_stiffness, "
+_FREE += "bending_stiffness [N m/rad, N m²]. Default bounds: half to "
 _FREE += "twice the arm's own value; friction 0 to 1."
 
 

@@ -29,7 +29,14 @@ WHOLE: Final = ("end", "cables_per_joint")
 
 _NAMES: Final = (*PARAMETERS, *WHOLE, "wire", "minimum")
 _SI: Final = {"mm": "m", "deg": "rad", "g": "kg", "N/mm": "N/m"}
-_KINDS: Final = {"m": "length", "kg": "mass", "N/m": "stiffness", "N": "tension"}
+_KINDS: Final = {
+    "m": "length",
+    "kg": "mass",
+    "N/m": "stiffness",
+    "N": "tension",
+    "N m/rad": "spring",
+    "N m²": "bending stiffness",
+}
 _WIDEST_ANGLE = 4.0 * math.pi  # a range of angles beyond this [rad] is probably in degrees
 
 
@@ -119,7 +126,8 @@ class Variable:
         """SI unit, or empty."""
         if self.kind == "minimum":
             return "N"
-        return _SI.get(PARAMETERS[self.kind].unit, "") if self.kind in PARAMETERS else ""
+        shown = PARAMETERS[self.kind].unit if self.kind in PARAMETERS else ""
+        return _SI.get(shown, shown)
 
     @property
     def is_continuous(self) -> bool:

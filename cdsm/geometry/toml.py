@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _ARM_KEYS = (
     *("gravity", "original_length", "wire", "wires", "urdf", "springs"),
     *("slack_below", "friction", "series_stiffness", "control", "minimum", "maximum"),
-    "tolerances",
+    *("slack", "gain", "tolerances"),
 )
 
 

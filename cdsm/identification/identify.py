@@ -1,4 +1,4 @@
-"""Identify parameters of an arm from measured stiffnesses and load loops, by least squares."""
+"""Identify parameters of an arm from what is measured on it, by least squares."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from cdsm.errors import InvalidInput
-from cdsm.identification.measurement import Measurement, WeightLoop
-from cdsm.identification.problem import Problem, TensionOf
+from cdsm.identification.measurement import Measurement, WeightLoop, name_of
+from cdsm.identification.problem import Problem, TensionOf, Test
 from cdsm.identification.result import Identification
+from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import plural
 from cdsm.support.progress import progress_allowed, progress_bar
@@ -22,7 +23,7 @@ _NEAR = 1e-3  # an optimum this near to a bound is tried on it: the search only 
 
 def identify(
     model_of: Callable[..., Manipulator],
-    measurements: Sequence[Measurement | WeightLoop],
+    measurements: Sequence[Test],
     free: Mapping[str, tuple[float, float]],
     *,
     start: Mapping[str, float] | None = None,
@@ -38,7 +39,8 @@ def identify(
     domain of a law.
 
     A :class:`WeightLoop` is predicted as by :func:`~cdsm.load_cycle`, with friction and history, so
-    its width determines the friction.
+    its width determines the friction. The coordinates of a :class:`TipPosition` are predicted as by
+    :func:`~cdsm.forward_statics`.
 
     The search (``least_squares`` of scipy) predicts all measurements about 10 P times. A
     measurement with a force takes ten times as long as one without; a loop with friction takes tens
@@ -47,8 +49,9 @@ def identify(
     Args:
         model_of: Function that builds the arm from the free parameters (dimensions, masses,
             springs, leads, …), given by keyword; or :class:`~cdsm.ArmParameters`.
-        measurements: Stiffnesses and loops. They have at least as many numbers as there are
-            parameters; a loop of n forces has n − 1 per axis, since its offset is unknown.
+        measurements: Stiffnesses, loops and positions of the tip. They have at least as many
+            numbers as there are parameters; a loop of n forces has n − 1 per axis, since its
+            offset is unknown.
         free: Bounds (low, high) of each parameter, in the unit in which ``model_of`` takes it. If
             they are positive and a factor of 100 or more apart, the search is logarithmic.
         start: First value of each parameter; by default the middle of its bounds. The search ends
@@ -56,23 +59,25 @@ def identify(
         tension_of: Function ``tension_of(posture, measurement, **p)`` that returns the tensions
             (C,) [N] or a :class:`~cdsm.Tension`, for example with the offset of a load cell as a
             parameter. Both ``tension_of`` and ``model_of`` get all free parameters. The default is
-            the tensions of the measurement.
+            the tensions of the measurement. It is not asked for positions of the tip.
         progress: Show a bar on the standard error, if that is a terminal.
 
     Raises:
         InvalidInput: There are no measurements or fewer than parameters; bounds or start are
             invalid; ``model_of`` or ``tension_of`` fails or does not take a parameter; or the start
-            does not give every measurement a stable stiffness.
+            does not give every measurement a stable prediction; or a position is far outside the
+            arm, as in mm.
     """
-    _check_measurements(measurements)
+    check_measurements(measurements)
     bounds = _checked_bounds(free)
-    informative = sum(each._readings.size for each in measurements)
-    informative -= sum(len(each.axes) for each in measurements if isinstance(each, WeightLoop))
+    informative = independent_readings(measurements)
     if informative < len(bounds):
         said = f"{plural(informative, 'independent reading')} given for "
         said += f"{plural(len(bounds), 'parameter')}, {', '.join(bounds)}; give at least as many, "
-        said += "or free fewer parameters. A stiffness counts as one, a loop as its readings minus "
-        raise InvalidInput("measurements", f"{said}one, since its offset is unknown.")
+        said += (
+            "or free fewer parameters. A stiffness or a coordinate counts as one, a loop as its "
+        )
+        raise InvalidInput("measurements", f"{said}readings minus one, as its offset is unknown.")
     problem = Problem(model_of, tension_of, measurements, bounds)
     first = _start(problem, start)
     with progress_allowed(progress), progress_bar("identifying parameters"):
@@ -97,12 +102,19 @@ def identify(
     )
 
 
-def _check_measurements(measurements: object) -> None:
-    kinds = Measurement | WeightLoop
+def independent_readings(measurements: Sequence[Test]) -> int:
+    """Return the number of readings, less one for each axis of a loop: its offset is unknown."""
+    offsets = sum(len(each.axes) for each in measurements if isinstance(each, WeightLoop))
+    return sum(each._readings.size for each in measurements) - offsets
+
+
+def check_measurements(measurements: object) -> None:
+    """Raise InvalidInput if these are no measurements, or planned ones without readings."""
+    kinds = Measurement | WeightLoop | TipPosition
     if not isinstance(measurements, list | tuple) or not all(
         isinstance(each, kinds) for each in measurements
     ):
-        said = "a list or tuple of Measurement and WeightLoop is needed."
+        said = "a list or tuple of Measurement, TipPosition and WeightLoop is needed."
         raise InvalidInput("measurements", f"{measurements!r} given; {said}")
     for i, each in enumerate(measurements):
         if isinstance(each, WeightLoop) and each.displacements is None:
@@ -147,6 +159,9 @@ def _start(problem: Problem, start: Mapping[str, float] | None) -> Array:
         said = f"{name} does not give every measurement a stable prediction. At "
         said += f"{problem.describe(point)}, {reason} Correct that, or give another start."
         raise InvalidInput("start", said)
+    for i, test in enumerate(problem.measurements):
+        if isinstance(test, TipPosition):
+            test._require_near(reason.arm, name_of(i, test.label))
     return point
 
 
@@ -176,7 +191,7 @@ def _unfinished(problem: Problem, best: Array, jacobian: Array) -> str:
     free = ~(((best == 0.0) & (gradient >= 0.0)) | ((best == 1.0) & (gradient <= 0.0)))
     step = np.linalg.lstsq(jacobian[:, free], -r, rcond=1e-6)[0] if free.any() else np.zeros(0)
     fall = float(np.sum((jacobian[:, free] @ step) ** 2))
-    if fall < (1e-2 if problem.has_loops else 1e-3):  # of χ²; a standard deviation is 1
+    if fall < (1e-2 if problem.has_rests else 1e-3):  # of χ²; a standard deviation is 1
         return ""
     edge = f"The model ended last at {problem.edge}" if problem.edge else "Give another start."
     said = f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "

@@ -35,7 +35,7 @@ def interval(
     tangent = np.linalg.lstsq(beside, -jacobian[:, i], rcond=1e-6)[0]
     width = math.sqrt(rise) / float(np.linalg.norm(jacobian[:, i] + beside @ tangent))
 
-    precision = 3e-4 if problem.has_loops else 1e-6  # in half widths
+    precision = 3e-4 if problem.has_rests else 1e-6  # in half widths
 
     @cache
     def excess(u: float) -> float:

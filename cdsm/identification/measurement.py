@@ -68,7 +68,7 @@ class Measurement:
     force: float = 0.0
 
     def __post_init__(self) -> None:
-        value, std = _positive("value", self.value, "N/m"), _positive("std", self.std, "N/m")
+        value, std = positive("value", self.value, "N/m"), positive("std", self.std, "N/m")
         force = scalar("force", self.force)
         if force < 0.0:
             remedy = "it must be positive, or 0 for the tangent. Turn the direction round instead."
@@ -151,7 +151,7 @@ class WeightLoop:
                 said += f"({n}, 3) in base axes."
                 raise InvalidInput("displacements", f"shape {array.shape} given; {said}")
             read = tuple(array.tolist() if array.ndim == 1 else map(tuple, array.tolist()))
-        std = _positive("displacement_std", self.displacement_std, "m")
+        std = positive("displacement_std", self.displacement_std, "m")
         _keep(self, forces=tuple(forces.tolist()), displacements=read, displacement_std=std)
 
     @property
@@ -226,12 +226,13 @@ def tension_before(test: Measurement | WeightLoop, pose: Posture) -> Tension | A
     return distribute_tension(pose, test.minimum, wrench=test.wrench)
 
 
-def name_of(i: int, test: Measurement | WeightLoop) -> str:
-    """Return the name of test number ``i``: its label, or "[i]" if it has none."""
-    return test.label or f"[{i}]"
+def name_of(i: int, label: str) -> str:
+    """Return the name of measurement number ``i``: its label, or "[i]" if it has none."""
+    return label or f"[{i}]"
 
 
-def _positive(name: str, value: object, unit: str) -> float:
+def positive(name: str, value: object, unit: str) -> float:
+    """Return a positive number, or raise InvalidInput with its ``unit``."""
     number = scalar(name, value)
     if number < SMALLEST:
         raise InvalidInput(name, f"{number:g} {unit} given; it must be positive.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,15 +11,19 @@ from scipy.optimize import least_squares
 
 from cdsm.errors import CdsmError, InvalidInput
 from cdsm.identification.measurement import Measurement, WeightLoop, name_of, tension_before
+from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
 from cdsm.support.validation import instance
 from cdsm.support.values import Array
 from cdsm.tension import Tension
 
+NONE: Final[Mapping[object, Posture]] = {}
 TensionOf = Callable[..., Tension | ArrayLike]
+Test = Measurement | WeightLoop | TipPosition
 
 _DECADES = 100.0  # bounds that are positive and this factor apart: the logarithm is searched
-_STEP, _STEP_OF_LOOPS = 1e-6, 1e-5  # of finite differences; loops are less exact, and have kinks
+_STEP, _STEP_OF_RESTS = 1e-6, 1e-5  # of finite differences; postures at rest are less exact
 _FALL = (1e-12, 1e-6), (1e-6, 1e-5)  # of χ², at which a search ends: fine, coarse; with loops
 _INSIDE = 1e-6  # nearest start to a bound: a search that starts on a bound may stay there
 
@@ -41,7 +45,7 @@ class Problem:
         self,
         model_of: Callable[..., Manipulator],
         tension_of: TensionOf | None,
-        measurements: Sequence[Measurement | WeightLoop],
+        measurements: Sequence[Test],
         bounds: Mapping[str, tuple[float, float]],
     ) -> None:
         self.model_of, self.tension_of = model_of, tension_of
@@ -50,8 +54,9 @@ class Problem:
         self._by_log = (self.low > 0.0) & (self.high >= _DECADES * self.low)
         self._ends = self._scaled(self.low), self._scaled(self.high)
         self._last: tuple[bytes, Prediction | str] = b"", ""
+        self._rests = dict[object, Posture]()  # of tips at the last point, by their conditions
         self.edge = ""  # where the model did not exist last, and why
-        self.has_loops = any(isinstance(each, WeightLoop) for each in self.measurements)
+        self.has_rests = any(not isinstance(each, Measurement) for each in self.measurements)
 
     def _scaled(self, values: Array) -> Array:
         return np.asarray(np.log(values, out=values.copy(), where=self._by_log))
@@ -83,12 +88,16 @@ class Problem:
         Raises InvalidInput if a function of the user fails.
         """
         if self._last[0] != x.tobytes():
-            self._last = x.tobytes(), self._predict(x)
+            rests = dict[object, Posture]()
+            self._last, self._rests = (x.tobytes(), self._predict(x, rests)), rests
             if isinstance(reason := self._last[1], str):
                 self.edge = f"{self.describe(x)}: {reason}"
         return self._last[1]
 
-    def _predict(self, x: Array) -> Prediction | str:
+    def _predict(
+        self, x: Array, rests: dict[object, Posture], near: Mapping[object, Posture] = NONE
+    ) -> Prediction | str:
+        """Predict at a point; put in ``rests`` where the arm rests, sought from those ``near``."""
         parameters = dict(zip(self.names, self.values(x).tolist(), strict=True))
         where, numbers = "model_of: ", list[Array]()
         try:
@@ -96,7 +105,12 @@ class Problem:
             where = ""
             instance("model_of", arm, Manipulator)
             for i, each in enumerate(self.measurements):
-                where = f"measurement {name_of(i, each)}: "
+                where = f"measurement {name_of(i, each.label)}: "
+                if isinstance(each, TipPosition):
+                    if (key := each._conditions) not in rests:
+                        rests[key] = each._rest(arm, near.get(key))
+                    numbers.append(each._coordinates(rests[key]))
+                    continue
                 pose = arm.at(each.angles)
                 if self.tension_of is None:
                     tension = tension_before(each, pose)
@@ -118,9 +132,9 @@ class Problem:
         errors = (each._errors(found) for each, found in pairs)
         return np.concatenate([off / std for off, std in errors])
 
-    def residuals(self, x: Array) -> Array:
-        """Compute r (n,) at a point; inf without a model."""
-        found = self.predict(x)
+    def residuals(self, x: Array, *, beside: bool = False) -> Array:
+        """Compute r (n,) at a point, or one ``beside`` the last; inf without a model."""
+        found = self._predict(x, {}, self._rests) if beside else self.predict(x)
         if isinstance(found, str):
             return np.full(sum(each._readings.size for each in self.measurements), np.inf)
         return self.weighed(found.numbers)
@@ -136,13 +150,13 @@ class Problem:
         A side beyond a bound or without a model is left out. Raises InvalidInput if both are.
         """
         here, columns = self.residuals(x), []
-        step = _STEP_OF_LOOPS if self.has_loops else _STEP
+        step = _STEP_OF_RESTS if self.has_rests else _STEP
         for i in range(x.size) if over is None else over:
             sides = list[tuple[float, Array]]()
             for way in (step, -step):
                 y = x.copy()
                 y[i] += way
-                if 0.0 <= y[i] <= 1.0 and np.isfinite(r := self.residuals(y)).all():
+                if 0.0 <= y[i] <= 1.0 and np.isfinite(r := self.residuals(y, beside=True)).all():
                     sides.append((way, r))
                     if not central:
                         break
@@ -172,8 +186,8 @@ class Problem:
             lambda part: self.jacobian(at(part), moving),
             bounds=(0.0, 1.0),
             x_scale="jac",
-            ftol=_FALL[self.has_loops][coarse],
-            xtol=1e-8 if coarse or self.has_loops else 1e-12,
+            ftol=_FALL[self.has_rests][coarse],
+            xtol=1e-8 if coarse or self.has_rests else 1e-12,
             gtol=1e-12,
             max_nfev=200,
         )

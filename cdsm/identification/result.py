@@ -17,9 +17,10 @@ from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination
 from cdsm.identification.intervals import interval
 from cdsm.identification.measurement import Measurement, WeightLoop, name_of
-from cdsm.identification.problem import Problem
+from cdsm.identification.problem import Problem, Test
+from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
-from cdsm.support.format import MODEL, aligned
+from cdsm.support.format import MODEL, aligned, coordinates
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import scalar
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
-_UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
+UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
 _OWN, _MIXED = "own unit", "N/m or m"
 
 
@@ -38,17 +39,17 @@ _OWN, _MIXED = "own unit", "N/m or m"
 class Identification(Result):
     """Parameters of an arm that explain its measurements best; made by :func:`identify`.
 
-    There are P parameters and n measured numbers: one for each stiffness, and all readings of each
-    loop. Each parameter has the unit in which ``model_of`` takes it, its own unit. All arrays are
-    read-only.
+    There are P parameters and n measured numbers: one for each stiffness, all readings of each
+    loop, and all coordinates of each position. Each parameter has the unit in which ``model_of``
+    takes it, its own unit. All arrays are read-only.
 
     Attributes:
         names: Names of the parameters, in the order of every (P,) array.
         values: Values of the parameters (P,).
         bounds: Bounds of the parameters (P, 2), low and high.
         measurements: The measurements.
-        predicted: Predicted numbers (n,): stiffnesses [N/m], and readings of loops [m] with fitted
-            offsets.
+        predicted: Predicted numbers (n,): stiffnesses [N/m], readings of loops [m] with fitted
+            offsets, and coordinates of the tip [m].
         residuals: r = (predicted − measured)/σ (n,) [-].
         jacobian: J = ∂r/∂p (n, P).
         arm: Arm with these values.
@@ -60,7 +61,7 @@ class Identification(Result):
     names: tuple[str, ...] = field(metadata=unit("1", "parameter"))
     values: Array = field(metadata=unit(_OWN, "parameter"))
     bounds: Array = field(metadata=unit(_OWN, "parameter", "bound"))
-    measurements: tuple[Measurement | WeightLoop, ...]
+    measurements: tuple[Test, ...]
     predicted: Array = field(metadata=unit(_MIXED, "reading"))
     residuals: Array = field(metadata=unit("1", "reading"))
     jacobian: Array
@@ -75,7 +76,7 @@ class Identification(Result):
 
     @quantity(_MIXED, "reading")
     def measured(self) -> Array:
-        """Measured numbers (n,): stiffnesses [N/m], and tip displacements of weight loops [m]."""
+        """Measured numbers (n,): stiffnesses [N/m], displacements of loops and coordinates [m]."""
         return frozen(np.concatenate([each._readings for each in self.measurements]))
 
     @cached_property
@@ -148,7 +149,7 @@ class Identification(Result):
                         f"{name} is at its {side} bound, {limit:g}: the optimum lies there or "
                         "beyond. Widen the bounds, or doubt the model."
                     )
-        if self.freedom and chdtrc(self.freedom, self.chi_square) < _UNLIKELY:
+        if self.freedom and chdtrc(self.freedom, self.chi_square) < UNLIKELY:
             k = int(abs(self.residuals).argmax())
             said.append(
                 f"the model does not explain the measurements within their σ: {self._verdict}, "
@@ -212,23 +213,31 @@ class Identification(Result):
             off, worst = self.residuals[own], f"{max(self.residuals[own], key=abs):.2f} σ"
             if isinstance(each, Measurement):
                 said = [f"{K[own][0] / 1e3:.4g} N/mm" for K in (self.measured, self.predicted)]
+            elif isinstance(each, TipPosition):
+                names = ", ".join(each.axes)
+                said = [
+                    f"{names} {coordinates(1e3 * p[own], '.4g')} mm"
+                    for p in (self.measured, self.predicted)
+                ]
             else:
                 rms = 1e6 * each.displacement_std * math.sqrt(np.mean(off**2))
                 said = [f"{off.size} readings", f"off by {rms:.3g} µm rms"]
-            tests.append((name_of(i, each), *said, worst))
+            tests.append((name_of(i, each.label), *said, worst))
         note = "(95 % from the std of the linear model; confidence() profiles χ²)"
-        model = f"({MODEL}; secant where a force is given; loops with friction)"
+        model = f"({MODEL}; secant where a force is given; loops with friction; tips at rest)"
         shown = [*aligned(lines), note, "", *aligned(tests), model, "", self._verdict]
         return "\n".join([*shown, *(f"warning: {sentence}" for sentence in self.warnings)])
 
     @property
     def reading_names(self) -> list[str]:
-        """Name of each of the n measured numbers: the label, and for loops the force's number."""
+        """Name of each of the n measured numbers: the label, and the force's number or the axis."""
         names = []
         for i, each in enumerate(self.measurements):
-            own, numbers = name_of(i, each), each._readings.size
+            own, numbers = name_of(i, each.label), each._readings.size
             if isinstance(each, WeightLoop):
                 names += [f"{own} force {k // len(each.axes) + 1}" for k in range(numbers)]
+            elif isinstance(each, TipPosition):
+                names += [f"{own} {axis}" for axis in each.axes]
             else:
                 names.append(own)
         return names

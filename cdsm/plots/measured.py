@@ -87,16 +87,20 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
     """
     rows = [fit.measurements[i] for i in fit.measurement_of]
     loops = [(i, one) for i, one in enumerate(fit.measurements) if hasattr(one, "forces")]
-    stiff = [k for k, one in enumerate(rows) if not hasattr(one, "forces")]
-    figure, (axes,) = style.panels(style.TWO_COLUMNS, 3.2, 1 + bool(stiff) + bool(loops))
+    stiff = [k for k, one in enumerate(rows) if hasattr(one, "value")]
+    tips = [k for k, one in enumerate(rows) if hasattr(one, "pull")]
+    count = 1 + bool(stiff) + bool(tips) + bool(loops)
+    figure, (axes,) = style.panels(style.TWO_COLUMNS, 3.2, count)
     *left, right = axes
-    if stiff:
-        measured, predicted = N_PER_MM * fit.measured[stiff], N_PER_MM * fit.predicted[stiff]
-        sigma = [N_PER_MM * rows[k].std for k in stiff]
-        ends = [np.append(measured, predicted).min(), np.append(measured, predicted).max()]
-        left[0].plot(ends, ends, color="0.6", linewidth=0.9)
-        left[0].errorbar(measured, predicted, xerr=sigma, fmt="o", color=style.BLUE)
-        left[0].set(xlabel="measured [N/mm], ± σ", ylabel="predicted [N/mm]")
+    panels = iter(left)
+    for own, unit, size in ((stiff, "N/mm", N_PER_MM), (tips, "mm", MM)):
+        if own:
+            panel, sigma = next(panels), [size * rows[k].std for k in own]
+            measured, predicted = size * fit.measured[own], size * fit.predicted[own]
+            ends = [np.append(measured, predicted).min(), np.append(measured, predicted).max()]
+            panel.plot(ends, ends, color="0.6", linewidth=0.9)
+            panel.errorbar(measured, predicted, xerr=sigma, fmt="o", color=style.BLUE)
+            panel.set(xlabel=f"measured [{unit}], ± σ", ylabel=f"predicted [{unit}]")
     if loops:
         _plot_loops(left[-1], fit, loops)
         style.legend_below(figure, left[-1], 5)

@@ -50,8 +50,9 @@ def forward_statics(
         arm: The arm.
         tension: F (C,) [N] that the motors hold.
         rest_lengths: Unstrained lengths l_0 (C,) [m] of the wires that the motors have left.
-        pull: How much wire each motor has taken in (C,) [m], from the lengths in which the cables
-            are just straight at the angles q_0 of the springs.
+        pull: How much wire each motor reports to have taken in (C,) [m], from the lengths in which
+            the cables are just straight at the angles q_0 of the springs: these lengths become
+            shorter by ``gain`` · pull − ``slack`` of each :class:`~cdsm.Cable`.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         start: Angles q (nv,) [rad] at which the search begins, under the whole load. None: load and
             pull grow from nothing, from the angles q_0; :attr:`Equilibrium.branch` says if the arm
@@ -96,7 +97,8 @@ def _model(
     straight = arm._laws.original_lengths(home.cable_lengths, least)
     if name == "pull":
         taken = vector("pull", value, count, "the wire taken in [m] per cable", "length")
-        rest = straight - taken
+        slack, gain = np.array([(cable.slack, cable.gain) for cable in arm.cables]).T
+        rest = straight - (gain * taken - slack)
     else:
         rest = vector("rest_lengths", value, count, "one length [m] per cable", "length")
     if not (rest > 0.0).all():

@@ -38,6 +38,7 @@ _ROWS = 1000  # arms in one batch, which bounds its memory
 _ROUNDING = 1e-9  # a smaller relative uncertainty is rounding
 _DEGREES, _PERCENT = (math.pi / 180.0, " deg"), (1e-2, " %")
 _UNITS = {"joint_angle": _DEGREES, "hole_angle": _DEGREES, "rigidity": _PERCENT, "spring": _PERCENT}
+_UNITS |= {"joint_stiffness": _PERCENT}
 _UNITS |= {"tension": (1.0, " N"), "link_mass": (1e-3, " g"), "friction": (1.0, "")}  # or mm
 
 
@@ -127,14 +128,14 @@ class Uncertainty(Result):
             *self._unstable,
             f"{self.name}: {self.shown} {unit} (one standard uncertainty, {relative:.2g} %)",
             f"95 % of such arms: {low:.4g} to {high:.4g} {unit}",
-            f"{'source':<14}{'tolerance':>16}{f'contribution [{unit}]':>24}{'of variance':>14}",
+            f"{'source':<16}{'tolerance':>16}{f'contribution [{unit}]':>24}{'of variance':>14}",
         ]
         for source, u in self.contributions.items():
             scale, of_inputs = _UNITS.get(source, (1e-3, " mm"))
             given = np.array([each.standard for each in self.tolerances.given[source]])
             tolerance = span(given / scale, "{:.3g}".format) + of_inputs
             share = 100.0 * (u / (self.standard_uncertainty or 1.0)) ** 2
-            line = f"{source:<14}{tolerance:>16}{u / size:>24.3g}{share:>12.3g} %"
+            line = f"{source:<16}{tolerance:>16}{u / size:>24.3g}{share:>12.3g} %"
             lines += [line] if u else []
         if without := [source for source, u in self.contributions.items() if not u]:
             lines.append(f"without influence on it: {', '.join(without)}")

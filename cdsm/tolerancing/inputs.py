@@ -25,7 +25,11 @@ from cdsm.urdf import CROSS_MASS
 Errors = Mapping[str, Array]
 """Errors (N, n) of the n inputs of each source, for N arms; a source that is missing has none."""
 
-_POSITIVE = ("rigidity", "spring")  # sources with relative errors of positive numbers
+_POSITIVE = (
+    "rigidity",
+    "spring",
+    "joint_stiffness",
+)  # sources with relative errors of positive numbers
 _NEAR = 1e-9  # a site this near to a disk [m] is on the disk
 _LENGTHS = ("lead", "hole_radius", "disk_offset", "link_length", "site")
 _LARGEST = 0.1  # largest standard uncertainty of a length, divided by the length of the arm
@@ -65,10 +69,11 @@ class Inputs:
         self._of_cable = np.eye(len(cables))[of[self._first]]
         each = [(c.name, i, site) for c in cables for i, site in enumerate(c.sites, 1)]
         sites = [f"{name} on {site.link}, site {i}" for name, i, site in each]
-        moved = ("base", *(arm.joint_names[j] for j in table.order))
+        moved = ("base", *(arm.springs.joints[j] for j in table.order))
         self.labels: dict[str, Sequence[str]] = {
             "rigidity": cables.names,
             "spring": [c.name for c in cables if c.series_stiffness < math.inf],
+            "joint_stiffness": [arm.springs.joints[j] for j in arm.springs.sprung],
             "joint_angle": arm.joint_names,
             "tension": cables.names,
             "lead": cables.names,
@@ -168,6 +173,7 @@ _NO_HOLES = (
 _LACKS = {
     "friction": "has no friction in its holes; see Manipulator.with_friction.",
     "spring": "has no springs in series; see series_stiffness of a Cable.",
+    "joint_stiffness": "has no springs at its joints; see joint_stiffness and Geometry.backbone.",
 }
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -114,3 +115,68 @@ def test_one_radius_of_all_holes_is_that_of_the_geometry() -> None:
     geometry = cdsm.ArmParameters(ARM, ("hole_radius",))(hole_radius=0.03).geometry
     assert geometry.hole_radius == 0.03
     assert geometry.hole_radii == (0.03, 0.03)
+
+
+SECTION = {"length": 0.1, "disks": 3, "hole_angles": [0.0, 2.0, 4.0], "hole_radius": 0.006}
+ROD = cdsm.Manipulator(
+    cdsm.Geometry.backbone(sections=[SECTION], bending_stiffness=0.01, poisson=0.25),
+    cdsm.LinearElasticity(48e3),
+)
+
+
+def test_motors_and_springs_have_parameters() -> None:
+    sprung = cdsm.Manipulator(
+        cdsm.Geometry.universal(
+            joints=2, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.012,
+            hole_radius=0.02, link_mass=0.1, lead=0.3, joint_stiffness=[2.0, 1.0],
+            bending_stiffness=5.0,
+        ),
+        cdsm.LinearElasticity(48e3),
+    )  # fmt: skip
+    names = ("joint_stiffness@2", "bending_stiffness@1", "slack@cable2_1", "gain")
+    parameters = cdsm.ArmParameters(sprung, names)
+    assert [*parameters.present.values()] == [1.0, 5.0, 0.0, 1.0]
+    arm = parameters(**dict(zip(names, (3.0, 6.0, 1e-3, 0.9), strict=True)))
+    assert [joint.stiffness for joint in arm.geometry.joints] == [2.0, 3.0]
+    own = dict(zip(arm.springs.joints, arm.springs.stiffness, strict=True))
+    assert (own["joint1_1"], own["joint2_1"], own["joint2_2"]) == (2.0, 3.0, 3.0)
+    assert [link.bending_stiffness for link in arm.geometry.links] == [6.0, 5.0]
+    assert [cable.slack for cable in arm.cables] == [0.0] * 3 + [1e-3, 0.0, 0.0]
+    assert {cable.gain for cable in arm.cables} == {0.9}
+    with pytest.raises(cdsm.InvalidInput, match="springs of the arm are not those"):
+        cdsm.ArmParameters(sprung.with_springs({"joint1_1": 4.0}), ("joint_stiffness",))
+
+
+def test_a_backbone_has_one_stiffness_or_one_per_gap() -> None:
+    softer = cdsm.ArmParameters(ROD, ("bending_stiffness@2",))(**{"bending_stiffness@2": 0.005})
+    ratio = softer.springs.stiffness / ROD.springs.stiffness
+    of_gap = ["gap2" in name for name in ROD.springs.joints]
+    assert ratio == pytest.approx([0.5 if each else 1.0 for each in of_gap])  # twist as well
+    with pytest.raises(cdsm.InvalidInput, match="free the bending_stiffness"):
+        cdsm.ArmParameters(ROD, ("joint_stiffness",))
+    with pytest.raises(cdsm.InvalidInput, match="no backbone and no links that bend"):
+        cdsm.ArmParameters(ARM, ("bending_stiffness",))
+    with pytest.raises(cdsm.InvalidInput, match="no cable that ends there"):
+        cdsm.ArmParameters(ROD, ("slack@2",))
+
+
+def test_slack_and_gain_change_what_a_pull_takes_in() -> None:
+    pull, loose = 0.004, -0.05
+    changed = cdsm.ArmParameters(ROD, ("slack", "gain"))(slack=1e-3, gain=0.5)
+    tip = cdsm.forward_statics(changed, pull=[pull, loose, loose]).pose.tip
+    same = cdsm.forward_statics(ROD, pull=[0.5 * pull - 1e-3, loose, loose]).pose.tip
+    assert tip == pytest.approx(same, abs=1e-9)
+    none = cdsm.forward_statics(changed, pull=[1e-3, loose, loose])
+    assert not none.tension.any()
+    with pytest.raises(cdsm.InvalidInput, match=r"cable3_1.*slack: -0\.001 m given"):
+        cdsm.ArmParameters(ROD, ("slack",))(slack=-1e-3)
+
+
+def test_files_hold_slack_and_gain(tmp_path: Path) -> None:
+    arm = cdsm.ArmParameters(ROD, ("slack@cable3_2", "gain"))(**{"slack@cable3_2": 1e-3, "gain": 2})
+    path = arm.write(tmp_path / "ARM.toml")
+    assert cdsm.Manipulator.read(path) == arm != ROD
+    all_slack = cdsm.Manipulator.read(path, changes={"slack": 2e-3})
+    assert [cable.slack for cable in all_slack.cables] == [2e-3, 1e-3, 2e-3]
+    with pytest.raises(cdsm.FileError, match=r"slack: -0\.002 m given"):
+        cdsm.Manipulator.read(path, changes={"slack": -2e-3})

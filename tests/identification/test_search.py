@@ -487,7 +487,7 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], tuple[str, ..
     "angles in degrees": (
         lambda: identify(prototype, [replace(EXACT[0], angles=(10.0, 0.0, 0.0))], ONE),
         cdsm.InvalidInput,
-        ("posture 1: joint1 = 57", "10 rad"),
+        ("posture 1: q: joint1 = 57", "10 rad"),
     ),
     "tension out of the domain": (
         lambda: identify(prototype, [replace(EXACT[0], tension=(900.0,) * 6)], ONE),

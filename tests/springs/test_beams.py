@@ -24,7 +24,7 @@ def rod(angles: Array = THREE, **changes: object) -> cdsm.Manipulator:
     return cdsm.Manipulator(geometry, LAW, gravity=(0.0, 0.0, 0.0))
 
 
-ROD = rod()
+ROD = cdsm.presets.tdcr_two_sections()
 
 # tensions [N], force [N], tip [m]; the computed rod per disk gap of tdcr-pinn at 3d5e7ba, base
 # axes: z along the rod, here x

@@ -100,6 +100,35 @@ def test_batches_have_the_springs() -> None:
     assert abs(rows["residual"]).max() < 1e-11
 
 
+@pytest.mark.parametrize("of", ["*", "joint2_*"])
+@pytest.mark.parametrize("coupled", [False, True])
+def test_uncertain_springs_are_springs_of_other_arms(of: str, coupled: bool) -> None:
+    alike = {"joint_stiffness": 1.0, "rest_angle": 0.1, "coupled": True} if coupled else {}
+    arm = sprung(**alike)
+    q = np.tile(Q[:2], 3)[: arm.nv]
+
+    def along(factor: float, redistribute: bool) -> float:
+        own = zip(arm.springs.joints, arm.springs.stiffness, arm.springs.angle, strict=True)
+        chosen = "joint2" if of.startswith("joint2") else "joint"
+        springs = {name: (k * (factor if chosen in name else 1.0), x) for name, k, x in own}
+        pose = arm.with_springs(springs).at(q)
+        F = cdsm.distribute_tension(pose if redistribute else arm.at(q), 5.0, wrench=WRENCH)
+        return cdsm.stiffness(pose, F.values, WRENCH).along("z")
+
+    least = cdsm.distribute_tension(arm.at(q), 5.0, wrench=WRENCH)
+    uncertain = cdsm.Tolerances(joint_stiffness=cdsm.Tolerance(0.05, correlation=1.0, of=of))
+    for redistribute in (False, True):
+        budget = cdsm.uncertainty(
+            arm.at(q), least, uncertain, direction="z", redistribute=redistribute
+        )
+        rise = abs(along(1.005, redistribute) - along(0.995, redistribute)) / 0.01
+        assert budget.standard_uncertainty == pytest.approx(0.05 * rise, rel=1e-5)
+    assert budget.contributions.keys() == {"joint_stiffness"}
+    bare = arm.with_springs({})
+    with pytest.raises(cdsm.InvalidInput, match="no springs at its joints"):
+        cdsm.uncertainty(bare.at(q), [9.0] * 9, uncertain, direction="z")
+
+
 OVERRIDDEN: tuple[dict[str, Any], ...] = ({"joint1_1": 3.0, "joint2_2": (1.0, 0.2)}, {})
 
 

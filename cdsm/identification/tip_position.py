@@ -1,0 +1,153 @@
+"""Measured positions of the tip of an arm, and what its motors did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+
+from cdsm.errors import InvalidInput
+from cdsm.identification.measurement import positive
+from cdsm.manipulator import Manipulator
+from cdsm.posture import Posture
+from cdsm.statics.forward import forward_statics
+from cdsm.support.validation import (
+    NO_WRENCH,
+    number_array,
+    one_of,
+    scalar,
+    wrench_vector,
+)
+from cdsm.support.values import Array
+
+OfCables = tuple[float, ...] | Mapping[str, float]
+"""One number for each cable (C,), or numbers by the name of the cable."""
+
+_MOTORS: Final = "pull", "rest_lengths", "tension"
+_FARTHEST = 10.0  # largest distance of a tip from the base, in lengths of the arm
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class TipPosition:
+    """Measured position of the tip of a real arm, and what its motors did.
+
+    The arm comes to rest as by :func:`~cdsm.forward_statics`, from the pulls, rest lengths or
+    tensions of its cables, one of the three. They are (C,), or a dict by the names of cables: a
+    cable that it does not name is loose.
+
+    Attributes:
+        x: Coordinate in base axes [m]; None if it was not measured. At least one is given.
+        y: As x.
+        z: As x.
+        std: Standard deviation of a coordinate [m].
+        pull: Wire that each motor reports to have taken in from the straight arm [m].
+        rest_lengths: Unstrained length of the wires that the motors have left [m].
+        tension: Tensions that the motors hold [N].
+        wrench: W (6,) at ``tool0``, base axes: force [N], then moment [N m].
+        label: Name in reports and figures.
+
+    Raises:
+        InvalidInput: A field is invalid. The error names the field and the fault.
+    """
+
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    std: float
+    pull: OfCables | None = None
+    rest_lengths: OfCables | None = None
+    tension: OfCables | None = None
+    wrench: tuple[float, ...] = NO_WRENCH
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.axes:
+            raise InvalidInput("x", "none of x, y and z given; give the coordinates measured [m].")
+        for axis in self.axes:
+            remedy = "Leave out a coordinate that was not measured."
+            try:
+                value = scalar(axis, getattr(self, axis))
+            except InvalidInput as error:
+                raise InvalidInput(
+                    axis, f"{str(error).removeprefix(f'{axis}: ')} {remedy}"
+                ) from None
+            object.__setattr__(self, axis, value)
+        std = positive("std", self.std, "m")
+        given = [name for name in _MOTORS if getattr(self, name) is not None]
+        if len(given) != 1:
+            said = f"give one of {', '.join(_MOTORS)}; {' and '.join(given) or 'none'} given."
+            raise InvalidInput("pull", said)
+        (name,) = given
+        if not isinstance(self.label, str):
+            raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
+        wrench = tuple(wrench_vector("wrench", self.wrench).tolist())
+        own: dict[str, object] = {
+            name: _numbers(name, getattr(self, name)),
+            "std": std,
+            "wrench": wrench,
+        }
+        for key, kept in own.items():
+            object.__setattr__(self, key, kept)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the coordinates that were measured."""
+        return tuple(axis for axis in "xyz" if getattr(self, axis) is not None)
+
+    @property
+    def _readings(self) -> Array:
+        return np.array([getattr(self, axis) for axis in self.axes], dtype=np.float64)
+
+    @property
+    def _conditions(self) -> tuple[object, ...]:
+        """What the motors did: equal for readings of which one prediction is enough."""
+        each = [getattr(self, name) for name in _MOTORS]
+        return (*(tuple(x.items()) if isinstance(x, dict) else x for x in each), self.wrench)
+
+    def _rest(self, arm: Manipulator, near: Posture | None = None) -> Posture:
+        """Compute where a model of the arm rests, sought from a posture ``near``."""
+        name = next(each for each in _MOTORS if getattr(self, each) is not None)
+        given = getattr(self, name)
+        if isinstance(given, dict):
+            names = arm.cables.names
+            home = np.clip(arm.springs.rest, arm.lower, arm.upper)
+            loose = {
+                "pull": [-arm.length / cable.gain for cable in arm.cables],
+                "rest_lengths": arm.cable_lengths(home) + arm.length,
+                "tension": np.zeros(len(names)),
+            }
+            values = np.array(loose[name])
+            for cable, value in given.items():
+                values[names.index(one_of("cable", cable, names))] = value
+            given = values
+        start = None if near is None else near.q
+        return forward_statics(arm, **{name: given}, wrench=self.wrench, start=start).pose
+
+    def _coordinates(self, pose: Posture) -> Array:
+        """Return the coordinates of the tip of a model that were measured."""
+        return pose.tip[["xyz".index(axis) for axis in self.axes], 3]
+
+    def _errors(self, predicted: Array) -> tuple[Array, float]:
+        """Return predicted minus measured coordinates, and their standard deviation."""
+        return predicted - self._readings, self.std
+
+    def _require_near(self, arm: Manipulator, name: str) -> None:
+        """Raise InvalidInput if the tip of an arm of this length cannot be there."""
+        far = float(np.linalg.norm(self._readings))
+        if far > _FARTHEST * arm.length:
+            said = f"{name} has the tip {far:.4g} m from the base, of an arm {arm.length:.4g} m "
+            raise InvalidInput("measurements", f"{said}long: mm? Give x, y, z in m.")
+
+
+def _numbers(name: str, given: object) -> OfCables:
+    """Return numbers of cables, (C,) or by name; InvalidInput says what they must be."""
+    if isinstance(given, Mapping):
+        return {cable: scalar(f"{name}[{cable!r}]", value) for cable, value in given.items()}
+    array = number_array(name, given)  # type: ignore[arg-type]
+    if array.ndim != 1 or not array.size:
+        said = "give one number per cable, or a dict by the names of cables."
+        raise InvalidInput(name, f"shape {array.shape} given; {said}")
+    return tuple(array.tolist())

@@ -1,0 +1,211 @@
+"""Positions of the tip: what they identify, and which explanation they leave."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdsm
+from cdsm import TipPosition
+from cdsm.identification import Identification
+
+SECTION = {"length": 0.1, "disks": 3, "hole_angles": [0.0, 2.0, 4.0], "hole_radius": 0.006}
+ROD = cdsm.Manipulator(
+    cdsm.Geometry.backbone(sections=[SECTION], bending_stiffness=0.01),
+    cdsm.LinearElasticity(48e3),
+)
+SPRUNG = cdsm.Manipulator(
+    cdsm.Geometry.universal(
+        joints=2, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.012,
+        hole_radius=0.02, link_mass=0.1, joint_stiffness=[2.0, 1.0],
+    ),
+    cdsm.LinearElasticity(48e3),
+)  # fmt: skip
+
+# D1: pull [m] of one tendon of the Nitinol segment and heights of its tip [mm], measured
+HEIGHTS = {0.005: (233, 235, 233), 0.010: (171, 168, 169)}
+D1 = [
+    TipPosition(
+        x=1e-3 * height,
+        pull={"cable10_1": pull},
+        std=1.354e-3,  # of readings at one pull
+        label=f"{1e3 * pull:g} mm, reading {i}",
+    )
+    for pull, heights in HEIGHTS.items()
+    for i, height in enumerate(heights, 1)
+]
+
+
+def test_slack_explains_the_nitinol_segment_and_nothing_else_does() -> None:
+    free = {
+        "slack": (0.0, 5e-3),
+        "hole_radius": (4e-3, 9e-3),
+        "gain": (0.5, 1.5),
+        "rigidity": (1e-4, 10.0),
+    }
+    model_of = cdsm.ArmParameters(cdsm.presets.nitinol_segment(), tuple(free))
+    found = cdsm.compare_explanations(model_of, D1, free)
+    rmse = {
+        name: 1e3 * math.sqrt(np.mean((fit.predicted - fit.measured) ** 2))
+        for name, fit in zip(found.names, found.alone, strict=True)
+    }
+    # an independent program: 1.50 mm with a slack of 1.01 mm; 4.20 (6.74 mm), 4.23 (0.89)
+    assert rmse == pytest.approx(
+        {"slack": 1.50, "rigidity": 4.07, "hole_radius": 4.20, "gain": 4.23}, abs=0.01
+    )
+    values = dict(zip(found.names, found.values, strict=True))
+    assert values["slack"] == pytest.approx(1.01e-3, abs=1e-5)
+    assert values["hole_radius"] == pytest.approx(6.74e-3, abs=1e-5)
+    assert values["gain"] == pytest.approx(0.89, abs=5e-3)
+    assert found.best == "slack"
+    assert found.explains == (True, False, False, False)
+    assert found.exclusive == ("rigidity",)
+    said = str(found)
+    assert "slack explains these measurements." in said
+    assert "rigidity, hole_radius, gain do not." in said
+    assert "slack and rigidity exclude each other" in said
+    assert "slack and gain exclude" not in said
+    assert found.to_pandas().shape[0] == 4
+    assert "reading 1 x" in " ".join(found.alone[0].reading_names)
+
+
+def readings(
+    arm: cdsm.Manipulator, given: list[dict[str, object]], axes: str = "xyz", seed: int = 0
+) -> list[TipPosition]:
+    """Simulate readings with errors of 0.2 mm."""
+    random, found = np.random.default_rng(seed), []
+    for each in given:
+        tip = cdsm.forward_statics(arm, **each).pose.tip[:3, 3]  # type: ignore[arg-type]
+        read = dict(zip("xyz", (tip + random.normal(size=3) * 2e-4).tolist(), strict=True))
+        found.append(TipPosition(**{axis: read[axis] for axis in axes}, std=2e-4, **each))  # type: ignore[arg-type]
+    return found
+
+
+def require_recovered(
+    arm: cdsm.Manipulator, true: dict[str, float], tests: list[dict[str, object]]
+) -> Identification:
+    model_of = cdsm.ArmParameters(arm, tuple(true))
+    measured = readings(model_of(**true), tests)
+    free = {name: (0.0 if name == "slack" else 0.3 * x, 3.0 * x) for name, x in true.items()}
+    found = cdsm.identify(model_of, measured, free)
+    for (name, value), std in zip(found.parameters.items(), found.std, strict=True):
+        assert abs(value - true[name]) < 2.58 * std, name  # 99 %
+        assert std < 0.05 * true[name], name
+    assert found.warnings == ()
+    return found
+
+
+LOOSE = -0.05
+
+
+def test_slack_and_bending_stiffness_are_recovered() -> None:
+    pulls: list[dict[str, object]] = [{"pull": [x, LOOSE, LOOSE]} for x in (0.002, 0.003, 0.004)]
+    tensions: list[dict[str, object]] = [{"tension": [x, 0.0, 0.0]} for x in (1.0, 2.0)]
+    true = {"slack": 7e-4, "bending_stiffness": 0.012}
+    found = require_recovered(ROD, true, [*pulls, *tensions])
+    assert "mm" in str(found)
+    assert found.freedom == 15 - 2
+
+
+def test_joint_stiffness_is_recovered() -> None:
+    tests: list[dict[str, object]] = [
+        {"tension": [x, 0.0, 0.0, 0.0, y, 0.0], "wrench": [0.0, 0.0, z, 0.0, 0.0, 0.0]}
+        for x, y, z in ((8.0, 0.0, 0.0), (0.0, 6.0, 0.0), (5.0, 5.0, -1.0), (0.0, 0.0, 2.0))
+    ]
+    require_recovered(SPRUNG, {"joint_stiffness@1": 2.3, "joint_stiffness@2": 0.8}, tests)
+
+
+def test_what_readings_cannot_tell_is_said() -> None:
+    # one pull: slack and gain take in the same wire
+    free = {"slack": (0.0, 2e-3), "gain": (0.5, 1.5)}
+    changed = cdsm.ArmParameters(ROD, ("slack",))(slack=1e-3)
+    both = readings(changed, [{"pull": [0.004, LOOSE, LOOSE]}] * 3, "x")
+    told = cdsm.compare_explanations(cdsm.ArmParameters(ROD, ("slack", "gain")), both, free)
+    assert told.explains == (True, True)
+    (both_free,) = told.together.values()
+    assert both_free.rank == 1
+    assert "these readings do not tell which one. not identifiable (rank 1 of 2)" in str(told)
+    assert told.exclusive == ()
+
+
+def test_names_of_cables_and_all_numbers_are_one() -> None:
+    for name, of_first, loose in (
+        ("pull", 0.003, -0.1),
+        ("tension", 2.0, 0.0),
+        ("rest_lengths", 0.097, 0.2),
+    ):
+        named = TipPosition(x=0.1, std=1e-3, **{name: {"cable3_1": of_first}})  # type: ignore[arg-type]
+        every = TipPosition(x=0.1, std=1e-3, **{name: [of_first, loose, loose]})  # type: ignore[arg-type]
+        np.testing.assert_allclose(named._rest(ROD).q, every._rest(ROD).q, atol=1e-9)
+
+
+GOOD = TipPosition(x=0.09, pull={"cable3_1": 0.003}, std=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("bad", "said"),
+    [
+        (lambda: replace(GOOD, x=None), "x: none of x, y and z given"),
+        (lambda: replace(GOOD, y=math.nan), "y: .*nan.* Leave out a coordinate"),
+        (lambda: replace(GOOD, std=0.0), "std: 0 m given"),
+        (lambda: replace(GOOD, pull=None), "none given"),
+        (lambda: replace(GOOD, tension=(1.0,)), "pull and tension given"),
+        (lambda: replace(GOOD, pull={"cable3_1": math.nan}), "cable3_1"),
+        (
+            lambda: replace(GOOD, pull=[[1.0]]),  # type: ignore[arg-type]
+            r"pull: shape \(1, 1\)",
+        ),
+        (lambda: fitted(replace(GOOD, x=90.0)), r"\[0\] has the tip 90 m from the base.*mm\?"),
+        (lambda: fitted(replace(GOOD, pull={"cable9_1": 0.0})), "cable9_1"),
+        (lambda: fitted(replace(GOOD, pull=(0.003, 0.0))), r"pull: shape \(2,\)"),
+        (lambda: fitted(replace(GOOD, pull=(3.0, 0.0, 0.0))), "leaves -2.* m of cable3_1"),
+        (lambda: fitted(GOOD, (-2e-3, -1e-3)), r"cable3_1.*slack: -0\.0015 m given"),
+    ],
+)
+def test_bad_input_is_named(bad: Callable[[], object], said: str) -> None:
+    with pytest.raises(cdsm.CdsmError, match=said):
+        bad()
+
+
+def fitted(test: TipPosition, bounds: tuple[float, float] = (0.0, 1e-3)) -> Identification:
+    return cdsm.identify(cdsm.ArmParameters(ROD, ("slack",)), [test], {"slack": bounds})
+
+
+def test_comparisons_that_cannot_be_made_are_named() -> None:
+    model_of = cdsm.ArmParameters(ROD, ("slack", "gain"))
+    free = {"slack": (0.0, 1e-3), "gain": (0.5, 1.5)}
+    with pytest.raises(cdsm.InvalidInput, match="two or more parameters"):
+        cdsm.compare_explanations(model_of, [GOOD] * 3, {"slack": (0.0, 1e-3)})
+    with pytest.raises(cdsm.InvalidInput, match="at least three"):
+        cdsm.compare_explanations(model_of, [GOOD], free)
+    with pytest.raises(cdsm.InvalidInput, match="model_of"):
+        cdsm.compare_explanations(lambda slack, gain: ROD, [GOOD] * 3, free)
+
+
+def test_positions_come_from_files(tmp_path: Path) -> None:
+    def read(text: str) -> tuple[TipPosition, ...]:
+        path = tmp_path / "tips.csv"
+        path.write_text(text, encoding="utf-8")
+        return cdsm.read_tip_positions(path, ROD, std=1e-3)
+
+    head = "label,x [mm],z [mm],cable3_1 [mm],cable3_2 [mm]\n"
+    one, two = read(f"{head}a,90,5,3,\nb,,6,0,2\n")
+    assert one == TipPosition(x=0.09, z=5e-3, pull={"cable3_1": 3e-3}, std=1e-3, label="a")
+    assert two == TipPosition(z=6e-3, pull={"cable3_1": 0.0, "cable3_2": 2e-3}, std=1e-3, label="b")
+    (pulled,) = read("x [m],cable3_3 [N]\n0.09,2\n")
+    assert pulled == TipPosition(x=0.09, tension={"cable3_3": 2.0}, std=1e-3)
+    for text, said in (
+        (f"{head}a,90,5,3 mm,\n", "line 2, column cable3_1: '3 mm' is not a finite number"),
+        (f"{head}a,nan,5,3,\n", "line 2, column x: 'nan'"),
+        (f"{head}a,,,3,\n", "line 2: no coordinate was measured"),
+        ("x [mm],cable3_9 [mm]\n90,3\n", "column cable3_9, which is not known"),
+        ("x [mm]\n90\n", "one of a cable, such as cable3_1"),
+        ("x,cable3_1 [mm]\n90,3\n", "column x has no unit"),
+        ("x [mm],cable3_1 [mm],cable3_2 [N]\n90,3,2\n", r"call it cable3_2 \[mm\]"),
+        (head, "holds no positions"),
+    ):
+        with pytest.raises(cdsm.FileError, match=said):
+            read(text)
