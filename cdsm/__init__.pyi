@@ -95,11 +95,11 @@ from cdsm.planning.saturation import saturation as saturation
 from cdsm.posture import MomentArms as MomentArms
 from cdsm.posture import Posture as Posture
 from cdsm.report import Report as Report
+from cdsm.statics.at_rest import Equilibrium as Equilibrium
 from cdsm.statics.buckling import CriticalLoad as CriticalLoad
 from cdsm.statics.buckling import CriticalTension as CriticalTension
 from cdsm.statics.buckling import critical_load as critical_load
 from cdsm.statics.buckling import critical_tension as critical_tension
-from cdsm.statics.equilibrium import Equilibrium as Equilibrium
 from cdsm.statics.equilibrium import equilibrium as equilibrium
 from cdsm.statics.forward import forward_statics as forward_statics
 from cdsm.statics.load_cycle import LoadHistory as LoadHistory

@@ -17,7 +17,8 @@ from cdsm.friction.stick import can_stick
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics.at_rest import Equilibrium
+from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
@@ -177,5 +178,6 @@ def _rest(
         reference_tension=tension.values,
         stiffness=history.stiffness(-1),
         stop_torque=frozen(history.stop_torque[-1].copy()),
+        _model=LockedArm(pose, tension.values, wrench),
     )
     return rest, history.sliding[-1] != 0
