@@ -1,7 +1,6 @@
 """Buckling: tension or load makes K_θ of a fixed posture singular, under the least tensions.
 
-The elasticity of the cables stiffens an arm, their tension usually softens it (active part of Eq.
-16), until it buckles. :func:`~cdsm.equilibrium` computes where it moves then.
+Tension usually softens an arm (active part of Eq. 16). See :func:`~cdsm.equilibrium` for what then.
 """
 
 from __future__ import annotations
@@ -170,7 +169,7 @@ def critical_tension(
 
     Raises:
         InvalidInput: ``wrench`` or ``up_to`` is invalid.
-        InfeasibleTension: No tensions balance the arm.
+        InfeasibleTension: No tensions balance it.
         ElasticityRangeError: Even the least tensions are outside the domains of the elasticities.
     """
     from scipy.optimize import brentq  # slow to import
@@ -204,7 +203,7 @@ def critical_tension(
     ]
     ranges = tuple(zip(edges[::2], edges[1::2], strict=True))
     minimum = next((end for _, end in ranges if end < high), math.inf if ranges else low)
-    where = minimum if math.isfinite(minimum) else float(bounds[margins.argmin()])
+    where = minimum if minimum < math.inf else float(bounds[margins.argmin()])
     return CriticalTension(
         posture=pose,
         wrench=W,
