@@ -68,6 +68,7 @@ class Setting:
     force: Array  # at the tip, in base axes (3,) [N]
     sag: bool = False  # whether the force moves the arm, tensioned without it, motors locked
     solver: str = DEFAULT_SOLVER
+    pull: Array | None = None  # wire that the motors take in (C,) [m]: the posture follows from it
 
 
 @final
@@ -92,7 +93,7 @@ class Shown:
     @property
     def tensions(self) -> Array | None:
         """Tensions (C,) [N] at the drawn posture."""
-        if self.setting.sag:
+        if self.setting.sag or self.setting.pull is not None:
             return None if self.rest is None else self.rest.tension
         return None if self.tension is None else self.tension.values
 
@@ -143,6 +144,13 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
     found: dict[str, Any] = {"setting": setting, "reference": pose}
     try:
         force = np.concatenate([setting.force, np.zeros(3)])
+        if setting.pull is not None:
+            rest = cdsm.forward_statics(arm, pull=setting.pull, wrench=force)
+            found |= {"rest": rest, "stiffness": rest.stiffness}
+            condition = Condition.STABLE if rest.branch == 1.0 else Condition.MOVED
+            condition = Condition.NEUTRAL if rest.neutral or not rest.stable else condition
+            said = "\n".join([*rest.warnings, *rest.pose.remarks])
+            return Shown(**found, condition=condition, problem=said)
         bounds, wrench = (setting.minimum, setting.maximum), force * (not setting.sag)
         tension = distribute_tension(pose, *bounds, wrench, setting.solver)
         found["tension"] = tension
