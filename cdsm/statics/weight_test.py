@@ -197,8 +197,8 @@ class WeightTest(Result):
         if self.breakaway_load == 0.0:
             said = "friction holds no cable here: "
             return [f"{said}one is slack, or the cables go straight through all holes"]
-        slides = f"at {self.sliding_load:.4g} N they slide: from this step on the tangent is at "
-        slides += f"most {100.0 * (SLIDING - 1.0):.0f} % above that of the same load without friction"
+        slides = f"at {self.sliding_load:.4g} N they slide: from here on the tangent is at most "
+        slides += f"{100.0 * (SLIDING - 1.0):.0f} % above that of the same load without friction"
         if self.sliding_load == math.inf:
             slides = "under this weight the arm does not slide yet: hang more"
         sliding = np.count_nonzero(self.history.sliding[-1]), len(self.history.holes)

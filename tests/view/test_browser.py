@@ -148,7 +148,7 @@ def test_sliders_of_motors_pull_an_arm_with_few_cables(browser: Any) -> None:
     with serve(arm, port=0) as view:
         page = Page(browser, view.url)
         assert page.page.get_by_text("least tension [N]").count() == 0
-        page.type("cable6_1 [mm]", 4.0)
-        rest = cdsm.forward_statics(arm, pull=[0.004, 0.0, 0.0])
+        page.type("cable6_1 [mm]", -4.0)
+        rest = cdsm.forward_statics(arm, pull=[-0.004, 0.0, 0.0])
         page.says("stiffness along x, y, z", along(rest.stiffness))
         assert not page.errors
