@@ -104,7 +104,8 @@ def _number_faults(element: etree._Element) -> Iterator[str]:
             values = numbers(f"{key} of <{element.tag}>", element.get(key), _COUNTS[key])
             element.set(key, " ".join(map(repr, values)))
         except XmlFault as error:
-            yield str(error)
+            ends = "; a joint without ends is continuous" if element.tag == "limit" else ""
+            yield f"{error}{ends}"
 
 
 def _number(element: etree._Element | None, key: str) -> float:

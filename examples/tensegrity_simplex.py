@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 import cdsm
-from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics import Equilibrium
 
 NODES = 1e-3 * np.array(
     [

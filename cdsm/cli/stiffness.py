@@ -14,6 +14,7 @@ from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
 
 if TYPE_CHECKING:
+    from cdsm.statics.at_rest import Equilibrium
     from cdsm.statics.buckling import CriticalLoad, CriticalTension
     from cdsm.statics.load_cycle import LoadHistory
     from cdsm.statics.weight_test import WeightTest
@@ -24,9 +25,11 @@ if TYPE_CHECKING:
 def stiffness(
     arm: options.Arm,
     changes: options.Changes = None,
-    angles: options.Angles = "0",
+    angles: options.Angles = "",
     minimum: options.Minimum = 0.0,
     maximum: options.Maximum = math.inf,
+    tension: options.Held = None,
+    pull: options.Pull = None,
     load: options.Load = None,
     mass: options.Mass = None,
     direction: Annotated[str | None, opt("One more direction for it.", "AXIS|X,Y,Z")] = None,
@@ -40,35 +43,42 @@ def stiffness(
 ) -> int:
     """Compute the least tensions at a posture, and the stiffness.
 
-    With [tolerances] in ARM.toml it also says how sure the numbers are; with friction, which
-    stiffness small loads measure.
+    With --tension or --pull, the posture and the tensions follow from what the motors do. With
+    [tolerances] in ARM.toml it also says how sure the numbers are; with friction, which stiffness
+    small loads measure.
 
     Exit code 0; 3 if the arm is unstable, or the report of --check fails.
     """
     from cdsm.support.files import write_text
 
-    pose = options.posture(arm, changes, angles)
-    wrench = options.load_at_tip(pose.arm, load, mass)
-    tension = cdsm.distribute_tension(pose, minimum, maximum, wrench)
-    K = cdsm.stiffness(pose, tension)
-    head, numbers = header(pose, [minimum])
+    robot = options.read(arm, changes)
+    wrench = options.load_at_tip(robot, load, mass)
+    rest = options.at_rest(robot, tension, pull, wrench, angles, minimum, maximum)
+    if rest is None:
+        pose = robot.at(options.coordinates(angles or "0", robot))
+        least = cdsm.distribute_tension(pose, minimum, maximum, wrench)
+        K, found = cdsm.stiffness(pose, least), list[object]([least])
+    else:
+        pose, K, found = rest.pose, rest.stiffness, [rest]
+    head, numbers = header(pose, [] if rest else [minimum])
     axes = {axis: options.direction_of(axis) for axis in ("x", "y", "z")}
     if direction is not None:
         axes[direction] = u = options.direction_of(direction)
         numbers |= {"direction": u, "along_direction_N_per_m": K.along(u)}
-    sure, uncertainty = _uncertainty(tension, axes)
+    sure, uncertainty = ([], Json()) if rest else _uncertainty(least, axes)
     if check or out is not None:
-        report = K.report()
+        report = rest.report() if rest else K.report()
         about = f"{arm}\n{head}\ncdsm {cdsm.__version__}"
         write(out, lambda file: write_text(file, report.to_html(about)))
-        warnings = () if report.passed else ("FAIL: the report says why.",)
+        failed = () if report.passed else ("FAIL: the report says why.",)
         told = numbers | report.to_dict() | uncertainty
-        return answer(as_json, told, head, report, *sure, warnings=warnings)
+        return answer(as_json, told, head, report, *sure, warnings=failed)
     lines = [] if direction is None else [f"along {direction}: {K.along(u) / 1e3:.4g} N/mm"]
-    stuck, sticking = _sticking(tension, axes)
-    parts = [head, tension, K, *lines, *stuck, *sure]
-    told = numbers | K.to_dict() | sticking | uncertainty
-    return answer(as_json, told, *parts, warnings=K.warnings[:1])
+    stuck, sticking = ([], Json()) if rest else _sticking(least, axes)
+    parts = [head, *found, K, *lines, *stuck, *sure]
+    told = numbers | K.to_dict() | (rest.to_dict() if rest else {}) | sticking | uncertainty
+    warnings = K.warnings[:1] + (rest.warnings if rest else ())
+    return answer(as_json, told, *parts, warnings=warnings)
 
 
 def _sticking(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tuple[list[str], Json]:
@@ -126,9 +136,11 @@ def _uncertainty(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tup
 def weigh(
     arm: options.Arm,
     changes: options.Changes = None,
-    angles: options.Angles = "0",
+    angles: options.Angles = "",
     minimum: options.Minimum = 0.0,
     maximum: options.Maximum = math.inf,
+    tension: options.Held = None,
+    pull: options.Pull = None,
     load: options.Load = None,
     mass: options.Mass = None,
     steps: Annotated[int | None, opt("Steps to the full load.", "N", min=1, max=1000)] = None,
@@ -139,33 +151,42 @@ def weigh(
 ) -> int:
     """Hang a weight at the tip, and find how far it moves.
 
-    The motors are locked (Eq. 20); --load and --mass are the weight, in 5 steps (12 in each
-    quarter of --cycles). With friction in the holes, small and large weights measure different
-    stiffness, and --cycles, to the load and its opposite, show the hysteresis.
+    The motors are locked (Eq. 20), or go on as --tension or --pull say; --load and --mass are the
+    weight, in 5 steps (12 in each quarter of --cycles). With friction in the holes, small and large
+    weights measure different stiffness, and --cycles, to the load and its opposite, show the
+    hysteresis.
 
     Exit code 0; 3 if the arm does not stay at its posture without the weight, buckles under it, or
     snaps through.
     """
     if out is not None and cycles is None:
         raise misuse("--out", "is the table of --cycles; give both.")
-    pose = options.posture(arm, changes, angles)
-    weight = _weight(pose.arm, load, mass)
-    tension = cdsm.distribute_tension(pose, minimum, maximum)
-    head, numbers = header(pose, [minimum], "included")
+    robot = options.read(arm, changes)
+    weight = _weight(robot, load, mass)
+    rest = options.at_rest(robot, tension, pull, [0.0] * 6, angles, minimum, maximum)
+    start: cdsm.Tension | Equilibrium
+    if rest is None:
+        pose = robot.at(options.coordinates(angles or "0", robot))
+        start = cdsm.distribute_tension(pose, minimum, maximum)
+        K = cdsm.stiffness(pose, start)
+    else:
+        pose, start, K = rest.pose, rest, rest.stiffness
+    head, numbers = header(pose, [] if rest else [minimum], "included")
     result: WeightTest | LoadHistory
     if cycles is not None:
-        result, more, note = _cycles(tension, weight, cycles, steps or 12)
+        result, more, note = _cycles(pose, start, weight, cycles, steps or 12)
         write(out, result.write)
     elif weight[3:].any():
         raise misuse("--load", "has a moment, but a weight is a force: FX,FY,FZ.")
     else:
-        more, result = {}, cdsm.weight_test(pose, tension, weight[:3], steps=steps or 5)
+        more, result = {}, cdsm.weight_test(pose, start, weight[:3], steps=steps or 5)
         without = " without friction" if pose.arm.has_friction else ""
         note = f"at the full load{without}:\n{result.states[-1]}"
     write_picture(figure, result.plot)
-    warnings = (*cdsm.stiffness(pose, tension).warnings, *result.warnings)
-    told = numbers | result.to_dict() | more
-    return answer(as_json, told, head, result, note, warnings=dict.fromkeys(warnings))
+    warnings = (*K.warnings, *(rest.warnings if rest else ()), *result.warnings)
+    told = numbers | ({"rest": rest} if rest else {}) | result.to_dict() | more
+    parts = [head, *([rest, K] if rest else []), result, note]
+    return answer(as_json, told, *parts, warnings=dict.fromkeys(warnings))
 
 
 def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Array:
@@ -180,7 +201,11 @@ def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Arra
 
 
 def _cycles(
-    tension: cdsm.Tension, weight: Array, cycles: int, steps: int
+    pose: cdsm.Posture,
+    start: cdsm.Tension | Equilibrium,
+    weight: Array,
+    cycles: int,
+    steps: int,
 ) -> tuple[LoadHistory, Json, str]:
     """Load and unload the tip; return the history, and what the last cycle loses."""
     import numpy as np
@@ -191,12 +216,12 @@ def _cycles(
     hump = np.concatenate([up, up[-2::-1] if steps > 1 else [], [0.0]])
     factors = np.concatenate([hump, -hump])
     wrenches = np.outer(np.tile(factors, cycles), weight) + 0.0  # no -0
-    history = cdsm.load_cycle(tension.posture, tension, wrenches)
+    history = cdsm.load_cycle(pose, start, wrenches)
     lost = float(history.dissipated[-len(factors) :].sum())
     far = np.linalg.norm(history.displacement, axis=1)
     left = 1e6 * without_rounding(far)[-1]
     note = f"the last cycle loses {1e3 * lost:.4g} mJ; residual displacement {left:.4g} µm"
-    if not tension.posture.arm.has_friction:
+    if not pose.arm.has_friction:
         note = "the holes have no friction, so there is no loop: --set friction=0.1, for example"
     return history, {"lost_in_last_cycle_J": lost, "left_over_m": float(far[-1])}, note
 

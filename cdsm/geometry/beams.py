@@ -48,6 +48,14 @@ class Beam:
         return {"bending_stiffness": EI, "torsion_stiffness": GJ, "pieces": self.pieces}
 
 
+def buckling_doubt(joints: Sequence[Joint]) -> str:
+    """Return a sentence if a backbone or neck has one piece from disk to disk; else nothing."""
+    if all(joint.axes or joint.pieces > 1 for joint in joints):
+        return ""
+    said = "the backbone has one piece from disk to disk: it buckles by its own cables at 12 EI/d² "
+    return said + "in place of π² EI/d², 21.6 % too late. Build it with pieces=4: 1.7 % too early."
+
+
 @records.record
 class Section:
     """A section of a backbone: its disks, and the cables that end at the last of them.

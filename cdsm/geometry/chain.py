@@ -19,6 +19,7 @@ from cdsm.geometry.parts import Disk, Joint, Link
 STEEPEST = math.radians(80.0)
 """Largest angle of a joint without a limit of its own [rad]."""
 
+_MOST_AXES = 400  # one behind the other; many more crash the parser of URDFs
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _OF_CROSS = 0.01  # mass of the cross of a beam's joint, taken from its piece
 _POISSON = 0.3
@@ -83,6 +84,14 @@ class Chain:
         last = self.disks[-1] if self.disks else None
         if not (last and last.link == self.link and abs(last.x - self.x) < _NEAR):
             self.disks.append(Disk(self.link, self.x, joint, radius, outer))
+
+    def faults(self) -> list[str]:
+        """Return what is wrong with the chain as a whole: too many joints."""
+        if len(self.axes) <= _MOST_AXES:
+            return []
+        said = f"joints: {len(self.axes)} axes with those of all pieces of beams; {_MOST_AXES} are "
+        said += "taken at most. Give fewer pieces or disks, or leave twist out: torsion_stiffness="
+        return [said + "inf"]
 
     def run(
         self,

@@ -88,7 +88,7 @@ class Geometry(Printed):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if faults := [*self._faults()]:
+        if faults := [*self._faults()] or self._chain.faults():
             raise CrossFaults(faults)
         for doubt in self._doubts():
             warn(f"{self.name}: {doubt}")

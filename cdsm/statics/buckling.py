@@ -1,8 +1,6 @@
 """Buckling: tension or load makes K_θ of a fixed posture singular, under the least tensions.
 
-The elasticity of the cables stiffens an arm; their tension usually softens it (active part of
-Eq. 16). With soft springs or long leads there is a critical tension: above it K_θ is not positive
-definite and the arm buckles. :func:`~cdsm.equilibrium` computes where it moves then.
+Tension usually softens an arm (active part of Eq. 16). See :func:`~cdsm.equilibrium` for what then.
 """
 
 from __future__ import annotations
@@ -19,12 +17,14 @@ from numpy.typing import ArrayLike
 import cdsm
 from cdsm.batch.evaluation import evaluate
 from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput
+from cdsm.geometry.beams import buckling_doubt
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, bound, instance, wrench_vector
 from cdsm.support.validation import quantity as checked
 from cdsm.support.values import Array, frozen
+from cdsm.support.warning import warn
 from cdsm.tension import distribute_tension
 
 if TYPE_CHECKING:
@@ -35,8 +35,6 @@ _PRECISION = 1e-12  # relative precision of a critical bound or load factor
 _ABOVE = 1.0 + 1e-9  # just above the low end of a law: rounding may put a tension below its bound
 _LOWEST, _LARGEST = 1e-3, 1e6  # lowest bound of a scan from zero [N]; end of doubled load factors
 _SHOWN = 10.0  # largest load factor of the curve if the critical one is infinite
-
-
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
 
@@ -60,9 +58,9 @@ class _Critical(Result):
         return self.stiffness.tension
 
     def _softest(self) -> str:
-        order, names = np.argsort(-abs(self.mode))[:4], self.posture.arm.joint_names
-        shares = ", ".join(f"{names[i]} {self.mode[i]:+.2f}" for i in order)
-        return f"softest joint motion: {shares}" + ", …" * (self.mode.size > order.size)
+        order, names = np.argsort(-abs(self.mode)), self.posture.arm.joint_names
+        shares = ", ".join(f"{names[i]} {self.mode[i]:+.2f}" for i in order[:4])
+        return f"softest joint motion: {shares}" + ", …" * (self.mode.size > 4)
 
 
 @final
@@ -94,8 +92,8 @@ class CriticalTension(_Critical):
     @property
     def warnings(self) -> tuple[str, ...]:
         """One sentence if the arm is UNSTABLE at every lower bound; otherwise empty."""
-        span = "from {:.4g} N to {:.4g} N".format(*self.examined)
-        return () if self.stable else (f"UNSTABLE at every lower bound {span}",)
+        said = "UNSTABLE at every lower bound from {:.4g} N to {:.4g} N"
+        return () if self.stable else (said.format(*self.examined),)
 
     def plot(self) -> Figure:
         """Plot the smallest eigenvalue of K_θ [N m/rad] against the lower bound of tension [N]."""
@@ -161,7 +159,8 @@ def critical_tension(
     """Compute the lower bound F_min [N] of tension at which K_θ stops being positive definite.
 
     The symmetric part of K_θ under the least tensions is examined at 200 bounds, even on a log
-    scale, up to ``up_to``, or to where no tensions within their laws and maxima balance the arm.
+    scale, up to ``up_to``, or to where no tensions within their laws and maxima balance the arm. A
+    :class:`CdsmWarning` says that a backbone with one piece from disk to disk reads too much.
 
     Args:
         pose: The posture, which stays fixed.
@@ -170,12 +169,14 @@ def critical_tension(
 
     Raises:
         InvalidInput: ``wrench`` or ``up_to`` is invalid.
-        InfeasibleTension: No tensions balance the arm.
+        InfeasibleTension: No tensions balance it.
         ElasticityRangeError: Even the least tensions are outside the domains of the elasticities.
     """
     from scipy.optimize import brentq  # slow to import
 
     arm, W = instance("pose", pose, Posture).arm, wrench_vector("wrench", wrench)
+    if arm.is_serpentine and (doubt := buckling_doubt(arm.geometry.joints)):
+        warn(doubt)
 
     @cache
     def at(minimum: float) -> Stiffness:
@@ -202,7 +203,7 @@ def critical_tension(
     ]
     ranges = tuple(zip(edges[::2], edges[1::2], strict=True))
     minimum = next((end for _, end in ranges if end < high), math.inf if ranges else low)
-    where = minimum if math.isfinite(minimum) else float(bounds[margins.argmin()])
+    where = minimum if minimum < math.inf else float(bounds[margins.argmin()])
     return CriticalTension(
         posture=pose,
         wrench=W,

@@ -10,12 +10,8 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import (
-    Equilibrium,
-    as_equilibrium,
-    followed,
-    locked_equilibrium,
-)
+from cdsm.statics.at_rest import Equilibrium
+from cdsm.statics.equilibrium import as_equilibrium, followed, locked_equilibrium
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import Balance, equilibrium_error, settle
 from cdsm.stiffness_matrix import checked_tension

@@ -14,12 +14,13 @@ import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.friction.stick import assemble_segments
 from cdsm.posture import Posture
+from cdsm.statics.at_rest import Equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
 from cdsm.support.format import without_rounding
 from cdsm.support.progress import track
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import WRENCH, number_array, whole_number
+from cdsm.support.validation import WRENCH, instance, number_array, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
@@ -161,7 +162,7 @@ class LoadHistory(Result):
 
 def load_cycle(
     pose: Posture,
-    tension: Tension | ArrayLike,
+    tension: Tension | Equilibrium | ArrayLike,
     wrenches: ArrayLike,
     *,
     motors: ArrayLike | None = None,
@@ -185,7 +186,8 @@ def load_cycle(
         pose: The reference posture, at which the motors are locked.
         tension: F at the reference: the result of :func:`~cdsm.distribute_tension`, or other
             tensions (C,) [N]. If they do not balance the arm, it settles on the way to the first
-            load.
+            load. Or an :class:`Equilibrium` with this posture, as of :func:`~cdsm.forward_statics`:
+            its motors go on holding the tensions, or the lengths, of slack cables too.
         wrenches: W of each load (n, 6) at ``tool0`` in base axes: force [N], then moment [N m].
             Before the first load the wrench is that of the ``Tension``, or zero.
         motors: Commands of the motors at each load (n, C): for a position-controlled cable the rest
@@ -204,7 +206,12 @@ def load_cycle(
             law.
         EquilibriumError: No equilibrium was found in the step to a load. The error names the load.
     """
-    F, W = checked_tension(pose, tension, None)
+    slack = np.zeros(len(instance("pose", pose, Posture).arm.cables))
+    if isinstance(tension, Equilibrium):
+        rest = tension._resumed(pose, None)
+        pose, F, W, slack = rest._held(rest._forced), rest.tension, rest.wrench, rest._paid_out
+    else:
+        F, W = checked_tension(pose, tension, None)
     pose.arm._laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
     loads = number_array("wrenches", wrenches, "wrench")
     if loads.ndim != 2 or loads.shape[1] != 6 or not 0 < len(loads) <= _MOST_LOADS:
@@ -215,7 +222,7 @@ def load_cycle(
         )
     substeps = whole_number("substeps", substeps, 1, 1000)
     arm = QuasiStaticArm(pose, F)
-    state, none = arm.initial(W), np.zeros(pose.q.size)
+    state, none = arm.initial(W, slack), np.zeros(pose.q.size)
     commands = np.tile(state.load.motors, (len(loads), 1))
     if motors is not None:
         wire = np.add.reduceat(state.arm_state.chain.rest_length, arm.start[:-1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,18 @@ class LockedArm:
                 self._laws.append((law, of, _LockedLaw(law, *parts)))
             except ElasticityRangeError as error:
                 raise laws.naming(error, of) from None
+
+    def under(self, wrench: Array) -> LockedArm:
+        """Return the arm under another wrench (6,), its motors as they are."""
+        other = copy(self)
+        other.wrench = wrench
+        return other
+
+    def resumed(self, pose: Posture, tension: Array) -> LockedArm:
+        """Return the arm, its motors as they are, with an equilibrium as the new reference."""
+        other = copy(self)
+        other.reference, other.tension = pose, tension
+        return other
 
     def at(self, q: Array) -> ArmState:
         """Compute the state at angles ``q`` (nv,) [rad]; InvalidInput if two sites coincide."""

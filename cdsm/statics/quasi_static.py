@@ -77,11 +77,15 @@ class QuasiStaticArm:
         unstrained = arm.original_length == "unstrained"
         self._problem = ChainProblem(arm.cables, self.start, tension, unstrained)
 
-    def initial(self, wrench: Array) -> QuasiStaticState:
-        """Return the state at the reference under ``wrench`` (6,), with even tensions."""
+    def initial(self, wrench: Array, slack: Array | float = 0.0) -> QuasiStaticState:
+        """Return the state at the reference under ``wrench`` (6,), with even tensions.
+
+        ``slack`` (C,) [m] is how much longer than straight the wires are.
+        """
         pose, motors = self.reference, np.where(self.forced, self._tension, 0.0)
         T, none = self._tension[pose.segments.chains.cable], np.zeros(pose.q.size)
-        rest_length = self._problem.rest_lengths(pose.segments.lengths, T)
+        rest_length = np.array(self._problem.rest_lengths(pose.segments.lengths, T))
+        rest_length[self.start[:-1]] += slack
         state = self._state(pose, rest_length, Load(wrench, none, motors), T)
         x = pose.q / Balance(lambda q: state, pose, state).unit
         return QuasiStaticState(Load(wrench, state.residual, motors), state, x, frozen(none))

@@ -13,9 +13,9 @@ import cdsm
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium, followed
+from cdsm.statics.at_rest import Equilibrium
+from cdsm.statics.equilibrium import as_equilibrium, equilibrium, followed
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
-from cdsm.statics.locked_arm import LockedArm
 from cdsm.support.directions import unit_direction
 from cdsm.support.format import MODEL, coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
@@ -195,11 +195,10 @@ class WeightTest(Result):
         if self.history is None or self.stuck is None:
             return []
         if self.breakaway_load == 0.0:
-            return ["friction holds no cable here: the cables go straight through all holes"]
-        slides = (
-            f"at {self.sliding_load:.4g} N they slide: from this step on the tangent is at most "
-            f"{100.0 * (SLIDING - 1.0):.0f} % above that of the same load without friction"
-        )
+            said = "friction holds no cable here: "
+            return [f"{said}one is slack, or the cables go straight through all holes"]
+        slides = f"at {self.sliding_load:.4g} N they slide: from here on the tangent is at most "
+        slides += f"{100.0 * (SLIDING - 1.0):.0f} % above that of the same load without friction"
         if self.sliding_load == math.inf:
             slides = "under this weight the arm does not slide yet: hang more"
         sliding = np.count_nonzero(self.history.sliding[-1]), len(self.history.holes)
@@ -217,7 +216,7 @@ class WeightTest(Result):
 
 def weight_test(
     pose: Posture,
-    tension: Tension | ArrayLike,
+    tension: Tension | Equilibrium | ArrayLike,
     force: ArrayLike,
     *,
     steps: int = 1,
@@ -233,7 +232,9 @@ def weight_test(
     Args:
         pose: The reference posture, at which the motors are locked.
         tension: F at the reference, as for :func:`~cdsm.equilibrium`. If these tensions do not
-            balance the arm, the test starts from the equilibrium they lead to.
+            balance the arm, the test starts from the equilibrium they lead to. Or an
+            :class:`Equilibrium` with this posture, as of :func:`~cdsm.forward_statics`: the test
+            starts there, and its motors go on holding the tensions, or the lengths.
         force: ΔF (3,) [N] at ``tool0`` in base axes, added to ``wrench``.
         steps: Number of equal load steps, at most 1000.
         wrench: Wrench (6,) without the weight: force [N], then moment [N m]. Default: the wrench of
@@ -251,24 +252,25 @@ def weight_test(
     if not force.any():
         raise InvalidInput("force", "is zero; nothing moves, and there is nothing to measure.")
     steps = whole_number("steps", steps, 1, 1000)
-    unloaded = equilibrium(pose, tension, wrench)
+    if isinstance(tension, Equilibrium):
+        unloaded = tension._resumed(pose, wrench)
+        held = unloaded._held(unloaded._forced)
+    else:
+        unloaded, held = equilibrium(pose, tension, wrench), pose
     states, added, W = [unloaded], np.append(force, np.zeros(3)), unloaded.wrench
-    for step in range(steps):
-        states.append(_follow(states[-1], W, added, step / steps, (step + 1) / steps))
+    for i in range(steps):
+        states.append(_follow(states[-1], W, added, i / steps, (i + 1) / steps))
     test = WeightTest(force=force, unloaded=unloaded, states=tuple(states[1:]))
     if math.isinf(test.frictionless) and math.isfinite(test.tangent):
-        raise InvalidInput(
-            "force",
-            f"{np.abs(force).max():.3g} N moves the tip by rounding only, and measures nothing; "
-            f"hang at least {_MEASURED * pose.arm.length * test.tangent:.1g} N.",
-        )
+        said = f"{np.abs(force).max():.3g} N moves the tip by rounding only; hang at least "
+        raise InvalidInput("force", f"{said}{_MEASURED * pose.arm.length * test.tangent:.1g} N.")
     if not pose.arm.has_friction:
         return test
     return WeightTest(
         force=force,
         unloaded=unloaded,
         states=test.states,
-        breakaway=breakaway(pose, unloaded.reference_tension, force, W),
+        breakaway=breakaway(held, unloaded.reference_tension, force, W),
         history=load_cycle(pose, tension, W + np.arange(steps + 1)[:, None] / steps * added),
     )
 
@@ -283,8 +285,7 @@ def _follow(
     step = goal - reached
     while reached < goal:
         part = min(goal, reached + step)
-        W = frozen(wrench + part * added)
-        arm = LockedArm(before.reference, before.reference_tension, W)
+        arm = before._model.under(frozen(wrench + part * added))
         found = followed(arm, before.pose, before.stop_torque)
         if found is not None:
             before, reached, step = as_equilibrium(arm, found), part, 2.0 * step

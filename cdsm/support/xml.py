@@ -65,5 +65,5 @@ def numbers(where: str, text: str | None, count: int) -> tuple[float, ...]:
         wanted = "a number is" if count == 1 else f"{count} numbers are"
         raise XmlFault(f"{where}: {text or ''!r:.160} given; {wanted} needed")
     if not all(math.isfinite(value) and abs(value) <= LARGEST for value in values):
-        raise XmlFault(f"{where}: {text!r:.160} given; it must be finite")
+        raise XmlFault(f"{where}: {text!r:.160} given; it must be finite, to {LARGEST:g}")
     return values

@@ -163,6 +163,8 @@ class PathPoses(ReadOnlyState, PoseSet):
 class RandomPoses(PoseSet):
     """Random postures: a scrambled Sobol sequence, spread evenly within the joint limits.
 
+    A joint without limits (continuous) takes one turn, −180° to 180°.
+
     Attributes:
         count: Number of postures; powers of two fill the space most evenly.
         seed: Seed of the sequence; equal seeds give equal postures.
@@ -188,7 +190,9 @@ class RandomPoses(PoseSet):
                 unit = sequence.fast_forward(start).random(stop - start)
             else:  # scipy warns of a first draw that is no power of two
                 unit = sequence.random(1 << (stop - 1).bit_length())[:stop]
-            return np.asarray(arm.lower + unit * (arm.upper - arm.lower))
+            lower = np.where(np.isinf(arm.lower), -math.pi, arm.lower)
+            upper = np.where(np.isinf(arm.upper), math.pi, arm.upper)
+            return np.asarray(lower + unit * (upper - lower))
 
         description = f"{self.count} Sobol points within the joint limits, seed {self.seed}"
         return _Postures({"pose": self.count}, angles, description, {})

@@ -177,7 +177,7 @@ class TipHandle:
     def follow(self, panel: Panel) -> None:
         """Move the joints of ``panel`` so that the tip is at, or nearest to, a new target."""
         target, self._target = self._target, None
-        if target is None:
+        if target is None or panel.pulls:
             return
         found = inverse_kinematics(self._arm, target, panel.setting.q)
         panel.move(found.angles)
@@ -192,7 +192,7 @@ class TipHandle:
 
         The reason is empty if the tip did, or if the arm has been moved since.
         """
-        self._node.visible = shown.reference is not None
+        self._node.visible = shown.reference is not None and shown.setting.pull is None
         if shown.reference is not None and not self._dragged:
             self._node.position = shown.reference.tip[:3, 3]
         return self._remark if np.array_equal(shown.setting.q, self._q) else ""

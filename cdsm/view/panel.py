@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, final
+from typing import TYPE_CHECKING, Any, Final, final
 
 import numpy as np
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import viser
 
 _STEPS = 500  # least number of steps of a slider, which is a few hundred pixels long
+_PULLED = 0.1  # most wire that a motor takes in or pays out, over the arm's length
 _LENGTHS = 10.0  # largest coordinate of a prismatic joint on its slider, over the arm's length
 _ROUND = 1e-9  # largest difference of an end of a slider from a round number, over a step
 
@@ -72,6 +73,28 @@ class Panel:
             self._sag = self._add_switch("motors locked", start.sag, _SAG)
         shown = JointUnits(arm.slides).shown
         self._unit = np.array([unit for _, unit in shown])
+        self.joints: list[viser.GuiSliderHandle[float]] = []
+        self.pulls: list[viser.GuiSliderHandle[float]] = []
+        if start.pull is not None:
+            self._load[0].visible = self._sag.visible = False
+            most = _PULLED * MM * arm.length
+            with gui.add_folder("Motors take in"):
+                self.pulls = [
+                    self.add_slider(f"{name} [mm]", -most, most, MM * taken)
+                    for name, taken in zip(arm.cables.names, start.pull.tolist(), strict=True)
+                ]
+        else:
+            self._add_joints(gui, arm, start, shown)
+        buttons = gui.add_button_group("all", ("Straight", "Reset"))
+        buttons.on_click(self._press)
+        with gui.add_folder("Cable tensions"):
+            self.names = self._add_switch("show names", False, "Name the cables in the picture.")
+            self._tensions = gui.add_markdown("")
+        self._python = gui.add_markdown("")
+
+    def _add_joints(
+        self, gui: viser.GuiApi, arm: Manipulator, start: Setting, shown: Iterable[tuple[str, Any]]
+    ) -> None:
         most = np.where(arm.slides, _LENGTHS * arm.length, 2.0 * math.pi)
         low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
         ends = np.transpose([low, high, start.q] / self._unit).tolist()
@@ -80,16 +103,14 @@ class Panel:
                 self.add_slider(f"{name} [{unit.replace('deg', '°')}]", *numbers)
                 for name, (unit, _), numbers in zip(arm.joint_names, shown, ends, strict=True)
             ]
-        buttons = gui.add_button_group("all", ("Straight", "Reset"))
-        buttons.on_click(self._press)
-        with gui.add_folder("Cable tensions"):
-            self.names = self._add_switch("show names", False, "Name the cables in the picture.")
-            self._tensions = gui.add_markdown("")
-        self._python = gui.add_markdown("")
 
     @property
     def setting(self) -> Setting:
         """Current values of all controls."""
+        if self.pulls:
+            pull = np.array([slider.value / MM for slider in self.pulls])
+            pushed = np.array([slider.value for slider in self._load[1:]])
+            return replace(self._start, pull=pull, force=pushed)
         q = self._unit * [joint.value for joint in self.joints]
         minimum, *force = [slider.value for slider in self._load]
         F, sag = np.array(force), self._sag.value
@@ -102,7 +123,14 @@ class Panel:
         self._python.content = python_text(self._arm, shown.setting)
 
     def move(self, q: Array) -> None:
-        """Move the sliders of the joints to q (nv,) [rad] or [m], as far as their ends allow."""
+        """Move the sliders of the joints to q (nv,) [rad] or [m], as far as their ends allow.
+
+        Sliders of motors go back to where they started.
+        """
+        if self._start.pull is not None:
+            for slider, taken in zip(self.pulls, self._start.pull.tolist(), strict=True):
+                slider.value = MM * taken  # type: ignore[misc]
+            return
         for joint, value in zip(self.joints, q / self._unit, strict=True):
             near = min(max(float(value), joint.min), joint.max)
             joint.value = round(near, 9) + 0.0  # type: ignore[misc]
@@ -179,6 +207,12 @@ def tensions_text(shown: Shown) -> str:
 def python_text(arm: Manipulator, setting: Setting) -> str:
     """Write the lines of Python that compute the numbers, if the arm has the name ``arm``."""
     wrench = f"[{_joined(setting.force)}, 0, 0, 0]"
+    if setting.pull is not None:
+        return (
+            "The same in Python:\n```\n"
+            f"pull = [{_joined(setting.pull)}]\n"
+            f"rest = cdsm.forward_statics(arm, pull=pull, wrench={wrench})\n```"
+        )
     given = [f"{setting.minimum:.12g}"]
     given += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []
     given += [f"wrench={wrench}"] if setting.force.any() and not setting.sag else []

@@ -46,6 +46,10 @@ def serve(
     Only this machine can connect, and no web page of another site. To see the view from another
     machine, forward the port: ``ssh -L 8080:localhost:8080 THIS_MACHINE``.
 
+    An arm with springs and fewer cables than joints has sliders of how much wire each motor takes
+    in, from straight cables, and :func:`~cdsm.forward_statics` gives its posture; with ``q`` or a
+    path it has those of the joints.
+
     Args:
         arm: The arm; it is not changed.
         host: Address to listen at, of this machine only: a loopback address or ``"localhost"``.
@@ -77,6 +81,8 @@ def serve(
     from cdsm.view.live_view import View
 
     straight = np.clip(np.zeros(instance("arm", arm, Manipulator).nv), arm.lower, arm.upper)
+    free = q is None and angles is None and tips is None
+    pulled = free and arm.has_springs and len(arm.cables) < arm.nv
     path = None if angles is None and tips is None else checked_path(arm, angles, tips)
     route = path if path is None or tips is not None else _tips(arm, path)
     start = Setting(
@@ -86,6 +92,7 @@ def serve(
         force=vector("force", force, 3, "force at the tip [N], base axes"),
         sag=flag("sag", sag),
         solver=one_of("installed solver", solver, installed_solvers()),
+        pull=np.zeros(len(arm.cables)) if pulled else None,
     )
     pull = max(quantity("largest_tension", largest_tension, "tension"), start.minimum)
     push = max(quantity("largest_force", largest_force, "force"), float(abs(start.force).max()))

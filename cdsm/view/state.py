@@ -17,7 +17,8 @@ from cdsm.friction.stick import can_stick
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
-from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics.at_rest import Equilibrium
+from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array, frozen
 from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
@@ -67,6 +68,7 @@ class Setting:
     force: Array  # at the tip, in base axes (3,) [N]
     sag: bool = False  # whether the force moves the arm, tensioned without it, motors locked
     solver: str = DEFAULT_SOLVER
+    pull: Array | None = None  # wire that the motors take in (C,) [m]: the posture follows from it
 
 
 @final
@@ -91,7 +93,7 @@ class Shown:
     @property
     def tensions(self) -> Array | None:
         """Tensions (C,) [N] at the drawn posture."""
-        if self.setting.sag:
+        if self.setting.sag or self.setting.pull is not None:
             return None if self.rest is None else self.rest.tension
         return None if self.tension is None else self.tension.values
 
@@ -142,6 +144,13 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
     found: dict[str, Any] = {"setting": setting, "reference": pose}
     try:
         force = np.concatenate([setting.force, np.zeros(3)])
+        if setting.pull is not None:
+            rest = cdsm.forward_statics(arm, pull=setting.pull, wrench=force)
+            found |= {"rest": rest, "stiffness": rest.stiffness}
+            condition = Condition.STABLE if rest.branch == 1.0 else Condition.MOVED
+            condition = Condition.NEUTRAL if rest.neutral or not rest.stable else condition
+            said = "\n".join([*rest.warnings, *rest.pose.remarks])
+            return Shown(**found, condition=condition, problem=said)
         bounds, wrench = (setting.minimum, setting.maximum), force * (not setting.sag)
         tension = distribute_tension(pose, *bounds, wrench, setting.solver)
         found["tension"] = tension
@@ -177,5 +186,6 @@ def _rest(
         reference_tension=tension.values,
         stiffness=history.stiffness(-1),
         stop_torque=frozen(history.stop_torque[-1].copy()),
+        _model=LockedArm(pose, tension.values, wrench),
     )
     return rest, history.sliding[-1] != 0

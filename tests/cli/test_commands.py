@@ -109,6 +109,26 @@ def test_stiffness_with_tolerances_and_friction(probe: Path, pose: cdsm.Posture)
     assert found["sticking"]["z"]["breakaway_N"] == cdsm.breakaway(rough, tension, "z").load
 
 
+def test_the_posture_follows_from_what_the_motors_do(tmp_path: Path) -> None:
+    section = {"length": 0.2, "disks": 4, "hole_angles": [0.0, 2.1, 4.2], "hole_radius": 0.01}
+    geometry = cdsm.Geometry.backbone(sections=[section], bending_stiffness=0.01)
+    file = cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4)).write(tmp_path / "rod.toml")
+    arm = cdsm.Manipulator.read(file)
+    F, weight = [2.0, 0.0, 1.0], [0.0, 0.0, -0.01]
+    rest = cdsm.forward_statics(arm, tension=F, wrench=[*weight, 0, 0, 0])
+    asked = ("--tension", "2,0,1", "--load", "0,0,-0.01")
+    assert_holds(told("stiffness", file, *asked), rest)
+    assert_holds(told("stiffness", file, *asked, "--check"), rest.report())
+    pulled = cdsm.forward_statics(arm, pull=[0.003, -0.004, 0.0])
+    hung = ("weigh", file, "--pull", "3,-4,0", "--load", "0,0,-0.01")
+    found = told(*hung)
+    assert found["rest"] == plain(pulled.to_dict())
+    assert_holds(found, cdsm.weight_test(pulled.pose, pulled, weight, steps=5))
+    assert "motors hold lengths" in call(*hung).stdout
+    for more in (("--tension", "2,0,1"), ("--angles", 0), ("--minimum", 2)):
+        assert "say what the motors do" in call(*hung, *more).stderr
+
+
 def test_weigh(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
     asked = ("weigh", probe, "--angles", 8, "--minimum", 30)
     tension = cdsm.distribute_tension(pose, 30.0)

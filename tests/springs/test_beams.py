@@ -1,6 +1,8 @@
 """Backbones and links that bend, against beam theory, other programs' rods, and MuJoCo."""
 
 import math
+import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -165,6 +167,31 @@ def test_tubes_of_the_virtual_prototype_cost_stiffness(
     np.testing.assert_allclose(100.0 * (along[141.0] / along[None] - 1.0), twisted, atol=0.5)
 
 
+@pytest.mark.parametrize(("pieces", "off"), [(1, 0.216), (4, -0.017)])
+def test_own_cables_buckle_each_gap(pieces: int, off: float) -> None:
+    section = {"length": 0.2, "disks": 5, "hole_angles": THREE.tolist(), "hole_radius": 0.01}
+    geometry = cdsm.Geometry.backbone(sections=[section], bending_stiffness=EI, pieces=pieces)
+    soft = cdsm.LinearElasticity(1e4)
+    arm = cdsm.Manipulator(geometry, soft, gravity=(0.0, 0.0, 0.0))
+    arm = arm.with_cables([replace(each, control="force") for each in arm.cables])
+    pose, expected = arm.at(np.zeros(arm.nv)), math.pi**2 * EI / 0.04**2
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = cdsm.critical_tension(pose, up_to=1e3)
+    assert 3.0 * found.minimum / expected - 1.0 == pytest.approx(off, abs=2e-3)
+    assert ["pieces=4" in str(each.message) for each in said] == [True] * (pieces == 1)
+
+
+def test_a_round_rod_beyond_euler_s_load_rests_in_any_direction() -> None:
+    arm, euler = cantilever(10), math.pi**2 * EI / (4.0 * 0.4**2)
+    start = np.full(arm.nv, 0.05)
+    for load, neutral in ((0.5, False), (1.05, True)):
+        wrench = [-load * euler, 0.0, 0.0, 0.0, 0.0, 0.0]
+        rest = cdsm.forward_statics(arm, tension=np.zeros(3), wrench=wrench, start=start)
+        assert rest.neutral is neutral
+        assert ("NEUTRAL" in str(rest)) is neutral
+
+
 def test_files_hold_backbones(tmp_path: object) -> None:
     geometry = ROD.geometry
     assert cdsm.Geometry.from_toml(geometry.to_toml()) == geometry
@@ -186,6 +213,7 @@ def test_beams_that_cannot_be_are_named() -> None:
         ),
         ({"bending_stiffness": 1.0, "outer_diameter": 1e-3, "youngs_modulus": 5e10}, "not both"),
         ({"bending_stiffness": 1.0, "pieces": 21}, "pieces"),
+        ({"bending_stiffness": 1.0, "pieces": 9}, "450 axes .* 400 are taken .* fewer pieces"),
     ):
         with pytest.raises(cdsm.GeometryError, match=said):
             cdsm.Geometry.backbone(sections=[section], **given)  # type: ignore[arg-type]

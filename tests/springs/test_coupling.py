@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.sweeps.poses import joint_angles
 
 pytestmark = pytest.mark.filterwarnings("ignore::cdsm.errors.CdsmWarning")
 
@@ -110,6 +111,12 @@ def test_batches_couple_too() -> None:
     F = cdsm.distribute_tension(ARM.at(PHI), 3.0, wrench=WRENCH)
     np.testing.assert_allclose(least, F.values, rtol=1e-9)
     assert "PASS" in str(cdsm.stiffness(ARM.at(PHI), F).report())
+
+
+def test_random_postures_take_one_turn_of_a_joint_without_ends() -> None:
+    q = joint_angles(ARM, cdsm.RandomPoses(64))
+    assert abs(q[:, 1]).max() == pytest.approx(np.pi, rel=0.1)
+    assert abs(q[:, 1]).max() <= np.pi
 
 
 def test_statics_friction_and_modes_couple() -> None:

@@ -85,3 +85,58 @@ def test_what_cannot_be_solved_is_named() -> None:
     loose = ARM.with_springs(dict.fromkeys(ARM.joint_names[:-1], 1.0))
     with pytest.raises(cdsm.EquilibriumError, match="nothing holds joint8_2"):
         cdsm.forward_statics(loose, tension=TENSION)
+
+
+def test_the_share_at_which_a_branch_ends_and_neutral_rests_are_said() -> None:
+    rest = cdsm.forward_statics(ARM, tension=TENSION)
+    assert (rest.neutral, rest.warnings) == (False, ())
+    assert "motors hold the tensions" in str(rest)
+    assert cdsm.forward_statics(ARM, pull=[0.004, 0.0, 0.0]).report().passed
+    assert rest.report().passed
+
+
+FORCE = np.array([0.0, 0.1, -0.2])
+GIVEN = ({"tension": TENSION}, {"pull": [0.006, -0.02, -0.02]}, {"pull": [0.004, 0.001, 0.0]})
+
+
+@pytest.mark.parametrize("given", GIVEN, ids=("tension", "slack", "pull"))
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_weights_hang_on_an_arm_whose_motors_go_on(
+    given: dict[str, object], friction: float
+) -> None:
+    arm = ARM.with_friction(friction)
+    solve = partial(cdsm.forward_statics, arm, **given)  # type: ignore[arg-type]
+    rest = solve()
+    loaded = solve(wrench=[*FORCE, 0.0, 0.0, 0.0])
+    test = cdsm.weight_test(rest.pose, rest, FORCE, steps=2)
+    moved = loaded.pose.tip[:3, 3] - rest.pose.tip[:3, 3]
+    np.testing.assert_allclose(test.states[-1].displacement, moved, atol=1e-9)
+    history = cdsm.load_cycle(rest.pose, rest, [[*FORCE, 0.0, 0.0, 0.0]])
+    if friction == 0.0:
+        np.testing.assert_allclose(history.displacement[-1], moved, atol=1e-9)
+        assert test.left_reference is False
+    else:
+        assert history.dissipated[0] > 0.0
+        assert 0.0 < np.linalg.norm(history.displacement[-1]) < np.linalg.norm(moved)
+    with pytest.raises(cdsm.InvalidInput, match="of another posture"):
+        cdsm.weight_test(loaded.pose, rest, FORCE)
+
+
+def test_motors_pull_a_sprung_arm_as_forward_statics_says() -> None:
+    pull = np.array([0.006, -0.004, 0.0])
+    begin = cdsm.forward_statics(ARM, pull=np.zeros(3))
+    history = cdsm.load_cycle(begin.pose, begin, np.zeros((3, 6)), motors=[pull, pull / 2, pull])
+    for k, part in enumerate((1.0, 0.5, 1.0)):
+        rest = cdsm.forward_statics(ARM, pull=part * pull)
+        np.testing.assert_allclose(history.tip[k], rest.pose.tip[:3, 3], atol=1e-9)
+    assert abs(history.dissipated).max() < 1e-12
+    rough = ARM.with_friction(0.2)
+    loop = np.outer([0.5, 1.0, 0.5, 0.0] * 3, [0.006, -0.004, 0.0])
+    slow = cdsm.load_cycle(
+        rough.at(begin.pose.q), begin.tension, np.zeros((12, 6)), motors=loop, substeps=16
+    )
+    np.testing.assert_allclose(slow.tip[11], slow.tip[7], atol=1e-6)  # the loop is closed
+    assert (slow.dissipated[4:] >= 0.0).all()
+    assert slow.dissipated[8:].sum() == pytest.approx(slow.dissipated[4:8].sum(), rel=1e-2)
+    assert slow.dissipated[8:].sum() > 1e-5
+    assert np.linalg.norm(slow.tip[6] - slow.tip[4]) > 1e-5  # hysteresis at half the pull

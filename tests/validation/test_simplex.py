@@ -5,7 +5,7 @@ import pytest
 import tensegrity_simplex as simplex
 
 import cdsm
-from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics import Equilibrium
 
 
 @pytest.fixture(scope="module")

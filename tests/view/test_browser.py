@@ -14,7 +14,7 @@ import cdsm
 from cdsm.view import serve
 from cdsm.view.live_view import View
 from tests.support.patience import HANGS
-from tests.view.test_state import DEGREES, INFEASIBLE, STABLE, UNSTABLE, along, soft_arm
+from tests.view.test_state import DEGREES, INFEASIBLE, STABLE, UNSTABLE, along, rod, soft_arm
 
 pytest.importorskip("viser", reason="the extra [view] is not installed")
 
@@ -141,3 +141,14 @@ def test_a_link_does_not_lead_the_page_to_another_server(browser: Any, view: Vie
         page.close()
         other.shutdown()
     assert not led.is_set()
+
+
+def test_sliders_of_motors_pull_an_arm_with_few_cables(browser: Any) -> None:
+    arm = rod()
+    with serve(arm, port=0) as view:
+        page = Page(browser, view.url)
+        assert page.page.get_by_text("least tension [N]").count() == 0
+        page.type("cable6_1 [mm]", -4.0)
+        rest = cdsm.forward_statics(arm, pull=[-0.004, 0.0, 0.0])
+        page.says("stiffness along x, y, z", along(rest.stiffness))
+        assert not page.errors

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.statics.equilibrium import Equilibrium
+from cdsm.statics import Equilibrium
 from cdsm.support.values import Array
 from cdsm.view.panel import python_text, results_text, tensions_text
 from cdsm.view.scene import Scene
@@ -246,3 +246,41 @@ def test_the_lines_of_python_compute_what_the_page_shows(friction: float, sag: b
     assert shown.tensions is not None
     # twelve digits are printed
     np.testing.assert_allclose(found.tension, shown.tensions, rtol=1e-9)
+
+
+# --- motors that pull ---------------------------------------------------------------------------
+
+
+def rod() -> cdsm.Manipulator:
+    section = {"length": 0.3, "disks": 6, "hole_angles": [0.0, 2.1, 4.2], "hole_radius": 0.01}
+    geometry = cdsm.Geometry.backbone(sections=[section], bending_stiffness=0.02)
+    return cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4))
+
+
+def pulled(*pull: float) -> Shown:
+    arm = rod()
+    q, force = np.zeros(arm.nv), np.array([0.0, 0.0, -0.05])
+    return show(arm, Setting(q=q, minimum=0.0, force=force, pull=np.array(pull)))
+
+
+def test_what_motors_pull_gives_the_posture_and_its_numbers() -> None:
+    shown = pulled(0.004, -0.006, 0.0)
+    force = [0.0, 0.0, -0.05, 0.0, 0.0, 0.0]
+    rest = cdsm.forward_statics(rod(), pull=[0.004, -0.006, 0.0], wrench=force)
+    assert shown.condition is Condition.STABLE
+    assert shown.posture is not None
+    np.testing.assert_allclose(shown.posture.tip, rest.pose.tip, atol=1e-12)
+    said = numbers(shown)
+    assert said["stiffness along x, y, z"] == along(rest.stiffness)
+    assert said["tip"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.pose.tip[:3, 3])
+    assert "slack" in tensions_text(shown)
+    names: dict[str, Any] = {"arm": rod(), "cdsm": cdsm}
+    exec(python_text(rod(), shown.setting).split("```")[1], names)
+    np.testing.assert_allclose(names["rest"].pose.q, rest.pose.q, atol=1e-12)
+
+
+def test_more_wire_than_a_cable_has_cannot_be_taken_in() -> None:
+    shown = pulled(1.0, 0.0, 0.0)
+    assert shown.condition is Condition.INVALID
+    assert (shown.tensions, shown.stiffness) == (None, None)
+    assert "leaves" in shown.problem

@@ -1,0 +1,262 @@
+"""Equilibrium of a loaded arm as a frozen value: where it rests, and what holds it there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import cdsm
+from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.posture import Posture
+from cdsm.statics.locked_arm import LockedArm
+from cdsm.statics.solve import (
+    FLAT,
+)
+from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.support.directions import Direction, unit_direction
+from cdsm.support.format import aligned, coordinates, without_rounding
+from cdsm.support.result import Result, quantity, unit
+from cdsm.support.validation import instance
+from cdsm.support.values import Array, frozen
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cdsm.report import Report
+
+_NEUTRAL = 1e-2  # smallest eigenvalue over the magnitudes of its terms: they cancel, to 1 %
+_IMMOBILE = 1e-14  # a compliance below this part of the norm of C_vv is rounding
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Equilibrium(Result):
+    """Equilibrium of an arm with locked motors under a load; made by :func:`~cdsm.equilibrium`.
+
+    Joint limits act as stops. All arrays are read-only.
+
+    Attributes:
+        reference: The posture at which the motors were locked.
+        reference_tension: F (C,) [N] at the reference.
+        stiffness: K_θ at the equilibrium, with the rest lengths of the *reference*: the derivative
+            by q of the torque J_Lᵀ F + g − J_Xᵀ W, without the stops. For a pure force it is the
+            exact Hessian of the potential. If no cable is slack and ``original_length`` of the arm
+            is "unstrained", it equals :func:`~cdsm.stiffness` of this posture and tension.
+        stop_torque: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit,
+            negative at an upper limit, zero elsewhere.
+        motors: ``"locked"``: they hold the lengths, so the elasticity of the cables counts in K_θ;
+            ``"tension"``: they hold the tensions (:func:`~cdsm.forward_statics`).
+        branch: Share of load and pull up to which the arm followed without a jump; 1: all of it.
+    """
+
+    _headline, _rows = "moved", "cable"
+
+    reference: Posture
+    reference_tension: Array = field(metadata=unit("N", "cable"))
+    stiffness: Stiffness
+    stop_torque: Array = field(metadata=unit("torque", "joint"))
+    _model: LockedArm
+    motors: Literal["locked", "tension"] = field(default="locked", metadata=unit("1"))
+    branch: float = field(default=1.0, metadata=unit("1"))
+
+    @property
+    def pose(self) -> Posture:
+        """Posture at the equilibrium."""
+        return self.stiffness.posture
+
+    @property
+    def _posture(self) -> Posture:
+        return self.pose
+
+    @quantity("N", "cable")
+    def tension(self) -> Array:
+        """Tensions F (C,) [N] at the equilibrium."""
+        return self.stiffness.tension
+
+    @quantity("N and N m", "component")
+    def wrench(self) -> Array:
+        """W (6,) at ``tool0`` in base axes: force [N], then moment [N m]."""
+        return self.stiffness.wrench
+
+    @quantity("torque", "joint")
+    def residual(self) -> Array:
+        """Residual torque J_Lᵀ F + g − J_Xᵀ W − stop_torque (nv,) [N m]."""
+        return frozen(self.stiffness.residual - self.stop_torque)
+
+    @quantity("m", "axis")
+    def displacement(self) -> Array:
+        """Displacement of the tip from the reference (3,) [m]."""
+        return frozen(self.pose.tip[:3, 3] - self.reference.tip[:3, 3])
+
+    @quantity("m")
+    def moved(self) -> float:
+        """Distance of the tip from the reference [m]."""
+        return float(np.linalg.norm(self.displacement))
+
+    @quantity("1")
+    def stable(self) -> bool:
+        """Whether the symmetric part of K_θ is positive definite for the joints not held by stops.
+
+        It is False for a neutral state, for example if all cables are slack. A joint that touches
+        its stop without a torque counts as free, even if this stop blocks the unstable motion.
+        """
+        K = self.stiffness.joint[np.ix_(self._free, self._free)]
+        values = np.linalg.eigvalsh((K + K.T) / 2.0)
+        return bool((values > 1e-2 * FLAT * abs(values).max(initial=0.0)).all())
+
+    @quantity("1")
+    def neutral(self) -> bool:
+        """Whether a joint motion meets hardly any resistance: 1 % or less of what its terms have.
+
+        These are the magnitudes of the five terms of K_θ along the motion of its smallest
+        eigenvalue. A straight round rod beyond its buckling load rests in any direction around its
+        axis; the small stiffness of a model of it is that of its joints, and holds nothing.
+        """
+        K, of = self.stiffness, np.ix_(self._free, self._free)
+        values, vectors = np.linalg.eigh((K.joint[of] + K.joint[of].T) / 2.0)
+        if not values.size:
+            return False
+        v, terms = vectors[:, 0], (K.active, K.passive, K.gravity, K.load, K.springs)
+        return bool(values[0] <= _NEUTRAL * sum(abs(v @ each[of] @ v) for each in terms))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence if the arm jumped on the way here, and one if it is neutral here."""
+        said = list[str]()
+        if self.branch < 1.0:
+            part = f"at {100.0 * self.branch:.4g} % of load and pull its branch of equilibria ends"
+            said.append(f"JUMPED: {part}; from there the arm moves to this other one")
+        if self.neutral or not self.stable:
+            said.append("NEUTRAL: not every joint is brought back")
+        return tuple(said)
+
+    @quantity("1")
+    def slack(self) -> tuple[str, ...]:
+        """Names of the position-controlled cables that are slack."""
+        held, none = self.pose.arm.cables.position_controlled, self.tension == 0.0
+        slack = held & none & (self.stiffness.cable_stiffness == 0.0)
+        return tuple(self.pose.arm.cables.names[c] for c in np.flatnonzero(slack))
+
+    @quantity("1")
+    def at_limit(self) -> tuple[str, ...]:
+        """Names of the joints that rest on a stop."""
+        return tuple(self.pose.arm.joint_names[i] for i in np.flatnonzero(self.stop_torque))
+
+    def _resumed(self, pose: Posture, wrench: object) -> Equilibrium:
+        """Return it with itself as the reference, its motors as they are.
+
+        Raises InvalidInput if ``pose`` is not its posture, or a wrench is given.
+        """
+        if wrench is not None:
+            raise InvalidInput("wrench", "comes with the Equilibrium; leave it out here.")
+        if not instance("pose", pose, Posture)._equals(self.pose):
+            raise InvalidInput("tension", "is the Equilibrium of another posture; give its pose.")
+        model = self._model.resumed(self.pose, self.tension)
+        own: Any = {"reference": self.pose, "reference_tension": self.tension, "branch": 1.0}
+        return replace(self, **own, _model=model)
+
+    def _held(self, forced: NDArray[np.bool_]) -> Posture:
+        """Return the posture, of an arm of which the cables ``forced`` (C,) have no stiffness."""
+        if not forced.any():
+            return self.pose
+        given = zip(self.pose.arm.cables, forced, strict=True)
+        cables = [replace(cable, control="force") if of else cable for cable, of in given]
+        return self.pose.arm.with_cables(cables).at(self.pose.q, check_limits=False)
+
+    @property
+    def _forced(self) -> NDArray[np.bool_]:
+        """Which cables have a motor that holds the tension (C,)."""
+        held: NDArray[np.bool_] = self.pose.arm.cables.position_controlled
+        return held & (self.motors == "tension")
+
+    @property
+    def _paid_out(self) -> Array:
+        """How much longer than straight the slack wires are (C,) [m]."""
+        pose, F = self.pose, self.tension
+        more = self.stiffness.free_lengths - pose.arm._laws.original_lengths(pose.cable_lengths, F)
+        return np.where(F == 0.0, np.maximum(more, 0.0), 0.0)
+
+    @property
+    def _free(self) -> NDArray[np.intp]:
+        """Indices (n,) of the joints that no stop pushes."""
+        return np.flatnonzero(self.stop_torque == 0.0)
+
+    @cached_property
+    def compliance(self) -> Array:
+        """Compliance at the tip (6, 6): tip motion per wrench, with joints at stops fixed.
+
+        C = J_X K_θ⁻¹ J_Xᵀ, with the rows and columns of the joints that no stop pushes. Linear rows
+        and columns of C are first: C_vv [m/N], C_vω [rad/N], C_ωω [rad/(N m)].
+
+        Raises:
+            SingularStiffness: K_θ of these joints is singular.
+        """
+        if not self.at_limit:
+            return self.stiffness.compliance
+        free, nv = self._free, self.stop_torque.size
+        K, J = self.stiffness.joint[np.ix_(free, free)], self.pose.jacobian[:, free]
+        _, values, right = np.linalg.svd(K)
+        if free.size and not values[-1] > FLAT * values[0]:
+            mode = np.zeros(nv)
+            mode[free] = right[-1]
+            raise SingularStiffness(
+                "K_θ of the joints off their stops is singular, most at "
+                f"{self.pose.arm.joint_names[int(abs(mode).argmax())]}: the arm is about to buckle "
+                "there.",
+                frozen(mode),
+            )
+        return frozen(J @ np.linalg.solve(K, J.T))
+
+    def report(self) -> Report:
+        """Check the stiffness here, as :meth:`Stiffness.report` does."""
+        pose = self._held(self.stiffness.cable_stiffness == 0.0)
+        return stiffness(pose, self.tension, self.wrench).report()
+
+    def along(self, direction: Direction) -> float:
+        """Compute the tip stiffness 1/(uᵀ C_vv u) [N/m] along u, with joints at stops fixed.
+
+        C_vv (3, 3) is the part of :attr:`compliance` that relates displacements to forces. u is an
+        axis such as ``"z"``, or (3,) in base axes, any length. The stiffness is inf if the tip
+        cannot move along u.
+
+        Raises:
+            InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
+            SingularStiffness: K_θ of the joints that are not at stops is singular.
+        """
+        if not self.at_limit:
+            return self.stiffness.along(direction)
+        u, C = unit_direction("direction", direction), self.compliance[:3, :3]
+        compliance = float(u @ C @ u)
+        return 1.0 / compliance if abs(compliance) > _IMMOBILE * np.linalg.norm(C) else math.inf
+
+    def plot(self) -> Figure:
+        """Plot the arm in mm at the reference (grey) and at the equilibrium."""
+        return cdsm.plots.plot_path([self.reference, self.pose])
+
+    def __str__(self) -> str:
+        arm, rows = self.pose.arm, [("cable", "tension [N]", "reference", "")]
+        for cable, F, F0 in zip(arm.cables, self.tension, self.reference_tension, strict=True):
+            below = cable.control == "position" and cable.elasticity.rest > F
+            state = "on the slack branch of its wire" if below else ""
+            state = "slack" if cable.name in self.slack else state
+            rows.append((cable.name, f"{F:.3f}", f"{F0:.3f}", state))
+        moved = coordinates(without_rounding(1000.0 * self.displacement))
+        lines = [*aligned(rows), f"tip moved by {moved} mm"]
+        lines += [
+            f"{arm.joint_names[i]} rests on its stop, which pushes with "
+            f"{self.stop_torque[i]:.4g} {arm.torque_unit(i)}"
+            for i in np.flatnonzero(self.stop_torque).tolist()
+        ]
+        lines.append(
+            "motors hold lengths: the elasticity of the cables counts in the stiffness"
+            if self.motors == "locked"
+            else "motors hold the tensions: cables add no stiffness of their own"
+        )
+        residual = f"{abs(self.residual).max():.1e} {arm.torque_unit()}"
+        state = "; ".join(self.warnings) or "stable"
+        return "\n".join([*lines, f"{state}, residual {residual}"])
