@@ -172,8 +172,8 @@ def solve_joint_angles(
         tolerance: Largest ‖L(θ) − L‖/arm length of reached lengths; for measured ones, their error.
 
     Raises:
-        InvalidInput: The lengths are not (C,) positive numbers; guess and tolerance as there.
-        InvalidInput: Two sites of a cable coincide at a posture of the search.
+        InvalidInput: The lengths are not (C,) positive numbers; guess and tolerance as there. Two
+            sites of a cable coincide at a posture of the search.
     """
     cables = instance("arm", arm, Manipulator).cables
     wanted = vector("cable_lengths", cable_lengths, len(cables), "one length [m] per cable")

@@ -106,11 +106,10 @@ class Manipulator(Printed):
 
     Raises:
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
-            not three numbers.
-        InvalidInput: Two cables have the same name, or a cable is on an unknown link.
-        InvalidInput: ``original_length`` is unknown.
-        FileError: The file of the cables cannot be read.
-        FileError: The file of the cables names no wire for some of them.
+            not three numbers. Two cables have the same name, or a cable is on an unknown link.
+            ``original_length`` is unknown.
+        FileError: The file of the cables cannot be read. The file of the cables names no wire for
+            some of them.
     """
 
     name: str
@@ -188,13 +187,12 @@ class Manipulator(Printed):
             springs: As for :meth:`with_springs`; a URDF has no element for them.
 
         Raises:
-            FileError: The file of the URDF or of the cables cannot be read.
-            FileError: The file of the cables names no wire for some of them.
+            FileError: The file of the URDF or of the cables cannot be read. The file of the cables
+                names no wire for some of them.
             GeometryError: The URDF is not a supported robot; lists every fault.
-            InvalidInput: No link is called ``tip``, or ``original_length`` is unknown.
-            InvalidInput: ``urdf`` is neither a path nor a text, or ``joint_names`` does not name
-                each moving joint once.
-            InvalidInput: Two cables have the same name, or a cable is on an unknown link.
+            InvalidInput: No link is called ``tip``, or ``original_length`` is unknown. ``urdf`` is
+                neither a path nor a text, or ``joint_names`` does not name each moving joint once.
+                Two cables have the same name, or a cable is on an unknown link.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
         more: Any = {"joint_names": joint_names, "springs": springs}
@@ -223,7 +221,7 @@ class Manipulator(Printed):
 
         Raises:
             FileError: The file cannot be read or does not describe an arm. Every fault is listed.
-            FileError: The file has no wire for some cables, and ``wire`` is not given.
+                The file has no wire for some cables, and ``wire`` is not given.
             GeometryError, InvalidInput: As :meth:`from_urdf`.
         """
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
@@ -260,9 +258,9 @@ class Manipulator(Printed):
             check_limits: Refuse angles beyond the joint limits.
 
         Raises:
-            InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` is not a bool.
-            InvalidInput: An angle is beyond its limit, and ``check_limits`` is True.
-            InvalidInput: Two neighbouring sites of a cable coincide at this posture.
+            InvalidInput: q is not (nv,) finite real numbers, or ``check_limits`` is not a bool. An
+                angle is beyond its limit, and ``check_limits`` is True. Two neighbouring sites of a
+                cable coincide at this posture.
         """
         q = self._angles(q, check_limits)
         routing = self._routing
@@ -474,8 +472,7 @@ class Manipulator(Printed):
                 or (k, q_0) with the angle [rad] or way [m] without torque, which is 0 otherwise.
 
         Raises:
-            InvalidInput: A stiffness is negative, or no number.
-            InvalidInput: There is no such joint.
+            InvalidInput: A stiffness is negative, or no number. There is no such joint.
         """
         return self._replace(springs=springs)
 

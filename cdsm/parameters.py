@@ -70,9 +70,9 @@ class ArmParameters:
         names: Names of the parameters, in any order.
 
     Raises:
-        InvalidInput: There is no such parameter or cable.
-        InvalidInput: The arm has no such joint, no geometry, or other cables, leads, holes or
-            springs than its geometry; or two names change the same number.
+        InvalidInput: There is no such parameter or cable. The arm has no such joint, no geometry,
+            or other cables, leads, holes or springs than its geometry; or two names change the same
+            number.
     """
 
     arm: Manipulator
@@ -120,9 +120,8 @@ class ArmParameters:
 
         Raises:
             GeometryError: No valid arm has these values.
-            InvalidInput: A parameter is not among :attr:`names`.
-            InvalidInput: A rigidity is not positive, or a value is not a number.
-            InvalidInput: A spring is not positive.
+            InvalidInput: A parameter is not among :attr:`names`. A rigidity is not positive, or a
+                value is not a number. A spring is not positive.
         """
         geometry = self._geometry
         parts: dict[str, list[Any]] = {

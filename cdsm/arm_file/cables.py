@@ -54,8 +54,8 @@ def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple
             WIRE.toml.
 
     Raises:
-        FileError: The file cannot be read or does not describe cables. Every fault is listed.
-        FileError: The file names no wire for some cables, and ``wire`` is not given.
+        FileError: The file cannot be read or does not describe cables. Every fault is listed. The
+            file names no wire for some cables, and ``wire`` is not given.
     """
     return tuple(read_model(path, wire, robot=False)[1])
 

@@ -138,8 +138,7 @@ def evaluate(
 
     Raises:
         InvalidInput: An argument has the wrong shape or is not a number; a tension is negative; or
-            two arguments contradict each other or one is missing.
-        InvalidInput: An output does not exist.
+            two arguments contradict each other or one is missing. An output does not exist.
     """
     instance("arm", arm, Manipulator)
     names = _checked_outputs(outputs)

@@ -91,8 +91,7 @@ def track(
 
     Raises:
         InvalidInput: The plan is not complete; or another argument is invalid; or a law returns no
-            :class:`Command` within the bounds.
-        InvalidInput: There is no such law.
+            :class:`Command` within the bounds. There is no such law.
     """
     arm = instance("plan", plan, PathPlan).arm
     if not plan.complete:

@@ -121,8 +121,8 @@ class Objective(Measure):
             stiffness, the least mass.
 
     Raises:
-        InvalidInput: ``of`` or ``goal`` is unknown.
-        InvalidInput: ``direction`` is missing, or is given for a quantity without a direction.
+        InvalidInput: ``of`` or ``goal`` is unknown. ``direction`` is missing, or is given for a
+            quantity without a direction.
     """
 
     goal: Literal["most", "least"] | None = None
@@ -150,9 +150,8 @@ class Constraint(Measure):
         at_most: Largest value allowed, in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; or None.
 
     Raises:
-        InvalidInput: ``of`` is unknown.
-        InvalidInput: No limit is given, or two; or ``direction`` is missing, or is given for a
-            quantity without a direction.
+        InvalidInput: ``of`` is unknown. No limit is given, or two; or ``direction`` is missing, or
+            is given for a quantity without a direction.
     """
 
     at_least: float | None = None

@@ -64,8 +64,8 @@ class DesignProblem(ReadOnlyState):
 
     Raises:
         InvalidInput: An argument is invalid; two variables change the same thing; the arm was made
-            from a URDF, or its leads or holes are not those of its geometry.
-        InvalidInput: The arm does not have a cable that is named.
+            from a URDF, or its leads or holes are not those of its geometry. The arm does not have
+            a cable that is named.
     """
 
     arm: Manipulator

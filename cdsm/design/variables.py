@@ -56,9 +56,8 @@ class Variable:
         choices: Values to choose from, instead of a range; always needed for a wire.
 
     Raises:
-        InvalidInput: There is no such variable.
-        InvalidInput: The range is empty or not of numbers; or joint or cable are missing, or given
-            for a variable that has one value for the arm.
+        InvalidInput: There is no such variable. The range is empty or not of numbers; or joint or
+            cable are missing, or given for a variable that has one value for the arm.
     """
 
     of: str

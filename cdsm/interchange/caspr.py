@@ -90,12 +90,11 @@ def read_caspr(
         check_inertia: As for :meth:`Manipulator.from_urdf`.
 
     Raises:
-        InvalidInput: ``elasticity`` is not an Elasticity, or ``cables`` is missing.
+        InvalidInput: ``elasticity`` is not an Elasticity, or ``cables`` is missing. The set of
+            cables does not exist. A cable cannot be routed.
         FileError: A file cannot be read, is not a CASPR model, or has parts that cannot be mapped:
             other joints, cables that are not ideal, pulleys. The first such part is named.
         GeometryError: A link has impossible moments of inertia.
-        InvalidInput: The set of cables does not exist.
-        InvalidInput: A cable cannot be routed.
     """
     if not isinstance(elasticity, Elasticity):
         raise InvalidInput("elasticity", f"{elasticity!r} given; an Elasticity is needed.")

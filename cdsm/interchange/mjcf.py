@@ -114,8 +114,7 @@ def to_mjcf(
 
     Raises:
         InvalidInput: Only one of ``pose`` and ``tension`` is given, the posture is of another arm,
-            both dampings are given, or an argument is invalid.
-        InvalidInput: ``actuators`` is unknown.
+            both dampings are given, or an argument is invalid. ``actuators`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
         SingularStiffness: A motion of the arm moves no link with mass.
     """

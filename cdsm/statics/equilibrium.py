@@ -42,8 +42,7 @@ def equilibrium(
             of the ``Tension``, or zero.
 
     Raises:
-        InvalidInput: As for :func:`~cdsm.stiffness`.
-        InvalidInput: The posture is beyond a joint limit.
+        InvalidInput: As for :func:`~cdsm.stiffness`. The posture is beyond a joint limit.
         ElasticityRangeError: A tension at the reference or at the equilibrium is outside the domain
             of its law. A law does not say how a cable becomes slack or yields.
         EquilibriumError: No equilibrium was found. If two sites of a cable meet (disks overlap),

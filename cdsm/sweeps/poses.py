@@ -51,8 +51,8 @@ class PoseSet(ABC):
                 each computed where it is needed. :func:`~cdsm.sweep` then returns a lazy Dataset.
 
         Raises:
-            InvalidInput: The arm has no such joint.
-            InvalidInput: The set does not fit the arm, or has more than 2³⁰ postures.
+            InvalidInput: The arm has no such joint. The set does not fit the arm, or has more than
+                2³⁰ postures.
             CdsmError: xarray, or dask for chunks, is not installed.
         """
         return angles_of(arm, self, None if chunk is None else whole_number("chunk", chunk, 1))

@@ -79,8 +79,8 @@ def sweep(
         them; then its own, such as ``cable``.
 
     Raises:
-        InvalidInput: An argument is wrong; the error names it and the reason.
-        InvalidInput: A joint or an output does not exist.
+        InvalidInput: An argument is wrong; the error names it and the reason. A joint or an output
+            does not exist.
         CdsmError: xarray, dask, or zarr for a store, is not installed.
         FileError: The store cannot be created, read or written, or has another sweep.
     """

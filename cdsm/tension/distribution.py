@@ -52,10 +52,10 @@ def distribute_tension(
 
     Raises:
         InvalidInput: An argument has the wrong shape or is not a number, or a minimum is above its
-            maximum, possibly after ``worst_friction`` has narrowed them.
+            maximum, possibly after ``worst_friction`` has narrowed them. The solver is not
+            installed, or a fixed cable does not exist.
         InfeasibleTension: No tension within the bounds balances the arm. The error gives the
             missing torque, and how far the bounds of cables without a fixed tension must widen.
-        InvalidInput: The solver is not installed, or a fixed cable does not exist.
         CdsmError: The solver's solution does not meet the optimality conditions.
     """
     cables = instance("pose", pose, Posture).arm.cables

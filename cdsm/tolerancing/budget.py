@@ -212,8 +212,8 @@ def uncertainty(
 
     Raises:
         InvalidInput: An argument has the wrong type or shape, is missing or not wanted; the arm has
-            none of a source; or the measurand does not exist for small errors of an input.
-        InvalidInput: ``of`` or ``cable`` is unknown.
+            none of a source; or the measurand does not exist for small errors of an input. ``of``
+            or ``cable`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's law.
         SingularStiffness: The measurand does not exist.
     """

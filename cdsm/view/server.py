@@ -71,10 +71,10 @@ def serve(
         ``wait()`` waits for Ctrl-C, ``close()`` or the end of a ``with`` block ends it.
 
     Raises:
-        CdsmError: viser is not installed (extra ``[view]``).
+        CdsmError: viser is not installed (extra ``[view]``). The installed viser starts its server
+            so that other sites cannot be refused.
         InvalidInput: A value has the wrong type or shape, an angle is beyond its limit, the solver
             is not installed, or host or port is not available.
-        CdsmError: The installed viser starts its server so that other sites cannot be refused.
     """
     need("view", "viser")
     from cdsm.view.guard import guarded_server
