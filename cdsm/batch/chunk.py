@@ -149,39 +149,59 @@ class Chunk:
         """Compute K_θ, its terms if they are needed, and what is read off it."""
         names, status, u = self._names, self._status, self._rows.directions
         wanted, fine = names & set(READINGS), np.flatnonzero(status == Status.OK)
-        fused = self._kernels.COMPILED and wanted <= {"along"} and names.isdisjoint(TERMS)
-        fused = fused and self._table.reduction is None
-        K, size = self._terms(full, F, k, W, apart=not fused)
+        apart = self._table.reduction is not None or not names.isdisjoint(TERMS)
+        K, size = self._terms(full, F, k, W, apart=apart)
         found: dict[str, Array] = {}
-        if not fused or "joint" in names:
+        if apart:
             terms = self._with_springs(self._alone(K))
             found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
-            found["joint"] = terms.sum(axis=1)
+            found["joint"], parts = terms.sum(axis=1), abs(terms).sum(axis=1)
+        elif self._kernels.COMPILED and wanted == {"along"}:
+            if "joint" in names:
+                found["joint"] = self._alone(K[:, 0]).copy()
+            shape = len(F), len(u), self._width
+            along, pivot, moment = np.empty(shape), np.empty(shape[::2]), bool(W[:, 3:].any())
+            # a copy is writable, whatever u is: the kernel compiles once
+            kernel = self._kernels.along
+            self._aside(kernel, K, size, at.tip_jacobian, u.copy(), moment, along, pivot)
+            found["along"] = self._alone(along)
+            self._read_anew(fine[~(self._alone(pivot)[fine] > _PIVOT)], wanted, at, F, k, W, found)
+            return found
+        else:
+            found["joint"], parts = self._alone(K[:, 0]).copy(), self._alone(size)
         if not wanted:
             return found
-        if not fused:
-            of_tip = _jacobian(at, fine)
-            read_off, status[fine] = self._aside(read, wanted, terms[fine], of_tip, u)
-            for name, value in read_off.items():
-                found[name] = np.full((len(status), *value.shape[1:]), np.nan)
-                found[name][fine] = value
-            return found
-        shape = len(F), len(u), self._width
-        along, pivot, moment = np.empty(shape), np.empty(shape[::2]), bool(W[:, 3:].any())
-        # a copy is writable, whatever u is: the kernel compiles once
-        kernel = self._kernels.along
-        self._aside(kernel, K, size, at.tip_jacobian, u.copy(), moment, along, pivot)
-        found["along"] = self._alone(along)
-        doubtful = fine[~(self._alone(pivot)[fine] > _PIVOT)]
-        if doubtful.size:
-            *pose, F, k, W = (self._picked(x, doubtful) for x in (*at, F, k, W))
-            some = Pose(*pose)
-            terms = one_by_one(self._terms(some, F, k, W, apart=True)[0], doubtful.size)
-            terms = self._with_springs(terms, doubtful)
-            of_tip = _jacobian(some, np.arange(doubtful.size))
-            read_off, status[doubtful] = read({"along"}, terms, of_tip, u)
-            found["along"][doubtful] = read_off["along"]
+        of_tip = _jacobian(at, fine)
+        read_off, codes = self._aside(read, wanted, found["joint"][fine], parts[fine], of_tip, u)
+        for name, value in read_off.items():
+            found[name] = np.full((len(status), *value.shape[1:]), np.nan)
+            found[name][fine] = value
+        status[fine] = codes
+        if not apart:
+            self._read_anew(fine[codes == Status.SINGULAR], wanted, at, F, k, W, found)
         return found
+
+    def _read_anew(
+        self,
+        rows: NDArray[np.intp],
+        wanted: set[str],
+        at: Pose,
+        F: Array,
+        k: Array,
+        W: Array,
+        found: dict[str, Array],
+    ) -> None:
+        """Fill what is ``wanted`` in ``rows`` that may be singular, which their terms decide."""
+        if not rows.size:
+            return
+        *pose, F, k, W = (self._picked(x, rows) for x in (*at, F, k, W))
+        some = Pose(*pose)
+        terms = one_by_one(self._terms(some, F, k, W, apart=True)[0], rows.size)
+        terms, of_tip = self._with_springs(terms, rows), _jacobian(some, np.arange(rows.size))
+        parts, u = abs(terms).sum(axis=1), self._rows.directions
+        read_off, self._status[rows] = read(wanted, terms.sum(axis=1), parts, of_tip, u)
+        for name, value in read_off.items():
+            found[name][rows] = value
 
     def _terms(self, at: Pose, F: Array, k: Array, W: Array, *, apart: bool) -> tuple[Array, Array]:
         B, nv, _ = at.gravity.shape

@@ -14,26 +14,30 @@ from cdsm.stiffness_matrix.value import FLAT, REGULAR, UNMOVED
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 
+_CLEAR = 1e3 * REGULAR
+
 INVERSE = ("along", "compliance", "cartesian")
 """Readings of K_θ⁻¹."""
 
 
 def read(
-    names: Collection[str], terms: Array, jacobian: Array, directions: Array
+    names: Collection[str], K: Array, parts: Array, jacobian: Array, directions: Array
 ) -> tuple[dict[str, Array], NDArray[np.uint8]]:
     """Compute readings of N postures, and their status; NaN where a reading does not exist.
 
     Args:
         names: Any of ``margin``, ``along``, ``compliance``, ``cartesian``, ``pseudoinverse``.
-        terms: The terms of K_θ (N, n, nv, nv).
+        K: K_θ (N, nv, nv).
+        parts: Sum of the magnitudes of its terms (N, nv, nv). Of their diagonals alone (N, nv), all
+            that is not clearly regular is called singular.
         jacobian: J_X (N, 6, nv).
         directions: Unit vectors u (D, 3) of ``along``.
     """
-    K, Jv = terms.sum(axis=1), jacobian[:, :3]
+    Jv = jacobian[:, :3]
     status = np.zeros(len(K), dtype=np.uint8)
     found: dict[str, Array] = {}
     if "margin" in names:
-        found["margin"] = np.linalg.eigvalsh((K + _transposed(K)) / 2.0)[:, 0]
+        found["margin"] = np.asarray(np.linalg.eigvalsh((K + _transposed(K)) / 2.0)[:, 0])
     if not {"cartesian", "pseudoinverse"}.isdisjoint(names):
         B, S, V = np.linalg.svd(Jv, full_matrices=False)
         still = S[:, -1] <= FLAT * S[:, 0] if S.shape[1] == 3 else np.ones(len(K), np.bool_)
@@ -43,7 +47,7 @@ def read(
     if "pseudoinverse" in names:
         found["pseudoinverse"] = _between(A, V @ K @ _transposed(V), still)
     if not set(INVERSE).isdisjoint(names):
-        inverse, singular = _inverse(K, abs(terms).sum(axis=1))
+        inverse, singular = _inverse(K, parts)
         status[singular] = Status.SINGULAR
         if "along" in names:
             torque = directions @ Jv  # (N, D, nv)
@@ -64,11 +68,13 @@ def read(
 
 def _inverse(K: Array, parts: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return K_θ⁻¹ and where it does not exist; there it is NaN."""
-    D = np.diagonal(parts, axis1=1, axis2=2)
+    clear = parts.ndim == 2
+    D = parts if clear else np.diagonal(parts, axis1=1, axis2=2)
     with np.errstate(all="ignore"):
         scale = 1.0 / np.sqrt(D)
         both = scale[:, :, None] * scale[:, None]
-        A, least = K * both, REGULAR * (parts * both).max(axis=(1, 2))
+        A = K * both
+        least = np.full(len(K), _CLEAR) if clear else REGULAR * (parts * both).max(axis=(1, 2))
         try:
             inverse = np.linalg.inv(A)
         except np.linalg.LinAlgError:  # at least one of them is singular to the last bit
@@ -78,7 +84,7 @@ def _inverse(K: Array, parts: Array) -> tuple[Array, NDArray[np.bool_]]:
         # 1/|A⁻¹| is a lower bound of the smallest singular value of A
         singular = ~(least * np.sqrt((inverse**2).sum(axis=(1, 2))) < 1.0)
     regular = np.flatnonzero(singular & (D.min(axis=1) > 0.0))
-    if regular.size:
+    if regular.size and not clear:
         values = np.linalg.svd(A[regular], compute_uv=False)[:, -1]
         singular[regular] = ~(values > least[regular])
     inverse[singular] = np.nan

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.batch import choice, solution
 from cdsm.support.values import Array
 
 WRENCH = np.array([1.0, 2.0, -1.0, 0.1, 0.05, -0.02])
@@ -163,3 +164,18 @@ def test_springs_that_cannot_be_are_named() -> None:
         arm.with_springs({"joint9_1": 1.0})
     with pytest.raises(cdsm.GeometryError, match="joint_stiffness"):
         sprung(joint_stiffness=-1.0)
+
+
+@pytest.mark.parametrize(
+    "outputs", [("joint",), ("joint", "along"), ("joint", "margin", "springs")]
+)
+def test_a_batch_counts_each_spring_once(outputs: tuple[str, ...]) -> None:
+    arm = cdsm.presets.virtual_prototype().with_springs({"joint1_1": 5.0, "joint3_2": 2.0})
+    q, F = np.random.default_rng(0).uniform(-0.1, 0.1, (3, arm.nv)), np.full(15, 60.0)
+    u = "z" if "along" in outputs else None
+    joint = cdsm.stiffness(arm.at(q[1]), F).joint
+    for compiled in (choice.plain, choice.compiled):
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(solution, "kernels_for", lambda *_, kernels=compiled: kernels())
+            batch = cdsm.evaluate(arm, q, F, outputs=outputs, direction=u)
+        np.testing.assert_allclose(batch["joint"][1], joint, rtol=0.0, atol=1e-10 * joint.max())
