@@ -44,14 +44,17 @@ class LockedArm:
         self.reference, self.tension, self.wrench = reference, tension, wrench
         self.tension_held = tension_held
         laws, L = reference.arm._laws, reference.cable_lengths
-        self.rest_length = laws.original_lengths(L, tension)
-        if rest_length is not None:
-            held = reference.arm.cables.position_controlled
-            self.rest_length = frozen(np.where(held, rest_length, L))
+        self.rest_length: Array | None = None  # motors that hold tensions hold no length
         self._laws = []
-        for law, of in () if tension_held else laws.held:
+        if tension_held:
+            return
+        own = laws.original_lengths(L, tension)
+        if rest_length is not None:
+            own = frozen(np.where(reference.arm.cables.position_controlled, rest_length, L))
+        self.rest_length = own
+        for law, of in laws.held:
             lengths = None if rest_length is not None else L[of]
-            parts = (self.rest_length[of], laws.series[of], tension[of], lengths)
+            parts = (own[of], laws.series[of], tension[of], lengths)
             try:
                 self._laws.append((law, of, _LockedLaw(law, *parts)))
             except ElasticityRangeError as error:

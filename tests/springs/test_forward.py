@@ -140,3 +140,13 @@ def test_motors_pull_a_sprung_arm_as_forward_statics_says() -> None:
     assert slow.dissipated[8:].sum() == pytest.approx(slow.dissipated[4:8].sum(), rel=1e-2)
     assert slow.dissipated[8:].sum() > 1e-5
     assert np.linalg.norm(slow.tip[6] - slow.tip[4]) > 1e-5  # hysteresis at half the pull
+
+
+def test_motors_that_hold_tensions_need_no_law_below_its_domain() -> None:
+    arm = cdsm.presets.virtual_prototype()
+    arm = arm.with_springs(dict.fromkeys(arm.joint_names, 30.0))
+    assert arm.cables[0].elasticity.low > 1.0
+    for F in (50.0, 1.0):
+        rest = cdsm.forward_statics(arm, tension=np.full(15, F))
+        np.testing.assert_array_equal(rest.tension, F)
+        assert not rest.stiffness.cable_stiffness.any()
