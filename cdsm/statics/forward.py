@@ -57,8 +57,6 @@ def forward_statics(
     Raises:
         InvalidInput: Not exactly one of the three is given, or an argument has the wrong shape; or
             motors hold rest lengths, but ``original_length`` of the arm is ``"stretched"``.
-        ElasticityRangeError: Motors hold lengths, and a tension at the rest is outside the domain of
-            its law.
         ElasticityRangeError: Motors hold lengths, and a tension is outside the domain of its law.
         EquilibriumError: No stable equilibrium was found, or nothing holds a joint.
     """
