@@ -12,13 +12,13 @@ import cdsm
 from cdsm.cli import options
 from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
-from cdsm.statics.buckling import CriticalLoad, CriticalTension
-from cdsm.statics.load_cycle import LoadHistory
-from cdsm.statics.weight_test import WeightTest
-from cdsm.tolerancing.budget import Uncertainty
 
 if TYPE_CHECKING:
+    from cdsm.statics.buckling import CriticalLoad, CriticalTension
+    from cdsm.statics.load_cycle import LoadHistory
+    from cdsm.statics.weight_test import WeightTest
     from cdsm.support.values import Array
+    from cdsm.tolerancing.budget import Uncertainty
 
 
 def stiffness(
@@ -98,7 +98,8 @@ def _uncertainty(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tup
     """
     from cdsm.support.format import aligned
 
-    pose, found = tension.posture, dict[str, Uncertainty]()
+    pose = tension.posture
+    found: dict[str, Uncertainty] = {}
     for name, u in axes.items() if pose.arm.tolerances.given else ():
         with contextlib.suppress(cdsm.SingularStiffness):
             found[name] = cdsm.uncertainty(pose, tension, pose.arm.tolerances, direction=u)
