@@ -63,7 +63,7 @@ def hinge() -> Iterator[Row]:
 
 
 def capstan() -> Iterator[Row]:
-    """Pull one cable of a bent arm through all its holes: the tension falls by exp(−μ Σφ)."""
+    """Pull one cable of a bent arm through all its holes: the tension falls by exp(−μ Σβ)."""
     friction = 0.1
     geometry = cdsm.Geometry.hinged(
         joints=3, twist=0.0, link_length=0.06, base_length=0.03, disk_offset=0.012,
@@ -80,7 +80,7 @@ def capstan() -> Iterator[Row]:
     T = history.segment_tensions[-1][start[-2] :]
     theirs = math.exp(-friction * segments.wrap[passed].sum())
     ours = float(T[-1] / T[0])
-    source = f"exp(−μ Σφ), {np.count_nonzero(passed)} holes, μ = {friction:g}"
+    source = f"exp(−μ Σβ), {np.count_nonzero(passed)} holes, μ = {friction:g}"
     what = "tension at the end of a pulled cable over that of its motor"
     yield Row(what, source, "-", theirs, ours, 1e-9)
 
