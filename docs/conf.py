@@ -1,60 +1,69 @@
-"""Settings of the site. ``docs/build.py`` builds it; nothing is fetched while it does."""
+"""Settings of the site: ``sphinx-build -W docs build/site``. Nothing is run, nothing fetched."""
 
+import shutil
+import subprocess
 import sys
+from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx.util.inspect import TypeAliasForwardRef
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 
-from docutils import nodes
-from sphinx.application import Sphinx
-from sphinx.util.inspect import TypeAliasForwardRef
+import cdsm
 
-from docs import generate
+# notebooks become pages, and typer writes that of the commands
+shutil.rmtree(HERE / "notebooks", ignore_errors=True)
+shutil.copytree(HERE.parent / "notebooks", HERE / "notebooks")
+COMMANDS = ["-m", "typer", "cdsm.cli", "utils", "docs", "--name", "cdsm", "--title", "Commands"]
+subprocess.run(
+    [sys.executable, *COMMANDS, "--output", HERE / "reference" / "commands.md"],
+    check=True,
+    cwd=HERE.parent,
+    stdout=subprocess.DEVNULL,
+)
 
+listed = (HERE / "reference" / "api.rst").read_text(encoding="utf-8").split()
+names = {f"cdsm.{name}" for name in cdsm.__all__ if name not in cdsm._MODULES}
+if missing := names.difference(listed):
+    raise LookupError(f"docs/reference/api.rst does not list {', '.join(sorted(missing))}")
 
-def _mathjax() -> str:
-    """Return the script that typesets formulas; a package ships it, so no page asks a server."""
-    spec = find_spec("sphinx-mathjax-offline")
-    assert spec is not None
-    assert spec.submodule_search_locations is not None
-    return str(Path(spec.submodule_search_locations[0], "static", "mathjax", "tex-svg.js"))
-
+# the script that typesets formulas; a package ships it, so no page asks a server
+spec = find_spec("sphinx-mathjax-offline")
+assert spec is not None
+assert spec.submodule_search_locations is not None
+MATHJAX = str(Path(spec.submodule_search_locations[0], "static", "mathjax", "tex-svg.js"))
 
 project = "cdsm"
 author = copyright = "The cdsm developers"
-version = release = generate.version()
+version = release = metadata.version("cdsm-stiffness")
 
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["static", "pictures", "joss"]
-nitpicky = True
+nitpicky = True  # for what pages name in full, as cdsm.stiffness or cdsm.Stiffness.along
 nitpick_ignore_regex = [
-    # other projects' types, whose indexes are on the network; and types of ours without a page
-    ("py:.*", r"(?!cdsm\.).*"),
-    ("py:data", r"cdsm\..*"),
-    ("py:.*", r"cdsm\.(?!paper|plots|presets|view)[a-z_]+\..*"),
-    ("py:.*", r"cdsm\.[a-z_]+\.[a-z_]+\..*"),
+    ("py:.*", r"(?!cdsm\.(\w+|[A-Z]\w+\.\w+|control\.\w+)$).*"),
+    ("py:mod", ".*"),
 ]
-
+exclude_patterns = ["joss", "templates"]
+templates_path = ["templates"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "fieldlist"]
 myst_heading_anchors = 3
-nb_execution_mode = "auto"
-nb_execution_excludepatterns = ["generated/tutorials/*"]  # tests.support.notebooks ran them
-nb_execution_in_temp = True
-nb_execution_raise_on_error = True
-nb_execution_timeout = 600
-nb_render_markdown_format = "myst"
+nb_execution_mode = "off"  # notebooks are committed with their outputs
 nb_merge_streams = True
 
+autosummary_ignore_module_all = False
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Direction")}
@@ -65,16 +74,14 @@ napoleon_attr_annotations = False
 napoleon_use_ivar = True
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 80
+linkcheck_ignore = [r"https://doi\.org/"]  # publishers turn programs away
 
 html_theme = "furo"
 html_title = "cdsm"
-html_static_path = ["static/site.css", _mathjax()]
+html_static_path = ["static/site.css", MATHJAX]
 html_css_files = ["site.css"]
-html_show_sourcelink = html_show_sphinx = False
-html_copy_source = False
-html_theme_options = {"source_edit_link": "", "navigation_with_keys": True}
+html_show_sourcelink = html_show_sphinx = html_copy_source = False
 mathjax_path = "tex-svg.js"
-mathjax3_config = {"svg": {"mtextInheritFont": True}, "options": {"enableMenu": False}}
 copybutton_prompt_text = r"\$ |>>> "
 copybutton_prompt_is_regexp = True
 
@@ -104,33 +111,8 @@ def _shorten(*event: object) -> tuple[str, str] | None:
     return str(event[-2]).replace("<factory>", "..."), str(event[-1] or "")
 
 
-def _show_as_shell(app: Sphinx, page: nodes.document) -> None:
-    """Show cells of commands as a shell takes them, without the ! that runs them."""
-    for block in page.findall(nodes.literal_block):
-        lines = block.astext().splitlines()
-        if lines and all(line.startswith("!") for line in lines):
-            block.rawsource = "\n".join(line[1:] for line in lines)
-            block.children = [nodes.Text(block.rawsource)]
-            block["language"] = "sh"
-
-
-def _describe(app: Sphinx, page: nodes.document) -> None:
-    """Give figures without a text the title of their section, for who cannot see them."""
-    for image in page.findall(lambda node: isinstance(node, nodes.image) and "alt" not in node):
-        section = image.parent
-        while not isinstance(section, nodes.section):
-            section = section.parent
-        image["alt"] = f"Figure: {section[0].astext()}"
-
-
 def setup(app: Sphinx) -> None:
-    """Write the generated pages before Sphinx looks for pages."""
-    app.connect("config-inited", lambda *_: generate.all_pages())
-    app.connect("doctree-read", _show_as_shell)
-    app.connect("doctree-read", _describe)
+    """Connect what docstrings need."""
     app.connect("autodoc-process-docstring", _keep_colon, priority=400)  # before napoleon
     app.connect("autodoc-process-docstring", _escape)
     app.connect("autodoc-process-signature", _shorten)
-    # the constants of presets are found there, not where their classes are
-    own = {"cdsm.presets": "cdsm.presets"}
-    app.connect("viewcode-follow-imported", lambda _, module, name: own.get(module))

@@ -17,8 +17,8 @@ from cdsm.plots.arm import draw_arm, picture
 from cdsm.plots.style import COLOR_MAP, MM
 
 FOLDER = Path(__file__).parent / "pictures"
-FRAMES = 48
-COLORS = 96
+FRAMES = 36
+COLORS = 48
 """Number of frames and colours of the animation."""
 
 geometry = cdsm.Geometry.universal(
@@ -47,7 +47,7 @@ def animation() -> None:
     tips = MM * np.array([pose.tip[:3, 3] for pose in [*poses, poses[0]]])
     scale = Normalize(plan.tensions.min(), plan.tensions.max())
     figure, axes = picture()
-    figure.set_dpi(150)
+    figure.set_dpi(130)
     figure.set_size_inches(3.5, 2.7)
     axes.set_position((-0.14, -0.26, 1.34, 1.5))
     canvas: Any = FigureCanvasAgg(figure)
@@ -68,7 +68,7 @@ def animation() -> None:
         frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     palette = frames[0].quantize(COLORS, Image.Quantize.MAXCOVERAGE)
     flat = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    flat[0].save(FOLDER / "bend.gif", save_all=True, append_images=flat[1:], duration=80, loop=0)
+    flat[0].save(FOLDER / "bend.gif", save_all=True, append_images=flat[1:], duration=107, loop=0)
 
 
 if __name__ == "__main__":

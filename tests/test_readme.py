@@ -1,4 +1,4 @@
-"""README is executed: every Python snippet runs, and prints the text block that follows it."""
+"""README and the pages: every Python snippet runs, and prints the text block that follows it."""
 
 import io
 import os
@@ -6,18 +6,27 @@ import re
 import subprocess
 import sys
 from contextlib import redirect_stdout
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
+NAME = attrgetter("stem")
+PAGES = [README, *sorted((ROOT / "docs").rglob("*.md"))]
 
 
-def test_snippets_print_what_the_readme_shows() -> None:
-    blocks = re.findall(r"```(\w+)\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+@pytest.mark.parametrize(
+    "page", [each for each in PAGES if "```python" in each.read_text(encoding="utf-8")], ids=NAME
+)
+def test_snippets_print_what_the_page_shows(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocks = re.findall(r"```(\w+)\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
     namespace: dict[str, object] = {}
-    printed, compared = "", 0
+    printed = ""
     for language, code in blocks:
         if language == "python":
             with redirect_stdout(io.StringIO()) as out:
@@ -25,8 +34,6 @@ def test_snippets_print_what_the_readme_shows() -> None:
             printed = out.getvalue()
         elif language == "text":
             assert printed == code
-            compared += 1
-    assert compared == 1
 
 
 @pytest.mark.slow

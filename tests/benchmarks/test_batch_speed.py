@@ -110,7 +110,7 @@ def test_sweep_into_a_store_costs_little_more_than_its_batch(
     tmp_path: Path, clock: Clock | None
 ) -> None:
     # half of these postures cannot be held: their tensions are searched
-    one, poses = cdsm.presets.virtual_prototype(), cdsm.RandomPoses(100_000 if clock else 200)
+    one, poses = cdsm.presets.virtual_prototype(), cdsm.RandomPoses(20_000 if clock else 200)
     q = cdsm.sweep(one, poses, outputs="tip_position").q.values
     stores = (tmp_path / f"{number}.zarr" for number in itertools.count())
 
@@ -125,8 +125,8 @@ def test_sweep_into_a_store_costs_little_more_than_its_batch(
     np.testing.assert_allclose(stored.along, found["along"], rtol=1e-10)
     np.testing.assert_allclose(stored.tip_position, found["tip"][:, :3, 3], rtol=1e-10)
     if clock:
-        what = "100 000 postures, sweep into a store: cost over the batch"
-        clock.race(what, sweep, batch, most=2.8, fast_repeat=1, rounds=5)
+        what = "20 000 postures, sweep into a store: cost over the batch"
+        clock.race(what, sweep, batch, most=2.8, fast_repeat=1, rounds=3)
 
 
 @pytest.mark.parametrize(("joints", "most", "least"), [(5, 4.0, 18.0), (20, 4.0, 3.3)])

@@ -246,7 +246,7 @@ def check(name: str, names: dict[str, Any]) -> None:
     CHECKS[name](SimpleNamespace(**names))
 
 
-@pytest.mark.slow
+@pytest.mark.notebooks
 @pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.ipynb")))
 def test_notebook_shows_the_numbers_that_its_text_tells(name: str) -> None:
     shown = nbformat.read(run(name), as_version=4)

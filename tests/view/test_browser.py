@@ -17,6 +17,7 @@ from tests.support.patience import HANGS
 from tests.view.test_state import DEGREES, INFEASIBLE, STABLE, UNSTABLE, along, rod, soft_arm
 
 pytest.importorskip("viser", reason="the extra [view] is not installed")
+pytestmark = pytest.mark.browser
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)

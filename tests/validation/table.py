@@ -1,12 +1,7 @@
-"""Is it true? Numbers of others beside those of cdsm: measured, in closed form, of other programs.
+"""Numbers of others beside those of cdsm: ``PYTHONPATH=examples python -m tests.validation.table``.
 
-Nothing is fitted here. Each row has a source, and what the number of the source leaves open: half
-of its last digit, or what a limit leaves out at a finite number of joints.
-
-    python examples/is_it_true.py
+Nothing is fitted here. docs/reference/validation.md shows the table and says what its columns are.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator
@@ -25,68 +20,42 @@ ELASTICA = "Bisshopp and Drucker, Q. Appl. Math. 3, 1945: elastica"
 
 
 class Row(NamedTuple):
-    """One number of others, and that of cdsm.
-
-    Attributes:
-        what: The quantity.
-        source: Who says so.
-        unit: Unit of both numbers.
-        theirs: Their number.
-        ours: The number of cdsm.
-        uncertainty: What theirs leaves open; nan where that is not known.
-    """
+    """One number of others, and that of cdsm."""
 
     what: str
     source: str
     unit: str
     theirs: float
     ours: float
-    uncertainty: float
-
-    @property
-    def difference(self) -> float:
-        """Ours minus theirs."""
-        return self.ours - self.theirs
+    uncertainty: float  # what theirs leaves open; nan where that is not known
 
 
 def rows() -> list[Row]:
     """Compute the whole table; MuJoCo's rows are left out where it is not installed."""
     found = [*simplex(), *hinge(), *capstan(), *elastica()]
-    if find_spec("mujoco") is not None:
-        found += tendons()
-    return [*found, *paper()]
+    return [*found, *(tendons() if find_spec("mujoco") else ()), *paper()]
 
 
 def simplex() -> Iterator[Row]:
-    """Compute the tensegrity: tensions from lengthened struts, frequency, share of tension."""
     rest = tensegrity_simplex.at_rest()
-    modes = cdsm.modes(rest.pose, rest.stiffness)
     stress = np.linalg.svd(tensegrity_simplex.simplex().at(np.zeros(12)).length_jacobian.T)[2][-1]
     yield Row("simplex: force in a strut", SIMPLEX, "kN", 1.5, rest.tension[9] / 1e3, 0.05)
     for name, cable, theirs in (("horizontal", 0, 0.393), ("diagonal", 6, 0.681)):
         ratio = float(stress[cable] / stress[9])
         yield Row(f"simplex: {name} cable over strut", SIMPLEX, "-", theirs, ratio, 5e-4)
-    frequency = float(modes.frequencies[0])
+    frequency = float(cdsm.modes(rest.pose, rest.stiffness).frequencies[0])
     yield Row("simplex: lowest mode, lumped masses", SIMPLEX, "Hz", 2.166, frequency, 5e-4)
     share = 100.0 * tensegrity_simplex.active_share(rest)
-    yield Row(
-        "simplex: active share of that mode", "numpy program of its own", "%", 81.0, share, 0.5
-    )
+    own = "numpy program of its own"
+    yield Row("simplex: active share of that mode", own, "%", 81.0, share, 0.5)
 
 
 def hinge() -> Iterator[Row]:
-    """Compute one straight hinge: K = 2 EA/l_0 R² − F h."""
     h, R, lead, EA, F = 0.012, 0.025, 0.2, 48e3, 400.0
     geometry = cdsm.Geometry.hinged(
-        joints=1,
-        twist=0.0,
-        link_length=0.05,
-        base_length=0.03,
-        disk_offset=h,
-        hole_radius=R,
-        link_mass=0.0,
-        lead=lead,
-    )
+        joints=1, twist=0.0, link_length=0.05, base_length=0.03, disk_offset=h, hole_radius=R,
+        link_mass=0.0, lead=lead,
+    )  # fmt: skip
     arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(EA), gravity=(0, 0, 0))
     ours = float(cdsm.stiffness(arm.at([0.0]), np.full(2, F)).joint[0, 0])
     theirs = 2.0 * EA * (1.0 + F / EA) / (lead + 2.0 * h) * R**2 - F * h
@@ -94,21 +63,13 @@ def hinge() -> Iterator[Row]:
 
 
 def capstan() -> Iterator[Row]:
-    """Pull one cable of a bent arm through all its holes: the tension falls by exp(−μ Σφ)."""
-    friction, straight = 0.1, cdsm.LinearElasticity(48e3)
+    """Pull one cable of a bent arm through all its holes: the tension falls by exp(−μ Σβ)."""
+    friction = 0.1
     geometry = cdsm.Geometry.hinged(
-        joints=3,
-        twist=0.0,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=0.025,
-        link_mass=0.0,
-        lead=0.1,
-        spread=math.radians(10.0),
-        friction=friction,
-    )
-    arm = cdsm.Manipulator(geometry, straight, gravity=(0, 0, 0))
+        joints=3, twist=0.0, link_length=0.06, base_length=0.03, disk_offset=0.012,
+        hole_radius=0.025, link_mass=0.0, lead=0.1, spread=math.radians(10.0), friction=friction,
+    )  # fmt: skip
+    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(48e3), gravity=(0, 0, 0))
     pose = arm.at(np.deg2rad([15.0, 15.0, 15.0]))
     taken = np.zeros((1, len(arm.cables)))
     taken[0, -1] = 2e-3
@@ -119,15 +80,9 @@ def capstan() -> Iterator[Row]:
     T = history.segment_tensions[-1][start[-2] :]
     theirs = math.exp(-friction * segments.wrap[passed].sum())
     ours = float(T[-1] / T[0])
-    source = f"exp(−μ Σφ), {np.count_nonzero(passed)} holes, μ = {friction:g}"
-    yield Row(
-        "tension at the end of a pulled cable over that of its motor",
-        source,
-        "-",
-        theirs,
-        ours,
-        1e-9,
-    )
+    source = f"exp(−μ Σβ), {np.count_nonzero(passed)} holes, μ = {friction:g}"
+    what = "tension at the end of a pulled cable over that of its motor"
+    yield Row(what, source, "-", theirs, ours, 1e-9)
 
 
 def many_joints(joints: int) -> tuple[cdsm.Posture, Array, float]:
@@ -135,24 +90,14 @@ def many_joints(joints: int) -> tuple[cdsm.Posture, Array, float]:
 
     Each joint has two cables of its own, from the disk before it to the disk after it, and K =
     2 EA/l_0 R² − F h as above: EI = K L/n. Joints in the middle of as many pieces are the second
-    order rule for the bending of a beam.
-
-    Returns:
-        The chain, its tensions [N] and EI [N m²].
+    order rule for the bending of a beam. Returns the chain, its tensions [N] and EI [N m²].
     """
     piece = 1.0 / joints
     h, R, lead, EA, F = piece / 8.0, 0.01, 0.5, 1e6, 1e4
-    geometry = cdsm.Geometry.hinged(
-        joints=joints,
-        twist=0.0,
-        link_length=[*[piece] * (joints - 1), piece / 2.0],
-        base_length=piece / 2.0,
-        disk_offset=h,
-        hole_radius=R,
-        link_mass=0.0,
-        joint_limit=1.0,
-        spread=1e-3,  # of holes that no cable uses
-    )
+    geometry = cdsm.Geometry.hinged(  # spread: of holes that no cable uses
+        joints=joints, twist=0.0, link_length=[*[piece] * (joints - 1), piece / 2.0], spread=1e-3,
+        base_length=piece / 2.0, disk_offset=h, hole_radius=R, link_mass=0.0, joint_limit=1.0,
+    )  # fmt: skip
     law, cables = cdsm.LinearElasticity(EA), []
     for k in range(joints):
         link, at = (f"link{k}", piece - h) if k else ("base_disk", piece / 2.0 - h)
@@ -160,12 +105,12 @@ def many_joints(joints: int) -> tuple[cdsm.Posture, Array, float]:
             ends = cdsm.Site(link, (at, 0.0, z)), cdsm.Site(f"link{k + 1}", (h, 0.0, z))
             cables.append(cdsm.Cable(f"{name}{k + 1}", ends, law, lead))
     arm = cdsm.Manipulator(geometry, cables=cables, gravity=(0, 0, 0))
-    stiff = 2.0 * EA * (1.0 + F / EA) / (lead + 2.0 * h) * R**2 - F * h
-    return arm.at(np.zeros(joints)), np.full(2 * joints, F), stiff * piece
+    EI = piece * (2.0 * EA * (1.0 + F / EA) / (lead + 2.0 * h) * R**2 - F * h)
+    return arm.at(np.zeros(joints)), np.full(2 * joints, F), EI
 
 
 def elastica(joints: int = 40) -> Iterator[Row]:
-    """Compute a chain of hinges beside the beam that it becomes as their number grows."""
+    # beside the beam that a chain becomes as the number of its joints grows
     pose, F, EI = many_joints(joints)
     left = 1.0 / joints**2  # what the second-order rule leaves out, up to a factor
     K = cdsm.stiffness(pose, F)
@@ -179,12 +124,11 @@ def elastica(joints: int = 40) -> Iterator[Row]:
     for load, theirs in ((1.0, 0.30172), (2.0, 0.49346)):
         wrench = [0.0, 0.0, -load * EI, 0.0, 0.0, 0.0]
         tip = cdsm.equilibrium(pose, F, wrench).pose.tip[:3, 3]
-        what = f"deflection of the tip over L at P L²/EI = {load:g}"
-        yield Row(what, f"{ELASTICA}, {joints} joints", "-", theirs, -float(tip[2]), theirs * left)
+        what = f"tip deflection over L at P L²/EI = {load:g}, {joints} joints"
+        yield Row(what, ELASTICA, "-", theirs, -float(tip[2]), theirs * left)
 
 
 def tendons() -> Iterator[Row]:
-    """Differentiate the joint torques of MuJoCo's own model of the arm of the README."""
     import mujoco
 
     arm = cdsm.presets.virtual_prototype(cdsm.LinearElasticity(48e3))
@@ -213,31 +157,23 @@ def tendons() -> Iterator[Row]:
 
 
 def paper() -> Iterator[Row]:
-    """Compare with the numbers of the paper's simulations; it does not print its dimensions."""
     from cdsm.paper.simulation import figure_4, figure_6, figure_7
 
-    for figure in (figure_4(), figure_6(), figure_7()):
-        for claim in figure.claims:
-            if claim.difference is None or claim.paper is None:
-                continue
-            for axis, theirs, ours in zip("xyz", claim.paper, claim.computed, strict=True):
-                what = f"{claim.figure}: {claim.quantity}, {axis}"
-                yield Row(what, f"{PAPER}; {claim.assumption}", claim.unit, theirs, ours, math.nan)
+    for claim in (each for figure in (figure_4, figure_6, figure_7) for each in figure().claims):
+        if claim.difference is None or claim.paper is None:
+            continue
+        for axis, theirs, ours in zip("xyz", claim.paper, claim.computed, strict=True):
+            what = f"{claim.figure}: {claim.quantity}, {axis}"
+            yield Row(what, f"{PAPER}; {claim.assumption}", claim.unit, theirs, ours, math.nan)
 
 
 def markdown(table: list[Row]) -> str:
-    """Return the table in Markdown."""
-    lines = [
-        "| what | theirs | cdsm | difference | uncertainty | source |",
-        "|---|--:|--:|--:|--:|---|",
-    ]
+    lines = ["| what | theirs | cdsm | uncertainty | source |", "|---|--:|--:|--:|---|"]
     for row in table:
         open_ = "not stated" if math.isnan(row.uncertainty) else f"{row.uncertainty:.1g}"
         unit = "" if row.unit == "-" else f" {row.unit}"
-        lines.append(
-            f"| {row.what} | {row.theirs:.5g}{unit} | {row.ours:.5g}{unit} | "
-            f"{row.difference:+.1g} | {open_} | {row.source} |"
-        )
+        numbers = f"{row.theirs:.4g}{unit} | {row.ours:.4g}{unit} | {open_}"
+        lines.append(f"| {row.what} | {numbers} | {row.source} |")
     return "\n".join(lines)
 
 
