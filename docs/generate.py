@@ -13,7 +13,6 @@ from sphinx.pycode import ModuleAnalyzer
 
 import cdsm
 from cdsm.cli import app
-from tests.support.notebooks import executed
 
 HERE = Path(__file__).parent
 GENERATED = HERE / "generated"
@@ -78,13 +77,10 @@ def all_pages() -> None:
 
 
 def _tutorials() -> dict[str, str]:
-    copies = executed()
-    names = "|".join(copies)
+    folder = HERE.parent / "notebooks"
     return {
-        f"tutorials/{name}.ipynb": re.sub(
-            rf"`({names})`", r"[\1](\1.ipynb)", copy.read_text(encoding="utf-8")
-        )
-        for name, copy in copies.items()
+        f"tutorials/{path.name}": path.read_text(encoding="utf-8")
+        for path in sorted(folder.glob("*.ipynb"))
     }
 
 

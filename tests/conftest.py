@@ -36,7 +36,7 @@ settings.load_profile("cdsm")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-NOT_QUICK = ("slow", "long", "speed")
+NOT_QUICK = ("slow", "long", "speed", "notebooks")
 
 
 @pytest.hookimpl(tryfirst=True)
