@@ -10,6 +10,7 @@ from nbclient import NotebookClient
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "notebooks"
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
+LANGUAGE = {"name": "python", "pygments_lexer": "ipython3"}
 
 
 def execute(path: Path) -> nbformat.NotebookNode:
@@ -28,7 +29,7 @@ def execute(path: Path) -> nbformat.NotebookNode:
         resources={"metadata": {"path": FOLDER}},
     )
     client.execute(env=os.environ | {"PYTHONPATH": places})
-    notebook.metadata = {"kernelspec": KERNEL, "language_info": {"name": "python"}}
+    notebook.metadata = {"kernelspec": KERNEL, "language_info": LANGUAGE}
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
     return notebook
