@@ -30,7 +30,7 @@ arm = cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
 
 def still() -> None:
     """Draw README's arm at README's posture, with tensions and compliance."""
-    pose = arm.at([0.17, 0.09, 0.17, 0.09, -0.14, 0, -0.14, 0])
+    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
     tension = cdsm.distribute_tension(pose, minimum=50.0)
     figure = cdsm.stiffness(pose, tension).plot()
     figure.savefig(FOLDER / "arm.png", dpi=200)

@@ -73,7 +73,7 @@ class Section:
 
     length: records.Length
     disks: Annotated[records.Integer, Field(ge=1, le=MAXIMUM_JOINTS)]
-    hole_angles: Annotated[Sequence[records.Number], Field(min_length=1, max_length=64)]
+    hole_angles: records.HoleAngles
     hole_radius: records.Length
     lead: records.LengthOrZero = 0.0
     friction: records.Friction = 0.0

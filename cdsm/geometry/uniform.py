@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from cdsm.geometry.beams import Beam
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Limit, Link
@@ -27,10 +27,10 @@ def _one_or_each_list(value: object) -> str:
 
 
 Turn = Annotated[records.Number, AfterValidator(_in_radians)]
-_Angles = Annotated[Sequence[records.Number], Field(min_length=1, max_length=64)]
 _HoleAngles = Annotated[
-    Annotated[_Angles, Tag(ONE)] | Annotated[Sequence[_Angles], Tag(EACH)],
+    Annotated[records.HoleAngles, Tag(ONE)] | Annotated[Sequence[records.HoleAngles], Tag(EACH)],
     Discriminator(_one_or_each_list),
+    BeforeValidator(records.plain),
 ]
 _OF_JOINTS = (
     *("disk_offset", "hole_radius", "disk_radius", "joint_limit", "link_length", "link_mass"),

@@ -72,7 +72,10 @@ def missing_leads(K: Stiffness) -> tuple[str, ...]:
 def model_of(K: Stiffness) -> str:
     """Return the assumptions behind the stiffness ``K`` in words, such as locked motors."""
     arm, model = K.posture.arm, MODEL
-    if arm.is_serpentine and any(link.bending_stiffness for link in arm.geometry.links):
+    if arm.is_serpentine and (
+        any(link.bending_stiffness for link in arm.geometry.links)
+        or any(joint.bending_stiffness for joint in arm.geometry.joints)
+    ):
         model = MODEL.replace("rigid links", "links that bend")
     if K.friction == "frictionless":
         return model

@@ -44,7 +44,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
-def _plain(value: object) -> object:
+def plain(value: object) -> object:
     """Convert numpy numbers and arrays to Python numbers and lists for strict validation."""
     return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
@@ -67,8 +67,8 @@ def _in_range(kind: str, zero: bool = False, inf: bool = False) -> AfterValidato
     return AfterValidator(check)
 
 
-Integer = Annotated[int, BeforeValidator(_plain)]
-Number = Annotated[float, BeforeValidator(_plain), Field(ge=-LARGEST, le=LARGEST)]
+Integer = Annotated[int, BeforeValidator(plain)]
+Number = Annotated[float, BeforeValidator(plain), Field(ge=-LARGEST, le=LARGEST)]
 Length = Annotated[Number, _in_range("length")]
 LengthOrZero = Annotated[Number, _in_range("length", zero=True)]
 Slack = Annotated[Number, _in_range("slack", zero=True)]
@@ -81,16 +81,17 @@ Bending = Annotated[Number, _in_range("bending stiffness")]
 Torsion = Annotated[
     float,
     Field(allow_inf_nan=True),
-    BeforeValidator(_plain),
+    BeforeValidator(plain),
     _in_range("bending stiffness", inf=True),
 ]
 SpringStiffness = Annotated[Number, _in_range("stiffness")]
 Tension = Annotated[Number, _in_range("tension", zero=True)]
 Coordinate = Annotated[Number, Field(ge=-RANGES["length"].high, le=RANGES["length"].high)]
-Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(_plain)]
+Direction = Annotated[tuple[Number, Number, Number], Field(strict=False), BeforeValidator(plain)]
 Point = Annotated[
-    tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), BeforeValidator(_plain)
+    tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), BeforeValidator(plain)
 ]
+HoleAngles = Annotated[Sequence[Number], BeforeValidator(plain), Field(min_length=1, max_length=64)]
 Name = Annotated[str, AfterValidator(_name)]
 
 ONE, EACH = "(one)", "(each)"
@@ -103,7 +104,7 @@ def one_or_each(value: object) -> str:
 
 
 PerJoint = Annotated[
-    Annotated[_Each, Tag(ONE)] | Annotated[Sequence[_Each], BeforeValidator(_plain), Tag(EACH)],
+    Annotated[_Each, Tag(ONE)] | Annotated[Sequence[_Each], BeforeValidator(plain), Tag(EACH)],
     Discriminator(one_or_each),
 ]
 """A value for all joints, or one for each joint, base to tip."""

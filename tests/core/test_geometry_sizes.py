@@ -144,6 +144,10 @@ def test_hole_angles_are_those_given() -> None:
     with pytest.warns(cdsm.CdsmWarning, match="cable1_1 and cable2_1 and cable3_1"):
         same = universal(hole_angles=given[0])
     assert [c.angle for c in same.cables] == given[0] * 3
+    with pytest.warns(cdsm.CdsmWarning, match="share holes"):
+        assert universal(hole_angles=np.array(given[0])) == same
+    turned = np.add.outer(np.arange(3), given[0])
+    assert universal(hole_angles=turned) == universal(hole_angles=turned.tolist())
     hinged = cdsm.Geometry.hinged(joints=3, twist=0.3, hole_angles=given, **SIZES)
     assert [c.angle for c in hinged.cables] == [angle for each in given for angle in each]
 
