@@ -22,23 +22,9 @@ def test_link_is_followed_and_mode_is_kept(tmp_path: Path) -> None:
     assert stat.S_IMODE(target.stat().st_mode) == 0o600
 
 
-def test_new_file_has_the_mode_that_open_gives(tmp_path: Path) -> None:
-    write_text(tmp_path / "ours", "text")
-    (tmp_path / "plain").write_text("text", encoding="utf-8")
-    ours, plain = (stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("ours", "plain"))
-    assert ours == plain
-
-
 def test_what_is_not_a_file_is_left_alone(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     with pytest.raises(cdsm.FileError, match="not a regular file"):
         write_text(pipe, "text")
     assert stat.S_ISFIFO(pipe.stat().st_mode)
-
-
-def test_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
-    geometry = cdsm.presets.virtual_prototype_geometry()
-    path = tmp_path / "arm.toml"
-    path.write_text(geometry.to_toml(), encoding="utf-8-sig")
-    assert cdsm.Geometry.read(path) == geometry

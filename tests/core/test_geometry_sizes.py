@@ -1,6 +1,5 @@
 """Sizes that differ from joint to joint, holes where they are wanted, sections, warnings."""
 
-import dataclasses
 import math
 import warnings
 from pathlib import Path
@@ -136,18 +135,6 @@ def test_phase_adds_to_the_angles_of_a_joint() -> None:
         assert after.angle == pytest.approx(before.angle + added, abs=1e-15)
 
 
-def test_hole_angles_are_those_given() -> None:
-    given = [[0.0, 2.1, 4.2], [1.0, 3.0], [0.5, 2.6, 4.7, 5.5]]
-    geometry = universal(hole_angles=given)
-    found = [[c.angle for c in geometry.cables if c.joint == k] for k in (1, 2, 3)]
-    assert found == given
-    with pytest.warns(cdsm.CdsmWarning, match="cable1_1 and cable2_1 and cable3_1"):
-        same = universal(hole_angles=given[0])
-    assert [c.angle for c in same.cables] == given[0] * 3
-    hinged = cdsm.Geometry.hinged(joints=3, twist=0.3, hole_angles=given, **SIZES)
-    assert [c.angle for c in hinged.cables] == [angle for each in given for angle in each]
-
-
 def test_alternating_hinges_share_holes_loudly_and_spread_sets_them_apart() -> None:
     alternating: dict[str, Any] = {"joints": 6, "twist": math.pi / 2, **SIZES}
     with pytest.warns(cdsm.CdsmWarning) as told:
@@ -187,21 +174,6 @@ def test_cables_of_one_angle_share_no_hole_on_rings_of_their_own() -> None:
         geometry.replace(cables=near)
 
 
-def test_lengths_in_mm_are_noticed_once() -> None:
-    with pytest.warns(cdsm.CdsmWarning, match="the arm is 210 m, hole_radius is 20 m") as told:
-        universal(**{key: 1000.0 * value for key, value in SIZES.items()})
-    assert len(told) == 1
-    with pytest.warns(cdsm.CdsmWarning, match="hole_radius is 20 m: it looks as if lengths are in"):
-        universal(hole_radius=20.0)
-
-
-def test_hole_angles_in_degrees_are_noticed() -> None:
-    first, *others = universal().cables
-    turned = dataclasses.replace(first, angle=-120.0)
-    with pytest.warns(cdsm.CdsmWarning, match=r"a hole angle is -120 rad: .* degrees; give rad"):
-        universal().replace(cables=(turned, *others))
-
-
 # --- sections -------------------------------------------------------------------------------
 
 
@@ -226,43 +198,6 @@ def test_sections_are_joined_end_to_end() -> None:
     np.testing.assert_allclose([R for R, _ in holes(last)], [0.025] * 4 + [0.012] * 6, rtol=1e-14)
     inner = arm_of(two_sections(cable_radius=0.012)).cables[-1]
     np.testing.assert_allclose([R for R, _ in holes(inner)], [0.012] * 10, rtol=1e-14)
-
-
-def test_one_section_is_the_arm_itself() -> None:
-    geometry = universal(hole_radius=[0.02, 0.018, 0.015])
-    assert cdsm.Geometry.sections([geometry], name=geometry.name) == geometry
-    halves = [
-        universal(joints=1, hole_radius=R, base_length=x) for R, x in ((0.02, 0.03), (0.01, 0))
-    ]
-    joined = cdsm.Geometry.sections(halves)
-    assert joined.joints == universal(joints=2, hole_radius=[0.02, 0.01]).joints
-
-
-def test_sections_that_share_holes_warn_and_can_be_spread() -> None:
-    part = universal(joints=2)
-    with pytest.warns(cdsm.CdsmWarning, match="cable1_1 and cable3_1"):
-        cdsm.Geometry.sections([part, part])
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        cdsm.Geometry.sections([part, part], spread=0.2)
-
-
-@pytest.mark.parametrize(
-    ("given", "error", "said"),
-    [
-        ([], cdsm.GeometryError, "sections: none given"),
-        (3, cdsm.InvalidInput, "a list or tuple of Geometry is needed"),
-        ([universal(), 3], cdsm.InvalidInput, "a list or tuple of Geometry is needed"),
-        (
-            [universal(joints=60, phase=0.1), universal(joints=60)],
-            cdsm.GeometryError,
-            "at most 100",
-        ),
-    ],
-)
-def test_faults_of_sections_are_named(given: Any, error: type[Exception], said: str) -> None:
-    with pytest.raises(error, match=said):
-        cdsm.Geometry.sections(given)
 
 
 # --- TOML -----------------------------------------------------------------------------------
@@ -311,34 +246,3 @@ def test_everything_of_python_is_in_toml(tmp_path: Path) -> None:
     arm = cdsm.Manipulator.read(path)
     assert arm == cdsm.Manipulator(geometry, presets.STEEL_WIRE_200GPA)
     assert cdsm.Manipulator.read(arm.write(path)) == arm
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "said"),
-    [
-        ("spread = 0.1", "sprad = 0.1", "sprad: is not a key that is known here; did you mean spr"),
-        ("spread = 0.1", "spread = 'a'", "spread"),
-        ("joints = 2\ntwist", "jonts = 2\ntwist", "sections[2].jonts: is not a key"),
-        ("[sections.hinged]", "[sections.hingd]", "sections[2].holds hingd"),
-        ("[[sections]]\n[sections.hinged]", "[hinged]", "hinged: is not a key that is known here"),
-        ("hole_radius = 0.012", "hole_radius = [0.012]", "sections[2].hole_radius: 1 values given"),
-    ],
-)
-def test_faults_in_toml_are_named(before: str, after: str, said: str) -> None:
-    assert before in TWO
-    with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.from_toml(TWO.replace(before, after, 1))
-    assert said in str(caught.value)
-
-
-def test_disks_of_a_picture_stand_where_the_cables_pass() -> None:
-    arm = arm_of(two_sections())
-    figure = cdsm.plots.plot_arm(arm.at(np.full(arm.nv, 0.1)))
-    axes: Any = figure.axes[0]
-    rings = [line for line in axes.lines if len(line.get_data_3d()[0]) == 49]
-    widths = []
-    for ring in rings:
-        points = np.array(ring.get_data_3d())
-        middle = points[:, :-1].mean(axis=1, keepdims=True)
-        widths.append(np.linalg.norm(points - middle, axis=0).mean())
-    np.testing.assert_allclose(widths, [27.5] * 4 + [13.2] * 6, rtol=1e-12)

@@ -1,7 +1,6 @@
 """Results by name: mappings, tables of text, dictionaries for JSON, pandas and xarray."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 import cdsm
 from cdsm.batch.evaluation import OUTPUTS
 from tests.support.arms import mixed_arm, random_posture
-from tests.support.foreign import POSTURE, crab
 
 POSE = random_posture(mixed_arm(), 3)
 PULL = cdsm.distribute_tension(POSE, 10.0)
@@ -70,11 +68,6 @@ def test_moment_arms_times_tensions_are_the_torque_that_balances_gravity() -> No
             _ = arms[short]  # type: ignore[index]
 
 
-def test_moment_arms_of_sliding_joints_have_no_unit() -> None:
-    arms = crab().at(POSTURE).moment_arms
-    assert "[-] where the joint slides" in str(arms)
-
-
 def test_shares_are_printed_by_name_and_add_up() -> None:
     shares = K.shares("z")
     assert list(shares) == NAMES
@@ -89,17 +82,6 @@ def test_shares_are_printed_by_name_and_add_up() -> None:
     assert sum(parts) == pytest.approx(100.0, abs=0.05 * len(parts))
     with pytest.raises(cdsm.InvalidInput):
         _ = shares["cable9"]
-
-
-def test_shares_of_an_unstable_arm_say_so_first() -> None:
-    soft = cdsm.serpentine_cables(
-        POSE.arm.geometry, cdsm.LinearElasticity(1e9), series_stiffness=10.0
-    )
-    loose = POSE.arm.with_cables(soft).at(POSE.q)
-    shares = cdsm.stiffness(loose, np.full(9, 300.0)).shares("z")
-    assert str(shares).startswith("UNSTABLE: the arm buckles, ")
-    assert repr(shares).endswith(", UNSTABLE>")
-    assert shares.to_dict()["is_stable"] is False
 
 
 def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
@@ -131,27 +113,6 @@ def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
     with pytest.raises(cdsm.InvalidInput, match="not orthogonal"):
         planar.cartesian_in([[1, 0, 0], [1, 0, 1]])
     np.testing.assert_allclose(K.cartesian_in(["x", "y", "z"]), K.cartesian, rtol=1e-9)
-
-
-def test_an_arm_of_two_coordinates_prints_and_has_a_cartesian_stiffness_where_it_moves() -> None:
-    geometry = cdsm.Geometry.universal(
-        joints=1,
-        cables_per_joint=3,
-        link_length=0.05,
-        base_length=0.02,
-        disk_offset=0.01,
-        hole_radius=0.03,
-        link_mass=0.1,
-    )
-    pose = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e5)).at([0.1, -0.05])
-    bent = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 20.0))
-    row = next(line for line in str(bent).splitlines() if line.startswith("cartesian"))
-    assert row.split()[-3:] == ["-", "-", "-"]
-    with pytest.raises(cdsm.SingularStiffness) as refused:
-        bent.cartesian_in(("x", "y", "z"))
-    # along the bone, which only turns about the joint
-    bone = pose.tip[:3, 3] - pose.joint_positions[0]
-    assert abs(refused.value.direction @ bone) == pytest.approx(np.linalg.norm(bone))
 
 
 U = (0.0, 0.3, 1.0)
@@ -219,17 +180,6 @@ def test_tables_hold_the_numbers_of_their_results() -> None:
     np.testing.assert_array_equal(tip, POSE.tip[:3, 3])
 
 
-def test_stiffness_is_a_labelled_dataset() -> None:
-    found = K.to_xarray()
-    one, other = POSE.arm.joint_names[:2]
-    at = found["joint_stiffness"].sel(joint=one, joint_column=other)
-    assert float(at) == K.joint[0, 1]
-    assert at.units == POSE.arm.stiffness_unit()
-    parts = found["active"] + found["passive"] + found["gravity"] + found["load"]
-    np.testing.assert_allclose(parts, K.joint)
-    assert float(found["tension"].sel(cable=NAMES[1])) == PULL.values[1]
-
-
 def test_batch_has_one_row_for_each_posture_in_pandas_and_labels_in_xarray() -> None:
     q = np.array([POSE.q, 0.5 * POSE.q, 99.0 * POSE.q])
     outputs = [name for name in OUTPUTS if name != "along"]
@@ -250,11 +200,3 @@ def test_batch_has_one_row_for_each_posture_in_pandas_and_labels_in_xarray() -> 
     pulls = cdsm.distribute_tensions(POSE.arm, q, 10.0)
     np.testing.assert_array_equal(pulls.to_xarray()["tension"], pulls.values)
     np.testing.assert_array_equal(pulls.to_pandas()[f"tension {NAMES[0]} [N]"], pulls.values[:, 0])
-
-
-def test_elasticities_are_read_and_written_by_methods(tmp_path: Path) -> None:
-    law = cdsm.presets.STRAND_1X19
-    assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
-    header = PLAN.write(tmp_path / "new.csv").read_text().splitlines()[0].split(",")
-    assert header[:2] == ["sample", "status"]
-    assert header[-5:] == ["tips x [m]", "tips y [m]", "tips z [m]", "target [N/m]", "reason"]

@@ -1,7 +1,6 @@
 """An arm as a function of parameters by name."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -77,18 +76,6 @@ def test_bad_values_are_refused() -> None:
         cdsm.ArmParameters(free, ("lead",))
 
 
-def test_leads_that_are_not_those_of_the_geometry_are_refused() -> None:
-    cables = [replace(each, lead=each.lead + 0.1 * (i == 1)) for i, each in enumerate(ARM.cables)]
-    with pytest.raises(cdsm.InvalidInput, match=f"lead or the holes of {cables[1].name} are not"):
-        cdsm.ArmParameters(ARM.with_cables(cables), ("lead",))
-
-
-def test_the_arm_keeps_its_tolerances() -> None:
-    tolerances = cdsm.Tolerances(lead=1e-3)
-    arm = ARM.with_tolerances(tolerances)
-    assert cdsm.ArmParameters(arm, ("lead",))(lead=0.2).tolerances == tolerances
-
-
 def test_a_cable_has_parameters_of_its_own() -> None:
     names = ("phase@1", "hole_angle@cable2_1", "lead@cable2_1", "friction@cable1_2")
     parameters = cdsm.ArmParameters(ARM, names)
@@ -108,9 +95,3 @@ def test_a_cable_has_parameters_of_its_own() -> None:
         cdsm.ArmParameters(ARM, ("phase", "hole_angle@cable2_1"))
     with pytest.raises(cdsm.InvalidInput, match="cable9_1"):
         cdsm.ArmParameters(ARM, ("lead@cable9_1",))
-
-
-def test_one_radius_of_all_holes_is_that_of_the_geometry() -> None:
-    geometry = cdsm.ArmParameters(ARM, ("hole_radius",))(hole_radius=0.03).geometry
-    assert geometry.hole_radius == 0.03
-    assert geometry.hole_radii == (0.03, 0.03)
