@@ -107,14 +107,14 @@ def check_optimality(chains: Chains) -> tuple[int, int]:
 
 
 def test_random_chains_meet_the_optimality_conditions() -> None:
-    slack, sliding = check_optimality(random_chains(0, 3000))
-    assert slack > 100
-    assert sliding > 3000
+    slack, sliding = check_optimality(random_chains(0, 1500))
+    assert slack > 50
+    assert sliding > 1500
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(1, 26))
-def test_a_hundred_thousand_chains_meet_the_optimality_conditions(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_twenty_thousand_chains_meet_the_optimality_conditions(seed: int) -> None:
     check_optimality(random_chains(seed, 4000, most=24))
 
 

@@ -199,19 +199,6 @@ def test_lead_and_motor_control_do_not_count_while_cables_stick() -> None:
         np.testing.assert_allclose(other, K[0], rtol=1e-12, atol=1e-12 * abs(K[0]).max())
 
 
-def test_straight_arm_does_not_stick() -> None:
-    arm = presets.virtual_prototype(LAW, lead=0.3, friction=0.2)
-    pose, F = arm.at(np.zeros(10)), np.full(15, 50.0)
-    expected = cdsm.stiffness(pose, F).joint
-    found = cdsm.stuck_stiffness(pose, F).joint
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * abs(expected).max())
-    # a wrap of the site's own is enough to hold
-    sites = [[replace(s, wrap=0.1 if s.friction else 0.0) for s in c.sites] for c in arm.cables]
-    tubes = [replace(c, sites=tuple(s)) for c, s in zip(arm.cables, sites, strict=True)]
-    held = cdsm.stuck_stiffness(arm.with_cables(tubes).at(np.zeros(10)), F).joint
-    assert np.linalg.eigvalsh(held)[0] > 2.0 * np.linalg.eigvalsh(expected)[0]
-
-
 NUMBERS = {
     # lead, bound, law: frictionless and stuck along x, y, z [N/mm]
     (0.0, 15.0): ((11.2, 11.4, 12.0), (25.8, 25.5, 26.0)),

@@ -209,7 +209,7 @@ def check_stiffness(K: cdsm.Stiffness, rng: np.random.Generator) -> None:
     loads = abs(W) @ abs(pose.jacobian).sum(axis=1) + (F.sum() + weight(arm)) * reach(arm)
     assert_derivative(torque, K.joint @ v, 32.0 * EPSILON * float(pulls + loads), step)
     singular = np.linalg.svd(K.joint, compute_uv=False)
-    if singular[-1] < 1e-8 * singular[0]:
+    if singular[-1] <= 1e-8 * singular[0]:
         return
     J = pose.jacobian
     expected = J @ np.linalg.inv(K.joint) @ J.T
