@@ -51,15 +51,6 @@ def test_energy_by_elongation_is_tension_and_tension_by_elongation_is_stiffness(
     assert np.all(fine < np.maximum(0.3 * coarse, 1e-8))  # second order, or rounding
 
 
-@pytest.mark.parametrize(("name", "spring"), CASES)
-def test_elongation_and_energy_begin_at_the_low_end(name: str, spring: float) -> None:
-    cable = hybrid(spring, LAWS[name])
-    first = LAWS[name].low
-    # the next number above 2.2 N, and rounding of 2.2² N² over twice the spring
-    assert float(cable.elongation(first, LENGTH)) == pytest.approx(0.0, abs=1e-15)
-    assert float(cable.energy(first, LENGTH)) == pytest.approx(0.0, abs=1e-15)
-
-
 @pytest.mark.parametrize(
     ("option", "value", "said"),
     [
@@ -210,18 +201,3 @@ def test_only_holes_have_friction(keys: dict[str, Any]) -> None:
         cdsm.Cable("a", (rough[0], plain[1]), STEEL)
     with pytest.raises(cdsm.InvalidInput, match=r"site 2 has friction or wrap.*cable ends there"):
         cdsm.Cable("a", (plain[0], rough[1]), STEEL, lead=0.1)
-
-
-def test_spring_longer_than_its_cable_is_told() -> None:
-    """Under 60 N a spring of 1 N/mm stretches by 60 mm, three times the 20 mm of cable1_1."""
-    geometry = cdsm.Geometry.universal(
-        joints=2, cables_per_joint=3, link_length=0.04, base_length=0.02, disk_offset=0.01,
-        hole_radius=0.03, link_mass=0.05,
-    )  # fmt: skip
-    wire, F = cdsm.LinearElasticity(2e3), np.full(6, 60.0)
-    for spring, lost in ((1e3, True), (3.1e3, False), (math.inf, False)):
-        cables = cdsm.serpentine_cables(geometry, wire, series_stiffness=spring)
-        arm = cdsm.Manipulator(geometry, cables=cables)
-        K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), F)
-        assert ("longer lead" in str(K)) == lost
-        assert any("longer lead" in line for line in K.report().notes) == lost

@@ -90,14 +90,6 @@ def test_every_link_has_a_disk_beside_each_of_its_joints() -> None:
     assert [disk.x for disk in disks] == pytest.approx([0.02 - 0.01, 0.01, 0.04 - 0.005, 0.005])
 
 
-def test_numpy_numbers_and_arrays_and_lists_are_accepted() -> None:
-    plain = cdsm.Geometry.universal(**UNIVERSAL)
-    numpy = {key: np.float64(value) for key, value in SIZES.items()}
-    assert cdsm.Geometry.universal(joints=np.int64(5), cables_per_joint=3, **numpy) == plain  # type: ignore[arg-type]
-    listed = cdsm.Joint(axes=[np.array([0.0, 1.0, 0.0])], disk_offset=0.01)  # type: ignore[arg-type]
-    assert listed == cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01)
-
-
 # --- TOML -----------------------------------------------------------------------------------
 
 
@@ -241,16 +233,6 @@ def test_text_that_is_no_geometry_is_a_geometry_error(text: str) -> None:
     assert str(caught.value).startswith("arm.toml: ")
     assert NOT_A_GEOMETRY[text] in str(caught.value)
     assert len(str(caught.value)) < 2000
-
-
-def test_faults_of_a_file_name_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "arm.toml"
-    path.write_text("[universal]\njoints = 0\n")
-    with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.read(path)
-    assert caught.value.source == str(path)
-    assert str(path) in str(caught.value)
-    assert len(caught.value.faults) == 6
 
 
 # --- files ----------------------------------------------------------------------------------

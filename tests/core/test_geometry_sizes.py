@@ -63,12 +63,6 @@ def test_a_size_per_joint_is_that_of_its_parts() -> None:
     assert by_joint == {1: (0.1, 0.05, 0.02), 2: (0.2, 0.1, 0.018), 3: (0.3, 0.15, 0.01)}
 
 
-@pytest.mark.parametrize("key", ["link_length", "disk_offset", "hole_radius", "link_mass", "phase"])
-def test_equal_values_per_joint_are_one_value(key: str) -> None:
-    value = {**SIZES, "phase": 0.1}[key]
-    assert universal(**{key: [value] * 3}) == universal(**{key: value})
-
-
 def test_a_cable_passes_each_disk_at_its_hole_radius_or_at_its_own() -> None:
     taper = arm_of(universal(hole_radius=[0.02, 0.018, 0.015]))
     for cable in taper.cables:
@@ -151,27 +145,6 @@ def test_alternating_hinges_share_holes_loudly_and_spread_sets_them_apart() -> N
     turned = np.degrees([c.angle for c in apart.cables]) - angles
     # hinges 1, 3, 5 share one plane, hinges 2, 4, 6 the other; both cables of a pair turn alike
     np.testing.assert_allclose(turned.reshape(6, 2), [[d] * 2 for d in (-12, -12, 0, 0, 12, 12)])
-
-
-def test_cables_of_one_angle_share_no_hole_on_rings_of_their_own() -> None:
-    routes: list[dict[str, Any]] = [
-        {"joint": 1, "angle": 0.1},
-        {"joint": 2, "angle": 0.1 + 2.0 * math.pi, "radius": 0.01},
-        {"joint": 2, "angle": 2.0},
-    ]
-    geometry = universal(joints=2)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        geometry.replace(cables=[cdsm.CableRoute(**route) for route in routes])
-        routes[1]["radius"] = 0.015  # that of the disks of joint 2, where cable 1 does not go
-        taper = universal(joints=2, hole_radius=[0.02, 0.015])
-        taper.replace(cables=[cdsm.CableRoute(**route) for route in routes])
-    routes[0]["joint"] = 2
-    with pytest.warns(cdsm.CdsmWarning, match="cables share holes: cable2_1 and cable2_2"):
-        taper.replace(cables=[cdsm.CableRoute(**route) for route in routes])
-    near = [cdsm.CableRoute(joint=1, angle=a) for a in (1e-9, 2.0 * math.pi - 1e-9, 3.0)]
-    with pytest.warns(cdsm.CdsmWarning, match="cable1_1 and cable1_2"):
-        geometry.replace(cables=near)
 
 
 # --- sections -------------------------------------------------------------------------------

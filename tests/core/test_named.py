@@ -169,17 +169,6 @@ def test_tables_have_a_row_for_each_and_units_in_the_columns(name: str, rows: in
     assert any("[N" in column or "[m" in column for column in table.columns)
 
 
-def test_tables_hold_the_numbers_of_their_results() -> None:
-    assert PULL.to_pandas()["tension [N]"].to_dict() == dict(PULL)
-    table = PLAN.to_pandas()
-    assert table["status"].to_list() == ["planned", "stiffness"]
-    assert table["achieved [N/m]"].iloc[0] == PLAN.achieved[0]
-    assert np.isnan(table["achieved [N/m]"].iloc[1])
-    assert table["target [N/m]"].to_list() == PLAN.target.tolist()
-    tip = table[["tips x [m]", "tips y [m]", "tips z [m]"]].iloc[0].to_numpy(dtype=float)
-    np.testing.assert_array_equal(tip, POSE.tip[:3, 3])
-
-
 def test_batch_has_one_row_for_each_posture_in_pandas_and_labels_in_xarray() -> None:
     q = np.array([POSE.q, 0.5 * POSE.q, 99.0 * POSE.q])
     outputs = [name for name in OUTPUTS if name != "along"]

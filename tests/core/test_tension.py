@@ -134,29 +134,6 @@ def test_torque_the_cables_cannot_exert_at_all_has_no_relaxation(
         assert part in str(error)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_torque_missing_by_less_than_linear_programs_care_for_is_named(seed: int) -> None:
-    """Nobody claims then that there are tensions after all."""
-    pose = random_posture(random_arm(seed, 3), seed)
-    J, count = pose.length_jacobian, len(pose.arm.cables)
-    size = abs(J).max()
-    # the least upper bound of all cables that balances the arm
-    found = linprog(
-        np.append(np.zeros(count), 1.0),
-        A_ub=np.column_stack([np.eye(count), -np.ones(count)]),
-        b_ub=np.zeros(count),
-        A_eq=np.column_stack([J.T / size, np.zeros(pose.arm.nv)]),
-        b_eq=-pose.gravity_torque / size,
-        bounds=[*[(20.0, None)] * count, (0.0, None)],
-    )
-    bound = float(found.x[-1])
-    assert cdsm.distribute_tension(pose, 20.0, bound * (1.0 + 1e-8)).values.max() <= bound * 1.1
-    with pytest.raises(cdsm.InfeasibleTension) as caught:
-        cdsm.distribute_tension(pose, 20.0, bound * (1.0 - 1e-8))
-    assert 0.0 < abs(caught.value.missing).max() < 1e-6
-    assert caught.value.relaxation == pytest.approx(1e-8 * bound, rel=1.0)
-
-
 def test_a_slight_torque_that_no_cable_exerts_is_missing_all_the_same() -> None:
     """Less than HiGHS takes for nothing, 1e-7 of the largest, and more than is ever left over."""
     geometry = cdsm.Geometry(
@@ -260,18 +237,6 @@ def test_solver_that_calls_a_wrong_point_optimal_is_caught(
     found = re.search(r"tensions of up to (\S+) N", str(caught.value))
     assert found is not None
     assert 10.0 <= float(found[1]) <= 500.0
-
-
-def test_solver_that_raises_is_reported_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(*_: object, **__: object) -> qpsolvers.Solution:
-        raise RuntimeError("out of cheese")
-
-    monkeypatch.setattr(qpsolvers, "solve_problem", failing)
-    with pytest.raises(cdsm.CdsmError, match=r"'osqp' failed: out of cheese.*daqp") as caught:
-        cdsm.distribute_tension(POSE, solver="osqp")
-    assert isinstance(caught.value.__cause__, RuntimeError)
-    with pytest.raises(cdsm.InvalidInput, match="installed solver"):
-        cdsm.distribute_tension(POSE, solver="simplex")
 
 
 def test_the_rule_that_is_too_narrow_is_named() -> None:

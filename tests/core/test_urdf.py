@@ -246,16 +246,6 @@ def test_link_is_a_solid_cylinder_of_the_hole_radius_about_mid_link_or_a_milligr
         assert inertia["ixy"] == inertia["ixz"] == inertia["iyz"] == 0.0
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_total_mass_is_that_of_links_and_crosses(name: str) -> None:
-    geometry = ARMS[name]
-    light = sum(len(joint.axes) - 1 for joint in geometry.joints)
-    light += sum(link.mass == 0.0 for link in geometry.links)
-    expected = sum(link.mass for link in geometry.links) + light * 1e-6
-    model = pin.buildModelFromXML(cdsm.to_urdf(geometry))
-    assert pin.computeTotalMass(model) == pytest.approx(expected, rel=1e-14)
-
-
 # --- reading back ---------------------------------------------------------------------------
 
 

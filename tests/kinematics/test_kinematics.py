@@ -98,16 +98,6 @@ def test_eq8_cable_lengths_of_one_hinge_in_closed_form() -> None:
     assert not lengths.flags.writeable
 
 
-def test_cable_lengths_beyond_limits_and_at_touching_disks_are_refused() -> None:
-    arm = planar_arm(2)
-    with pytest.raises(cdsm.InvalidInput, match=r"joint2 = 57\.3°"):
-        arm.cable_lengths([0.0, 1.0])
-    assert arm.cable_lengths([0.0, 1.0], check_limits=False).shape == (4,)
-    touching = random_arm(1, 2, "hinged")  # its limits are where the disks touch
-    with pytest.raises(cdsm.InvalidInput, match=r"cable1_\d.*coincide at q"):
-        touching.cable_lengths([touching.upper[0], 0.0])
-
-
 # --- solved targets ------------------------------------------------------------------------------
 
 
@@ -141,16 +131,6 @@ def test_eq7_targets_are_reached_by_the_nearest_angles(kind: str, joints: int, o
         reached = found.posture.tip[:, places]
         np.testing.assert_allclose(reached, pose.tip[:, places], rtol=0.0, atol=1e-8)
         assert distance(found) < 1.01 * least_distance(found, found.angles)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_eq5_too_few_cables_give_the_nearest_angles(kind: str) -> None:
-    full = some_arm(kind, 5, 6)
-    arm = cdsm.Manipulator.from_urdf(full.urdf, full.cables[: full.nv // 2], tip=full.tip_link)
-    lengths = arm.cable_lengths(inside(arm, 1, 0.4))
-    found = cdsm.solve_joint_angles(arm, lengths, inside(arm, 51, 0.4))
-    assert found.reachable
-    assert distance(found) < 1.01 * least_distance(found, found.angles)
 
 
 def test_eq7_no_other_solver_finds_nearer_angles() -> None:

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cdsm
-from cdsm.stiffness_matrix.value import UNMOVED
 from cdsm.support.values import Array
 from tests.support import arms
 
@@ -197,13 +196,10 @@ def _problem(seed: int, name: str) -> tuple[cdsm.Posture, Array, Array, Array]:
     return pose, low, np.where(other < least - 0.5, np.round((other + least) / 2.0, 6), 200.0), W
 
 
-# in most draws the other tensions pull less on no cable; in the first three rows they do
+# in most draws the other tensions pull less on no cable; in the first row they do
 PROBLEMS = [
-    *[(seed, "universal-5") for seed in (0, 2, 9, 11)],
-    *[(seed, "universal-3") for seed in (1, 2, 5, 7, 11)],
-    *[(3, "mixed"), (5, "mixed"), (7, "mixed"), (5, "universal-1"), (1, "hinged-6")],
-    *[(seed, name) for seed in (0, 4) for name in ("universal-2", "universal-3", "mixed")],
-    *[(1, "hinged-3"), (2, "hinged-3"), (2, "hinged-6")],
+    *[(0, "universal-5"), (2, "universal-5"), (1, "universal-3"), (3, "mixed")],
+    *[(5, "universal-1"), (1, "hinged-6"), (0, "universal-2"), (1, "hinged-3")],
 ]
 
 
@@ -467,25 +463,6 @@ def test_straight_arm_cannot_move_along_itself(name: str) -> None:
         np.testing.assert_allclose(abs(caught.value.direction), (1.0, 0.0, 0.0), atol=1e-15)
 
 
-@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
-def test_where_the_tip_cannot_move_does_not_depend_on_the_size_of_the_arm(size: float) -> None:
-    geometry = cdsm.Geometry.hinged(
-        joints=2,
-        twist=0.0,
-        base_length=0.0,
-        link_length=size,
-        disk_offset=0.1 * size,
-        hole_radius=0.2 * size,
-        link_mass=0.1,
-    )
-    arm = cdsm.Manipulator(geometry, arms.STEEL)
-    K = cdsm.stiffness(arm.at(np.zeros(2)), arms.random_tension(arm, 0))
-    way = K.posture.jacobian[:3]
-    across = np.eye(3)[int(abs(way).sum(axis=1).argmax())]
-    for part, moves in ((0.9 * UNMOVED, False), (1.1 * UNMOVED, True)):
-        assert (K.along((1.0, *(part * across)[1:])) < math.inf) == moves
-
-
 def test_pendulum_is_held_by_its_load_alone() -> None:
     """No elasticity, no weight, no tension: K_θ = fℓ of the force f that pulls along the link."""
     arm = arms.random_arm(1, 1, "hinged")
@@ -516,29 +493,3 @@ def test_what_is_singular_does_not_depend_on_the_units_of_a_joint(units: float) 
                 _ = other.compliance
             way = scale @ caught.value.direction
             np.testing.assert_allclose(way[0], -way[1], rtol=1e-6)
-
-
-@pytest.mark.parametrize("count", range(1, 8))
-@pytest.mark.parametrize("rigidity", [0.01, 1e6])
-def test_passive_stiffness_is_that_of_each_cable_whatever_their_number(
-    rigidity: float, count: int
-) -> None:
-    # as soft as no cable is: nothing that is added besides is small beside it
-    law = cdsm.LinearElasticity(rigidity)
-    arm = arms.random_arm(2, 3)
-    assert arm.geometry is not None
-    idle = cdsm.Cable(
-        "idle",
-        (cdsm.Site("base_link", (0.0, 0.0, 0.0)), cdsm.Site("base_link", (1.0, 0.0, 0.0))),
-        law,
-    )
-    some = [replace(cable, elasticity=law) for cable in arm.cables[:count]]
-    fixed = [replace(idle, name=f"idle{c}") for c in range(3)]
-    q = arms.random_posture(arm, 2).q
-    for cables in (some, [*fixed, *some], [*some, *fixed]):
-        pose = cdsm.Manipulator(arm.geometry, cables=cables).at(q)
-        K = cdsm.stiffness(pose, np.full(len(cables), 3.0))
-        k = rigidity / (pose.cable_lengths / (1.0 + 3.0 / rigidity))  # EA/l_0
-        _close(K.cable_stiffness, k, 1e-15)
-        J = pose.length_jacobian
-        _close(K.passive, np.sum([k[c] * np.outer(J[c], J[c]) for c in range(len(k))], 0), 1e-14)

@@ -85,12 +85,11 @@ def _rising(x: Array, y: Array) -> tuple[Array, Array]:
     [(random_arm(0, 2), 0.5), (random_arm(1, 3, "hinged"), 1.0), (mixed_arm(), 0.9)],
 )
 def test_clearances_equal_a_direct_computation(arm: cdsm.Manipulator, reach: float) -> None:
-    for seed in range(2):
-        pose = random_posture(arm, seed, reach)
-        found = cdsm.clearance(pose)
-        expected = (*direct_cables_and_links(pose), direct_disks(pose))
-        # the search of two places stops at 1e-7 m
-        assert (found.cables, found.links, found.disks) == pytest.approx(expected, abs=2e-7)
+    pose = random_posture(arm, 0, reach)
+    found = cdsm.clearance(pose)
+    expected = (*direct_cables_and_links(pose), direct_disks(pose))
+    # the search of two places stops at 1e-7 m
+    assert (found.cables, found.links, found.disks) == pytest.approx(expected, abs=2e-7)
 
 
 def test_batch_is_the_single_posture_and_diameters_count() -> None:

@@ -123,17 +123,6 @@ def test_strand_arm_stands_between_two_tensions() -> None:
         assert sign * margin(found.posture, place * (1.0 - 1e-6)) < 0.0
 
 
-def test_arm_that_never_stands_is_said_to_be_unstable_throughout() -> None:
-    arm = hinge(spring=1.0, gravity=(-9.81, 0.0, 0.0), mass=1.0)
-    found = cdsm.critical_tension(arm.at([0.0]))
-    assert found.stable == ()
-    assert found.minimum == found.examined[0] == 0.0
-    assert "UNSTABLE at every lower bound" in str(found)
-    load = cdsm.critical_load(arm.at([0.0]), [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert (load.factor, load.limit) == (0.0, "buckling")
-    assert "buckles without the load already" in str(load)
-
-
 @pytest.mark.parametrize("degrees", [-40.0, 7.0, 25.0])
 def test_bent_pair_buckles_at_its_closed_form(degrees: float) -> None:
     """Across one hinge L± = 2 h cos θ/2 ± 2 R sin θ/2, so all of K is known at any angle."""

@@ -9,7 +9,6 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import cdsm
-from cdsm.statics import solve
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.support.values import Array
 from tests.support import arms
@@ -263,20 +262,6 @@ def test_answer_below_a_law_names_the_cables_though_iterates_may_pass() -> None:
 
 
 # --- failure -------------------------------------------------------------------------------
-
-
-def test_no_place_to_rest_is_an_error_with_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    pose, pull = balanced("universal-3-8-all")
-    monkeypatch.setattr(solve, "_STEPS", 2)
-    monkeypatch.setattr(solve, "_flow", lambda f, x: x)
-    W = pull.wrench + 2.0 * arms.random_wrench(6)
-    with pytest.raises(cdsm.EquilibriumError, match="no stable place to rest") as caught:
-        cdsm.equilibrium(pose, pull, W)
-    error = caught.value
-    assert error.residual.shape == (pose.arm.nv,)
-    assert error.joint == pose.arm.joint_names[int(abs(error.residual).argmax())]
-    assert 0.0 <= error.load_factor < 1.0
-    assert "raise the tensions" in str(error)
 
 
 # --- the question ---------------------------------------------------------------------------

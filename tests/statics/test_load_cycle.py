@@ -254,31 +254,7 @@ def test_numbers_of_an_independent_program_on_the_prototype(mu: float) -> None:
     assert abs(np.count_nonzero(history.sliding[3]) - holes) <= 3
 
 
-def test_secants_scale_with_friction() -> None:
-    # to first order in the load, the secant depends on load over friction only
-    for load in (2.0, 5.0):
-        stiff = []
-        for mu in (0.05, 0.1):
-            pose, pull = prototype(mu)
-            force = load * mu / 0.05
-            moved = cdsm.load_cycle(pose, pull, along_z(force)).displacement[0, 2]
-            stiff.append(force / moved)
-        assert stiff[0] == pytest.approx(stiff[1], rel=5e-3)
-
-
 # --- results and errors ---------------------------------------------------------------------
-
-
-def test_history_is_labelled_and_drawn() -> None:
-    pose, pull = planar(0.2)
-    history = cdsm.load_cycle(pose, pull, along_z(*np.linspace(0.0, 5.0, 30)))
-    figure = history.plot()
-    assert figure.axes[0].get_xlabel() == "displacement along the force [mm]"
-    moved, force = np.array(figure.axes[0].lines[0].get_data())
-    assert (moved[0], force[0], force[-1]) == (0.0, 0.0, 5.0)
-    np.testing.assert_allclose(moved[1:], 1e3 * history.displacement[:, 2], rtol=1e-12)
-    with pytest.raises(cdsm.InvalidInput, match="whole number from -30 to 29"):
-        history.pose(30)
 
 
 def test_bad_arguments_are_named() -> None:

@@ -67,25 +67,3 @@ def test_straight_arm_holds_no_cable() -> None:
     assert test.breakaway_load == test.sliding_load == 0.0
     assert test.stuck == pytest.approx(test.tangent, rel=1e-9)
     assert "straight through all holes" in str(test)
-
-
-def test_arm_that_only_friction_holds_at_its_reference_says_so() -> None:
-    geometry = cdsm.Geometry.universal(
-        joints=4,
-        cables_per_joint=3,
-        base_length=0.02,
-        link_length=0.05,
-        hole_radius=0.01,
-        disk_offset=0.005,
-        link_mass=0.05,
-    )
-    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(3000.0)).with_friction(0.2)
-    pose = arm.at(np.full(arm.nv, 0.1))
-    pull = cdsm.distribute_tension(pose, 150.0)
-    assert not cdsm.stiffness(pose, pull).is_stable
-    test = cdsm.weight_test(pose, pull, [0.0, 0.0, 0.2])
-    assert test.history is not None
-    np.testing.assert_allclose(test.history.tip[0], pose.tip[:3, 3], atol=1e-9)
-    (said,) = test.warnings
-    assert said.startswith("LEFT ITS REFERENCE: without friction the arm does not stay there")
-    assert said.endswith("With friction it moves by (0, 0, 0) mm")

@@ -8,7 +8,6 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from tests.support import arms
 from tests.support.locked import (
     LENGTH,
     MOMENT,
@@ -82,19 +81,6 @@ def test_steps_lead_to_the_same_end_on_a_curve() -> None:
         assert rest.reference is pose
 
 
-def test_test_starts_where_unbalanced_tensions_lead() -> None:
-    pose, _ = prototype()
-    tension = arms.random_tension(pose.arm, 3)
-    force = np.array([0.0, -5.0, 0.0])
-    test = cdsm.weight_test(pose, tension, force)
-    before = cdsm.equilibrium(pose, tension)
-    after = cdsm.equilibrium(pose, tension, np.append(force, np.zeros(3)))
-    assert np.linalg.norm(before.displacement) > 1e-4
-    moved = after.pose.tip[:3, 3] - before.pose.tip[:3, 3]
-    np.testing.assert_allclose(test.displacement, moved, atol=1e-13)
-    assert test.tangent == before.stiffness.along(force)
-
-
 # --- buckling -------------------------------------------------------------------------------
 
 
@@ -132,54 +118,6 @@ def test_arm_that_snaps_through_has_buckled() -> None:
     # equilibrium() goes on to where it comes to rest
     W = moment * MOMENT - 7.0 * np.eye(6)[0]
     assert cdsm.equilibrium(pose, [pretension] * 2, W).at_limit == ("joint1",)
-
-
-@pytest.mark.parametrize("steps", [1, 7])
-def test_snapping_through_is_seen_however_few_the_steps(steps: int) -> None:
-    """At the full load the arm rests stably beyond: the way there is what tells."""
-    geometry = cdsm.Geometry.hinged(
-        joints=1,
-        twist=0.0,
-        link_length=0.05,
-        base_length=0.02,
-        disk_offset=0.01,
-        hole_radius=0.02,
-        link_mass=0.0,
-    )
-    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(100.0), gravity=(0.0, 0.0, 0.0))
-    pose = arm.at([0.0])
-    force = np.array([-40.0, 0.0, 10.0])
-    assert cdsm.equilibrium(pose, [5.0, 5.0], np.append(force, np.zeros(3))).stable
-    with pytest.raises(cdsm.EquilibriumError, match="buckles at") as caught:
-        cdsm.weight_test(pose, [5.0, 5.0], force, steps=steps)
-
-    # the torque that the load must overcome, from the same closed forms as tests/support/locked.py
-    def load(angle: float) -> float:
-        lengths = [
-            2.0 * (0.01 * math.cos(angle / 2) + s * 0.02 * math.sin(angle / 2)) for s in (1, -1)
-        ]
-        slopes = [-0.01 * math.sin(angle / 2) + s * 0.02 * math.cos(angle / 2) for s in (1, -1)]
-        pull = [max(100.0 * (1.05 * L / 0.02 - 1.0), 0.0) for L in lengths]
-        torque = pull[0] * slopes[0] + pull[1] * slopes[1]
-        # the tip is at (ℓ cos θ, −ℓ sin θ)
-        return torque / (0.05 * (40.0 * math.sin(angle) - 10.0 * math.cos(angle)))
-
-    parts = [load(angle) for angle in np.linspace(-0.9, -1e-3, 20001)]
-    assert caught.value.load_factor == pytest.approx(max(parts), rel=1e-3)
-
-
-def test_arm_between_disks_that_all_but_touch_is_followed_by_any_steps() -> None:
-    """Buckled, four joints on their stops: segments of micrometres tilt by rounding alone."""
-    arm = arms.random_arm(313526, 4, "universal", cdsm.LinearElasticity(213.5))
-    pose = arms.random_posture(arm, 760486)
-    pull = cdsm.distribute_tension(pose, 18.0)
-    once, twice, often = (
-        cdsm.weight_test(pose, pull, [-0.9, 3.0, 2.4], steps=steps) for steps in (1, 2, 7)
-    )
-    assert len(once.unloaded.at_limit) == 4
-    assert once.left_reference
-    for test in (twice, often):
-        np.testing.assert_allclose(test.displacement, once.displacement, atol=1e-9)
 
 
 # --- the question ---------------------------------------------------------------------------
