@@ -359,20 +359,6 @@ def test_nearly_singular_stiffness_is_decided_as_for_the_single_posture() -> Non
     assert only(immobile, 0) == {"compliance"}
 
 
-def test_straight_arm_has_no_cartesian_matrix_and_is_infinitely_stiff_along_itself() -> None:
-    arm = random_arm(1, 3)
-    q, tension, _ = problem(arm, 2)
-    q[0] = 0.0
-    names = ("along", "cartesian", "pseudoinverse", "compliance", "margin")
-    batch = cdsm.evaluate(arm, q, tension, outputs=names, direction=(1.0, 0.0, 0.0))
-    np.testing.assert_array_equal(batch.status, [cdsm.Status.IMMOBILE, cdsm.Status.OK])
-    assert batch["along"][0] == math.inf
-    assert math.isfinite(batch["along"][1])
-    assert only(batch, 0) == {"along", "compliance", "margin"}
-    # what can be, is, and asking for no more makes it no failure
-    assert cdsm.evaluate(arm, q, tension, outputs=("along",), direction=(1.0, 0.0, 0.0)).ok.all()
-
-
 # --- bad input ------------------------------------------------------------------------------
 
 ARM = random_arm(1, 2)

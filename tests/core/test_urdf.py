@@ -7,7 +7,6 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -167,24 +166,6 @@ def test_yourdfpy_and_pinocchio_agree_on_every_link(name: str, tmp_path: Path) -
             rtol=0.0,
             atol=1e-13,
         )
-
-
-@pytest.mark.parametrize("name", ARMS)
-def test_mujoco_loads_it_and_places_the_last_link_alike(name: str) -> None:
-    geometry = ARMS[name]
-    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e5))
-    model = mujoco.MjModel.from_xml_string(arm.urdf)
-    assert model.nq == arm.nv
-    data = mujoco.MjData(model)
-    q = np.random.default_rng(0).uniform(-0.3, 0.3, arm.nv)
-    data.qpos[:] = q
-    mujoco.mj_kinematics(model, data)
-    last = f"link{len(geometry.links)}"
-    pose = arm.at(q, check_limits=False).link_pose(last)
-    np.testing.assert_allclose(data.body(last).xpos, pose[:3, 3], rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(
-        data.body(last).xmat.reshape(3, 3), pose[:3, :3], rtol=0.0, atol=1e-13
-    )
 
 
 # --- what is in the file --------------------------------------------------------------------

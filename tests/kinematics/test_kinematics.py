@@ -251,16 +251,6 @@ def test_measured_lengths_are_reachable_within_their_error() -> None:
     assert abs(slope).max() < 1e-6 * np.linalg.norm(exact.length_error)
 
 
-def test_answers_where_disks_touch_keep_off_the_limit_and_repeat() -> None:
-    arm = random_arm(7, 3, "hinged")
-    found, again = (cdsm.inverse_kinematics(arm, [-0.1, 0.0, 0.05]) for _ in range(2))
-    assert found.at_limit
-    assert found.posture.cable_lengths.shape == (6,)
-    np.testing.assert_array_equal(found.angles, again.angles)
-    assert np.isfinite(cdsm.solve_joint_angles(arm, np.full(6, 0.5)).angles).all()
-    assert np.isfinite(cdsm.inverse_kinematics(arm, [1e9, 1e8, 0.0]).angles).all()
-
-
 # --- bad input and output ------------------------------------------------------------------------
 
 ARM = random_arm(1, 2)

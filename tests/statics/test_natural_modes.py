@@ -14,7 +14,6 @@ from tests.support.arms import (
     mixed_arm,
     random_arm,
     random_posture,
-    random_tension,
     random_wrench,
 )
 from tests.support.differences import assert_second_order
@@ -136,24 +135,6 @@ def test_each_shape_is_driven_back_by_omega_squared(name: str) -> None:
             size=float(abs(inverse).max()),
             tolerance=1e-7,
         )
-
-
-@pytest.mark.parametrize("name", ARMS)
-@pytest.mark.parametrize("moment", [False, True])
-def test_shapes_are_orthonormal_in_mass_and_stiffness(name: str, moment: bool) -> None:
-    pose = random_posture(ARMS[name], 5)
-    K = cdsm.stiffness(pose, random_tension(pose.arm, 5), random_wrench(5, moment))
-    found = cdsm.modes(pose, K)
-    phi = np.hstack([found.growth_shapes, found.shapes])
-    squares = np.concatenate([-(found.growth_rates**2), (2.0 * math.pi * found.frequencies) ** 2])
-    symmetric = (K.joint + K.joint.T) / 2.0
-    np.testing.assert_allclose(phi.T @ found.mass @ phi, np.eye(pose.arm.nv), rtol=0.0, atol=1e-11)
-    np.testing.assert_allclose(
-        phi.T @ symmetric @ phi, np.diag(squares), rtol=0.0, atol=1e-11 * squares.max()
-    )
-    assert (np.diff(found.frequencies) > 0.0).all()
-    for shape in phi.T:
-        assert shape[abs(shape).argmax()] > 0.0
 
 
 def test_modes_of_an_arm_that_buckles_grow_and_say_how_fast() -> None:
