@@ -7,8 +7,6 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import cdsm
-from cdsm.measures.polytope import balanced
-from cdsm.support.linear_program import INFEASIBLE, OPTIMAL, UNBOUNDED, least
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture
 
@@ -158,26 +156,3 @@ def test_errors_name_what_is_missing() -> None:
         cdsm.payload(pose, "z", 15.0, 100.0, deflection=-1.0)
     with pytest.raises(cdsm.InvalidInput, match="force"):
         cdsm.force_polytope(pose, 15.0, 800.0).radius_at([1.0, 2.0])
-
-
-@pytest.mark.parametrize("reach", [0.5, 1e-2, 1e-4, 0.0])
-def test_programs_end_where_highs_does(reach: float) -> None:
-    """Also near the straight arm, where the tip hardly moves along x and forces there are huge."""
-    for seed in range(4):
-        arm = random_arm(seed, 3)
-        pose = random_posture(arm, seed, reach)
-        low, high = np.full(len(arm.cables), 5.0), np.full(len(arm.cables), 5e3)
-        A = np.column_stack([pose.length_jacobian.T, -pose.jacobian[:3].T])
-        lever = np.where((A == 0.0).all(axis=0), 1.0, abs(A).max(axis=0))  # HiGHS wants order one
-        ends = (
-            np.append(low, np.full(3, -np.inf)) * lever,
-            np.append(high, np.full(3, np.inf)) * lever,
-        )
-        for u in (*np.eye(3), np.ones(3)):
-            cost, bounds = np.append(np.zeros(low.size), -u) / lever, np.transpose(ends)
-            expected = least(cost, A_eq=A / lever, b_eq=-pose.gravity_torque, bounds=bounds)
-            found = balanced(pose, np.eye(3), np.zeros(6), low, high)(u)
-            status = INFEASIBLE if found is None else UNBOUNDED if np.isinf(found[0]) else OPTIMAL
-            assert status == expected.status
-            if found is not None and status == OPTIMAL:
-                assert found[0] == pytest.approx(-expected.fun, rel=1e-6)
