@@ -266,7 +266,7 @@ def test_row_where_sites_coincide_is_empty() -> None:
     # and leaves nothing behind for the next
     for value in batch.values:
         np.testing.assert_array_equal(value[0], value[2])
-    with pytest.raises(cdsm.InvalidInput):
+    with pytest.raises(cdsm.InvalidInput, match=r"'loop': .*coincide at q = \[1\.57.*Move a site"):
         arm.at(q[1])
     pull = cdsm.distribute_tensions(arm, q, 5.0)
     assert pull.status[1] == cdsm.Status.COINCIDENT_SITES

@@ -1,6 +1,5 @@
-"""Manipulator: joint limits, and sites that meet."""
+"""Manipulator: joint limits, and lengths in another unit."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -39,25 +38,6 @@ def test_angles_at_their_limits_are_inside_even_through_degrees() -> None:
         ARM.at(np.deg2rad(np.rad2deg(sign * ARM.upper)))
     with pytest.raises(cdsm.InvalidInput):
         ARM.at(ARM.upper + 1e-6)
-
-
-def test_sites_that_meet_at_a_posture_are_named_there() -> None:
-    geometry = cdsm.Geometry(
-        base_length=0.02,
-        hole_radius=0.03,
-        joints=(cdsm.Joint(axes=((0.0, 0.0, 1.0),), disk_offset=0.01, limit=3.0),) * 2,
-        links=(cdsm.Link(length=0.05, mass=0.1),) * 2,
-        cables=(cdsm.CableRoute(joint=1, angle=0.0),),
-    )
-    sites = (
-        cdsm.Site("base_disk", (0.02, 0.02, 0.0)),  # 20 mm beside the joint, reached at 90 degrees
-        cdsm.Site("link1", (0.02, 0.0, 0.0)),
-    )
-    arm = cdsm.Manipulator(geometry, cables=[cdsm.Cable("loop", sites, STEEL)])
-    assert np.isfinite(arm.at([1.5, 0.0]).length_jacobian).all()
-    with pytest.raises(cdsm.InvalidInput, match=r"coincide at q = \[1\.57.*Move a site") as caught:
-        arm.at([math.pi / 2.0, 0.0])
-    assert caught.value.name == "cable 'loop'"
 
 
 _MASS = (
