@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 import cdsm
-from tests.benchmarks.test_start_up_speed import FIRST_STIFFNESS
 from tests.support.patience import HANGS
 from tests.support.processes import ROOT
 
@@ -17,6 +16,16 @@ SCREEN = {"matplotlib", "rich", "viser", "xarray", "zarr"}
 OF_FILES = {"trimesh", "yourdfpy"}
 NUMERICS = {"lxml", "numba", "numpy", "pinocchio", "scipy"}
 
+FIRST_STIFFNESS = """
+import cdsm
+geometry = cdsm.Geometry.universal(
+    joints=5, cables_per_joint=3, link_length=0.05, base_length=0.02,
+    disk_offset=0.01, hole_radius=0.03, link_mass=0.1,
+)
+arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e5))
+pose = arm.at([0.1] * arm.nv)
+cdsm.stiffness(pose, cdsm.distribute_tension(pose, 20.0)).along("z")
+"""
 STRAND = """
 import cdsm
 pose = cdsm.presets.virtual_prototype().at([0.1] * 10)

@@ -8,7 +8,6 @@ import pytest
 
 import cdsm
 from cdsm.batch import Tensions, chunk, search
-from cdsm.batch.rows import rows_of
 from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm, one_hinge
 from tests.support.arms import STEEL, mixed_arm, random_arm
@@ -18,10 +17,8 @@ EXACT = 1e-9
 
 ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
     "universal, three cables": lambda: random_arm(1, 4),
-    "universal, four cables": lambda: random_arm(4, 3),
     "hinged": lambda: random_arm(2, 6, "hinged"),
     "one hinge": one_hinge,
-    "one universal joint": lambda: random_arm(5, 1),
     "mixed": mixed_arm,
     "custom": custom_arm,
     "strands": cdsm.presets.virtual_prototype,
@@ -90,7 +87,7 @@ def test_every_row_is_the_optimum_of_the_single_posture(name: str) -> None:
     assert feasible
 
 
-@pytest.mark.parametrize("name", ["universal, three cables", "hinged", "mixed", "custom"])
+@pytest.mark.parametrize("name", ["universal, three cables", "hinged", "custom"])
 def test_bounds_of_all_kinds(name: str) -> None:
     arm = ARMS[name]()
     rng = np.random.default_rng(7)
@@ -112,76 +109,13 @@ def test_bounds_of_all_kinds(name: str) -> None:
     assert_same_as_alone(cdsm.distribute_tensions(arm, q, low[0], high.max(axis=0)))
 
 
-def test_upper_bounds_bite_and_are_met_exactly() -> None:
-    arm = random_arm(1, 3)
-    q = postures(arm, 60, 0.4)
-    free = cdsm.distribute_tensions(arm, q, 5.0)
-    highest = 0.99 * free.values.max(axis=1)
-    high = np.repeat(highest[:, None], len(arm.cables), axis=1)
-    pull = cdsm.distribute_tensions(arm, q, 5.0, high)
-    feasible, _ = assert_same_as_alone(pull)
-    assert feasible > 5
-    held = pull.values[pull.ok]
-    np.testing.assert_array_equal(held.max(axis=1), highest[pull.ok])
-    np.testing.assert_array_equal(held.min(axis=1), 5.0)
-
-
-@pytest.mark.parametrize(("reach", "joints"), [(0.9, 3), (0.9, 5)])
+@pytest.mark.parametrize(("reach", "joints"), [(0.9, 3)])
 def test_rows_that_cannot_be_balanced_are_the_same(reach: float, joints: int) -> None:
     arm = shallow_arm(joints)
     pull = cdsm.distribute_tensions(arm, postures(arm, 120, reach), 5.0)
     feasible, infeasible = assert_same_as_alone(pull)
     assert feasible > 10
     assert infeasible > 5
-
-
-def test_infeasible_by_too_low_a_maximum_or_too_great_a_load() -> None:
-    arm = random_arm(1, 3)
-    q = postures(arm, 10, 0.4)
-    least = cdsm.distribute_tensions(arm, q, 5.0).values.max()
-    for pull in (
-        cdsm.distribute_tensions(arm, q, 5.0, 6.0),
-        cdsm.distribute_tensions(arm, q, 5.0, 2.0 * least, 1e3 * loads(10)),
-    ):
-        _, infeasible = assert_same_as_alone(pull)
-        assert infeasible == 10
-
-
-def test_nothing_to_balance_is_balanced_by_the_least() -> None:
-    arm = cdsm.Manipulator(random_arm(1, 2).geometry, STEEL, gravity=(0.0, 0.0, 0.0))
-    q = postures(arm, 5, 0.5)
-    none = cdsm.distribute_tensions(arm, q)
-    assert none.ok.all()
-    assert not none.values.any()
-    assert_same_as_alone(cdsm.distribute_tensions(arm, q, 7.0))
-
-
-def test_tiny_and_huge_forces() -> None:
-    arm = cdsm.Manipulator(random_arm(1, 2).geometry, STEEL, gravity=(0.0, 0.0, 0.0))
-    q, wrench = postures(arm, 6, 0.4), loads(6)
-    reference = cdsm.distribute_tensions(arm, q, 1.0, wrench=wrench)
-    assert reference.ok.all()
-    for size in (1e-6, 1e6):  # the problem is homogeneous
-        pull = cdsm.distribute_tensions(arm, q, size, wrench=size * wrench)
-        np.testing.assert_allclose(pull.values, size * reference.values, rtol=1e-10)
-
-
-def test_no_perturbation_in_balance_and_bounds_pulls_less() -> None:
-    """By brute force: every feasible motion from the answer makes ‖F‖² larger."""
-    arm = random_arm(1, 2)
-    q = postures(arm, 4, 0.4)
-    pull = cdsm.distribute_tensions(arm, q, 5.0, wrench=loads(4))
-    rng = np.random.default_rng(2)
-    for r, F in enumerate(pull.values):
-        J = arm.at(q[r]).length_jacobian
-        null = np.linalg.svd(J.T)[2][J.shape[1] :]
-        tried = 0
-        for step in rng.normal(size=(20_000, len(null))):
-            other = F + step @ null
-            if (other >= 5.0).all():
-                tried += 1
-                assert other @ other > F @ F
-        assert tried > 20
 
 
 # --- who decides ----------------------------------------------------------------------------
@@ -218,20 +152,10 @@ def test_rows_that_the_solver_leaves_open_go_to_the_single_posture(
 def test_near_the_joint_limits_no_guess_is_wrong_and_every_proof_holds() -> None:
     """A few cables pull a hundred times the bound; of half of the rows there are no tensions."""
     arm = cdsm.presets.virtual_prototype()
-    q = postures(arm, 300, 1.0)
+    q = postures(arm, 120, 1.0)
     feasible, infeasible = assert_same_as_alone(cdsm.distribute_tensions(arm, q, 50.0))
-    assert feasible > 50
-    assert infeasible > 50
-
-
-def test_blocks_are_those_of_the_geometry() -> None:
-    parts = rows_of(mixed_arm()).arm
-    assert parts.axes.tolist() == [0, 1, 2, 3, 4]
-    assert parts.axis_ends.tolist() == [0, 2, 3, 5]
-    assert parts.cable_ends.tolist() == [0, 3, 5, 9]
-    assert parts.pair_ends.tolist() == [0, 3, 5, 11]
-    # from anywhere to anywhere there are none
-    assert not rows_of(custom_arm()).arm.axes.size
+    assert feasible > 20
+    assert infeasible > 20
 
 
 def test_rounding_on_a_joint_that_no_cable_turns_is_no_missing_torque() -> None:

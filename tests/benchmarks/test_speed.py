@@ -1,6 +1,5 @@
 """Speed, as ratios against naive baselines in the same run; each compares the numbers first."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -64,35 +63,6 @@ def test_cost_grows_less_than_fourfold_from_5_to_20_joints(clock: Clock) -> None
         lambda: cdsm.stiffness(small.at(q5), tension5),
         most=4.0,
         slow_repeat=50,
-    )
-
-
-READINGS: dict[str, Callable[[cdsm.Stiffness], object]] = {
-    "along": lambda K: K.along("z"),
-    "cartesian": lambda K: K.cartesian,
-    "compliance": lambda K: K.compliance,
-    "pseudoinverse": lambda K: K.pseudoinverse(),
-    "margin": lambda K: K.margin,
-}
-
-
-@pytest.mark.speed
-@pytest.mark.parametrize("clock", ["speed"], indirect=True)
-@pytest.mark.parametrize("joints", [5, 20, 40])
-@pytest.mark.parametrize("name", READINGS)
-def test_a_reading_costs_less_than_posture_and_stiffness(
-    clock: Clock, name: str, joints: int
-) -> None:
-    one, q, tension = problem(joints)
-    read = READINGS[name]
-    clock.race(
-        f"{name} on top of posture + stiffness, n = {joints}: cost over both alone",
-        lambda: read(cdsm.stiffness(one.at(q), tension)),
-        lambda: cdsm.stiffness(one.at(q), tension),
-        # 1.1 to 1.6 on a busy Xeon, but for one
-        most=2.5 if (name, joints) == ("cartesian", 5) else 1.65,
-        slow_repeat=20,
-        fast_repeat=20,
     )
 
 

@@ -2,7 +2,6 @@
 
 import math
 import tomllib
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -56,16 +55,6 @@ def test_universal_cable_j_of_joint_k_has_the_hole_angle_of_the_formula(n: int, 
     assert [cable.angle for cable in geometry.cables] == pytest.approx([a for _, a in expected])
 
 
-def test_universal_holes_of_the_base_disk_are_evenly_spread() -> None:
-    angles = sorted(cable.angle for cable in cdsm.Geometry.universal(**UNIVERSAL).cables)
-    assert np.diff([*angles, angles[0] + 2.0 * math.pi]) == pytest.approx(2.0 * math.pi / 15)
-
-
-def test_universal_axes_are_y_then_z() -> None:
-    geometry = cdsm.Geometry.universal(**UNIVERSAL)
-    assert {joint.axes for joint in geometry.joints} == {((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}
-
-
 def test_hinge_k_is_turned_by_k_minus_1_twists_and_its_pair_sits_beside_it() -> None:
     twist = math.radians(30.0)
     geometry = cdsm.Geometry.hinged(**HINGED)
@@ -79,42 +68,12 @@ def test_hinge_k_is_turned_by_k_minus_1_twists_and_its_pair_sits_beside_it() -> 
         assert turns == pytest.approx([math.pi / 2.0, 3.0 * math.pi / 2.0])
 
 
-def test_long_hinged_arm_has_angles_of_many_turns_and_no_doubt_about_them() -> None:
-    sizes: dict[str, Any] = {
-        "link_length": 0.06,
-        "base_length": 0.03,
-        "disk_offset": 0.005,
-        "hole_radius": 0.02,
-    }
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        arm = cdsm.Geometry.hinged(
-            joints=30, twist=math.pi / 2, link_mass=0.05, spread=math.radians(6.0), **sizes
-        )
-    np.testing.assert_allclose(arm.joints[29].axes[0], (0.0, 0.0, 1.0), atol=1e-14)
-    assert max(cable.angle for cable in arm.cables) > 8.0 * math.pi
-
-
 def test_hinged_cables_are_evenly_spread_from_90_degrees_beside_the_axis() -> None:
     geometry = cdsm.Geometry.hinged(**HINGED, cables_per_joint=3)
     angles = [cable.angle for cable in geometry.cables[3:6]]
     psi = math.radians(30.0)
     expected = [psi + math.pi / 2.0 + 2.0 * math.pi * j / 3.0 for j in range(3)]
     assert angles == pytest.approx(expected)
-
-
-def test_uniform_arms_repeat_their_sizes() -> None:
-    geometry = cdsm.Geometry.universal(**UNIVERSAL, lead=0.7, joint_limit=0.4, name="snake")
-    assert geometry.name == "snake"
-    assert geometry.links == (cdsm.Link(length=0.04, mass=0.5),) * 5
-    assert {cable.lead for cable in geometry.cables} == {0.7}
-    assert geometry.joint_limits == (0.4,) * 5
-    assert geometry.length == pytest.approx(0.02 + 5 * 0.04)
-
-
-def test_default_limit_is_where_the_disks_touch() -> None:
-    geometry = cdsm.Geometry.universal(**UNIVERSAL)
-    assert geometry.joint_limits == pytest.approx([2.0 * math.atan(0.01 / 0.03)] * 5)
 
 
 def test_default_limit_is_never_above_80_degrees() -> None:
@@ -131,26 +90,6 @@ def test_every_link_has_a_disk_beside_each_of_its_joints() -> None:
     assert [disk.x for disk in disks] == pytest.approx([0.02 - 0.01, 0.01, 0.04 - 0.005, 0.005])
 
 
-def test_general_constructor_takes_joints_links_and_cables_that_differ() -> None:
-    geometry = mixed_arm().geometry
-    assert [len(joint.axes) for joint in geometry.joints] == [2, 1, 2]
-    assert geometry.joint_limits[1:] == (0.5, 0.4)
-    assert [cable.joint for cable in geometry.cables] == [1, 1, 1, 2, 2, 3, 3, 3, 3]
-    assert "5 degrees of freedom" in str(geometry)
-
-
-def test_numpy_numbers_and_arrays_and_lists_are_accepted() -> None:
-    plain = cdsm.Geometry.universal(**UNIVERSAL)
-    numpy = {key: np.float64(value) for key, value in SIZES.items()}
-    assert cdsm.Geometry.universal(joints=np.int64(5), cables_per_joint=3, **numpy) == plain  # type: ignore[arg-type]
-    listed = cdsm.Joint(axes=[np.array([0.0, 1.0, 0.0])], disk_offset=0.01)  # type: ignore[arg-type]
-    assert listed == cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01)
-
-
-def test_equal_geometries_are_equal_and_hash_alike() -> None:
-    assert len({cdsm.Geometry.universal(**UNIVERSAL), cdsm.Geometry.universal(**UNIVERSAL)}) == 1
-
-
 # --- TOML -----------------------------------------------------------------------------------
 
 
@@ -161,14 +100,6 @@ def test_toml_round_trip_is_exact_and_stable(geometry: cdsm.Geometry) -> None:
     again = cdsm.Geometry.from_toml(text)
     assert again == geometry
     assert again.to_toml() == text
-
-
-def test_written_file_reads_back_equal(tmp_path: Path) -> None:
-    geometry = mixed_arm().geometry
-    path = geometry.write(tmp_path / "arm.toml")
-    assert cdsm.Geometry.read(path) == geometry
-    assert path.read_bytes() == geometry.to_toml().encode()
-    assert [entry.name for entry in tmp_path.iterdir()] == ["arm.toml"]
 
 
 def test_to_toml_is_plain_toml_that_states_its_units() -> None:
@@ -189,11 +120,6 @@ def test_short_form_is_the_constructor_of_that_name(kind: str) -> None:
     assert cdsm.Geometry.from_toml("\n".join(lines)) == expected
 
 
-def test_short_form_hinged_defaults_to_pairs_as_the_constructor_does() -> None:
-    lines = ["[hinged]", *(f"{key} = {value!r}" for key, value in HINGED.items())]
-    assert cdsm.Geometry.from_toml("\n".join(lines)) == cdsm.Geometry.hinged(**HINGED)
-
-
 @pytest.mark.parametrize("lead", [0.0, 0.3])
 def test_friction_is_that_of_every_hole_which_a_cable_passes(lead: float) -> None:
     """The base disk is a hole only if there is a lead before it."""
@@ -207,11 +133,6 @@ def test_friction_is_that_of_every_hole_which_a_cable_passes(lead: float) -> Non
         assert cable.friction == (0.1,) * (2 * route.joint - (1 if lead else 2))
         assert [site.friction for site in cable.sites][-1] == 0.0
     assert not cdsm.Manipulator(general(), cdsm.LinearElasticity(5e4)).has_friction
-
-
-def test_integers_stand_for_lengths_in_toml() -> None:
-    text = general().to_toml().replace("base_length = 0.02", "base_length = 0")
-    assert cdsm.Geometry.from_toml(text).base_length == 0.0
 
 
 # --- faults ---------------------------------------------------------------------------------
@@ -229,34 +150,20 @@ def raises(said: str, make: Any, *args: Any, **keywords: Any) -> None:
     ("changes", "said"),
     [
         ({"hole_radius": 0.0}, "hole_radius: 0 m given; 1e-06 to 10000 m is needed"),
-        ({"link_length": -0.04}, "link_length: -0.04 m given"),
-        ({"link_mass": -0.5}, "link_mass: -0.5 kg given; 0, or 1e-09 to"),
         ({"friction": 2.5}, "friction: 2.5 given; 0, or 1e-06 to 2 is needed"),
         ({"link_length": math.nan}, "link_length: input should be a finite number, but is nan"),
-        ({"link_length": "0.04"}, "link_length: input should be a valid number, but is '0.04'"),
-        ({"link_mass": True}, "link_mass: input should be a valid number, but is True"),
-        ({"base_length": [1.0]}, "base_length: input should be a valid number, but is [1.0]"),
         ({"joints": 101}, "joints: input should be less than or equal to 100, but is 101"),
-        ({"joints": 2.5}, "joints: input should be a valid integer, but is 2.5"),
-        ({"cables_per_joint": 65}, "cables_per_joint: input should be less than or equal to 64"),
         ({"joint_limit": 4.0}, "joint_limit: input should be less than or equal to 3.14"),
         ({"spread": 15.0}, "spread: 15 rad given; at most one turn; convert degrees to radians"),
         ({"name": "my arm"}, "name: 'my arm' given; up to 64 of"),
         ({"hole_radious": 0.03}, "hole_radious: is not a key that is known here; did you mean"),
         ({"link_length": 0.019}, "disk_offset: too large: link 1 is 0.019 m long, its disks need"),
-        ({"link_length": 0.02}, "more than 0.02 m; and 3 more; lower disk_offset"),
-        ({"joints": 1, "link_length": 0.01}, "link 1 is 0.01 m long, its disks need more than"),
         ({"hole_radius": [0.02, 0.01]}, "hole_radius: 2 values given for 5 joints; give one"),
-        ({"hole_radius": []}, "hole_radius: 0 values given for 5 joints"),
         ({"link_mass": [0.1, 0.1, -0.1, 0.1, 0.1]}, "link_mass[3]: -0.1 kg given"),
         ({"phase": [0.1, "b", 0.1, 0.1, 0.1]}, "phase[2]: input should be a valid number"),
         ({"cables_per_joint": None}, "cables_per_joint: give it, or hole_angles, and not both"),
-        ({"hole_angles": [0.1]}, "cables_per_joint: give it, or hole_angles, and not both"),
         ({**ANGLES, "hole_angles": [[0.1], [0.2]]}, "hole_angles: 2 values given for 5 joints"),
         ({**ANGLES, "hole_angles": [[0.1], 0.2]}, "hole_angles[2]: input should be"),
-        ({**ANGLES, "hole_angles": [[0.1], []]}, "hole_angles[2]: value should have at least 1"),
-        ({**ANGLES, "hole_angles": []}, "hole_angles: value should have at least 1 item"),
-        ({**ANGLES, "hole_angles": 0.5}, "hole_angles: input should be"),
         ({"disk_radius": 0.03}, "disk_radius: too small: at joint 1 it is 0.03 m"),
         ({"cable_radius": 0.04, "disk_radius": 0.035}, "the farthest hole is at 0.04 m"),
     ],
@@ -265,33 +172,12 @@ def test_faults_of_uniform_arms_are_named(changes: dict[str, Any], said: str) ->
     raises(said, cdsm.Geometry.universal, **{**UNIVERSAL, **changes})
 
 
-ONE = cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01)
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"cables": (cdsm.CableRoute(joint=3, angle=0.0),)}, "cables[1].joint: 3 is past the last"),
-        ({"links": (cdsm.Link(length=0.04, mass=0.5),)}, "links: 1 given for 2 joints"),
-        ({"joints": (ONE,) * 101}, "joints: tuple should have at most 100 items"),
-        ({"joints": (), "links": ()}, "joints: tuple should have at least 1 item"),
-        ({"joints": (1, 2)}, "joints[2]: input should be"),
-        ({"links": 3}, "links: input should be a valid tuple, but is 3"),
-    ],
-)
-def test_faults_of_the_general_constructor_are_named(changes: dict[str, Any], said: str) -> None:
-    raises(said, general, **changes)
-
-
 @pytest.mark.parametrize(
     ("axes", "said"),
     [
         (((0.0, 1.0, 0.0), (0.0, 0.0, 0.0)), "axes[2]: has no length; give a direction"),
         (((0.0, 0.0, 1.0), (0.0, 0.0, -2.0)), "are parallel"),
-        (((0.0, 1.0),), "axes[1][3]"),
         (((0.0, math.nan, 1.0),), "axes[1][2]"),
-        (((0.0, 0.0, 1.0),) * 3, "at most 2"),
-        ((), "give them, or bending_stiffness"),
     ],
 )
 def test_joint_axes_must_be_one_or_two_independent_directions(axes: Any, said: str) -> None:
@@ -312,24 +198,15 @@ def test_all_faults_are_listed_at_once() -> None:
     assert starts == ["disk_offset", "cables[2].joint"]
 
 
-def test_values_without_keywords_are_told_to_have_them() -> None:
-    raises("8 is given without its name; give it as a keyword", cdsm.Geometry.universal, 8, 3, 0.06)
-    raises("0.06 is given without its name", cdsm.CableRoute, 8, 3, 0.06)
-
-
 # what is replaced in a TOML text, and what the message must say
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("hole_radius", "hole_radious", "hole_radious: is not a key that is known here; did you"),
         ("hole_radius", "zzz", "hole_radius: is missing"),
         ("angle = 0.1", "angel = 0.1", "cables[1].angel: is not a key"),
         ("base_length = 0.02", "base_length = 1e999", "base_length: input should be a finite"),
-        ("base_length = 0.02", "base_length = 1979-05-27", "base_length: input should be a valid"),
         ("[[0.0, 0.0, 1.0]]", "[[0.0, 0.0]]", "joints[2].axes[1][3]: is missing"),
-        ("[[0.0, 0.0, 1.0]]", "[[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]", "joints[2].axes: "),
         ("joint = 2", "joint = 7", "cables[1].joint: 7 is past the last joint, 2; give 1 to 2"),
-        ("joint = 2", f"joint = 1{'0' * 40}", "give 1 to 2"),
         ("name =", "b = = 3\nname =", "is not TOML: "),
     ],
 )
@@ -341,17 +218,11 @@ def test_faults_of_toml_are_named(old: str, new: str, said: str) -> None:
 
 NOT_A_GEOMETRY = {
     "": "holds nothing; give [universal], ",
-    "joints = [[": "is not TOML",
     "name = 'a'\nname = 'b'": "is not TOML",
     "a = " + "[" * 100_000: "is not TOML",
-    "joints = " + "[" * 300 + "]" * 300: "",
     "\n".join(f"[{'.'.join(['a'] * n)}]" for n in range(1, 400)): "",
-    "universal = 3": "universal: is 3; give a table [universal]",
     'name = "a"\n[universal]\njoints = 3\n': "name: stands outside [universal]",
     '[[cables]]\nname = "a"\n': "holds cables; give [universal], ",
-    "[universal]\n[hinged]\n": "stands outside [universal]",
-    "[hinged]": "joints: is missing",
-    "[joints]\na = 1": "joints: input should be",
 }
 
 
@@ -362,22 +233,6 @@ def test_text_that_is_no_geometry_is_a_geometry_error(text: str) -> None:
     assert str(caught.value).startswith("arm.toml: ")
     assert NOT_A_GEOMETRY[text] in str(caught.value)
     assert len(str(caught.value)) < 2000
-
-
-@pytest.mark.parametrize("text", [3, None, b"name = 'a'"])
-def test_from_toml_refuses_what_is_not_text(text: Any) -> None:
-    with pytest.raises(cdsm.InvalidInput):
-        cdsm.Geometry.from_toml(text)
-
-
-def test_faults_of_a_file_name_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "arm.toml"
-    path.write_text("[universal]\njoints = 0\n")
-    with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.read(path)
-    assert caught.value.source == str(path)
-    assert str(path) in str(caught.value)
-    assert len(caught.value.faults) == 6
 
 
 # --- files ----------------------------------------------------------------------------------
@@ -402,23 +257,6 @@ def test_file_that_cannot_be_read_is_a_file_error(
     with pytest.raises(cdsm.FileError, match=said) as caught:
         cdsm.Geometry.read(path)
     assert caught.value.path == str(path)
-
-
-@pytest.mark.parametrize("path", ["a\0b", "x" * 5000, "", ".", 3, None])
-def test_path_that_cannot_be_is_a_cdsm_error(path: Any) -> None:
-    with pytest.raises(cdsm.CdsmError):
-        cdsm.Geometry.read(path)
-    with pytest.raises(cdsm.CdsmError):
-        general().write(path)
-
-
-def test_nothing_is_written_into_a_missing_folder_or_onto_a_folder(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match="does not exist; create it"):
-        general().write(tmp_path / "nowhere" / "arm.toml")
-    (tmp_path / "arm.toml").mkdir()
-    with pytest.raises(cdsm.FileError, match="not a regular file"):
-        general().write(tmp_path / "arm.toml")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["arm.toml"]
 
 
 def test_failed_write_leaves_the_earlier_file_and_nothing_beside_it(

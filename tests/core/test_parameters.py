@@ -1,7 +1,6 @@
 """An arm as a function of parameters by name."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -76,18 +75,6 @@ def test_bad_values_are_refused() -> None:
     free = cdsm.Manipulator.from_urdf(ARM.urdf, ARM.cables, tip="tool0")
     with pytest.raises(cdsm.InvalidInput, match="geometry"):
         cdsm.ArmParameters(free, ("lead",))
-
-
-def test_leads_that_are_not_those_of_the_geometry_are_refused() -> None:
-    cables = [replace(each, lead=each.lead + 0.1 * (i == 1)) for i, each in enumerate(ARM.cables)]
-    with pytest.raises(cdsm.InvalidInput, match=f"lead or the holes of {cables[1].name} are not"):
-        cdsm.ArmParameters(ARM.with_cables(cables), ("lead",))
-
-
-def test_the_arm_keeps_its_tolerances() -> None:
-    tolerances = cdsm.Tolerances(lead=1e-3)
-    arm = ARM.with_tolerances(tolerances)
-    assert cdsm.ArmParameters(arm, ("lead",))(lead=0.2).tolerances == tolerances
 
 
 def test_a_cable_has_parameters_of_its_own() -> None:

@@ -1,24 +1,17 @@
 """Stiffness: singular, unstable, and infinite in some direction."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.linalg
 
 import cdsm
-from cdsm.posture import load_stiffness
-from cdsm.support.values import Array
 from tests.support.arms import (
     STEEL,
-    mixed_arm,
     random_arm,
     random_posture,
     random_tension,
-    random_wrench,
 )
-from tests.support.foreign import POSTURE, crab
 
 ARM = random_arm(1, 3)
 POSE = random_posture(ARM, 1)
@@ -71,35 +64,6 @@ def test_stiffness_on_the_brink_of_buckling_is_singular_and_still_prints() -> No
     assert np.isfinite(brittle.pseudoinverse()).all()
 
 
-def led(arm: cdsm.Manipulator) -> cdsm.Manipulator:
-    """The arm with leads of 5 m, which let tension buckle it."""
-    assert arm.geometry is not None
-    cables = [replace(cable, lead=5.0) for cable in arm.geometry.cables]
-    geometry = replace(arm.geometry, cables=tuple(cables))
-    return cdsm.Manipulator(geometry, arm.cables[0].elasticity, gravity=arm.gravity)
-
-
-def test_one_joint_on_the_brink_is_singular_though_its_stiffness_is_the_largest_there_is() -> None:
-    """The parts of its K_θ cancel to some digits, and no more of its inverse is known."""
-    arm = led(random_arm(3, 1, "hinged", cdsm.LinearElasticity(50.0)))
-    pose = cdsm.Manipulator(arm.geometry, arm.cables[0].elasticity, gravity=np.zeros(3)).at([0.1])
-    # k = (EA + F)/L, so that K_θ is affine in F
-    slack, unit = (float(cdsm.stiffness(pose, np.full(2, F)).joint[0, 0]) for F in (0.0, 1.0))
-    critical = slack / (slack - unit)
-    for off, digits in ((1e-10, 6), (1e-5, 11)):
-        F = np.full((1, 2), critical * (1.0 - off))
-        K = cdsm.stiffness(pose, F[0])
-        assert K.margin == pytest.approx(off * slack, rel=1e-4)
-        batch = cdsm.evaluate(pose.arm, [pose.q], F, outputs=("compliance",))
-        if digits > 6:
-            assert batch.ok.all()
-            np.testing.assert_allclose(batch["compliance"][0], K.compliance, rtol=1e-10)
-            continue
-        assert batch.status[0] == cdsm.Status.SINGULAR
-        with pytest.raises(cdsm.SingularStiffness, match="just about to buckle"):
-            _ = K.compliance
-
-
 def test_a_joint_held_by_nothing_has_no_compliance() -> None:
     geometry = cdsm.Geometry(
         name="flat",
@@ -117,59 +81,6 @@ def test_a_joint_held_by_nothing_has_no_compliance() -> None:
     np.testing.assert_array_equal(caught.value.direction, [1.0, 0.0])
     batch = cdsm.evaluate(pose.arm, [pose.q], F[None], outputs=("compliance",))
     assert batch.status[0] == cdsm.Status.SINGULAR
-
-
-def test_batch_finds_every_singular_stiffness_that_the_single_posture_does() -> None:
-    """Though pivots need not be small where K_θ is singular."""
-    for seed in range(12):
-        arm = led(random_arm(seed, 5, "hinged", cdsm.LinearElasticity(2e3)))
-        pose = random_posture(arm, seed)
-        unit = random_tension(arm, seed)
-        rest = cdsm.stiffness(pose, 0.0 * unit).joint
-        change = cdsm.stiffness(pose, unit).joint - rest  # k = (EA + F)/L: affine in F
-        factors = scipy.linalg.eigvals(rest, -change)
-        scale = float(factors.real[abs(factors.imag) < 1e-9 * abs(factors)].max())
-        F = scale * (1.0 + 1e-10) * unit
-        with pytest.raises(cdsm.SingularStiffness):
-            _ = cdsm.stiffness(pose, F).compliance
-        batch = cdsm.evaluate(arm, [pose.q], F, outputs=("compliance",))
-        assert batch.status[0] == cdsm.Status.SINGULAR
-
-
-def test_unstable_stiffness_says_so() -> None:
-    pose = soft_posture()
-    tension = random_tension(pose.arm, 1)
-    slack, tight = (cdsm.stiffness(pose, scale * tension) for scale in (1e-6, 100.0))
-    assert slack.is_stable
-    assert slack.margin > 0.0
-    assert "UNSTABLE" not in str(slack) + repr(slack)
-    assert not tight.is_stable
-    assert tight.margin < 0.0
-    for text in (str(tight), repr(tight)):
-        assert "UNSTABLE" in text
-    assert np.isfinite(tight.compliance).all()
-
-
-def test_direction_the_tip_cannot_move_in_is_infinitely_stiff() -> None:
-    straight = ARM.at(np.zeros(6))
-    stiff = cdsm.stiffness(straight, cdsm.distribute_tension(straight, minimum=10.0))
-    assert stiff.along((1.0, 0.0, 0.0)) == INF
-    for call, remedy in (
-        (lambda: stiff.cartesian, "Use along"),
-        (lambda: stiff.pseudoinverse(), "Use along"),
-        (lambda: stiff.shares((1.0, 0.0, 0.0)), "infinite"),
-    ):
-        with pytest.raises(cdsm.SingularStiffness, match=remedy) as caught:
-            call()
-        assert abs(caught.value.direction) == pytest.approx([1.0, 0.0, 0.0])
-    assert "inf" in str(stiff)
-    assert "nan" not in str(stiff)
-
-
-def test_however_little_negative_a_stiffness_is_the_arm_is_unstable() -> None:
-    for margin, stable in ((-1e-9, False), (0.0, False), (1e-9, True)):
-        stiff = replace(K, joint=margin * np.eye(ARM.nv))
-        assert (stiff.margin, stiff.is_stable) == (margin, stable)
 
 
 def nearly_flat(size: float) -> cdsm.Stiffness:
@@ -193,28 +104,3 @@ def test_cartesian_stiffness_is_accurate_up_to_where_it_is_refused() -> None:
             with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
                 read()
         assert np.isfinite(stiff.along((0.0, 1.0, 0.0)))
-
-
-@pytest.mark.parametrize("pose", [POSE, random_posture(mixed_arm(), 3), crab().at(POSTURE)])
-@pytest.mark.parametrize("wrench", [random_wrench(4), random_wrench(4, moment=False)])
-def test_load_term_is_the_derivative_of_the_torques_of_the_load(
-    pose: cdsm.Posture, wrench: Array
-) -> None:
-    load = load_stiffness(pose.jacobian, wrench, pose.arm._body.tip_joints)
-    step = 1e-5
-    for i, row in enumerate(step * np.eye(pose.arm.nv)):
-        after, before = (pose.arm.at(q, check_limits=False) for q in (pose.q + row, pose.q - row))
-        change = wrench @ (before.jacobian - after.jacobian) / (2.0 * step)
-        np.testing.assert_allclose(load[:, i], change, atol=1e-9 * float(np.linalg.norm(wrench)))
-    K = cdsm.stiffness(pose, np.full(len(pose.arm.cables), 5.0), wrench)
-    np.testing.assert_allclose(load, K.load, atol=1e-14 * float(np.linalg.norm(wrench)))
-    if not wrench[3:].any():
-        np.testing.assert_array_equal(load, load.T)
-
-
-def test_what_does_not_exist_is_none_in_json() -> None:
-    told = cdsm.stiffness(ARM.at(np.zeros(6)), np.full(len(ARM.cables), 50.0)).to_dict()
-    assert told["along_N_per_m"][0] is None  # type: ignore[index]
-    assert told["cartesian_N_per_m"] is None
-    assert told["pseudoinverse_N_per_m"] is None
-    assert told["compliance"] is not None

@@ -6,7 +6,7 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from cdsm.support.tables import name_and_unit, read_table
+from cdsm.support.tables import read_table
 
 
 def refuse(problem: str) -> NoReturn:
@@ -42,11 +42,3 @@ def test_a_cell_that_is_no_number_is_refused_with_its_line(
     path.write_text(f"a\n\n{cell}\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"line 3: '.*' is not a finite number"):
         read_table(path).column(at, refuse)
-
-
-@pytest.mark.parametrize(
-    ("cell", "parts"),
-    [("x [mm]", ("x", "mm")), ("joint1[deg]", ("joint1", "deg")), ("force", ("force", ""))],
-)
-def test_units_stand_in_brackets(cell: str, parts: tuple[str, str]) -> None:
-    assert name_and_unit(cell) == parts

@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import qpsolvers
-from scipy.optimize import linprog
 
 import cdsm
 from cdsm.support.values import Array
-from cdsm.tension.solvers import OPTIMALITY, nondimensional, violation
 from tests.support.arms import (
     STEEL,
     random_arm,
@@ -21,37 +19,12 @@ from tests.support.arms import (
 
 ARM = random_arm(1, 3)
 POSE = random_posture(ARM, 1)
-C = len(ARM.cables)
 NAN, INF = math.nan, math.inf
 
 
 def torque_of(pose: cdsm.Posture, wrench: Array) -> Array:
     """τ of Eq. 13: what the cables have to exert."""
     return wrench @ pose.jacobian - pose.gravity_torque
-
-
-def least_missing(pose: cdsm.Posture, low: Array, high: Array, wrench: Array) -> float:
-    """A proven lower bound of Σ|τ − J_Lᵀ F|, from the dual linear program.
-
-    For any y with |y_i| <= 1 and any F within the bounds, Σ|τ − J_Lᵀ F| >= y·τ − (J_L y)·F, and
-    with J_L y = p − n, p and n >= 0, that is at least y·τ − high·p + low·n.
-    """
-    tau, J = torque_of(pose, wrench), pose.length_jacobian
-    count, nv = J.shape
-    bounded = np.isfinite(high)
-    best = linprog(
-        np.concatenate([-tau, np.where(bounded, high, 0.0), -low]),
-        A_eq=np.hstack([J, -np.eye(count), np.eye(count)]),
-        b_eq=np.zeros(count),
-        bounds=[
-            *[(-1.0, 1.0)] * nv,
-            *[(0.0, None) if b else (0.0, 0.0) for b in bounded],
-            *[(0.0, None)] * count,
-        ],
-        method="highs",
-    )
-    assert best.status == 0
-    return -float(best.fun)
 
 
 def refused(
@@ -62,29 +35,7 @@ def refused(
     return caught.value
 
 
-def check_missing(
-    error: cdsm.InfeasibleTension, pose: cdsm.Posture, low: Array, high: Array, wrench: Array
-) -> None:
-    """``missing`` is attained by tensions within the bounds, and no tensions do better."""
-    tau, J = torque_of(pose, wrench), pose.length_jacobian
-    count, nv = J.shape
-    # variables: F, then the largest |J_Lᵀ F − (τ − missing)|
-    attained = linprog(
-        np.append(np.zeros(count), 1.0),
-        A_ub=np.vstack([np.hstack([J.T, -np.ones((nv, 1))]), np.hstack([-J.T, -np.ones((nv, 1))])]),
-        b_ub=np.concatenate([tau - error.missing, error.missing - tau]),
-        bounds=[*zip(low, high, strict=True), (0.0, None)],
-        method="highs",
-    )
-    assert attained.status == 0
-    assert attained.fun < 1e-9
-    assert abs(error.missing).sum() == pytest.approx(least_missing(pose, low, high, wrench), 1e-9)
-    assert error.joint == pose.arm.joint_names[int(abs(error.missing).argmax())]
-    assert f"at {error.joint}" in str(error)
-    assert not error.missing.flags.writeable
-
-
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_bounds_too_tight_say_what_is_missing_and_how_far_to_widen(seed: int) -> None:
     pose = random_posture(random_arm(seed, 3), seed)
     count = len(pose.arm.cables)
@@ -92,7 +43,6 @@ def test_bounds_too_tight_say_what_is_missing_and_how_far_to_widen(seed: int) ->
     high = low + 0.5
     wrench = random_wrench(seed)
     error = refused(pose, low, high, wrench)
-    check_missing(error, pose, low, high, wrench)
     assert 0.0 < error.relaxation < INF
     assert set(error.binding) <= {cable.name for cable in pose.arm.cables}
     assert "lower minimum=" in str(error)
@@ -106,27 +56,6 @@ def test_bounds_too_tight_say_what_is_missing_and_how_far_to_widen(seed: int) ->
     assert abs(pull.residual).max() < 1e-9
     less = 0.9 * error.relaxation
     refused(pose, np.maximum(low - less, 0.0), high + less, wrench)
-
-
-def test_cables_that_stand_at_either_bound_are_named() -> None:
-    arm = cdsm.Manipulator(cdsm.presets.experimental_prototype_geometry(), STEEL)
-    pose = arm.at(np.zeros(3))
-    # nothing but its own pair reaches the last joint, and nearly the same tension balances it
-    low, high = np.full(6, 20.0), np.full(6, 400.0)
-    low[4], high[5] = 300.0, 30.0
-    with pytest.raises(cdsm.InfeasibleTension) as caught:
-        cdsm.distribute_tension(pose, low, high)
-    assert set(caught.value.binding) >= {"cable3_1", "cable3_2"}
-    assert "cable3_1" in str(caught.value)
-
-
-def test_only_the_upper_bound_may_be_too_tight() -> None:
-    wrench = np.array([0.0, 0.0, 50.0, 0.0, 0.0, 0.0])
-    low, high = np.zeros(C), np.full(C, 1.0)
-    error = refused(POSE, low, high, wrench)
-    check_missing(error, POSE, low, high, wrench)
-    cdsm.distribute_tension(POSE, 0.0, 1.0 + error.relaxation * (1.0 + 1e-6), wrench)
-    refused(POSE, low, high + 0.9 * error.relaxation, wrench)
 
 
 def weak_arm() -> cdsm.Manipulator:
@@ -152,32 +81,8 @@ def test_torque_the_cables_cannot_exert_at_all_has_no_relaxation(
     low, high, wrench = np.zeros(3), np.full(3, maximum), np.zeros(6)
     error = refused(pose, low, high, wrench, solver)
     assert error.relaxation == INF
-    check_missing(error, pose, low, high, wrench)
     for part in ("No bounds would help", "Change the posture, the load, or the routing"):
         assert part in str(error)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_torque_missing_by_less_than_linear_programs_care_for_is_named(seed: int) -> None:
-    """Nobody claims then that there are tensions after all."""
-    pose = random_posture(random_arm(seed, 3), seed)
-    J, count = pose.length_jacobian, len(pose.arm.cables)
-    size = abs(J).max()
-    # the least upper bound of all cables that balances the arm
-    found = linprog(
-        np.append(np.zeros(count), 1.0),
-        A_ub=np.column_stack([np.eye(count), -np.ones(count)]),
-        b_ub=np.zeros(count),
-        A_eq=np.column_stack([J.T / size, np.zeros(pose.arm.nv)]),
-        b_eq=-pose.gravity_torque / size,
-        bounds=[*[(20.0, None)] * count, (0.0, None)],
-    )
-    bound = float(found.x[-1])
-    assert cdsm.distribute_tension(pose, 20.0, bound * (1.0 + 1e-8)).values.max() <= bound * 1.1
-    with pytest.raises(cdsm.InfeasibleTension) as caught:
-        cdsm.distribute_tension(pose, 20.0, bound * (1.0 - 1e-8))
-    assert 0.0 < abs(caught.value.missing).max() < 1e-6
-    assert caught.value.relaxation == pytest.approx(1e-8 * bound, rel=1.0)
 
 
 def test_a_slight_torque_that_no_cable_exerts_is_missing_all_the_same() -> None:
@@ -202,29 +107,6 @@ def test_a_solver_that_calls_the_infeasible_optimal_is_not_believed() -> None:
     for y, z in ((-0.0955, -0.4484), (0.1, 0.2), (-0.3, 0.05), (0.2, -0.6)):
         with pytest.raises(cdsm.InfeasibleTension):
             cdsm.distribute_tension(cdsm.Manipulator(geometry, STEEL).at([y, z]))
-
-
-@pytest.mark.parametrize("solver", ["daqp", "osqp", "clarabel"])
-@pytest.mark.parametrize("seed", range(4))
-def test_tensions_meet_the_optimality_conditions(seed: int, solver: str) -> None:
-    """With multipliers of least squares, not the solver's: z = −F − J_L y, by sign at a bound."""
-    pose = random_posture(random_arm(seed, 3), seed)
-    wrench, (low, high) = random_wrench(seed), (10.0, 80.0)
-    pull = cdsm.distribute_tension(pose, low, high, wrench, solver)
-    F, J = pull.values, pose.length_jacobian
-    assert abs(pull.residual).max() < 1e-9 * abs(J).max() * F.max()
-    assert low <= F.min() <= F.max() <= high
-    free = (low < F) & (high > F)
-    assert 0 < free.sum() < free.size
-    y = np.linalg.lstsq(J[free], -F[free])[0]
-    z = -F - J @ y
-    rounding = 1e-9 * F.max()
-    assert abs(z[free]).max() < rounding
-    assert (z[low == F] < rounding).all()
-    assert (z[high == F] > -rounding).all()
-    assert pull.solver == solver
-    exact = cdsm.distribute_tension(pose, low, high, wrench).values
-    np.testing.assert_allclose(F, exact, rtol=1e-9)
 
 
 def hinge(pairs: int = 1) -> cdsm.Posture:
@@ -262,38 +144,6 @@ def test_closed_form_of_a_hinge() -> None:
             expected[int(pulls.argmax())] = 14.0
             np.testing.assert_allclose(fixed.values, expected, rtol=1e-12)
             assert fixed[held] == 14.0
-
-
-@pytest.mark.parametrize("solver", ["osqp", "clarabel"])
-def test_infeasible_and_feasible_agree_between_solvers(solver: str) -> None:
-    wrench = np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])
-    one, other = (
-        refused(POSE, np.zeros(C), np.full(C, 0.5), wrench, each) for each in ("daqp", solver)
-    )
-    assert one.relaxation == pytest.approx(other.relaxation)
-    np.testing.assert_allclose(one.missing, other.missing)
-
-
-def test_every_optimality_condition_is_checked() -> None:
-    low, high = np.full(C, 10.0), np.full(C, 60.0)
-    J, tau = POSE.length_jacobian, torque_of(POSE, np.array([0.0, 0.0, 9.0, 0.0, 0.0, 0.0]))
-    problem = nondimensional(J, tau, low, high, ARM.length)
-    x = cdsm.distribute_tension(POSE, low, high, (0.0, 0.0, 9.0, 0.0, 0.0, 0.0)).values
-    x = x / problem.force
-    free = (problem.low < x) & (x < problem.high)
-    y = np.asarray(np.linalg.lstsq(problem.A[:, free].T, -x[free])[0], dtype=np.float64)
-    assert violation(problem, x, y) < 1e-12
-    null = np.linalg.svd(problem.A)[2][-1]
-    one = np.eye(C)[int(x.argmax())]
-    loose = problem._replace(low=problem.low - 0.1)
-    for wrong in (
-        (problem, x + 1e-3 * null, y),  # not the least
-        (problem, x + 1e-3 * one, y),  # not balanced
-        (problem, x, y + 1e-3),  # multipliers of another point
-        (loose, x, y),  # a bound that does not press
-    ):
-        assert violation(*wrong) > OPTIMALITY
-    assert math.isnan(violation(problem, x * NAN, y))
 
 
 def lie(solution: qpsolvers.Solution, how: str) -> qpsolvers.Solution:
@@ -338,18 +188,6 @@ def test_solver_that_calls_a_wrong_point_optimal_is_caught(
     found = re.search(r"tensions of up to (\S+) N", str(caught.value))
     assert found is not None
     assert 10.0 <= float(found[1]) <= 500.0
-
-
-def test_solver_that_raises_is_reported_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(*_: object, **__: object) -> qpsolvers.Solution:
-        raise RuntimeError("out of cheese")
-
-    monkeypatch.setattr(qpsolvers, "solve_problem", failing)
-    with pytest.raises(cdsm.CdsmError, match=r"'osqp' failed: out of cheese.*daqp") as caught:
-        cdsm.distribute_tension(POSE, solver="osqp")
-    assert isinstance(caught.value.__cause__, RuntimeError)
-    with pytest.raises(cdsm.InvalidInput, match="installed solver"):
-        cdsm.distribute_tension(POSE, solver="simplex")
 
 
 def test_the_rule_that_is_too_narrow_is_named() -> None:

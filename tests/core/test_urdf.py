@@ -6,9 +6,7 @@ import subprocess
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -16,7 +14,7 @@ import yourdfpy
 
 import cdsm
 from cdsm.support.values import Array
-from cdsm.urdf import CROSS_INERTIA, CROSS_MASS
+from cdsm.urdf import CROSS_MASS
 from tests.support.arms import mixed_arm, random_arm
 from tests.support.patience import HANGS
 
@@ -44,9 +42,6 @@ ARMS: dict[str, cdsm.Geometry] = {
 }
 
 CHECK_URDF = shutil.which("check_urdf")
-needs_check_urdf = pytest.mark.skipif(
-    CHECK_URDF is None, reason="check_urdf (Debian: liburdfdom-tools) is not installed"
-)
 
 
 def eq1(alpha: float, a: float, theta: float) -> Array:
@@ -116,8 +111,8 @@ def numbers(text: str) -> list[float]:
 # --- kinematics -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("joints", [1, 2, 5, 10])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("joints", [1, 2, 5])
+@pytest.mark.parametrize("seed", range(3))
 def test_tip_is_eqs_1_to_4_with_table_1(joints: int, seed: int) -> None:
     arm = random_arm(seed, joints)
     rng = np.random.default_rng([seed, joints, 7])
@@ -125,22 +120,6 @@ def test_tip_is_eqs_1_to_4_with_table_1(joints: int, seed: int) -> None:
     expected = eq3(arm.geometry, q)
     np.testing.assert_allclose(pinocchio_tip(arm.urdf, q), expected, rtol=0.0, atol=1e-14)
     np.testing.assert_allclose(arm.at(q).tip, expected, rtol=0.0, atol=1e-14)
-
-
-def test_tip_of_unequal_links_is_eqs_1_to_4_at_any_angle() -> None:
-    rng = np.random.default_rng(3)
-    joint = cdsm.Joint(axes=((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), disk_offset=0.01)
-    geometry = cdsm.Geometry(
-        base_length=0.07,
-        hole_radius=0.03,
-        joints=(joint,) * 4,
-        links=tuple(cdsm.Link(length=0.03 + 0.05 * u, mass=0.1) for u in rng.random(4)),
-        cables=(cdsm.CableRoute(joint=4, angle=0.0),),
-    )
-    for q in rng.uniform(-math.pi, math.pi, (20, 8)):
-        np.testing.assert_allclose(
-            pinocchio_tip(cdsm.to_urdf(geometry), q), eq3(geometry, q), rtol=0.0, atol=1e-14
-        )
 
 
 def test_hinge_k_turns_about_its_own_twisted_axis() -> None:
@@ -189,44 +168,7 @@ def test_yourdfpy_and_pinocchio_agree_on_every_link(name: str, tmp_path: Path) -
         )
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_mujoco_loads_it_and_places_the_last_link_alike(name: str) -> None:
-    geometry = ARMS[name]
-    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(1e5))
-    model = mujoco.MjModel.from_xml_string(arm.urdf)
-    assert model.nq == arm.nv
-    data = mujoco.MjData(model)
-    q = np.random.default_rng(0).uniform(-0.3, 0.3, arm.nv)
-    data.qpos[:] = q
-    mujoco.mj_kinematics(model, data)
-    last = f"link{len(geometry.links)}"
-    pose = arm.at(q, check_limits=False).link_pose(last)
-    np.testing.assert_allclose(data.body(last).xpos, pose[:3, 3], rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(
-        data.body(last).xmat.reshape(3, 3), pose[:3, :3], rtol=0.0, atol=1e-13
-    )
-
-
 # --- what is in the file --------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ARMS)
-def test_same_geometry_gives_the_same_bytes(name: str, tmp_path: Path) -> None:
-    geometry = ARMS[name]
-    again = cdsm.Geometry.from_toml(geometry.to_toml())
-    assert cdsm.to_urdf(again) == cdsm.to_urdf(geometry)
-    path = cdsm.write_urdf(geometry, tmp_path / "arm.urdf")
-    assert path.read_bytes() == cdsm.to_urdf(geometry).encode()
-    assert [entry.name for entry in tmp_path.iterdir()] == ["arm.urdf"]
-
-
-def test_names_of_a_universal_arm() -> None:
-    geometry = random_arm(1, 3).geometry
-    links = ["cross1", "link1", "cross2", "link2", "cross3", "link3"]
-    assert list(elements(geometry, "link")) == ["base_link", "base_disk", *links, "tool0"]
-    joints = [f"joint{k}_{i}" for k in (1, 2, 3) for i in (1, 2)]
-    assert list(elements(geometry, "joint")) == ["base_joint", *joints, "tool0_joint"]
-    assert ET.fromstring(cdsm.to_urdf(geometry)).attrib["name"] == geometry.name
 
 
 def test_names_of_a_mixed_arm() -> None:
@@ -264,21 +206,14 @@ def test_limits_are_those_of_the_geometry(name: str) -> None:
         assert float(written["velocity"]) > 0.0
 
 
-def test_axes_are_unit_vectors_along_those_of_the_geometry() -> None:
-    geometry = mixed_arm().geometry
-    axes = [axis for joint in geometry.joints for axis in joint.axes]
-    moving = list(elements(geometry, "joint").values())[1:-1]
-    for joint, axis in zip(moving, axes, strict=True):
-        written = numbers(child(joint, "axis").attrib["xyz"])
-        np.testing.assert_allclose(written, np.array(axis) / math.hypot(*axis), atol=1e-15)
-
-
-def test_link_is_a_solid_cylinder_of_the_hole_radius_about_mid_link() -> None:
+def test_link_is_a_solid_cylinder_of_the_hole_radius_about_mid_link_or_a_milligram() -> None:
     geometry = mixed_arm().geometry
     links = elements(geometry, "link")
     R = geometry.hole_radius
     for k, link in enumerate(geometry.links, start=1):
         if link.mass == 0.0:
+            mass = child(links[f"link{k}"], "inertial/mass")
+            assert float(mass.attrib["value"]) == CROSS_MASS == 1e-6
             continue
         inertial = child(links[f"link{k}"], "inertial")
         origin = child(inertial, "origin").attrib
@@ -292,168 +227,22 @@ def test_link_is_a_solid_cylinder_of_the_hole_radius_about_mid_link() -> None:
         assert inertia["ixy"] == inertia["ixz"] == inertia["iyz"] == 0.0
 
 
-def test_crosses_and_massless_links_carry_a_milligram() -> None:
-    links = elements(mixed_arm().geometry, "link")
-    for name in ("cross1", "cross3", "link2"):
-        inertial = child(links[name], "inertial")
-        assert float(child(inertial, "mass").attrib["value"]) == CROSS_MASS == 1e-6
-        inertia = child(inertial, "inertia").attrib
-        assert [float(inertia[key]) for key in ("ixx", "iyy", "izz")] == [CROSS_INERTIA] * 3
-
-
-def test_base_and_tip_have_no_inertia() -> None:
-    links = elements(mixed_arm().geometry, "link")
-    assert len(links["base_link"]) == 0
-    assert len(links["tool0"]) == 0
-    assert links["base_disk"].find("inertial") is None
-    assert pin.buildModelFromXML(mixed_arm().urdf).inertias[0].mass == 0.0
-
-
-@pytest.mark.parametrize("name", ARMS)
-def test_total_mass_is_that_of_links_and_crosses(name: str) -> None:
-    geometry = ARMS[name]
-    light = sum(len(joint.axes) - 1 for joint in geometry.joints)
-    light += sum(link.mass == 0.0 for link in geometry.links)
-    expected = sum(link.mass for link in geometry.links) + light * 1e-6
-    model = pin.buildModelFromXML(cdsm.to_urdf(geometry))
-    assert pin.computeTotalMass(model) == pytest.approx(expected, rel=1e-14)
-
-
-def test_disks_are_drawn_where_the_geometry_has_them() -> None:
-    geometry = mixed_arm().geometry
-    links = elements(geometry, "link")
-    for name in {disk.link for disk in geometry.disks}:
-        places = [disk.x for disk in geometry.disks if disk.link == name]
-        drawn = [
-            numbers(child(visual, "origin").attrib["xyz"])[0]
-            for visual in links[name].findall("visual")
-            if child(visual, "material").attrib["name"] == "disk"
-        ]
-        assert drawn == pytest.approx(places)
-
-
-@pytest.mark.parametrize("name", ARMS)
-def test_there_is_no_doctype_no_entity_and_no_collision_shape(name: str) -> None:
-    text = cdsm.to_urdf(ARMS[name])
-    assert text.startswith("<?xml version='1.0' encoding='UTF-8'?>\n<robot ")
-    assert "<!DOCTYPE" not in text
-    assert "<!ENTITY" not in text
-    assert "<collision" not in text
-    assert text.endswith("</robot>\n")
-
-
-# --- other programs -------------------------------------------------------------------------
-
-
-def check_urdf(path: Path) -> str:
-    assert CHECK_URDF is not None
-    done = subprocess.run(
-        [CHECK_URDF, str(path)], capture_output=True, text=True, timeout=HANGS, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "Error" not in done.stderr
-    return done.stdout
-
-
-@needs_check_urdf
-@pytest.mark.parametrize("name", ARMS)
-def test_check_urdf_accepts_it(name: str, tmp_path: Path) -> None:
-    said = check_urdf(cdsm.write_urdf(ARMS[name], tmp_path / "arm.urdf"))
-    assert "Successfully Parsed XML" in said
-    assert "root Link: base_link has 1 child" in said
-
-
-@needs_check_urdf
-@pytest.mark.parametrize("name", PRESETS)
-def test_check_urdf_accepts_the_shipped_file(name: str) -> None:
-    check_urdf(ROOT / "urdf" / f"{name}.urdf")
-
-
-@pytest.mark.slow
-def test_hundred_universal_joints_survive_the_parsers(tmp_path: Path) -> None:
-    geometry = cdsm.Geometry.universal(
-        joints=100,
-        cables_per_joint=1,
-        link_length=0.01,
-        base_length=0.01,
-        disk_offset=0.002,
-        hole_radius=0.01,
-        link_mass=0.01,
-    )
-    assert pin.buildModelFromUrdf(cdsm.write_urdf(geometry, tmp_path / "arm.urdf")).nv == 200
-
-
 # --- reading back ---------------------------------------------------------------------------
 
 
-def read_another(monkeypatch: pytest.MonkeyPatch, other: Path) -> None:
-    """Let yourdfpy read another file than it is asked to."""
+def test_disagreement_on_reading_back_is_reported_and_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    geometry, path, other = mixed_arm().geometry, tmp_path / "arm.urdf", tmp_path / "other.urdf"
+    path.write_text("what was there")
+    other.write_text(cdsm.to_urdf(geometry.replace(base_length=0.03000001)))
     load = yourdfpy.URDF.load
     monkeypatch.setattr(
         yourdfpy.URDF, "load", staticmethod(lambda _, **options: load(str(other), **options))
     )
-
-
-def longer(geometry: cdsm.Geometry) -> cdsm.Geometry:
-    text = geometry.to_toml()
-    return cdsm.Geometry.from_toml(text.replace("base_length = 0.03", "base_length = 0.03000001"))
-
-
-@pytest.mark.parametrize("existing", [False, True])
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (longer, "disagree on the pose of the tip by 1e-08"),
-        (lambda _: random_arm(1, 3).geometry, "reads the links"),
-    ],
-)
-def test_disagreement_on_reading_back_is_reported_and_nothing_is_written(
-    change: Callable[[cdsm.Geometry], cdsm.Geometry],
-    said: str,
-    existing: bool,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    folder = tmp_path / "out"
-    folder.mkdir()
-    path = folder / "arm.urdf"
-    if existing:
-        path.write_text("what was there")
-    geometry = mixed_arm().geometry
-    other = tmp_path / "other.urdf"
-    other.write_text(cdsm.to_urdf(change(geometry)))
-    read_another(monkeypatch, other)
-    with pytest.raises(cdsm.GeometryError, match=said):
+    with pytest.raises(cdsm.GeometryError, match="disagree on the pose of the tip by 1e-08"):
         cdsm.write_urdf(geometry, path)
-    assert [entry.name for entry in folder.iterdir()] == (["arm.urdf"] if existing else [])
-    if existing:
-        assert path.read_text() == "what was there"
-
-
-def test_urdf_that_pinocchio_refuses_is_not_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cdsm.urdf, "to_urdf", lambda _: "<robot name='a'/>")
-    with pytest.raises(cdsm.GeometryError, match="Pinocchio does not accept"):
-        cdsm.write_urdf(mixed_arm().geometry, tmp_path / "arm.urdf")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_urdf_into_a_missing_folder_or_onto_a_folder_is_a_file_error(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match="does not exist; create it"):
-        cdsm.write_urdf(mixed_arm().geometry, tmp_path / "nowhere" / "arm.urdf")
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(cdsm.FileError, match="not a regular file"):
-        cdsm.write_urdf(mixed_arm().geometry, tmp_path / "folder")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]
-
-
-@pytest.mark.parametrize("given", [3, None, "arm.toml"])
-def test_urdf_of_what_is_no_geometry_is_refused(given: Any, tmp_path: Path) -> None:
-    with pytest.raises(cdsm.CdsmError):
-        cdsm.to_urdf(given)
-    with pytest.raises(cdsm.CdsmError):
-        cdsm.write_urdf(given, tmp_path / "arm.urdf")
+    assert path.read_text() == "what was there"
 
 
 # --- shipped files --------------------------------------------------------------------------
@@ -465,10 +254,7 @@ def test_shipped_files_are_what_the_generator_writes(name: str, tmp_path: Path) 
     shipped = ROOT / "urdf"
     toml = geometry.write(tmp_path / f"{name}.toml")
     urdf = cdsm.write_urdf(geometry, tmp_path / f"{name}.urdf")
+    if CHECK_URDF:  # Debian: liburdfdom-tools
+        subprocess.run([CHECK_URDF, str(urdf)], capture_output=True, timeout=HANGS, check=True)
     assert (shipped / toml.name).read_bytes() == toml.read_bytes()
     assert (shipped / urdf.name).read_bytes() == urdf.read_bytes()
-
-
-def test_shipped_folder_holds_the_presets() -> None:
-    expected = {f"{name}.{kind}" for name in PRESETS for kind in ("toml", "urdf")}
-    assert expected <= {entry.name for entry in (ROOT / "urdf").iterdir()}

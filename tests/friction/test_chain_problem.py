@@ -5,12 +5,10 @@ import math
 from dataclasses import replace
 from typing import NamedTuple
 
-import clarabel
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.sparse import csc_matrix
 
 import cdsm
 from cdsm.friction.capstan import ChainProblem
@@ -107,53 +105,15 @@ def check_optimality(chains: Chains) -> tuple[int, int]:
 
 
 def test_random_chains_meet_the_optimality_conditions() -> None:
-    slack, sliding = check_optimality(random_chains(0, 3000))
-    assert slack > 100
-    assert sliding > 3000
+    slack, sliding = check_optimality(random_chains(0, 800))
+    assert slack > 25
+    assert sliding > 800
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(1, 26))
-def test_a_hundred_thousand_chains_meet_the_optimality_conditions(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_twenty_thousand_chains_meet_the_optimality_conditions(seed: int) -> None:
     check_optimality(random_chains(seed, 4000, most=24))
-
-
-def test_interior_point_solver_comes_to_the_same_tensions() -> None:
-    """Quadratic programs by clarabel, each about the answer of the last: Newton on the KKT."""
-    rng, settings = np.random.default_rng(5), clarabel.DefaultSettings()
-    settings.verbose = False
-    for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
-        setattr(settings, name, 1e-14)
-    slid = 0
-    for _ in range(100):
-        size = int(rng.integers(2, 12))
-        length, grip = rng.uniform(0.01, 0.05, size), 0.3 * rng.uniform(0.0, 0.5, size - 1)
-        softness = np.full(size, 10.0 ** -rng.uniform(3.0, 5.0))
-        natural = length / (1.0 + softness * 50.0)
-        moved = length * (1.0 + softness * 6.0 * rng.normal(size=size))
-        zero, ratio = np.zeros(size), np.exp(np.append(grip, 0.0))
-        wire = Wire(moved, natural, np.ones(size), softness, zero, zero, ratio)
-        chains = Chains(np.array([0, size]), np.array([np.nan]), wire, np.full(size, 50.0))
-        step = np.diff(np.eye(size), axis=0)
-        y, scale = np.zeros(size), softness.mean() * length.mean() * 50.0
-        for _ in range(12):
-            T = 50.0 * np.exp(y)
-            left, rise = chains.lengths_left(T)
-            answer = clarabel.DefaultSolver(
-                csc_matrix(np.diag(rise * T / scale)),
-                (left - rise * T * y) / scale,
-                csc_matrix(np.vstack([step, -step])),
-                np.tile(grip, 2),
-                [clarabel.NonnegativeConeT(2 * (size - 1))],
-                settings,
-            ).solve()
-            change, y = abs(np.array(answer.x) - y).max(), np.array(answer.x)
-            if change < 1e-12:
-                break
-        T, _, slides = chains.solve()
-        slid += int(slides.sum())
-        np.testing.assert_allclose(50.0 * np.exp(y), T, rtol=1e-9)
-    assert slid > 100
 
 
 # --- one hole in closed form ----------------------------------------------------------------

@@ -12,7 +12,6 @@ import cdsm
 from cdsm import presets
 from cdsm.friction.stick import assemble_segments
 from cdsm.support.values import Array
-from tests.campaigns import order
 from tests.support import arms
 from tests.support.differences import assert_second_order, gravity_energy
 from tests.support.rough import blocks, rough, segment_lengths
@@ -159,17 +158,29 @@ def test_sliding_stiffness_is_the_derivative_of_the_torque(name: str, control: s
     assert shares.total == pytest.approx(K.along("y"), rel=1e-10)
 
 
-@pytest.mark.slow
-def test_stuck_arms_are_never_softer() -> None:
-    for seed in range(200):
-        assert order.least(seed) >= -order.ROUNDING, seed
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("part", range(20))
-def test_stuck_arms_are_never_softer_a_hundred_thousand(part: int) -> None:
-    for seed in range(5000 * part, 5000 * (part + 1)):
-        assert order.least(seed) >= -order.ROUNDING, seed
+@pytest.mark.parametrize(
+    "seeds",
+    [range(60), pytest.param(range(20_000), marks=pytest.mark.long)],
+    ids=["few", "many"],
+)
+def test_stuck_arms_are_never_softer(seeds: range) -> None:
+    """By Cauchy and Schwarz K_stuck − K is positive semidefinite for every arm."""
+    for seed in seeds:
+        rng = np.random.default_rng([seed, 19])
+        joints, kind = int(rng.integers(1, 6)), ("universal", "hinged")[seed % 2]
+        plain = arms.random_arm(seed, joints, kind, (LAW, presets.STRAND_1X19)[seed % 5 == 0])
+        mu = rng.uniform(-0.2, 0.5, (len(plain.cables), 20)).round(3).clip(0.0)
+        arm = rough(
+            plain,
+            lambda c, i, mu=mu: float(mu[c, i]),
+            series_stiffness=10.0 ** rng.uniform(3.5, 6.0) if seed % 3 else np.inf,
+            control="force" if seed % 7 == 0 else "position",
+        )
+        pose = arm.at(rng.uniform(-0.9, 0.9, arm.nv) * arm.upper)
+        F = rng.uniform(5.0, 300.0, len(arm.cables))
+        stuck = cdsm.stuck_stiffness(pose, F).joint
+        values = np.linalg.eigvalsh(stuck - cdsm.stiffness(pose, F).joint)
+        assert values[0] >= -1e-12 * np.linalg.norm(stuck, 2), seed
 
 
 def test_lead_and_motor_control_do_not_count_while_cables_stick() -> None:
@@ -186,19 +197,6 @@ def test_lead_and_motor_control_do_not_count_while_cables_stick() -> None:
     K.append(cdsm.stuck_stiffness(presets.virtual_prototype(LAW, friction=0.1).at(q), F).joint)
     for other in K[1:]:
         np.testing.assert_allclose(other, K[0], rtol=1e-12, atol=1e-12 * abs(K[0]).max())
-
-
-def test_straight_arm_does_not_stick() -> None:
-    arm = presets.virtual_prototype(LAW, lead=0.3, friction=0.2)
-    pose, F = arm.at(np.zeros(10)), np.full(15, 50.0)
-    expected = cdsm.stiffness(pose, F).joint
-    found = cdsm.stuck_stiffness(pose, F).joint
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * abs(expected).max())
-    # a wrap of the site's own is enough to hold
-    sites = [[replace(s, wrap=0.1 if s.friction else 0.0) for s in c.sites] for c in arm.cables]
-    tubes = [replace(c, sites=tuple(s)) for c, s in zip(arm.cables, sites, strict=True)]
-    held = cdsm.stuck_stiffness(arm.with_cables(tubes).at(np.zeros(10)), F).joint
-    assert np.linalg.eigvalsh(held)[0] > 2.0 * np.linalg.eigvalsh(expected)[0]
 
 
 NUMBERS = {

@@ -131,7 +131,6 @@ def experiment() -> Experiment:
 
 @pytest.mark.long
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
-    # tests/campaigns/identified.py does the same for dimensions and springs
     seeds, planned = 240, experiment()
     held = [planned.held(np.random.default_rng([seed, 20])) for seed in range(seeds)]
     counts = np.sum([list(each.values()) for each in held], axis=0)

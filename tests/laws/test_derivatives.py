@@ -42,7 +42,7 @@ def _postures() -> dict[str, Callable[[], cdsm.Posture]]:
     serpentine: dict[str, Callable[[], cdsm.Manipulator]] = {
         f"{kind}-{n}": lambda n=n, kind=kind: arms.random_arm(n, n, kind)  # type: ignore[misc]
         for kind in ("universal", "hinged")
-        for n in range(1, 9)
+        for n in (1, 2, 4, 8)
     }
     general: dict[str, Callable[[], cdsm.Manipulator]] = {
         "mixed": arms.mixed_arm,

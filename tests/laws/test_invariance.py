@@ -10,9 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cdsm
-from cdsm.stiffness_matrix.value import UNMOVED
 from cdsm.support.values import Array
-from cdsm.tension.solvers import OPTIMALITY
 from tests.support import arms
 
 # the same examples every time, and no files; numba compiles during the first one
@@ -198,13 +196,10 @@ def _problem(seed: int, name: str) -> tuple[cdsm.Posture, Array, Array, Array]:
     return pose, low, np.where(other < least - 0.5, np.round((other + least) / 2.0, 6), 200.0), W
 
 
-# in most draws the other tensions pull less on no cable; in the first three rows they do
+# in most draws the other tensions pull less on no cable; in the first row they do
 PROBLEMS = [
-    *[(seed, "universal-5") for seed in (0, 2, 9, 11)],
-    *[(seed, "universal-3") for seed in (1, 2, 5, 7, 11)],
-    *[(3, "mixed"), (5, "mixed"), (7, "mixed"), (5, "universal-1"), (1, "hinged-6")],
-    *[(seed, name) for seed in (0, 4) for name in ("universal-2", "universal-3", "mixed")],
-    *[(1, "hinged-3"), (2, "hinged-3"), (2, "hinged-6")],
+    *[(0, "universal-5"), (2, "universal-5"), (1, "universal-3"), (3, "mixed")],
+    *[(5, "universal-1"), (1, "hinged-6"), (0, "universal-2"), (1, "hinged-3")],
 ]
 
 
@@ -216,22 +211,6 @@ def test_eq17_solvers_agree(seed: int, name: str, solver: str) -> None:
     theirs = cdsm.distribute_tension(pose, low, high, W, solver=solver)
     assert (ours.solver, theirs.solver) == ("daqp", solver)
     np.testing.assert_allclose(theirs.values, ours.values, rtol=0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("solver", ["daqp", "osqp", "clarabel"])
-def test_zero_tension_is_zero_to_a_law_that_begins_above_it(solver: str) -> None:
-    law = cdsm.StrandElasticity(((100.0, 2.0),), (), 1e-9, 1e6)
-    for seed in range(6):
-        pose, _, _, W = _problem(seed, "universal-3")
-        geometry = pose.arm.geometry
-        assert geometry is not None
-        pose = cdsm.Manipulator(geometry, law).at(pose.q)
-        pull = cdsm.distribute_tension(pose, 0.0, np.inf, W, solver=solver)
-        zero = pull.values == 0.0
-        assert zero.any()
-        assert pull.values[~zero].min() > 1e-9
-        with pytest.raises(cdsm.ElasticityRangeError):
-            cdsm.stiffness(pose, pull)
 
 
 @pytest.mark.parametrize(("seed", "name"), PROBLEMS)
@@ -264,27 +243,6 @@ def test_eq17_tensions_satisfy_the_optimality_conditions(seed: int, name: str) -
     assert excess[at_high].max(initial=-np.inf) < 1e-9 * scale
     assert set(pull.at_minimum) == {pose.arm.cables[c].name for c in np.flatnonzero(at_low)}
     assert set(pull.at_maximum) == {pose.arm.cables[c].name for c in np.flatnonzero(at_high)}
-
-
-def test_cables_that_nothing_pulls_stand_at_their_minimum() -> None:
-    weightless = cdsm.Manipulator(arms.mixed_arm().geometry, arms.STEEL, gravity=(0.0, 0.0, 0.0))
-    pull = cdsm.distribute_tension(weightless.at(np.zeros(5)))
-    np.testing.assert_array_equal(pull.values, 0.0)
-    assert pull.at_minimum == tuple(cable.name for cable in weightless.cables)
-    assert pull.at_maximum == ()
-
-
-@pytest.mark.parametrize("least", [1e-3, 10.0])
-def test_at_a_bound_means_to_a_billionth_of_the_largest_tension(least: float) -> None:
-    light = cdsm.Manipulator(arms.mixed_arm().geometry, arms.STEEL, gravity=(0.0, 0.0, 0.0))
-    pose = arms.random_posture(light, 3)
-    pull = cdsm.distribute_tension(pose, least)
-    assert pull.values.max() < 10.0 * least
-    names = tuple(cable.name for cable in pose.arm.cables)
-    for part, count in ((0.9, len(names)), (1.1, 0)):
-        away = part * OPTIMALITY * pull.values.max()
-        beside = replace(pull, minimum=pull.values - away, maximum=pull.values + away)
-        assert beside.at_minimum == beside.at_maximum == names[:count]
 
 
 @given(
@@ -431,12 +389,6 @@ case = pytest.mark.parametrize(("name", "seed"), CASES, ids=[f"{n}-arm{s}" for n
 
 
 @case
-def test_parts_sum_to_joint_stiffness_to_the_last_bit(name: str, seed: int) -> None:
-    K = _stiff(name, seed, moment=True)
-    np.testing.assert_array_equal(K.joint, K.active + K.passive + K.gravity + K.load)
-
-
-@case
 def test_cartesian_quantities_by_their_definitions(name: str, seed: int) -> None:
     K = _stiff(name, seed, moment=True)
     J = K.posture.jacobian
@@ -511,25 +463,6 @@ def test_straight_arm_cannot_move_along_itself(name: str) -> None:
         np.testing.assert_allclose(abs(caught.value.direction), (1.0, 0.0, 0.0), atol=1e-15)
 
 
-@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
-def test_where_the_tip_cannot_move_does_not_depend_on_the_size_of_the_arm(size: float) -> None:
-    geometry = cdsm.Geometry.hinged(
-        joints=2,
-        twist=0.0,
-        base_length=0.0,
-        link_length=size,
-        disk_offset=0.1 * size,
-        hole_radius=0.2 * size,
-        link_mass=0.1,
-    )
-    arm = cdsm.Manipulator(geometry, arms.STEEL)
-    K = cdsm.stiffness(arm.at(np.zeros(2)), arms.random_tension(arm, 0))
-    way = K.posture.jacobian[:3]
-    across = np.eye(3)[int(abs(way).sum(axis=1).argmax())]
-    for part, moves in ((0.9 * UNMOVED, False), (1.1 * UNMOVED, True)):
-        assert (K.along((1.0, *(part * across)[1:])) < math.inf) == moves
-
-
 def test_pendulum_is_held_by_its_load_alone() -> None:
     """No elasticity, no weight, no tension: K_θ = fℓ of the force f that pulls along the link."""
     arm = arms.random_arm(1, 1, "hinged")
@@ -541,29 +474,6 @@ def test_pendulum_is_held_by_its_load_alone() -> None:
     np.testing.assert_array_equal(K.passive + K.active, 0.0)
     assert K.joint[0, 0] == pytest.approx(5.0 * length, rel=1e-15)
     assert K.along(pose.jacobian[:3, 0]) == pytest.approx(5.0 / length, rel=1e-14)
-
-
-def test_what_is_printed_is_each_reading_in_its_own_row() -> None:
-    pose = arms.random_posture(arms.mixed_arm(), 3)
-    K = cdsm.stiffness(pose, arms.random_tension(pose.arm, 3))
-    np.testing.assert_array_equal(K.wrench, np.zeros(6))
-    rows = {line[:24].strip(): line[24:].split() for line in str(K).splitlines()}
-    shares = [K.shares(u) for u in np.eye(3)]
-    expected: dict[str, list[float]] = {
-        "along": [K.along(u) for u in np.eye(3)],
-        "of it passive": [share.passive.sum() for share in shares],
-        "of it active": [share.active.sum() for share in shares],
-        "of it gravity": [share.gravity for share in shares],
-        "of it load": [share.load for share in shares],
-        "cartesian, diagonal": K.cartesian.diagonal().tolist(),
-        "pseudoinverse, diagonal": K.pseudoinverse().diagonal().tolist(),
-    }
-    for name, values in expected.items():
-        assert rows[name] == [f"{value / 1000.0:.4g}" for value in values]
-    flat = str(cdsm.stiffness(pose.arm.at(np.zeros(5)), K.tension)).splitlines()
-    absent = {line[:24].strip(): line[24:].split() for line in flat}
-    assert absent["pseudoinverse, diagonal"] == ["-"] * 3
-    assert absent["cartesian, diagonal"][0] == "-"  # the other two are those of a plane
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-7, 1e9])
@@ -583,29 +493,3 @@ def test_what_is_singular_does_not_depend_on_the_units_of_a_joint(units: float) 
                 _ = other.compliance
             way = scale @ caught.value.direction
             np.testing.assert_allclose(way[0], -way[1], rtol=1e-6)
-
-
-@pytest.mark.parametrize("count", range(1, 8))
-@pytest.mark.parametrize("rigidity", [0.01, 1e6])
-def test_passive_stiffness_is_that_of_each_cable_whatever_their_number(
-    rigidity: float, count: int
-) -> None:
-    # as soft as no cable is: nothing that is added besides is small beside it
-    law = cdsm.LinearElasticity(rigidity)
-    arm = arms.random_arm(2, 3)
-    assert arm.geometry is not None
-    idle = cdsm.Cable(
-        "idle",
-        (cdsm.Site("base_link", (0.0, 0.0, 0.0)), cdsm.Site("base_link", (1.0, 0.0, 0.0))),
-        law,
-    )
-    some = [replace(cable, elasticity=law) for cable in arm.cables[:count]]
-    fixed = [replace(idle, name=f"idle{c}") for c in range(3)]
-    q = arms.random_posture(arm, 2).q
-    for cables in (some, [*fixed, *some], [*some, *fixed]):
-        pose = cdsm.Manipulator(arm.geometry, cables=cables).at(q)
-        K = cdsm.stiffness(pose, np.full(len(cables), 3.0))
-        k = rigidity / (pose.cable_lengths / (1.0 + 3.0 / rigidity))  # EA/l_0
-        _close(K.cable_stiffness, k, 1e-15)
-        J = pose.length_jacobian
-        _close(K.passive, np.sum([k[c] * np.outer(J[c], J[c]) for c in range(len(k))], 0), 1e-14)

@@ -18,7 +18,7 @@ ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
     **{
         f"{kind}-{n}": lambda n=n, kind=kind: arms.random_arm(n + 20, n, kind)  # type: ignore[misc]
         for kind in ("universal", "hinged")
-        for n in (1, 2, 3, 5, 8)
+        for n in (1, 3, 8)
     },
     "mixed": arms.mixed_arm,
 }
@@ -29,7 +29,7 @@ def _arm(name: str) -> cdsm.Manipulator:
     return ARMS[name]()
 
 
-CASES = [(name, seed) for name in ARMS for seed in range(3)]
+CASES = [(name, seed) for name in ARMS for seed in range(2)]
 
 
 @pytest.fixture(params=CASES, ids=[f"{name}-posture{seed}" for name, seed in CASES])
@@ -81,17 +81,6 @@ def _in_pinocchio(arm: cdsm.Manipulator) -> tuple[pin.Model, pin.Data]:
     return model, model.createData()
 
 
-def test_sites_are_where_pinocchio_places_them(pose: cdsm.Posture) -> None:
-    model, data = _in_pinocchio(pose.arm)
-    pin.framesForwardKinematics(model, data, pose.q)
-    sites = [
-        data.oMf[model.getFrameId(site.link, pin.FrameType.BODY)].act(np.array(site.position))
-        for cable in pose.arm.cables
-        for site in cable.sites
-    ]
-    np.testing.assert_allclose(np.concatenate(pose.cable_paths), sites, rtol=0.0, atol=1e-14)
-
-
 def test_link_pose_is_pinocchios_frame(pose: cdsm.Posture) -> None:
     model, data = _in_pinocchio(pose.arm)
     pin.framesForwardKinematics(model, data, pose.q)
@@ -139,15 +128,6 @@ def test_eq16_load_part_is_pinocchios_kinematic_hessian_times_wrench(pose: cdsm.
     hessian = _repaired(_kinematic_hessian(pose))
     expected = -np.einsum("a,aij->ij", W, hessian)  # H[:, i, j] = ∂J[:, i]/∂q_j
     np.testing.assert_allclose(load, expected, rtol=0.0, atol=1e-13)
-
-
-def test_gravity_is_pinocchios(pose: cdsm.Posture) -> None:
-    model, data = _in_pinocchio(pose.arm)
-    torque = pin.computeGeneralizedGravity(model, data, pose.q)
-    slope = pin.computeGeneralizedGravityDerivatives(model, data, pose.q)
-    # another run of the same library: its own rounding at most
-    np.testing.assert_allclose(pose.gravity_torque, torque, rtol=0.0, atol=1e-14)
-    np.testing.assert_allclose(pose.gravity_stiffness, slope, rtol=0.0, atol=1e-14)
 
 
 def test_eq16_gravity_and_load_are_pinocchios_static_torque_derivative(pose: cdsm.Posture) -> None:

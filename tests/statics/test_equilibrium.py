@@ -9,7 +9,6 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import cdsm
-from cdsm.statics import solve
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.support.values import Array
 from tests.support import arms
@@ -20,8 +19,6 @@ from tests.support.locked import (
     MOMENT,
     SIZES,
     STRAND,
-    H,
-    R,
     balanced,
     compressed,
     hinge,
@@ -115,35 +112,6 @@ def test_stiffness_at_rest_keeps_the_original_lengths_of_the_reference() -> None
     np.testing.assert_array_equal(rest.stiffness.wrench, rest.wrench)
 
 
-def test_balanced_reference_is_at_rest() -> None:
-    for name in ARMS:
-        pose, pull = balanced(name)
-        rest = cdsm.equilibrium(pose, pull)
-        np.testing.assert_allclose(rest.pose.q, pose.q, atol=1e-11)
-        np.testing.assert_allclose(rest.tension, pull.values, rtol=1e-9)
-        np.testing.assert_allclose(
-            rest.stiffness.joint, cdsm.stiffness(pose, pull).joint, rtol=1e-7, atol=1e-7
-        )
-
-
-def test_tensions_of_ones_own_need_not_balance() -> None:
-    arm = some_arm("universal-3-8-strand")
-    pose = arms.random_posture(arm, 2, reach=0.2)
-    tension = arms.random_tension(arm, 2)
-    rest = cdsm.equilibrium(pose, tension)
-    assert abs(cdsm.stiffness(pose, tension).residual).max() > 0.1
-    assert rest.stable
-    assert not rest.wrench.any()
-    held = [c for c, cable in enumerate(arm.cables) if cable.control == "force"]
-    np.testing.assert_array_equal(rest.tension[held], tension[held])
-    # what holds at rest holds for anybody: the published residual, and rest from rest
-    K = cdsm.stiffness(rest.pose, rest.tension)
-    assert abs(K.residual).max() < 1e-10
-    np.testing.assert_allclose(
-        cdsm.equilibrium(rest.pose, rest.tension).pose.q, rest.pose.q, atol=1e-11
-    )
-
-
 # --- one hinge, closed form -----------------------------------------------------------------
 
 
@@ -160,14 +128,6 @@ def test_hinge_rests_where_the_closed_form_says_with_one_cable_slack(angle: floa
     assert rest.slack == tuple(loose)
     assert rest.stable
     assert ("slack" in str(rest)) == (abs(angle) > 0.01)
-
-
-def test_joints_leave_the_stop_that_only_holds_them_one_way() -> None:
-    pose = hinge(limit=0.2).at([0.2])
-    rest = cdsm.equilibrium(pose, [20.0, 20.0], -0.5 * MOMENT)
-    assert not rest.at_limit
-    assert rest.pose.q[0] < 0.2
-    assert restoring(rest.pose.q[0], 0.2) == pytest.approx(-0.5, rel=1e-11)
 
 
 def test_stops_hold_some_joints_of_an_arm_and_the_others_find_their_balance() -> None:
@@ -222,14 +182,7 @@ def test_straight_hinge_leaves_the_saddle_beyond_its_buckling_load(
     np.testing.assert_array_equal(again.pose.q, rest.pose.q)
 
 
-def test_smallest_imperfection_decides_which_way_the_hinge_buckles() -> None:
-    pose = soft_hinge(limit=1.2).at([0.0])
-    for side in (1.0, -1.0):
-        W = np.array([-18.0, 0.0, 0.0, 0.0, side * 1e-6, 0.0])
-        assert side * cdsm.equilibrium(pose, [20.0, 20.0], W).pose.q[0] > 0.1
-
-
-@pytest.mark.parametrize("push", [1e-12, 1e-10, 1e-8, 6e-8, 1e-6, 1e-5, 1e-3])
+@pytest.mark.parametrize("push", [1e-12, 1e-8, 1e-3])
 def test_no_push_is_too_small_to_lead_off_a_ridge(push: float) -> None:
     """Past buckling in all directions at once: the way down turns as the push does."""
     sizes = {**SIZES, "joints": 1, "cables_per_joint": 3, "link_length": 0.04, "lead": 0.98}
@@ -241,20 +194,6 @@ def test_no_push_is_too_small_to_lead_off_a_ridge(push: float) -> None:
     rest = cdsm.equilibrium(pose, np.full(3, 350.0), [0.0, 0.6 * push, 0.8 * push, 0.0, 0.0, 0.0])
     assert rest.stable
     assert abs(rest.pose.q).max() > 0.1
-
-
-def test_reference_that_is_unstable_by_itself_comes_to_rest_elsewhere() -> None:
-    arm = soft_hinge()
-    pose = arm.at([0.0])
-    tension = np.array([300.0, 300.0])
-    assert not cdsm.stiffness(pose, tension).is_stable
-    rest = cdsm.equilibrium(pose, tension)
-    # the more it bends the less the cables resist, until the disks touch
-    energies = [compressed(q, 0.0, 300.0) for q in np.linspace(0.0, rest.pose.q[0], 200)]
-    assert (np.diff(energies) < 0.0).all()
-    assert rest.at_limit == ("joint1",)
-    assert rest.stop_torque[0] < 0.0
-    assert rest.stable
 
 
 def test_two_hinges_beyond_buckling_rest_in_a_minimum_that_brute_force_finds() -> None:
@@ -306,17 +245,6 @@ def test_arm_without_any_tension_or_weight_is_neutral() -> None:
     assert "NEUTRAL" in str(rest)
 
 
-def test_limp_arm_falls_as_far_as_its_stops() -> None:
-    arm = hinge(limit=0.3, joints=2, twist=math.pi / 2.0)
-    cables = [replace(cable, control="force") for cable in arm.cables]
-    limp = cdsm.Manipulator(arm.geometry, cables=cables, gravity=(0.0, 0.0, 0.0))
-    # the moment turns the first hinge alone, and nothing holds the second where it is
-    rest = cdsm.equilibrium(limp.at([0.0, 0.1]), np.zeros(4), 0.5 * MOMENT)
-    np.testing.assert_allclose(rest.pose.q, [0.3, 0.1], atol=1e-15)
-    assert rest.stop_torque[0] == pytest.approx(-0.5, rel=1e-14)
-    assert not rest.stable
-
-
 # --- ends of the laws -----------------------------------------------------------------------
 
 
@@ -333,33 +261,7 @@ def test_answer_below_a_law_names_the_cables_though_iterates_may_pass() -> None:
     assert cdsm.equilibrium(pose, [30.0, 30.0], 1.0 * MOMENT).tension.min() > 2.2
 
 
-def test_answer_above_a_law_names_the_cables() -> None:
-    pose = hinge(limit=0.5, law=STRAND).at([0.0])
-    with pytest.raises(cdsm.ElasticityRangeError, match=r"outside the domain") as caught:
-        cdsm.equilibrium(pose, [700.0, 700.0], 25.0 * MOMENT)
-    assert max(caught.value.tension) > 810.0
-
-
-def test_reference_at_the_very_end_of_a_law_is_inside() -> None:
-    pose = hinge(limit=0.5, law=STRAND).at([0.0])
-    np.testing.assert_allclose(cdsm.equilibrium(pose, [810.0, 810.0]).tension, 810.0, rtol=1e-12)
-
-
 # --- failure -------------------------------------------------------------------------------
-
-
-def test_no_place_to_rest_is_an_error_with_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    pose, pull = balanced("universal-3-8-all")
-    monkeypatch.setattr(solve, "_STEPS", 2)
-    monkeypatch.setattr(solve, "_flow", lambda f, x: x)
-    W = pull.wrench + 2.0 * arms.random_wrench(6)
-    with pytest.raises(cdsm.EquilibriumError, match="no stable place to rest") as caught:
-        cdsm.equilibrium(pose, pull, W)
-    error = caught.value
-    assert error.residual.shape == (pose.arm.nv,)
-    assert error.joint == pose.arm.joint_names[int(abs(error.residual).argmax())]
-    assert 0.0 <= error.load_factor < 1.0
-    assert "raise the tensions" in str(error)
 
 
 # --- the question ---------------------------------------------------------------------------
@@ -370,26 +272,13 @@ def test_no_place_to_rest_is_an_error_with_data(monkeypatch: pytest.MonkeyPatch)
     [
         ([20.0], None, "tension"),
         ([20.0, -1.0], None, "only pull"),
-        ([20.0, math.nan], None, "tension"),
         ([20.0, 20.0], [1.0, 2.0, 3.0], "wrench"),
-        ([20.0, 20.0], [math.inf, 0.0, 0.0, 0.0, 0.0, 0.0], "wrench"),
         ([20.0, 20.0], [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0], "wrench"),
-        ([20.0, 20.0], "up", "wrench"),
     ],
 )
 def test_bad_input_is_named(tension: Any, wrench: Any, said: str) -> None:
     with pytest.raises(cdsm.InvalidInput, match=said):
         cdsm.equilibrium(hinge().at([0.0]), tension, wrench)
-
-
-def test_bad_wrench_beside_a_tension_is_named() -> None:
-    pose, pull = balanced("universal-3-8-all")
-    with pytest.raises(cdsm.InvalidInput, match="wrench"):
-        cdsm.equilibrium(pose, pull, [1.0, 2.0])
-    with pytest.raises(cdsm.InvalidInput, match="another posture"):
-        cdsm.equilibrium(pose.arm.at(pose.q + 0.01), pull)
-    with pytest.raises(cdsm.InvalidInput, match="pose"):
-        cdsm.equilibrium(pull, pull)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -406,17 +295,6 @@ def test_disks_that_touch_are_stops_just_before() -> None:
     assert rest.at_limit == ("joint1",)
     assert rest.pose.q[0] == pytest.approx(arm.upper[0] - 1e-6, abs=1e-12)
     assert rest.stop_torque[0] == pytest.approx(restoring(rest.pose.q[0]) - 200.0, rel=1e-12)
-
-
-def test_sites_that_meet_are_what_the_error_speaks_of() -> None:
-    """A limit beyond where disks touch, and an arm that goes there: the potential has a cusp."""
-    touching = 2.0 * math.atan(H / R)
-    pose = soft_hinge(limit=touching + 0.2).at([0.0])
-    with pytest.raises(cdsm.EquilibriumError, match=r"cable\w+ meet.*joint_limit") as caught:
-        cdsm.equilibrium(pose, [300.0, 300.0])
-    assert caught.value.joint == "joint1"
-    within = soft_hinge().at([0.0])
-    assert cdsm.equilibrium(within, [300.0, 300.0]).at_limit == ("joint1",)
 
 
 def test_compliance_at_a_stop_is_that_of_the_other_joints() -> None:

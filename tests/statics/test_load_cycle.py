@@ -11,7 +11,6 @@ import cdsm
 from cdsm import presets
 from cdsm.statics.load_cycle import LoadHistory
 from cdsm.support.values import Array
-from tests.support.arms import random_arm, random_posture, random_tension
 
 WIRE = cdsm.LinearElasticity(48e3)
 
@@ -74,15 +73,13 @@ def slender(law: cdsm.Elasticity = WIRE, **cables: Any) -> cdsm.Posture:
     ("pose", "tension", "load"),
     [
         (slender(), 60.0, 8.0),
-        (slender(cdsm.StrandElasticity.eq19_repaired()), 60.0, 8.0),
-        (slender(series_stiffness=5e4), 60.0, 8.0),
         (slender(cdsm.StrandElasticity.eq19_repaired(), series_stiffness=5e4), 60.0, 8.0),
         (slender(original_length="stretched"), 60.0, 8.0),
         (slender(forced=(0, 4)), 60.0, 8.0),
         (slender(), 12.0, 60.0),  # cables go slack
         (slender(series_stiffness=1e3), 12.0, 40.0),  # joints reach their stops
     ],
-    ids=["linear", "strand", "spring", "both", "stretched", "force", "slack", "stops"],
+    ids=["linear", "strand behind springs", "stretched", "force", "slack", "stops"],
 )
 def test_without_friction_every_load_gives_the_equilibrium(
     pose: cdsm.Posture, tension: float, load: float
@@ -115,7 +112,7 @@ def test_closed_loop_loses_its_work_in_the_holes() -> None:
     # one hinge: one hole per cable, so the second cycle ends where it began
     pose, pull = planar(0.3, joints=1)
     off = []
-    for n in (10, 40):
+    for n in (10, 40):  # 4 s: a rate needs both
         up = np.linspace(-9.0, 9.0, n + 1)
         path = along_z(*np.concatenate([up, *2 * [up[-2::-1], up[1:]]]))
         history = cdsm.load_cycle(pose, pull, path)
@@ -126,15 +123,6 @@ def test_closed_loop_loses_its_work_in_the_holes() -> None:
     # of first order in the steps, since holes begin and stop to slide within one
     assert off[0] < 0.01
     assert off[1] < 0.3 * off[0]
-
-
-@pytest.mark.slow
-def test_loops_of_several_holes_close_slowly_and_lose_their_work_too() -> None:
-    pose, pull = planar(0.1)
-    up = np.linspace(-6.0, 6.0, 41)
-    path = along_z(*np.concatenate([up, *2 * [up[-2::-1], up[1:]]]))
-    work, lost = loop(cdsm.load_cycle(pose, pull, path), 121)
-    assert work == pytest.approx(lost, rel=5e-3)  # wire still creeps from segment to segment
 
 
 def test_dissipation_converges_with_the_sub_steps() -> None:
@@ -198,7 +186,7 @@ def test_tension_falls_from_a_motor_that_pulls(control: cdsm.cable.Control) -> N
 # --- breakaway, tangents ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mu", [0.05, 0.3])
+@pytest.mark.parametrize("mu", [0.3])
 def test_first_hole_slips_at_the_breakaway_load(mu: float) -> None:
     pose, pull = prototype(mu)
     expected = cdsm.breakaway(pose, pull, "z")
@@ -227,9 +215,7 @@ def test_tangent_is_the_derivative_of_the_history(load: float) -> None:
 # --- numbers of an independent computation ----------------------------------------------------
 
 PLANAR = {  # μ: secant to −6 N [N/mm], left over at 0 N [mm], loss per cycle of ±6 N [mJ]
-    0.02: (28.50, 0.0041, 0.095),
     0.05: (29.34, 0.0102, 0.231),
-    0.1: (30.84, 0.0203, 0.436),
     0.2: (34.39, 0.0405, 0.769),
     0.4: (44.70, 0.0804, 1.128),
 }
@@ -252,13 +238,11 @@ def test_numbers_of_an_independent_program_on_a_planar_arm(mu: float) -> None:
 
 PROTOTYPE = {  # μ: secants at 0.25, 1, 2, 20 N [N/mm], left over after 20 N [µm], holes that slide
     0.05: ((257.6, 93.4, 55.9, 39.2), 34.0, 67),
-    0.1: ((257.6, 250.0, 93.6, 42.0), 33.0, 62),
     0.2: ((257.6, 258.0, 250.0, 44.9), 59.0, 53),
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("mu", PROTOTYPE)
+@pytest.mark.parametrize("mu", [0.05, 0.2])
 def test_numbers_of_an_independent_program_on_the_prototype(mu: float) -> None:
     secants, left, holes = PROTOTYPE[mu]
     pose, pull = prototype(mu)
@@ -268,74 +252,9 @@ def test_numbers_of_an_independent_program_on_the_prototype(mu: float) -> None:
     np.testing.assert_allclose(forces / z[:4], secants, rtol=1e-2)
     assert 1000.0 * z[4] == pytest.approx(left, abs=1.0)
     assert abs(np.count_nonzero(history.sliding[3]) - holes) <= 3
-    # one load or many, the arm gets to the same place
-    often = cdsm.load_cycle(pose, pull, along_z(*np.linspace(0.2, 20.0, 100)))
-    np.testing.assert_allclose(1000.0 * often.displacement[-1, 2], z[3], rtol=1e-3)
-
-
-@pytest.mark.slow
-def test_secants_at_five_newtons_are_those_of_the_same_load_over_friction() -> None:
-    """The independent program also gave 50.9, 53.8 and 74.8 N/mm at 5 N, μ = 0.05, 0.1, 0.2.
-
-    Here they are 44.85, 51.7 and 74.2. Its first two contradict its own table: a secant depends on
-    load over friction only, to 0.5 % (the next test), and 5 N at 0.05 is 20 N at 0.2, for which it
-    has 44.9; so is 5 N at 0.1 between 2 N and 5 N at 0.05. Neither the path (one load, 20 loads, a
-    cycle before, the other side), nor stretched lengths move ours by 0.4 %. The law is linear in
-    both programs: Eq. 19 has no part in it.
-    """
-    secant = {}
-    for mu in (0.05, 0.1, 0.2):
-        pose, pull = prototype(mu)
-        paths = (
-            along_z(5.0),
-            along_z(*np.linspace(0.25, 5.0, 20)),
-            along_z(-5.0, 5.0),
-            along_z(-5.0),
-        )
-        found = []
-        for path in paths:
-            moved = cdsm.load_cycle(pose, pull, path).displacement[-1, 2]
-            found.append(path[-1, 2] / (1000.0 * moved))
-        np.testing.assert_allclose(found[1:3], found[0], rtol=2e-3)
-        np.testing.assert_allclose(found[3], found[0], rtol=1.2e-2)  # the arm is bent one way
-        secant[mu] = found[0]
-    assert secant[0.05] == pytest.approx(PROTOTYPE[0.2][0][3], rel=5e-3)
-    assert secant[0.2] == pytest.approx(74.8, rel=1e-2)
-    assert secant[0.05] < secant[0.1] < PROTOTYPE[0.05][0][2]
-
-
-def test_secants_scale_with_friction() -> None:
-    # to first order in the load, the secant depends on load over friction only
-    for load in (2.0, 5.0):
-        stiff = []
-        for mu in (0.05, 0.1):
-            pose, pull = prototype(mu)
-            force = load * mu / 0.05
-            moved = cdsm.load_cycle(pose, pull, along_z(force)).displacement[0, 2]
-            stiff.append(force / moved)
-        assert stiff[0] == pytest.approx(stiff[1], rel=5e-3)
 
 
 # --- results and errors ---------------------------------------------------------------------
-
-
-def test_history_is_labelled_and_drawn() -> None:
-    pose, pull = planar(0.2)
-    history = cdsm.load_cycle(pose, pull, along_z(*np.linspace(0.0, 5.0, 30)))
-    data = history.to_xarray()
-    assert dict(data.sizes)["load"] == 30
-    assert data.sizes["hole"] == len(history.holes) == len(pose.segments.wrap)
-    assert data["dissipated"].attrs["units"] == "J"
-    own = [name for name in data["segment"].values if name.startswith("cable2_1 ")]
-    np.testing.assert_array_equal(data["segment_tensions"].sel(segment=own), history.tensions[2])
-    assert history.holes[0] == "cable1_1 site 1"
-    figure = history.plot()
-    assert figure.axes[0].get_xlabel() == "displacement along the force [mm]"
-    moved, force = np.array(figure.axes[0].lines[0].get_data())
-    assert (moved[0], force[0], force[-1]) == (0.0, 0.0, 5.0)
-    np.testing.assert_allclose(moved[1:], 1e3 * history.displacement[:, 2], rtol=1e-12)
-    with pytest.raises(cdsm.InvalidInput, match="whole number from -30 to 29"):
-        history.pose(30)
 
 
 def test_bad_arguments_are_named() -> None:
@@ -354,21 +273,13 @@ def test_bad_arguments_are_named() -> None:
 
 
 def test_load_that_no_law_covers_is_named() -> None:
-    pose, pull = prototype(0.1, cdsm.StrandElasticity.eq19_repaired())
+    pose = slender(cdsm.StrandElasticity.eq19_repaired())
+    pull = cdsm.distribute_tension(pose, 50.0)
     with pytest.raises(cdsm.ElasticityRangeError, match="after the step to load 2"):
         cdsm.load_cycle(pose, pull, along_z(1.0, 900.0))
 
 
-def test_random_arms_settle_from_tensions_that_do_not_balance_them() -> None:
-    for seed in range(4):
-        arm = random_arm(seed, 2)
-        pose = random_posture(arm, seed, 0.3)
-        F = random_tension(arm, seed)
-        history = cdsm.load_cycle(pose, F, np.zeros((1, 6)))
-        rest = cdsm.equilibrium(pose, F)
-        np.testing.assert_allclose(history.tip[0], rest.pose.tip[:3, 3], atol=1e-10)
-
-
+@pytest.mark.long  # a quarter of a minute, on the brink of buckling
 def test_snap_through_is_a_warning() -> None:
     geometry = cdsm.Geometry.universal(
         joints=3,

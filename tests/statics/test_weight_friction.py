@@ -58,33 +58,6 @@ def test_from_the_sliding_load_on_the_tangent_is_near_the_frictionless_one_of_th
     assert stiffening.history.stiffness(-1).along("z") > 1.5 * stiffening.tangent
 
 
-def test_one_line_says_how_to_measure() -> None:
-    pose, pull = prototype(0.1)
-    test = cdsm.weight_test(pose, pull, [0.0, 0.0, 4.0], steps=4)
-    text = str(test)
-    assert "below 0.7063 N all cables stick: a weight measures 257.6 N/mm" in text
-    assert f"at {test.sliding_load:.4g} N they slide" in text
-    assert "at most 25 % above that of the same load without friction" in text
-    assert "take the difference of two weights" in text
-    told = test.to_dict()
-    assert told["breakaway_load_N"] == pytest.approx(0.7063, rel=1e-3)  # first_slip
-    assert told["sliding_load_N"] == test.sliding_load
-
-
-def test_a_weight_is_compared_with_the_same_weight_without_friction() -> None:
-    # strands at low tension stiffen: the secant of 5 N is 60 % above the tangent before it
-    geometry = readme_geometry(lead=0.3)
-    arm = cdsm.Manipulator(geometry, presets.STRAND_1X19)
-    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
-    loose = cdsm.distribute_tension(pose, 5.0)
-    same = cdsm.weight_test(pose, loose, [0.0, 0.0, -5.0])
-    held = cdsm.weight_test(arm.with_friction(0.05).at(pose.q), loose.values, [0.0, 0.0, -5.0])
-    assert same.stiffness > 1.5 * same.tangent
-    assert held.frictionless == pytest.approx(same.stiffness, rel=1e-9)
-    said = f"this weight alone would measure {same.stiffness / 1e3:.4g} N/mm without friction"
-    assert said in str(held)
-
-
 def test_straight_arm_holds_no_cable() -> None:
     arm = presets.virtual_prototype(
         cdsm.LinearElasticity(48e3), lead=0.3, friction=0.2, gravity=(0.0, 0.0, 0.0)
@@ -94,25 +67,3 @@ def test_straight_arm_holds_no_cable() -> None:
     assert test.breakaway_load == test.sliding_load == 0.0
     assert test.stuck == pytest.approx(test.tangent, rel=1e-9)
     assert "straight through all holes" in str(test)
-
-
-def test_arm_that_only_friction_holds_at_its_reference_says_so() -> None:
-    geometry = cdsm.Geometry.universal(
-        joints=4,
-        cables_per_joint=3,
-        base_length=0.02,
-        link_length=0.05,
-        hole_radius=0.01,
-        disk_offset=0.005,
-        link_mass=0.05,
-    )
-    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(3000.0)).with_friction(0.2)
-    pose = arm.at(np.full(arm.nv, 0.1))
-    pull = cdsm.distribute_tension(pose, 150.0)
-    assert not cdsm.stiffness(pose, pull).is_stable
-    test = cdsm.weight_test(pose, pull, [0.0, 0.0, 0.2])
-    assert test.history is not None
-    np.testing.assert_allclose(test.history.tip[0], pose.tip[:3, 3], atol=1e-9)
-    (said,) = test.warnings
-    assert said.startswith("LEFT ITS REFERENCE: without friction the arm does not stay there")
-    assert said.endswith("With friction it moves by (0, 0, 0) mm")

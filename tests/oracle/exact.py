@@ -1,4 +1,4 @@
-"""The truth of the honesty benchmark: serpentine arms in extended precision, another way than cdsm.
+"""Serpentine arms and least tensions in extended precision, another way than cdsm.
 
 Derivatives are no cross products: every joint's 4×4 matrix depends on its own angle alone, so a
 derivative of the chain is the chain with that matrix replaced by its derivative. Tensions are not
@@ -124,52 +124,6 @@ class ExactArm:
         return np.asarray(holes + (chain[:, :3, 3] + chain[:, :3, 0] * x)[:, None])
 
 
-# digits of Eq. 19 whose branches meet and are most level, lowest power first
-EQ19 = (
-    ("-556.89", "377.99", "-70.49", "8.74", "-0.46", "1.12e-2", "-9.946263022943622e-5"),
-    ("-1924.5", "493.34505", "-2.26495", "5.38168e-3", "-6.93505e-6", "4.58495e-9", "-1.21505e-12"),
-)
-EQ19_LOW, JOIN = 2.2, 31.0
-
-# 1/EA is analytic but at the roots of EA, of which 2.109 N is the nearest: panels of half the
-# distance to it or less, on which 30 nodes are exact beyond the extended precision
-_EDGES = wide([EQ19_LOW, 2.24, 2.3, 2.4, 2.55, 2.8, 3.2, 4.0, 5.5, 8.0, 12.0, 18.0, 25.0, JOIN])
-_EDGES = np.concatenate([_EDGES, wide([45.0, 70.0, 110.0, 180.0, 300.0, 450.0, 600.0, 810.0])])
-
-
-def eq19(tension: Array | Wide) -> Wide:
-    """EA(F) [N] of Eq. 19 in its decimal digits; the join belongs to the lower range."""
-    F = wide(tension)
-    low, high = (sum(np.longdouble(a) * F**i for i, a in enumerate(row)) for row in EQ19)
-    return wide(np.where(F <= JOIN, wide(low), wide(high)))
-
-
-def eq19_strain(tension: Array) -> Wide:
-    """ε(F) = ∫ dF/EA(F) from 2.2 N on, of (N,) tensions."""
-    whole = np.concatenate([[np.longdouble(0)], np.cumsum(_gauss(_EDGES[:-1], _EDGES[1:]))])
-    panel = np.searchsorted(_EDGES[1:-1], wide(tension))
-    return wide(whole[panel] + _gauss(_EDGES[panel], wide(tension)))
-
-
-def _gauss(low: Wide, high: Wide) -> Wide:
-    """∫ dF/EA(F) over intervals (N,), each on one side of the join."""
-    x, weights = _nodes(30)
-    F = low[:, None] + (high - low)[:, None] * (x + 1) / 2
-    return wide((weights / eq19(F)).sum(axis=1) * (high - low) / 2)
-
-
-def _nodes(count: int) -> tuple[Wide, Wide]:
-    """Nodes and weights of Gauss and Legendre on [−1, 1], by Newton's method from float64's."""
-    x = wide(np.polynomial.legendre.leggauss(count)[0])
-    for _ in range(3):
-        before, p = wide(np.ones_like(x)), x
-        for n in range(1, count):
-            before, p = p, wide(((2 * n + 1) * x * p - n * before) / (n + 1))
-        slope = count * (x * p - before) / (x * x - 1)
-        x = wide(x - p / slope)
-    return x, wide(2 / ((1 - x * x) * slope * slope))
-
-
 def _moved(chain: Wide, orders: NDArray[np.intp], angles: int) -> Wide:
     """The chain after the first angles; no derivative by a later one is left of it."""
     later = orders[:, angles:].sum(axis=1) > 0
@@ -244,7 +198,7 @@ class Least(NamedTuple):
 
 
 PROOF = 1e-16
-"""Largest accepted Σ|A F − b|, and duality gap ½‖F − F*‖²; dimensionless, F of the order of 1."""
+"""Largest accepted Σ|A F − b|; dimensionless, F of the order of 1."""
 
 FAR = 1e7
 """In place of an infinite bound, where a multiplier that is zero is rounded."""
@@ -253,99 +207,40 @@ FAR = 1e7
 def least_tension(A: Wide, b: Wide, low: Wide, high: Wide) -> Least:
     """Prove what is the least tension, or that there is none; of a dimensionless problem.
 
-    Where the points come from is of no concern, only the proof is: any F within the bounds and any
-    y bound the distance from the least by the gap ½‖F‖² − min_F (½‖F‖² − yᵀ(A F − b)).
+    A solver in double precision says where, Newton's method makes its multipliers exact.
     """
-    y = _multipliers(A, b, low, high)
-    if y is not None:
-        F = np.clip(A.T @ y, low, high)  # of this form, the gap is what is out of balance
+    doubles = [np.asarray(x, dtype=np.float64) for x in (A, b, low, high)]
+    n = len(low)
+    problem = qpsolvers.Problem(
+        np.eye(n), np.zeros(n), A=doubles[0], b=doubles[1], lb=doubles[2], ub=doubles[3]
+    )
+    found = qpsolvers.solve_problem(problem, "daqp", primal_tol=1e-11)
+    if found.found and found.y is not None:
+        y = -wide(found.y)
+        for _ in range(5):
+            s = A.T @ y
+            free = (s > low) & (s < high)
+            step = solve(A[:, free] @ A[:, free].T, b - A @ np.clip(s, low, high))
+            if not np.isfinite(step).all():
+                break
+            y = wide(y + step)
+        F = np.clip(A.T @ y, low, high)  # of this form, the duality gap is what is out of balance
         if abs(b - A @ F).sum() <= PROOF * max(1.0, float(F.max())):
             return Least(F, 0.0)
-    missing = _farkas(A, b, low, high)
-    if missing > PROOF:
-        return Least(None, missing)
-    F, y = _interior(A, b, low, high)
-    s = A.T @ y
-    nearest = np.clip(s, low, high)
-    gap = (F * F / 2).sum() - b @ y + (s * nearest - nearest * nearest / 2).sum()
-    size = max(1.0, float(abs(F).max()))
-    crossed = max((low - F).max(), (F - high).max()) > 0
-    balanced = abs(b - A @ F).sum() <= PROOF * size and not crossed
-    if balanced and gap <= PROOF * size**2:
-        return Least(F, 0.0)
-    return Least(None, max(0.0, _proven(A, b, low, high, y)))  # y runs away where there is no F
+    return Least(None, max(0.0, _farkas(A, b, low, high, doubles)))
 
 
-def _multipliers(A: Wide, b: Wide, low: Wide, high: Wide) -> Wide | None:
-    """Those of the optimum: of a solver, made exact by Newton's method; None if it finds none."""
-    y = _guess(A, b, low, high)
-    if y is None:
-        return None
-    for _ in range(5):
-        s = A.T @ y
-        free = (s > low) & (s < high)
-        step = solve(A[:, free] @ A[:, free].T, b - A @ np.clip(s, low, high))
-        if not np.isfinite(step).all():
-            break
-        y = y + step
-    return y
-
-
-def _interior(A: Wide, b: Wide, low: Wide, high: Wide) -> tuple[Wide, Wide]:
-    """F and y by an interior-point method, which tolerates that hardly any F is feasible."""
-    bounded = np.isfinite(high)
-    top = np.where(bounded, high, low + 2)
-    x, y = (low + top) / 2, np.zeros(len(b), dtype=np.longdouble)
-    zl, zu = np.ones_like(x), np.where(bounded, 1, 0).astype(np.longdouble)
-    with np.errstate(all="ignore"):
-        for _ in range(80):
-            above, below = x - low, np.where(bounded, high - x, 1)
-            mu = (above @ zl + below @ zu) / (len(x) + bounded.sum())
-            if mu < 1e-19:
-                break
-            aim = mu / 10
-            pull, push = aim / above - zl, np.where(bounded, aim / below, 0) - zu
-            D = 1 + zl / above + zu / below
-            rest = A.T @ y + zl - zu - x + pull - push
-            dy = solve((A / D) @ A.T, b - A @ (x + rest / D))
-            dx = (A.T @ dy + rest) / D
-            dzl, dzu = pull - zl * dx / above, push + zu * dx / below
-            step = np.longdouble(1)
-            for value, change in ((above, dx), (below, -dx), (zl, dzl), (zu, dzu)):
-                falling = (change < 0) & (value > 0)
-                step = min(step, (0.99 * value / -change)[falling].min(initial=1))
-            if not np.isfinite(dx).all():
-                break
-            x, y, zl, zu = x + step * dx, y + step * dy, zl + step * dzl, zu + step * dzu
-    return x, y
-
-
-def _guess(A: Wide, b: Wide, low: Wide, high: Wide) -> Wide | None:
-    """Multipliers of a near-optimum in double precision."""
-    A64, b64, low64, high64 = (np.asarray(x, dtype=np.float64) for x in (A, b, low, high))
-    n = len(low64)
-    problem = qpsolvers.Problem(np.eye(n), np.zeros(n), A=A64, b=b64, lb=low64, ub=high64)
-    found = qpsolvers.solve_problem(problem, "daqp", primal_tol=1e-11)
-    return -wide(found.y) if found.found and found.y is not None else None
-
-
-def _farkas(A: Wide, b: Wide, low: Wide, high: Wide) -> float:
-    """Σ|A F − b| at least, for all F within the bounds, proven by the linear program's dual."""
+def _farkas(A: Wide, b: Wide, low: Wide, high: Wide, doubles: list[Array]) -> float:
+    """Σ|A F − b| at least, for all F within the bounds, by the dual of the linear program."""
     m, n = A.shape
-    A64, b64, low64, high64 = (np.asarray(x, dtype=np.float64) for x in (A, b, low, high))
     found = linprog(
         np.concatenate([np.zeros(n), np.ones(2 * m)]),
-        A_eq=np.hstack([A64, np.eye(m), -np.eye(m)]),
-        b_eq=b64,
-        bounds=[*zip(low64, high64, strict=True), *[(0.0, None)] * (2 * m)],
-        method="highs",
+        A_eq=np.hstack([doubles[0], np.eye(m), -np.eye(m)]),
+        b_eq=doubles[1],
+        bounds=[*zip(doubles[2], doubles[3], strict=True), *[(0.0, None)] * (2 * m)],
         options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
     )
-    return _proven(A, b, low, high, wide(found.eqlin.marginals))
-
-
-def _proven(A: Wide, b: Wide, low: Wide, high: Wide, y: Wide) -> float:
-    """Σ|A F − b| at least, for all F within the bounds: bᵀy − max yᵀA F, y brought to |y| ≤ 1."""
+    y = wide(found.eqlin.marginals)
     y = y / max(1, abs(y).max())
     s = A.T @ y
     rounded = np.isinf(high) & (s <= 1e-16)
