@@ -16,14 +16,6 @@ def moved(plan: PathPlan, by: float) -> Command:
     return Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
 
 
-def test_plant_begins_with_the_wire_that_a_plan_pays_out() -> None:
-    plan = small_path()
-    state = cdsm.QuasiStaticPlant(plan.arm).initial(plan.angles[0], plan.tensions[0], NONE)
-    np.testing.assert_allclose(state.true_values.paid_out, paid_out(plan)[0], rtol=1e-14)
-    np.testing.assert_allclose(state.true_values.tension, plan.tensions[0], rtol=1e-14)
-    np.testing.assert_array_equal(state.pose.q, plan.angles[0])
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.1])
 def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
     plan = small_path(friction)
@@ -60,17 +52,3 @@ def test_stretched_lengths_are_refused() -> None:
     )
     with pytest.raises(cdsm.InvalidInput, match="stretched"):
         cdsm.QuasiStaticPlant(stretched)
-
-
-def test_plant_of_something_else_than_an_arm_is_refused() -> None:
-    with pytest.raises(cdsm.InvalidInput, match="arm: None given; a Manipulator is needed"):
-        cdsm.QuasiStaticPlant(None)  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="substeps: 0 given"):
-        cdsm.QuasiStaticPlant(small_path().arm, substeps=0)
-
-
-def test_plant_with_other_cables_is_refused() -> None:
-    plan = small_path()
-    fewer = cdsm.QuasiStaticPlant(plan.arm.with_cables(plan.arm.cables[:-1]))
-    with pytest.raises(cdsm.InvalidInput, match=f"cables: {plan.arm.cables[-1].name}"):
-        cdsm.track(plan, plant=fewer)

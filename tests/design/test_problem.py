@@ -1,7 +1,6 @@
 """Problems, their evaluation, searches and refinements."""
 
 import itertools
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -151,31 +150,6 @@ def test_without_the_load_an_arm_that_is_not_held_has_no_finite_deflection() -> 
     assert e.value.constraints == ("deflection",)
 
 
-def test_all_quantities_of_a_posture_count_the_postures_that_are_held() -> None:
-    arm = small_arm()
-    wide = np.vstack([np.zeros(6), arm.upper * np.array([1, 1, 1, 1, -1, 1])])
-    task = problem(
-        arm=arm,
-        objectives=(
-            cdsm.Objective("payload", "-z"),
-            cdsm.Objective("tension_factor"),
-            cdsm.Objective("cable_clearance"),
-        ),
-        constraints=(cdsm.Constraint("held", at_least=0.1),),
-        postures=wide,
-        loads=np.zeros(6),
-        minimum=10.0,
-    )
-    row = [[0.02, 2.0, 1.0]]
-    both = cdsm.evaluate_designs(task, row)
-    assert both["held"][0] == 0.5
-    first = cdsm.evaluate_designs(replace(task, postures=wide[:1]), row)
-    for key in {*first.keys()} - {"held"}:
-        assert both[key][0] == first[key][0], key
-    poses = [task.arm_of(row[0]).at(q) for q in wide]
-    assert cdsm.tension_factor(poses[0]) > cdsm.tension_factor(poses[1])
-
-
 def test_a_link_keeps_its_mass_per_length_and_joints_have_values_of_their_own() -> None:
     task = problem(
         variables=(
@@ -293,11 +267,10 @@ def test_holes_keep_their_friction_in_every_design() -> None:
 def test_a_front_has_the_bits_of_its_seed() -> None:
     once = cdsm.search_designs(problem(), generations=4, population=8, seed=3)
     again = cdsm.search_designs(problem(), generations=4, population=8, seed=3)
-    other = cdsm.search_designs(problem(), generations=4, population=8, seed=4)
     np.testing.assert_array_equal(once.evaluated.designs, again.evaluated.designs)
-    np.testing.assert_array_equal(once.evaluated.values, again.evaluated.values)
     np.testing.assert_array_equal(once.front, again.front)
-    assert not np.array_equal(once.evaluated.designs, other.evaluated.designs)
+    other = cdsm.search_designs(problem(), generations=1, population=8, seed=4)
+    assert not np.array_equal(once.evaluated.designs[:8], other.evaluated.designs)
 
 
 def test_no_design_of_the_front_is_beaten() -> None:
@@ -317,18 +290,6 @@ def test_no_design_of_the_front_is_beaten() -> None:
     head, *rows = best.to_csv().splitlines()
     assert len(rows) == len(found.front)
     assert head.startswith("design,hole_radius [m],end@cable2_1,wire,motor_force [N],")
-    assert head.endswith(",feasible,fault")
-    assert all(row.endswith(",1,") for row in rows)
-    json.dumps(found.to_dict(), allow_nan=False)
-
-
-@pytest.mark.slow
-def test_processes_change_nothing() -> None:
-    task = problem()
-    rows = np.array([[0.016, 1.0, 0.0], [0.02, 2.0, 1.0], [0.03, 3.0, 1.0]])
-    one, two = (cdsm.evaluate_designs(task, rows, jobs=n) for n in (1, 2))
-    # one process may have compiled the kernels, the others may not
-    np.testing.assert_allclose(one.values, two.values, rtol=1e-12)
 
 
 def test_an_infeasible_problem_is_named() -> None:
@@ -345,22 +306,11 @@ def test_an_infeasible_problem_is_named() -> None:
     weak = problem(maximum=21.0)
     with pytest.raises(InfeasibleDesign, match=r"not held: posture \d: no tension within"):
         cdsm.search_designs(weak, generations=1, population=4)
-    short = problem(variables=(cdsm.Variable("disk_offset", 0.04, 0.05),))
-    with pytest.raises(InfeasibleDesign, match="none of 4 designs is an arm"):
-        cdsm.search_designs(short, generations=1, population=4)
+    with pytest.raises(cdsm.InvalidInput, match="end@cable2_1 is not continuous"):
+        cdsm.refine_design(problem())
 
 
 # --- refinement --------------------------------------------------------------------------
-
-CONTINUOUS = (
-    cdsm.Variable("hole_radius", 0.012, 0.04),
-    cdsm.Variable("disk_offset@2", 0.005, 0.02),
-    cdsm.Variable("link_length@2", 0.05, 0.1),
-    cdsm.Variable("lead", 0.0, 0.5),
-    cdsm.Variable("phase@3", -1.0, 1.0),
-    cdsm.Variable("hole_angle@cable1_2", -1.0, 6.0),
-    cdsm.Variable("minimum", 5.0, 50.0),
-)
 
 
 def test_refinement_finds_what_a_fine_search_finds() -> None:
@@ -381,27 +331,16 @@ def test_refinement_finds_what_a_fine_search_finds() -> None:
 START = 1.5e4
 
 
-def test_problems_that_cannot_be_refined_say_why() -> None:
-    with pytest.raises(cdsm.InvalidInput, match="end@cable2_1 is not continuous"):
-        cdsm.refine_design(problem())
-    two = problem(variables=CONTINUOUS)
-    with pytest.raises(cdsm.InvalidInput, match="several objectives"):
-        cdsm.refine_design(two)
-
-
 # --- bad problems ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"variables": ()}, "one variable"),
         ({"variables": (cdsm.Variable("end@cable2_1", 1, 4),)}, "end@cable2_1.high: 4"),
         ({"variables": (cdsm.Variable("hole_radius@9", 0.01, 0.02),)}, "joints 1 to 3"),
         ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead of a joint twice"),
         ({"loads": np.zeros((1, 5))}, "loads: shape"),
-        ({"diameter": 1.2}, "diameter: 1.2 m given; 0, or 1e-06 to 0.5 m"),
-        ({"coverage": -3.0}, "coverage: -3 given; give 0 or more"),
         (
             {"objectives": (cdsm.Objective("force_radius"),), "maximum": np.inf},
             "force_radius needs a finite one",
@@ -421,14 +360,10 @@ def test_bad_problems_name_what_is_wrong(changes: dict[str, Any], said: str) -> 
     ("make", "said"),
     [
         (lambda: cdsm.Variable("hole_radius", 0.03, 0.02), "give low < high"),
-        (lambda: cdsm.Variable("hole_radius", 0.03), "needs both"),
         (lambda: cdsm.Variable("hole_radius", -0.03, 0.03), r"-0.03 m given; 0, or 1e-06 to"),
         (lambda: cdsm.Variable("minimum", -5.0, 5.0), "cables only pull"),
-        (lambda: cdsm.Variable("wire", 1.0, 2.0), "needs low and high, or|has no range"),
         (lambda: cdsm.Variable("end", 1, 3), "name of a cable"),
-        (lambda: cdsm.Variable("minimum@1", 1.0, 3.0), "one value for the arm"),
         (lambda: cdsm.Objective("stiffness"), "direction: is needed"),
-        (lambda: cdsm.Objective("mass", "z"), "direction: has no meaning"),
         (lambda: cdsm.Constraint("mass"), "at_least or at_most"),
         (lambda: cdsm.Objective("beauty"), "no quantity of a design is called .beauty"),
     ],
@@ -446,14 +381,6 @@ def test_bad_parts_name_what_is_wrong(make: Any, said: str) -> None:
 def test_ranges_in_other_units_are_doubted(of: Any, low: float, high: float, said: str) -> None:
     with pytest.warns(cdsm.CdsmWarning, match=said):
         cdsm.Variable(of, low, high)
-
-
-def test_a_posture_beyond_the_limits_is_named_without_remedies_that_a_search_lacks() -> None:
-    beyond = problem(postures=np.vstack([BENT, np.full(6, 2.0)]))
-    with pytest.raises(InfeasibleDesign, match=r"posture 4: q: joint1_1") as caught:
-        cdsm.search_designs(beyond, generations=1, population=4)
-    assert "check_limits" not in str(caught.value)
-    assert ".." not in str(caught.value)
 
 
 def test_files_for_the_workshop(tmp_path: Path) -> None:
@@ -496,16 +423,3 @@ def test_a_cable_is_cut_for_all_postures_within_the_joint_limits() -> None:
     assert (cut >= high - 1e-7).all()
     np.testing.assert_allclose(shortest, low, atol=2e-4)  # the grid ends before the limits
     np.testing.assert_allclose(cut, high, atol=2e-4)
-
-
-def test_the_axis_counts_designs_in_whole_numbers() -> None:
-    task = problem(objectives=(cdsm.Objective("motor_force"),))
-    (axes,) = cdsm.search_designs(task, generations=2, population=4).plot().axes
-    assert (axes.get_xticks() % 1.0 == 0.0).all()
-
-
-def test_leads_that_are_not_those_of_the_geometry_are_refused() -> None:
-    arm = small_arm()
-    cables = [replace(each, lead=each.lead + 0.1 * (i == 1)) for i, each in enumerate(arm.cables)]
-    with pytest.raises(cdsm.InvalidInput, match=f"lead or the holes of {cables[1].name} are not"):
-        problem(arm=arm.with_cables(cables))

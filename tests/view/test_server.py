@@ -1,7 +1,6 @@
 """The live view, without a browser: its scene, its controls, its path, and what it refuses."""
 
 import importlib.util
-import math
 import re
 import signal
 import socket
@@ -44,16 +43,15 @@ def node(view: View, name: str) -> Any:
 # --- the scene ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("order", [1, -1])
-def test_the_scene_holds_the_arm_where_the_api_has_it(order: int) -> None:
+def test_the_scene_holds_the_arm_where_the_api_has_it() -> None:
+    """Whatever the order of its joints."""
     plain = soft_arm()
-    names = plain.joint_names[::order]
     arm = cdsm.Manipulator.from_urdf(
-        plain.urdf, plain.cables, tip=plain.tip_link, joint_names=names
+        plain.urdf, plain.cables, tip=plain.tip_link, joint_names=plain.joint_names[::-1]
     )
     q = np.deg2rad(DEGREES)
     pose = plain.at(q)
-    with serve(arm, port=0, q=q[::order], minimum=STABLE) as view:
+    with serve(arm, port=0, q=q[::-1], minimum=STABLE) as view:
         for link in ("link1", "link3"):  # shape 0 of a link is its backbone, half a link along x
             place = pose.link_pose(link)
             middle = place[:3, 3] + 0.03 * place[:3, 0]
@@ -64,35 +62,12 @@ def test_the_scene_holds_the_arm_where_the_api_has_it(order: int) -> None:
             # a browser holds float32
             np.testing.assert_allclose(node(view, f"/cables/{i}").points, ends, atol=1e-7)
         assert node(view, "/ellipsoid").visible
-        assert not node(view, "/sticks").visible
-
-
-@pytest.mark.parametrize("mesh", [False, True])
-def test_robots_without_shapes_are_sticks(mesh: bool, caplog: pytest.LogCaptureFixture) -> None:
-    robot = foreign.TREE
-    if mesh:  # one that is not there
-        visual = '<visual><geometry><mesh filename="package://lost/x.stl"/></geometry></visual>'
-        robot = robot.replace('<link name="floor">', f'<link name="floor">{visual}')
-    law = cdsm.LinearElasticity(3e4)
-    arm = cdsm.Manipulator.from_urdf(robot, foreign.cables(law), tip="tip", gravity=(0.0, 0.0, 0.0))
-    with serve(arm, port=0, q=foreign.POSTURE, minimum=0.0) as view:
-        assert view.shown.posture is not None
-        sticks = node(view, "/sticks")
-        assert sticks.visible
-        np.testing.assert_allclose(sticks.points, view.shown.posture.bones, atol=1e-7)
-        assert len(node(view, "/brackets").points) == len(view.shown.posture.brackets)
-    assert ("lost/x.stl" in caplog.text) == mesh
-
-
-def test_cables_are_named_with_their_tensions(view: View) -> None:
-    view._panel.names.value = True  # type: ignore[misc]
-    tensions = view.shown.tensions
-    assert tensions is not None
-    assert node(view, "/names/4").visible
-    assert node(view, "/names/4").text == f"cable2_2: {tensions[4]:.4g} N"
-    view._panel.names.value = False  # type: ignore[misc]
-    assert view.shown.tensions is not None
-    assert not node(view, "/names/4").visible
+    crab = foreign.crab()  # without shapes, and with joints that slide
+    with serve(crab, port=0, q=foreign.POSTURE, minimum=0.0) as view:
+        bones = crab.at(foreign.POSTURE).bones
+        np.testing.assert_allclose(node(view, "/sticks").points, bones, atol=1e-7)
+        shown = np.where(crab.slides, 1e3 * foreign.POSTURE, np.rad2deg(foreign.POSTURE))
+        np.testing.assert_allclose([joint.value for joint in view._panel.joints], shown)
 
 
 # --- the controls -------------------------------------------------------------------------------
@@ -109,33 +84,6 @@ def test_numbers_beyond_all_limits_do_not_end_the_view(view: View) -> None:
         slider.value = before  # type: ignore[misc]
         assert view.shown.condition is Condition.STABLE
         assert node(view, "/arm").visible
-
-
-def test_a_fault_of_our_own_leaves_no_number_behind(
-    view: View, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    def broken(*_: object) -> None:
-        raise np.linalg.LinAlgError("did not converge")
-
-    with monkeypatch.context() as patch:
-        patch.setattr("cdsm.view.live_view.show", broken)
-        view._request()
-        assert view.shown.condition is Condition.FAILED
-    assert "did not converge" in view._panel._text.content
-    assert "| tip |" not in view._panel._text.content
-    assert not node(view, "/cables").visible
-    assert "did not converge" in caplog.text
-    view._request()
-    assert view.shown.stiffness is not None
-
-
-def test_joints_that_slide_have_sliders_in_millimetres() -> None:
-    crab = foreign.crab()
-    with serve(crab, port=0, q=foreign.POSTURE, minimum=0.0) as view:
-        units = [joint.label.split()[-1] for joint in view._panel.joints]
-        assert units == ["[mm]" if slides else "[°]" for slides in crab.slides]
-        shown = np.where(crab.slides, 1e3 * foreign.POSTURE, np.rad2deg(foreign.POSTURE))
-        np.testing.assert_allclose([joint.value for joint in view._panel.joints], shown)
 
 
 # --- the path -----------------------------------------------------------------------------------
@@ -186,7 +134,7 @@ def test_a_port_in_use_is_named_and_nothing_is_left_running() -> None:
     assert threading.active_count() == threads
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.0.1", "no.such.host.invalid", "", 7])
+@pytest.mark.parametrize("host", ["0.0.0.0", "no.such.host.invalid", 7])
 def test_addresses_of_other_machines_are_refused(host: Any) -> None:
     with pytest.raises(cdsm.InvalidInput, match=r"host: .* use `ssh -L 8080:localhost:8080`"):
         serve(soft_arm(), host=host)
@@ -197,10 +145,6 @@ def test_addresses_of_other_machines_are_refused(host: Any) -> None:
     [
         ({"port": 70000}, "port: 70000"),
         ({"minimum": -1.0}, "minimum: -1 N given"),
-        ({"force": (1.0, 2.0)}, "force: shape"),
-        ({"largest_tension": 0.0}, "largest_tension: 0 N given"),
-        ({"largest_force": math.nan}, "largest_force"),
-        ({"q": np.full(6, 3.0)}, "joint1_1"),
         ({"q": [0.0]}, "q: shape"),
         ({"solver": "no such"}, "no installed solver is called 'no such'"),
         ({"angles": [*PATH[:3], np.full(6, 3.0)]}, "angles: sample 4: "),
