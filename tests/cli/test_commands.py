@@ -209,14 +209,6 @@ def test_new_writes_the_arm_of_the_readme(tmp_path: Path) -> None:
     assert call(*said.partition("cdsm ")[2].split()).exit_code == 0
 
 
-@pytest.mark.parametrize("text", ["nan", "2.6", "2.6,1", "3,x", "0", "3,-1", ""])
-def test_new_takes_whole_numbers_of_joints(text: str, tmp_path: Path) -> None:
-    result = call("new", tmp_path / "ARM.toml", "--joints", text)
-    assert result.exit_code == 2
-    assert "give a whole number, or several: 4 or 3,3" in result.stderr
-    assert not [*tmp_path.iterdir()]
-
-
 def test_new_makes_an_arm_file_of_a_robot(tmp_path: Path) -> None:
     robot, cables, arm = (tmp_path / name for name in ("r.urdf", "c.toml", "ARM.toml"))
     robot.write_text(ROBOT, encoding="utf-8")

@@ -89,14 +89,6 @@ def test_lead_decides_whether_stiffness_falls_with_tension(results: Results) -> 
         assert cdsm.stiffness(pose, cdsm.distribute_tension(pose, 800.0)).is_stable
 
 
-def test_fig4_active_part_falls_in_proportion_to_tension(results: Results) -> None:
-    curve, _ = of_arm(results, "fig4").curves
-    # not exactly: gravity's share of the tensions does not grow with the bound
-    growth = curve.pseudoinverse_part[-1] / curve.pseudoinverse_part[0]
-    assert np.all(curve.pseudoinverse_part < 0.0)
-    np.testing.assert_allclose(growth, 800.0 / 100.0, rtol=0.05)
-
-
 def test_fig6_increments_are_within_two_percent_of_the_paper(results: Results) -> None:
     (claim,) = claims(results, "fig6", "increment")
     assert claim.paper == (4.24, 2.9, 4.57)
@@ -125,12 +117,6 @@ def test_fig8_rises_and_then_falls_a_little_with_eq19_within_its_digits(results:
     assert all(x > 0.0 for claim in (ten, arc, s) for x in claim.original + claim.along)
 
 
-def test_paper_reading_overestimates_a_hung_weight_everywhere(results: Results) -> None:
-    for name in ("fig3", "fig4", "fig6", "fig7", "fig8"):
-        for curve in of_arm(results, name).curves:
-            assert np.all(curve.pseudoinverse > curve.along)
-
-
 def test_original_length_stiffens_by_the_strain_and_changes_nothing_else(results: Results) -> None:
     """K of a locked wire is EA (1 + ε)/L instead of EA/L."""
     figure = of_arm(results, "fig6")
@@ -142,13 +128,6 @@ def test_original_length_stiffens_by_the_strain_and_changes_nothing_else(results
     assert (stiffer < 1.05 * strain[:, 2:]).all()
     assert figure.curves[0].original_length == "stretched"
     assert figure.original[0].original_length == "unstrained"
-
-
-def test_every_number_that_was_searched_for_says_so(results: Results) -> None:
-    for name in ("fig3", "fig4", "fig6", "fig7", "fig8", "lead"):
-        assert all(claim.searched for claim in results[name].claims)
-    (claim,) = results["fig6"].claims
-    assert all(word in claim.searched for word in ("mass", "gravity", "cables", "lower bound"))
 
 
 def test_virtual_prototype_is_that_of_section_iv() -> None:
