@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import binom
 
 import cdsm
 from cdsm.identification import Measurement, WeightLoop, identify
@@ -120,12 +119,12 @@ def test_jacobian_is_the_derivative_of_the_residuals() -> None:
 
 @pytest.mark.long
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
-    """Of friction and of rigidity, in 240 experiments."""
-    seeds, planned = 240, Experiment(hinge, PLANNED, TRUE, FREE)
-    held = [planned.held(np.random.default_rng([seed, 20])) for seed in range(seeds)]
-    counts = np.sum([list(each.values()) for each in held], axis=0)
-    fewest, most = binom.interval(0.998, seeds, 0.95)
-    assert ((fewest <= counts) & (counts <= most)).all(), counts
+    """Of friction and of rigidity, in 200 experiments of two loops each."""
+    planned = [replace(loop, forces=(0.0, 12.0, 24.0, 12.0, 0.0)) for loop in PLANNED]
+    seeds, arm = 200, Experiment(hinge, planned, TRUE, FREE)
+    held = [arm.held(np.random.default_rng([seed, 20])) for seed in range(seeds)]
+    shares = np.mean([list(each.values()) for each in held], axis=0)
+    assert ((shares >= 0.91) & (shares <= 0.98)).all(), shares
 
 
 # --- what cannot be told --------------------------------------------------------------------
