@@ -103,18 +103,6 @@ def test_interval_that_the_measurements_do_not_end_is_open() -> None:
     assert narrow.confidence()["softness"] == (-math.inf, math.inf)
 
 
-def test_interval_that_the_model_ends_is_open() -> None:
-    def model_of(softness: float) -> cdsm.Manipulator:
-        if softness > 2.05e-3:
-            raise cdsm.InvalidInput("softness", "no such wire is sold.")
-        return hinge(softness)
-
-    found = identify(
-        model_of, readings(0.3), {"softness": (1e-4, 1e-1)}, start={"softness": 1.9e-3}
-    )
-    assert found.confidence()["softness"][1] == math.inf
-
-
 def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
     measured = readings(0.1)
     (rigidity, _), _, _ = line(measured)
@@ -136,9 +124,6 @@ def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
 
     assert chi_square(high) - chi_square(beyond) == pytest.approx(norm.ppf(0.975) ** 2, rel=5e-3)
     assert any(each.startswith("softness is at its lower bound") for each in found.warnings)
-
-
-# --- how often they hold --------------------------------------------------------------------
 
 
 def strand_arm(hole_radius: float, drive: float, lead: float) -> cdsm.Manipulator:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.identification import Measurement, WeightLoop, identify
+from cdsm.identification import WeightLoop, identify
 from cdsm.identification.problem import Problem
 from tests.support.coverage import Experiment
 
@@ -53,9 +53,6 @@ def measured(seed: int, planned: list[WeightLoop] = PLANNED) -> list[WeightLoop]
 FOUND = identify(hinge, measured(0), FREE, start={"friction": 0.3, "rigidity": 3e4})
 
 
-# --- what is found --------------------------------------------------------------------------
-
-
 def test_friction_and_rigidity_come_back_within_five_per_cent() -> None:
     # linearised, σ is 1.3 % and 0.2 %: 5 % is four σ
     for name, (low, high) in FOUND.confidence().items():
@@ -84,27 +81,6 @@ def test_loops_of_a_load_cycle_give_the_arm_that_made_them() -> None:
     assert found.freedom == 2 * 3 * (len(FORCES) - 1) - 2
 
 
-@pytest.mark.slow
-def test_loops_and_stiffnesses_determine_together_what_neither_does_alone() -> None:
-    # a loop tells rigidity over length; the stiffness of another arm's posture tells as little
-    free = {**FREE, "lead": (0.1, 1.0)}
-    start = {**TRUE, "lead": 0.25}
-    exact = [PLANNED[0].simulated(hinge())]
-    alone = identify(hinge, exact, free, start=start)
-    assert alone.correlation[1, 2] > 0.99
-    assert any("rigidity and lead are correlated" in warning for warning in alone.warnings)
-    length = Measurement(
-        value=cdsm.stiffness(hinge().at((0.0,)), (40.0, 40.0)).along("z"),
-        direction="z",
-        angles=(0.0,),
-        tension=(40.0, 40.0),
-        std=1.0,
-    )
-    both = identify(hinge, [*exact, length], free, start=start)
-    assert both.freedom == alone.freedom + 1
-    assert both.std[1] < alone.std[1]
-
-
 def test_jacobian_is_the_derivative_of_the_residuals() -> None:
     problem = Problem(hinge, None, measured(1), FREE)
     true = np.array(list(TRUE.values()))
@@ -127,9 +103,6 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     assert ((shares >= 0.91) & (shares <= 0.98)).all(), shares
 
 
-# --- what cannot be told --------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_without_wrap_friction_is_not_determined_and_that_is_said() -> None:
     # lead, disks and link in one line: nothing presses the cable against a hole
@@ -137,16 +110,6 @@ def test_without_wrap_friction_is_not_determined_and_that_is_said() -> None:
     found = identify(hinge, straight, FREE, start=TRUE)
     low, high = found.confidence()["friction"]
     assert math.isinf(high) or high - low > 0.1
-    product = {"area": (1e-6, 1e-5), "modulus": (1e9, 1e11)}
-    loops = [loop.simulated(hinge()) for loop in PLANNED]
-    found = identify(
-        lambda area, modulus: hinge(rigidity=area * modulus),
-        loops,
-        product,
-        start={"area": 3e-6, "modulus": 1.6e10},
-    )
-    assert found.rank == 1
-    assert any("not identifiable (rank 1 of 2)" in warning for warning in found.warnings)
 
 
 def test_bad_loops_name_the_offender_and_the_remedy() -> None:

@@ -105,19 +105,3 @@ def test_the_force_comes_on_top_of_the_wrench() -> None:
     ):
         off = identify(lambda lead: snake(lead=lead), wrong, free, start=true)
         assert abs(off.parameters["lead"] / 0.35 - 1.0) > 1e-3
-
-
-def test_a_weight_that_is_too_much_for_the_model_is_named_or_stepped_back_from() -> None:
-    # the lighter the arm, the less pulls against 5 N
-    heavy = Measurement(100.0, DOWN, BENT, minimum=3.0, std=1.0, force=5.0, label="heavy")
-    with pytest.raises(cdsm.InvalidInput, match=r"start: .* measurement heavy: tension .* N"):
-        identify(lambda lead: snake(lead=lead), [heavy], {"lead": (0.2, 0.4)}, start={"lead": 0.3})
-    arm = snake(mass=0.6)
-    test = cdsm.weight_test(
-        arm.at(BENT), cdsm.distribute_tension(arm.at(BENT), 3.0), 5.0 * np.array(DOWN)
-    )
-    held = replace(heavy, value=test.stiffness)
-    found = identify(
-        lambda mass: snake(mass=mass), [held], {"mass": (0.05, 3.0)}, start={"mass": 2.0}
-    )
-    assert found.parameters["mass"] == pytest.approx(0.6, rel=1e-6)

@@ -81,8 +81,6 @@ EXACT = measured(prototype(**TRUE))
 READ = noisy(EXACT, 1)
 NOISY = identify(prototype, READ, FREE)
 
-# --- what is found --------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("minimum", [False, True])
 def test_parameters_are_recovered_from_measurements_without_noise(minimum: bool) -> None:
@@ -121,24 +119,11 @@ def test_jacobian_is_the_derivative_of_the_residuals() -> None:
     assert abs(NOISY.residuals @ NOISY.jacobian / lengths).max() < 1e-5
 
 
-def test_covariance_is_the_inverse_of_the_normal_matrix_and_grows_with_the_std() -> None:
+def test_covariance_is_the_inverse_of_the_normal_matrix() -> None:
     J = NOISY.jacobian
     scale = np.outer(NOISY.std, NOISY.std)
     np.testing.assert_allclose(NOISY.covariance / scale, np.linalg.inv(J.T @ J) / scale, rtol=1e-6)
     np.testing.assert_allclose(NOISY.correlation, NOISY.covariance / scale, rtol=1e-12)
-    doubled = [replace(each, std=2.0 * each.std) for each in READ]
-    again = identify(prototype, doubled, FREE, start=NOISY.parameters)
-    np.testing.assert_allclose(again.values, NOISY.values, rtol=1e-6)
-    np.testing.assert_allclose(again.std, 2.0 * NOISY.std, rtol=1e-4)
-
-
-@pytest.mark.slow
-def test_every_start_and_order_of_parameters_leads_to_the_same_optimum() -> None:
-    start = {"hole_radius": 0.021, "drive": 9e5, "lead": 0.06}
-    found = identify(prototype, NOISY.measurements, FREE, start=start)
-    np.testing.assert_allclose(found.values, NOISY.values, rtol=1e-6)
-    turned = identify(prototype, NOISY.measurements, dict(reversed(FREE.items())))
-    assert turned.parameters == pytest.approx(NOISY.parameters, rel=1e-6)
 
 
 @pytest.mark.slow
@@ -175,71 +160,27 @@ def test_a_wrench_beside_measured_tensions_is_part_of_the_prediction() -> None:
     assert abs(found.parameters["mass"] - 0.5) > 0.1
 
 
-# --- what cannot be known -------------------------------------------------------------------
-
-
 def by_product(area: float, modulus: float, hole_radius: float = 0.03) -> cdsm.Manipulator:
     return prototype(hole_radius=hole_radius, rigidity=area * modulus)
 
 
-def by_sum(tube: float, motor: float, drive: float = 4e4) -> cdsm.Manipulator:
-    return prototype(lead=tube + motor, drive=drive)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("model_of", "true", "free", "pair"),
-    [
-        (
-            by_product,
-            {"area": 1e-6, "modulus": 5e10, "hole_radius": 0.03},
-            {"area": (5e-7, 2e-6), "modulus": (2e10, 2e11), "hole_radius": (0.02, 0.04)},
-            ("area", "modulus"),
-        ),
-        (
-            by_sum,
-            {"tube": 0.2, "motor": 0.1, "drive": 4e4},
-            {"tube": (0.05, 0.5), "motor": (0.0, 0.5), "drive": (1e4, 1e6)},
-            ("tube", "motor"),
-        ),
-    ],
-)
-def test_parameters_that_only_act_together_are_named(
-    model_of: Callable[..., cdsm.Manipulator],
-    true: dict[str, float],
-    free: dict[str, tuple[float, float]],
-    pair: tuple[str, str],
-) -> None:
-    found = identify(model_of, measured(model_of(**true)), free)
+def test_parameters_that_only_act_together_are_named() -> None:
+    free = {"area": (5e-7, 2e-6), "modulus": (2e10, 2e11), "hole_radius": (0.02, 0.04)}
+    exact = measured(by_product(area=1e-6, modulus=5e10, hole_radius=0.03))
+    found = identify(by_product, exact, free)
     assert found.rank == 2
     sentence = next(each for each in found.warnings if "not identifiable (rank 2 of 3)" in each)
-    assert all(name in sentence for name in pair)
-    other = next(name for name in true if name not in pair)
-    assert other not in sentence
-    i, j, k = (found.names.index(name) for name in (*pair, other))
+    assert "area" in sentence
+    assert "modulus" in sentence
+    assert "hole_radius" not in sentence
+    i, j, k = (found.names.index(name) for name in free)
     assert np.isinf(found.std[[i, j]]).all()
     assert found.correlation[i, j] == pytest.approx(-1.0)
-    # the third is known all the same, and what they make together
+    # the third is known all the same
     assert math.isfinite(found.std[k])
     assert found.correlation[i, k] == 0.0
-    assert found.parameters[other] == pytest.approx(true[other], rel=1e-5)
-    assert found.confidence()[pair[0]] == (-math.inf, math.inf)
-    assert not np.isnan(found.covariance).any()
-
-
-def test_a_parameter_without_any_effect_is_named_alone() -> None:
-    def model_of(hole_radius: float, colour: float) -> cdsm.Manipulator:
-        return prototype(hole_radius)
-
-    found = identify(
-        model_of, measured(prototype(), 4), {"hole_radius": (0.02, 0.04), "colour": (0.0, 1.0)}
-    )
-    assert found.rank == 1
-    (sentence,) = found.warnings
-    assert "colour by +0.01," in sentence
-    assert "hole_radius" not in sentence
-    assert found.parameters["hole_radius"] == pytest.approx(0.03, rel=1e-6)
-    assert found.freedom == 3
+    assert found.parameters["hole_radius"] == pytest.approx(0.03, rel=1e-5)
+    assert found.confidence()["area"] == (-math.inf, math.inf)
 
 
 def test_correlated_parameters_are_named_with_their_correlation() -> None:
@@ -302,8 +243,6 @@ def test_measurements_that_the_model_does_not_explain_are_named() -> None:
     sentence = next(each for each in found.warnings if "does not explain" in each)
     assert "posture 5" in sentence
 
-
-# --- bad input ------------------------------------------------------------------------------
 
 ONE = {"hole_radius": (0.02, 0.05)}
 

@@ -77,8 +77,6 @@ def folder(path: Path, links: str, cables: str, doctype: bool = True) -> Path:
     return path
 
 
-# --- q is that of the file --------------------------------------------------------------------
-
 BRANCHES = (
     ("trunk", "U_XZ", 0),
     ("right", "S_FIXED_XYZ", 1),  # behind "left" by name

@@ -15,8 +15,6 @@ from tests.support import arms
 from tests.support.locked import BUCKLING, LENGTH, STRAND, TABLE, soft, soft_hinge, some_arm
 from tests.support.paths import ARM, DOWN, assert_holds, waving
 
-# --- the targets are hit --------------------------------------------------------------------
-
 
 def test_samples_have_the_efforts_of_plans_from_scratch() -> None:
     arm, q = presets.virtual_prototype(STRAND), waving(12)
@@ -121,9 +119,6 @@ def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
             assert each.status == "rate"
 
 
-# --- what cannot be -------------------------------------------------------------------------
-
-
 def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
     q = waving(9)
     q[2, 3] = 2.0
@@ -161,9 +156,6 @@ def test_samples_that_no_tension_holds_are_named() -> None:
     assert beyond.infeasible[0].status == "elasticity"
 
 
-# --- the largest change ---------------------------------------------------------------------
-
-
 def along_hinge(F: float) -> float:
     """along(z) of the straight soft hinge, both cables at F: K over the lever squared."""
     return soft(F) / LENGTH**2
@@ -198,9 +190,6 @@ def test_rate_of_each_cable_is_its_own() -> None:
     assert plan.complete
     assert_holds(plan, 50.0, math.inf)
     assert abs(np.diff(plan.tensions[:, 4])).max() == pytest.approx(rate[4], rel=1e-9)
-
-
-# --- what motors are told -------------------------------------------------------------------
 
 
 def test_rest_length_and_elongation_make_the_length() -> None:
@@ -257,8 +246,6 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
         assert float(row["achieved [N/m]"]) == plan.achieved[k]
     assert not any("rest_lengths cable2_1" in column for column in rows[0])
 
-
-# --- the border -----------------------------------------------------------------------------
 
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"angles": None}, "angles: neither of angles= and tips="),

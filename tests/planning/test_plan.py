@@ -14,7 +14,7 @@ from cdsm.support.values import Array
 from tests.planning.test_range import corners
 from tests.support import arms
 from tests.support.differences import central_difference
-from tests.support.locked import LENGTH, STRAND, hinge, soft, soft_hinge, some_arm
+from tests.support.locked import LENGTH, STRAND, hinge, soft, soft_hinge
 from tests.support.paths import DOWN
 
 ARMS: dict[str, tuple[str, int, int, cdsm.Elasticity, float, float]] = {
@@ -46,9 +46,6 @@ def assert_admissible(plan: StiffnessPlan, low: float, high: float) -> None:
     assert K.margin >= floor(plan, low, high) * (1.0 - 1e-9)
 
 
-# --- the target is hit ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ARMS)
 def test_random_targets_are_hit_as_a_hung_weight_measures(name: str) -> None:
     pose, low, high = posture(name)
@@ -72,25 +69,6 @@ def test_random_targets_are_hit_as_a_hung_weight_measures(name: str) -> None:
             for sign in (1.0, -1.0)
         ]
         assert 2.0 / sum(soft) == pytest.approx(target, rel=1e-4)
-
-
-@pytest.mark.parametrize("name", ["universal-3-8-all", "hinged-4-0-all", "mixed-3-0-all"])
-@pytest.mark.parametrize("moment", [False, True])
-def test_springs_force_controlled_cables_and_wrenches_take_part(name: str, moment: bool) -> None:
-    pose = arms.random_posture(some_arm(name), 11, reach=0.25)
-    W = arms.random_wrench(4, moment)
-    found = cdsm.stiffness_range(pose, DOWN, 40.0, 300.0, W, starts=6)
-    for part in (0.1, 0.6, 0.95):
-        target = found.low + part * (found.high - found.low)
-        plan = cdsm.plan_stiffness(pose, DOWN, target, 40.0, 300.0, W)
-        assert cdsm.stiffness(pose, plan.tension.values, W).along(DOWN) == pytest.approx(
-            target, rel=1e-9
-        )
-        assert_admissible(plan, 40.0, 300.0)
-        np.testing.assert_array_equal(plan.tension.wrench, W)
-
-
-# --- with the least effort ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("part", [0.04, 0.9])
@@ -179,9 +157,6 @@ def test_efforts_are_those_of_an_independent_program(
     assert np.linalg.norm(plan.tension) <= 1.005 * effort
 
 
-# --- out of reach ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", [name for name in ARMS if name != "universal-5-strand"])
 def test_unreachable_targets_are_refused_with_the_range(name: str) -> None:
     pose, low, high = posture(name)
@@ -211,9 +186,6 @@ def test_every_stiffness_of_a_hinge_beside_its_kinks_is_reached() -> None:
     np.testing.assert_allclose(plan.tension.values, 33.0, rtol=1e-9)
 
 
-# --- next to the ends, and where there is nothing to choose ---------------------------------
-
-
 def test_one_cable_on_one_hinge_has_one_stiffness() -> None:
     pair = hinge(law=cdsm.LinearElasticity(2e5)).geometry.replace(
         links=(cdsm.Link(length=0.05, mass=0.2),)
@@ -232,9 +204,6 @@ def test_one_cable_on_one_hinge_has_one_stiffness() -> None:
     path = cdsm.plan_path(arm, DOWN, [found.low, 1e4, found.low], angles=np.zeros((3, 1)))
     assert path.planned == (0, 2)
     assert path.infeasible[0].status == "stiffness"
-
-
-# --- several targets ------------------------------------------------------------------------
 
 
 def test_several_directions_are_hit_at_once_if_they_can_be() -> None:

@@ -156,19 +156,6 @@ def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
         cdsm.plan_stiffness(pose, DOWN, 0.9 * found.low, 10.0)
 
 
-def test_domain_of_a_force_controlled_cable_bounds_nothing() -> None:
-    """Its elasticity does not matter; a tension beyond it is no fault."""
-    arm = presets.experimental_prototype(gravity=(0.0, 0.0, 9.81))
-    pose = arm.at(np.zeros(3))
-    held = np.array([cable.control == "position" for cable in arm.cables])
-    low = np.full(6, 50.0)
-    low[3] = 815.0
-    assert not held[3]
-    found = cdsm.stiffness_range(pose, DOWN, low, 1000.0)
-    for pull in (found.low_tension, found.high_tension):
-        assert pull.values[held].max() <= 810.0 < 815.0 <= pull.values[3]
-
-
 BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
     ({"direction": (0.0, 1.0)}, cdsm.InvalidInput, "direction"),
     ({"minimum": 80.0, "maximum": 70.0}, cdsm.InvalidInput, "maximum: 70 N"),
@@ -192,9 +179,6 @@ def test_bad_input_is_named(
     if "starts" not in change:
         with pytest.raises(error, match=message):
             cdsm.plan_stiffness(**given, target=1e5)
-
-
-# --- laws of which nothing is known ---------------------------------------------------------
 
 
 def bump(F: Array) -> Array:

@@ -15,8 +15,6 @@ from tests.support.jobs import Work, balanced, batched, one_by_one, rested, solv
 
 THREADS = 8
 
-# --- the same bits --------------------------------------------------------------------------
-
 
 # many of what is cheap, few of what is dear
 MIXED: tuple[Work, ...] = (stiff,) * 20 + (balanced,) * 8 + (batched,) * 2 + (rested, solved)
@@ -51,9 +49,6 @@ def test_processes_with_a_pickled_arm_give_the_same_bits() -> None:
         jobs = {w: pool.submit(one_by_one, arm, w, seeds) for w in dict.fromkeys(MIXED)}
         for work, job in jobs.items():
             assert job.result() == one_by_one(arm, work, seeds)
-
-
-# --- threads that come and go ---------------------------------------------------------------
 
 
 def resident() -> int:

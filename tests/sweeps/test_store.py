@@ -137,9 +137,6 @@ def test_a_store_of_another_sweep_is_refused_with_the_difference(
         swept(store=folder)
 
 
-# --- files -----------------------------------------------------------------------------------
-
-
 def test_netcdf_gives_the_same_sweep_back(tmp_path: Path, whole: xr.Dataset) -> None:
     path = cdsm.write_sweep(whole, tmp_path / "s.nc")
     xr.testing.assert_identical(cdsm.read_sweep(path), whole)

@@ -147,9 +147,6 @@ def test_worst_friction_narrows_the_bounds_as_at_one_posture(worst: bool) -> Non
         np.testing.assert_allclose(entry.force_radius, polytope.radius, rtol=1e-7)
 
 
-# --- labels ----------------------------------------------------------------------------------
-
-
 def test_dimensions_and_coordinates_are_those_of_the_question(everything: xr.Dataset) -> None:
     poses, cases = ("joint1_1", "joint3_2"), ("wrench", "minimum")
     assert everything.status.dims == (*poses, *cases)
@@ -188,9 +185,6 @@ def test_attributes_hold_the_arm(everything: xr.Dataset, tmp_path: Any) -> None:
     assert everything.attrs["source"] == f"cdsm {cdsm.__version__}"
 
 
-# --- pose sets -------------------------------------------------------------------------------
-
-
 def test_path_is_even_along_straight_lines() -> None:
     corners = np.zeros((3, 6))
     corners[1, 0], corners[2, :2] = 0.3, [0.3, 0.1]
@@ -213,8 +207,6 @@ def test_random_postures_fill_the_limits_and_come_again_with_their_seed() -> Non
     place = np.floor(256 * (first - arm.lower) / (arm.upper - arm.lower)).astype(int)
     assert all(np.array_equal(np.sort(column), np.arange(256)) for column in place.T)
 
-
-# --- bad input -------------------------------------------------------------------------------
 
 Q = np.zeros((2, 6))
 DATA = xr.DataArray(Q, dims=("row", "joint"))

@@ -126,9 +126,6 @@ def is_refused(view: View, **options: Any) -> bool:
         return bool(error.response.status_code == 403)
 
 
-# --- who may connect ----------------------------------------------------------------------------
-
-
 def test_a_page_of_another_origin_reads_nothing(view: View) -> None:
     port = port_of(view)
     for origin in (
@@ -160,9 +157,6 @@ def test_this_machine_is_served_under_all_its_names(view: View, host: str) -> No
     assert page_status(view, f"{host}:9000") == 200  # a tunnel of ssh has a port of its own
     with Client(view, host=host, origin=f"http://{name.lower()}") as friend:
         assert friend.control("force z [N]")
-
-
-# --- what they may send -------------------------------------------------------------------------
 
 
 def test_a_client_changes_nothing_of_a_control_but_its_value(view: View) -> None:

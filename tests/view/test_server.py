@@ -40,9 +40,6 @@ def node(view: View, name: str) -> Any:
     return handle
 
 
-# --- the scene ----------------------------------------------------------------------------------
-
-
 def test_the_scene_holds_the_arm_where_the_api_has_it() -> None:
     """Whatever the order of its joints."""
     plain = soft_arm()
@@ -70,9 +67,6 @@ def test_the_scene_holds_the_arm_where_the_api_has_it() -> None:
         np.testing.assert_allclose([joint.value for joint in view._panel.joints], shown)
 
 
-# --- the controls -------------------------------------------------------------------------------
-
-
 def test_numbers_beyond_all_limits_do_not_end_the_view(view: View) -> None:
     joint, force = view._panel.joints[0], view._panel._load[2]
     for slider, condition in ((joint, Condition.NO_POSTURE), (force, Condition.INVALID)):
@@ -84,9 +78,6 @@ def test_numbers_beyond_all_limits_do_not_end_the_view(view: View) -> None:
         slider.value = before  # type: ignore[misc]
         assert view.shown.condition is Condition.STABLE
         assert node(view, "/arm").visible
-
-
-# --- the path -----------------------------------------------------------------------------------
 
 
 def test_a_path_is_played_to_its_end_and_again() -> None:
@@ -120,9 +111,6 @@ def test_a_path_of_tips_is_followed_by_inverse_kinematics() -> None:
         view._panel.joints[0].value = 5.0  # type: ignore[misc]
         assert view.shown.posture is not None
         assert "away from the handle" not in view._panel._text.content  # forgotten elsewhere
-
-
-# --- what it refuses ----------------------------------------------------------------------------
 
 
 def test_a_port_in_use_is_named_and_nothing_is_left_running() -> None:

@@ -71,9 +71,6 @@ def along(K: cdsm.Stiffness) -> str:
     return ", ".join(f"{K.along(u) / 1e3:.4g}" for u in np.eye(3))
 
 
-# --- tensions that balance the force ------------------------------------------------------------
-
-
 def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     arm = soft_arm()
     shown = show(arm, setting(arm, force=(0.5, -1.0, -2.0)))
@@ -132,9 +129,6 @@ def test_names_and_messages_are_text_and_not_markup() -> None:
     for written in (text(shown), tensions_text(shown)):
         assert "<b>*" not in written
         assert "&#60;b&#62;&#42;" in written
-
-
-# --- locked motors ------------------------------------------------------------------------------
 
 
 def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force() -> None:

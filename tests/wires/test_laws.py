@@ -118,9 +118,6 @@ def test_tension_outside_the_law_is_an_error_with_data(method: str) -> None:
     getattr(STRAND, method)([2.2, 810.0])
 
 
-# --- constructors ---------------------------------------------------------------------------
-
-
 def test_linear_law_is_exact() -> None:
     tension = np.array([0.0, 1.0, 7.5, 1e5])
     for EA in (226_195.0, 49.0, *RANGES["rigidity"][1:]):
@@ -222,8 +219,6 @@ def test_bad_constructor_input_names_the_argument(make: Callable[[], object], sa
         make()
 
 
-# --- the curve between the points of a table ------------------------------------------------
-
 EXACT: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
     "Eq. 19": (STRAND.strain, STRAND.rigidity),
     "power 0.3": (lambda F: 1e-3 * F**0.3, lambda F: 1e3 * F**0.7 / 0.3),
@@ -259,14 +254,3 @@ def test_curve_meets_its_points_and_rises(law: cdsm.TabulatedElasticity) -> None
         assert (np.diff(law.strain(tension)) >= 0.0).all()
     above = np.nextafter(points[1:-1], np.inf)
     np.testing.assert_allclose(law.rigidity(above), law.rigidity(points[1:-1]), rtol=1e-6)
-
-
-def test_own_law_works_in_single_postures_and_batches() -> None:
-    law = cdsm.Elasticity.from_rigidity(lambda F: 1e3 + F, 0.0, 1e3)
-    arm = cdsm.presets.virtual_prototype(elasticity=law)
-    tension = np.full(len(arm.cables), 50.0)
-    K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), tension)
-    l0 = K.posture.cable_lengths / (1.0 + np.log(1.05))  # ε = ∫ dF/(1 kN + F)
-    np.testing.assert_allclose(K.cable_stiffness, 1050.0 / l0, rtol=1e-9)
-    batch = cdsm.evaluate(arm, np.zeros((2, arm.nv)), tension=tension, outputs=("joint",))
-    np.testing.assert_allclose(batch["joint"][1], K.joint, rtol=1e-10, atol=1e-12)

@@ -50,9 +50,6 @@ def strand_test(noise: float, seed: int) -> tuple[Array, Array]:
     return shaken, test.force + noise * random.normal(size=test.force.size)
 
 
-# --- recovery -------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.long)])
 def test_laws_come_back_and_bands_hold_them(count: int) -> None:
     """Five wires, 60 to 2000 points, 0.1 to 1 N, 1 to 10 µm, 40 tensions from 10 to 780 N."""
@@ -113,17 +110,6 @@ def test_yield_ends_the_law(points: int, noise: float) -> None:
     assert fit.elasticity.rigidity(inner) == pytest.approx(EA, rel=0.05)
 
 
-def test_the_law_does_not_depend_on_how_long_the_wire_was() -> None:
-    displacement, force = strand_test(0.5, 3)
-    one = cdsm.fit_tensile_test(displacement, force, GAUGE).elasticity
-    other = cdsm.fit_tensile_test(3.0 * displacement, force, 3.0 * GAUGE).elasticity
-    F = np.linspace(10.0, 800.0, 50)
-    np.testing.assert_allclose(other.rigidity(F), one.rigidity(F), rtol=1e-4)
-
-
-# --- what machines record -------------------------------------------------------------------
-
-
 def test_cycles_that_bed_the_wire_in_are_left_out() -> None:
     """EA of the last branch is 20 kN above 50 N; the first one lies far beside it."""
     test = cdsm.read_tensile_csv(ROOT / "tests" / "data" / "tensile_cycles.csv", gauge_length=GAUGE)
@@ -135,20 +121,6 @@ def test_cycles_that_bed_the_wire_in_are_left_out() -> None:
     part = cdsm.fit_tensile_test(test.displacement, test.force, GAUGE, between=(60.0, 300.0))
     assert 60.0 <= part.elasticity.low < 65.0 < 295.0 < part.elasticity.high <= 301.0
     assert part.elasticity.rigidity(part.tension) == pytest.approx(20e3, rel=0.05)
-
-
-def test_between_chooses_another_branch() -> None:
-    """A first pull to 200 N with 12 kN, then one to 600 N, and another to 250 N, with 48 kN."""
-    force = np.concatenate([np.linspace(a, b, 100) for a, b in ((0, 200), (200, 20), (20, 600))])
-    strain = np.where(np.arange(300) < 100, force / 12e3, 200 / 12e3 + (force - 200) / EA)
-    back = np.concatenate([np.linspace(600, 30, 100), np.linspace(30, 250, 100)])
-    strain = np.append(strain, strain[-1] + (back - 600) / 24e3)
-    force = np.append(force, back) + 0.1 * np.random.default_rng(0).normal(size=500)
-    for between, wanted in (((-np.inf, np.inf), EA), ((30.0, 600.0), EA), ((40.0, 250.0), 24e3)):
-        fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE, between=between)
-        assert fit.elasticity.rigidity([60.0, 200.0]) == pytest.approx(wanted, rel=0.02)
-    first = cdsm.fit_tensile_test(GAUGE * strain[:150], force[:150], GAUGE)
-    assert first.elasticity.rigidity([60.0, 150.0]) == pytest.approx(12e3, rel=0.02)
 
 
 def test_slack_and_lone_points_are_left_out() -> None:
@@ -173,25 +145,6 @@ def test_rupture_is_left_out_and_repeated_points_are_averaged() -> None:
     assert fit.elasticity.rigidity([50.0, 700.0]) == pytest.approx(EA, rel=2e-3)
 
 
-def test_drift_is_told() -> None:
-    displacement, force = linear_test(300, 0.2)
-    fit = cdsm.fit_tensile_test(displacement, force + 3.0 * np.sin(displacement * 2e4), GAUGE)
-    assert any("neighbouring residuals go together" in note for note in fit.notes)
-
-
-# --- band, report, figure -------------------------------------------------------------------
-
-
-def test_band_contains_its_own_fit_with_18_points_written_by_hand() -> None:
-    strain = [0, 2, 4, 6, 8, 10, 13, 16, 20, 25, 30, 35, 40, 50, 60, 70, 80, 90]  # 1e-4
-    first = [0, 2.1, 5.2, 9.5, 15, 21.8, 33.5, 47, 66.5]
-    force = [*first, 93, 121, 150, 179.5, 240, 301, 363, 425, 488]
-    fit = cdsm.fit_tensile_test(1e-4 * np.array(strain), force, 1.0)
-    assert (fit.band.low <= fit.rigidity).all()
-    assert (fit.rigidity <= fit.band.high).all()
-    assert any(note.startswith("18 points, fewer than 41") for note in fit.notes)
-
-
 def test_the_uncertainty_is_that_of_the_band_where_the_cables_work() -> None:
     fit = cdsm.fit_tensile_test(*strand_test(0.5, 0), GAUGE)
     F = np.linspace(300.0, 330.0, 1000)
@@ -202,8 +155,6 @@ def test_the_uncertainty_is_that_of_the_band_where_the_cables_work() -> None:
     with pytest.raises(cdsm.InvalidInput, match=r"low: from 50 to 900 N given; the band is from"):
         fit.relative_uncertainty(50.0, 900.0)
 
-
-# --- bad input ------------------------------------------------------------------------------
 
 RAMP = np.linspace(0.0, 0.01, 100)
 PULL = np.linspace(0.0, 500.0, 100)
