@@ -102,12 +102,6 @@ def test_a_change_of_length_that_the_plan_makes_is_no_change_of_tension() -> Non
         assert not command.saturated.any()
 
 
-def test_feedforward_needs_no_sensor() -> None:
-    one, other = control.feedforward(held(5.0)), control.feedforward(held(-300.0))
-    assert one.paid_out[0] == other.paid_out[0] == 0.4
-    assert one.tension[0] == 50.0
-
-
 def test_feedforward_of_an_overload_pays_the_wire_out_that_is_too_tense() -> None:
     wanted = held(0.0)
     wanted = wanted._replace(reference=wanted.reference._replace(tension=np.array([240.0])))

@@ -6,7 +6,6 @@ import pytest
 import cdsm
 from cdsm import control
 from cdsm.control import Command
-from cdsm.control.plants import tensions_of
 from tests.support.tracking import paid_out, small_path
 
 pytest.importorskip("mujoco")
@@ -47,13 +46,3 @@ def test_stiffness_loop_holds_an_arm_with_inertia() -> None:
 def test_friction_is_refused() -> None:
     with pytest.raises(cdsm.InvalidInput, match="friction"):
         cdsm.MuJoCoPlant(small_path(0.1).arm)
-
-
-def test_a_slack_branch_pulls_below_the_range_of_its_law() -> None:
-    arm = small_path().arm
-    slack = cdsm.Manipulator(arm.geometry, arm.cables[0].elasticity.slack_below())
-    lengths = slack.cable_lengths(np.zeros(slack.nv))
-    for force in (2.3, 1.5, 0.5, 0.0):
-        F = np.full(6, force)
-        wire = slack._laws.original_lengths(lengths, F)
-        np.testing.assert_allclose(tensions_of(slack, lengths, wire, F), F, atol=1e-9)

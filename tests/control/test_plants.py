@@ -35,16 +35,6 @@ def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
     np.testing.assert_array_equal(before.pose.q, plan.angles[0])  # a state does not change
 
 
-def test_paying_wire_out_slackens_its_cable() -> None:
-    plan = small_path()
-    plant = cdsm.QuasiStaticPlant(plan.arm)
-    state = plant.initial(plan.angles[0], plan.tensions[0], NONE)
-    wire = paid_out(plan)[0].copy()
-    wire[2] += 1e-4
-    command = Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
-    assert plant.step_to(state, command, NONE).true_values.tension[2] < plan.tensions[0, 2] - 1.0
-
-
 def test_stretched_lengths_are_refused() -> None:
     arm = small_path().arm
     stretched = cdsm.Manipulator(

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,17 +13,8 @@ from cdsm.view.panel import python_text, results_text, tensions_text
 from cdsm.view.scene import Scene
 from cdsm.view.state import Condition, Setting, Shown, show
 from tests.support import foreign
+from tests.support.arms import readme_geometry
 
-GEOMETRY: dict[str, Any] = {
-    "joints": 3,
-    "cables_per_joint": 3,
-    "link_length": 0.06,
-    "base_length": 0.03,
-    "disk_offset": 0.012,
-    "hole_radius": 0.02,
-    "link_mass": 0.1,
-    "lead": 0.3,
-}
 DEGREES = [10.0, 5.0, -8.0, 12.0, 6.0, -4.0]
 STABLE, UNSTABLE, INFEASIBLE = 20.0, 60.0, 150.0
 """Least tensions [N] at which the soft arm is each of them, none above 200 N."""
@@ -34,7 +24,7 @@ FORCE = (0.2, -0.3, -0.5)
 
 def soft_arm() -> cdsm.Manipulator:
     """Springs in series: it buckles before the tensions are infeasible."""
-    geometry = cdsm.Geometry.universal(**GEOMETRY)
+    geometry = readme_geometry(joints=3, hole_radius=0.02, link_mass=0.1)
     law = cdsm.LinearElasticity(2e5)
     cables = cdsm.serpentine_cables(geometry, law, series_stiffness=8000.0)
     return cdsm.Manipulator(geometry, cables=cables)
@@ -152,25 +142,6 @@ def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force
     moved = sagged(arm, UNSTABLE, (0.0, 0.0, 0.0))
     assert moved.condition is Condition.MOVED
     assert "moved to another equilibrium" in text(moved)
-
-
-def test_without_an_equilibrium_there_is_no_number() -> None:
-    strand = cdsm.Manipulator(soft_arm().geometry, elasticity=cdsm.presets.STRAND_1X19)
-    shown = sagged(strand, 3.0, (0.0, 0.0, -20.0))  # a cable would get slack: no law says how
-    assert shown.condition is Condition.OUTSIDE_ELASTICITY
-    assert shown.rest is None
-    assert shown.tensions is None
-    assert set(numbers(shown)) == {"tip"}
-
-
-def test_joints_on_their_stops_are_named_and_do_not_yield() -> None:
-    shown = sagged(soft_arm(), 5.0, (0.0, 0.0, -12.0))
-    assert shown.rest is not None
-    assert shown.rest.at_limit
-    said = numbers(shown)
-    assert said["joint limit reached"].replace("&#95;", "_") == ", ".join(shown.rest.at_limit)
-    C = shown.rest.compliance[:3, :3]
-    assert said["stiffness along x, y, z"] == ", ".join(f"{1e-3 / c:.4g}" for c in np.diag(C))
 
 
 def test_an_arm_with_friction_sags_less_and_shows_which_holes_slide() -> None:
