@@ -105,7 +105,7 @@ def test_written_arm_is_read_back_with_all_bits(
         assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
 
 
-@pytest.mark.parametrize("text", [FINGER, FINGER.strip(), FINGER.replace("\n", "\r\n")])
+@pytest.mark.parametrize("text", [FINGER, FINGER.replace("\n", "\r\n")])
 def test_urdf_is_a_file_beside_it_or_text_inside(tmp_path: Path, text: str) -> None:
     (tmp_path / "robots").mkdir()
     (tmp_path / "robots" / "finger.urdf").write_bytes(text.encode())
@@ -176,12 +176,3 @@ def test_faults_of_a_urdf_are_named(urdf: str, said: str, tmp_path: Path) -> Non
     with pytest.raises(cdsm.CdsmError) as caught:
         read(tmp_path, f"wire = 48e3\n[urdf]\n{urdf}\n{CABLES}")
     assert said in str(caught.value)
-
-
-def test_a_urdf_is_neither_an_arm_file_nor_a_geometry(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match=r"is a robot \(URDF\), no ARM\.toml"):
-        read(tmp_path, FINGER)
-    text = f"wire = 48e3\n[urdf]\ntip = 'tip'\ntext = '''{FINGER}'''\n{CABLES}"
-    assert read(tmp_path, text).nv == 1
-    with pytest.raises(cdsm.GeometryError, match="has no geometry; use Manip"):
-        cdsm.Geometry.read(tmp_path / "arm.toml")

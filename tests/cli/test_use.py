@@ -46,6 +46,7 @@ COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
         ("sweep PROBE --grid joint1_1=-9:9:1 --out s.csv", 2, "2 or more angles"),
         ("sweep PROBE --random 5 --out s.csv", 3, "no posture could be evaluated"),
         ("new arm.toml --from PROBE", 2, "is no robot"),
+        ("view PROBE --port 70000", 2, "70000"),
     ],
 )
 def test_exit_codes_and_messages(

@@ -40,8 +40,7 @@ DOCTYPE = '<!DOCTYPE {0} SYSTEM "../../../templates/{1}.dtd">\n'
 
 
 def link(num: int, kind: str, parent: int | None = None, **changes: object) -> str:
-    count = {"R": 1, "U": 2, "S_": 3, "P_A": 1, "PL": 3, "T": 3, "SP": 6, "P_X": len(kind) - 2}
-    size = next(n for key, n in count.items() if kind.startswith(key) or key == "P_X")
+    size = caspr_models.coordinates(kind)
     fields = {
         "num": num,
         "name": f"part {num}",
@@ -264,10 +263,3 @@ def test_no_other_doctype_is_let_pass(doctype: str, tmp_path: Path) -> None:
     file.write_text(doctype + text, encoding="utf-8")
     with pytest.raises(cdsm.FileError, match="DOCTYPE"):
         cdsm.read_caspr(path, elasticity=LAW)
-
-
-def test_folder_must_hold_one_of_each(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match=r"holds none where one \*_bodies.xml is needed"):
-        cdsm.read_caspr(tmp_path, elasticity=LAW)
-    with pytest.raises(cdsm.InvalidInput, match="Elasticity is needed"):
-        cdsm.read_caspr(tmp_path, elasticity=3.0)  # type: ignore[arg-type]

@@ -107,20 +107,11 @@ def soft() -> tuple[cdsm.Posture, Array]:
     return pose.arm.with_cables(cables).at(pose.q), pull
 
 
-def held(arm: cdsm.Manipulator, q: Any, least: float) -> tuple[cdsm.Posture, Array]:
-    pose = arm.at(np.asarray(q))
-    return pose, cdsm.distribute_tension(pose, least).values
-
-
 ARMS: dict[str, Any] = {
     **{kind: lambda kind=kind: serpentine(kind) for kind in ("universal", "hinged", "mixed")},
     "tree with slides": lambda: (crab(gravity=(1.0, -2.0, -9.0)).at(POSTURE), TENSION),
     "soft and force-controlled": soft,
     "finger": finger,
-    "virtual prototype": lambda: held(
-        cdsm.presets.virtual_prototype(), np.deg2rad(np.full(10, 10.0)), 50.0
-    ),
-    "robot from a URDF": lambda: held(two_links(BODIES["of a plate"]), [0.1, -0.2], 10.0),
 }
 
 
@@ -193,7 +184,6 @@ HELD: dict[str, tuple[cdsm.Manipulator, Array, float]] = {
         np.deg2rad([5.0, 5.0]),
         10.0,
     ),
-    "robot from a URDF": (two_links(BODIES["of a plate"]), np.array([0.1, -0.2]), 10.0),
     "massless links": (universal(2, 0.0), np.deg2rad([5.0, -3, 5, -3]), 20.0),
 }
 SECONDS = 0.5

@@ -88,13 +88,3 @@ def test_multiple_eigenvalue_has_bounds_for_gradients() -> None:
         assert change <= slope @ step + 1e-12 * K.margin
         fell.append(slope @ step - change)
     assert max(fell) > 1e-3 * K.margin
-
-
-def test_where_the_tip_cannot_move_there_is_no_gradient() -> None:
-    geometry = cdsm.presets.experimental_prototype_geometry()
-    pose = cdsm.Manipulator(geometry, arms.STEEL).at(np.zeros(3))
-    gradient = cdsm.stiffness_gradient(cdsm.stiffness(pose, np.full(6, 50.0)))
-    with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
-        gradient.along([1.0, 0.0, 0.0])
-    with pytest.raises(cdsm.SingularStiffness):
-        _ = gradient.cartesian

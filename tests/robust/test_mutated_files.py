@@ -66,7 +66,6 @@ def _path(path: Path) -> None:
 
 READERS: dict[str, Reader] = {
     "geometry": Reader("full.toml", _geometry),
-    "short geometry": Reader("short.toml", _geometry),
     "arm": Reader("arm.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
     "arm of a urdf": Reader("finger.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
     "cables": Reader("cables.toml", lambda path: _arm(crab().with_cables(cdsm.read_cables(path)))),
@@ -91,11 +90,6 @@ READERS: dict[str, Reader] = {
 def whole_files(path: Path) -> Path:
     """Fill a folder with a whole file for every reader."""
     mixed_arm().geometry.write(path / "full.toml")
-    (path / "short.toml").write_text(
-        "[universal]\njoints = 5\ncables_per_joint = 3\nlink_length = 0.04\nbase_length = 0.02\n"
-        "disk_offset = 0.01\nhole_radius = 0.03\nlink_mass = 0.5\n",
-        encoding="utf-8",
-    )
     mixed_arm().write(path / "arm.toml")
     crab().write(path / "finger.toml")
     cdsm.write_cables(crab().cables, path / "cables.toml")

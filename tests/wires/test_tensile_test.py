@@ -97,15 +97,6 @@ def test_the_header_is_within_the_first_50_lines(titles: int, tmp_path: Path) ->
         cdsm.read_tensile_csv(path, gauge_length=0.4)
 
 
-def test_a_strain_needs_no_gauge_length(tmp_path: Path) -> None:
-    path = written(tmp_path, "strain [%],force [N]\n" + rows())
-    test = cdsm.read_tensile_csv(path)
-    np.testing.assert_allclose(test.displacement / test.gauge_length, 1e-2 * np.arange(9))
-    assert test.source.endswith("no gauge length: displacements are those of 1 m of wire")
-    law = cdsm.fit_tensile_test(test.displacement, test.force, test.gauge_length).elasticity
-    np.testing.assert_allclose(law.rigidity([50.0, 350.0]), 5000.0, rtol=1e-6)
-
-
 def test_of_two_gauges_none_is_chosen_silently() -> None:
     path = DATA / "tensile_two_gauges.csv"
     with pytest.raises(cdsm.FileError, match=r"Crosshead \[mm\] and Extensometer \[mm\] may both"):
