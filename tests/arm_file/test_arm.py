@@ -161,18 +161,3 @@ def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) ->
         read(tmp_path, SHORT.replace(before, after, 1))
     assert said in str(caught.value)
     assert "arm.toml: " in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("urdf", "said"),
-    [
-        ("tip = 'tip'", "give file (a path, from the folder of this one) or text"),
-        ("file = 'a.urdf'", "urdf.tip: is missing"),
-        ("tip = 'tip'\nfile = 'absent.urdf'", "arm.toml: urdf.file: "),
-        ("tip = 'top'\ntext = '''" + FINGER + "'''", "no link is called 'top'"),
-    ],
-)
-def test_faults_of_a_urdf_are_named(urdf: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(cdsm.CdsmError) as caught:
-        read(tmp_path, f"wire = 48e3\n[urdf]\n{urdf}\n{CABLES}")
-    assert said in str(caught.value)

@@ -84,17 +84,3 @@ def test_friction_of_a_cable_is_that_of_its_holes_without_one_of_their_own(tmp_p
     assert cable.sites[1].wrap == 0.05
     assert cable.friction == (0.1, 0.3)
     assert cdsm.read_cables(cdsm.write_cables([cable], path)) == (cable,)
-
-
-def test_wire_of_all_cables_stands_at_the_top_or_is_given(tmp_path: Path) -> None:
-    path = tmp_path / "cables.toml"
-    without = ONE.replace('wire = "rope"\n', "")
-    path.write_text(without, encoding="utf-8")
-    with pytest.raises(cdsm.FileError) as caught:
-        cdsm.read_cables(path)
-    assert caught.value.path == str(path)
-    assert cdsm.read_cables(path, "1x19-1.2mm")[0].elasticity == presets.STRAND_1X19
-    assert cdsm.read_cables(path, 48e3)[0].elasticity == cdsm.LinearElasticity(48e3)
-    path.write_text('wire = "solid-1.2mm"\nminimum = 3.0\n' + without, encoding="utf-8")
-    (cable,) = cdsm.read_cables(path)
-    assert (cable.elasticity, cable.minimum) == (presets.STEEL_WIRE_200GPA, 3.0)

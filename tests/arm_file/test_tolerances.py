@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 import cdsm
-from tests.cli.test_commands import call
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "arm.toml"
 
@@ -60,17 +59,3 @@ def test_every_kind_comes_back_to_the_last_bit(tmp_path: Path) -> None:
     assert again == arm
     assert again.tolerances == ALL_KINDS
     assert again.with_gravity("-y").with_friction(0.1).tolerances == ALL_KINDS
-
-
-def test_stiffness_uses_the_table_of_the_arm(tmp_path: Path) -> None:
-    arm = tmp_path / "arm.toml"
-    text = EXAMPLE.read_text(encoding="utf-8")
-    assert "±" not in call("stiffness", EXAMPLE, "--angles", 5).stdout
-    table = text[text.index("#[tolerances]") :]
-    arm.write_text(text.replace(table, table.replace("\n#", "\n")[1:]), encoding="utf-8")
-    own = call("stiffness", arm, "--angles", 5).stdout
-    assert own.count("±") == 3
-    assert "  hole radius" in own
-    given = call("stiffness", EXAMPLE, "--angles", 5, "--set", "tolerances.rigidity=0.1").stdout
-    assert "  rigidity" in given
-    assert "  hole radius" not in given

@@ -146,20 +146,6 @@ def test_a_tension_offset_is_found_through_tension_of() -> None:
     assert found.parameters == pytest.approx({"drive": 5e4, "offset": 4.0}, rel=1e-6)
 
 
-@pytest.mark.slow
-def test_a_wrench_beside_measured_tensions_is_part_of_the_prediction() -> None:
-    arm, wrench, pull = prototype(mass=0.5), (0.0, 0.0, -10.0, 0.0, 0.0, 0.0), (40.0,) * 6
-    exact = []
-    for each in measured(arm, 6):
-        value = cdsm.stiffness(arm.at(each.angles), pull, wrench).along(each.direction)
-        exact.append(replace(each, value=value, std=1e-3 * value, wrench=wrench, tension=pull))
-    found = identify(lambda mass: prototype(mass=mass), exact, {"mass": (0.1, 2.0)})
-    assert found.parameters["mass"] == pytest.approx(0.5, rel=1e-6)
-    without = [replace(each, wrench=(0.0,) * 6) for each in exact]
-    found = identify(lambda mass: prototype(mass=mass), without, {"mass": (0.1, 2.0)})
-    assert abs(found.parameters["mass"] - 0.5) > 0.1
-
-
 def by_product(area: float, modulus: float, hole_radius: float = 0.03) -> cdsm.Manipulator:
     return prototype(hole_radius=hole_radius, rigidity=area * modulus)
 

@@ -51,50 +51,6 @@ def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
 
 
 @pytest.mark.slow
-def test_several_directions_are_hit_at_every_sample() -> None:
-    q = waving(3)
-    held = [cdsm.stiffness(ARM.at(a), cdsm.distribute_tension(ARM.at(a), 60.0)) for a in q]
-    directions = np.eye(3)[1:]
-    several = [[K.along(u) for u in directions] for K in held]
-    plan = cdsm.plan_path(ARM, directions, several, 30.0, 300.0, angles=q)
-    np.testing.assert_allclose(plan.achieved, several, rtol=1e-9)
-    for k in (0, 1):  # with nothing to go on from, and with something
-        hard = np.array([[held[0].along(u) for u in np.eye(3)]] * 2)
-        hard[k] *= [1.5, 0.7, 1.5]
-        part = cdsm.plan_path(ARM, np.eye(3), hard, 30.0, 300.0, angles=q[[0, 0]])
-        assert [(each.index, each.status) for each in part.infeasible] == [(k, "stiffness")]
-        assert "all targets at once" in part.infeasible[0].reason
-
-
-def test_hung_weight_measures_what_was_planned_while_the_arm_carries_another() -> None:
-    """Soft, stiff with 10 N in the hand, soft; measured up and down with locked motors."""
-    s = np.arange(24)
-    stiff = np.interp(s, [6, 10, 14, 18], [0.0, 1.0, 1.0, 0.0])
-    W = np.zeros((24, 6))
-    W[:, 2] = -10.0 * (stiff == 1.0)
-    plan = cdsm.plan_path(ARM, DOWN, 70e3 + 25e3 * stiff, 50.0, 800.0, W, angles=waving(24))
-    assert plan.complete
-    assert_holds(plan, 50.0, 800.0)
-    for K, load in zip(plan.stiffness, W, strict=True):
-        np.testing.assert_array_equal(K.wrench, load)
-        # torque of cables, weight and load by the joint angles alone: a wrong sign leaves newtons
-        pose = K.posture
-        torque = pose.length_jacobian.T @ K.tension + pose.gravity_torque - pose.jacobian.T @ load
-        assert abs(torque).max() < 1e-9
-    for k in (2, 12, 20):
-        force = 1e-7 * plan.target[k] * np.array(DOWN)
-        load = plan.stiffness[k].wrench
-        soft = [
-            1.0
-            / cdsm.weight_test(
-                ARM.at(plan.angles[k]), plan.tensions[k], sign * force, wrench=load
-            ).stiffness
-            for sign in (1.0, -1.0)
-        ]
-        assert 2.0 / sum(soft) == pytest.approx(plan.target[k], rel=1e-6)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 5])
 def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
     """Strands, tables and straight wires; wrenches with a moment."""

@@ -129,34 +129,6 @@ def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: 
     assert tried > 1000
 
 
-KNOWN = [  # seed, target [N/m], effort ‖F‖ [N] of an independent program
-    (2, 110896.076, 76.6403),
-    (6, 2647.397, 264.5468),
-    (10, 7246.608, 177.7846),
-    (14, 10947.014, 212.3807),
-    (18, 1149.346, 425.5580),
-    (22, 8297.864, 364.1637),
-    (26, 7779.646, 308.5537),
-    (30, 5887.553, 388.3994),
-]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("seed", "target", "effort"), KNOWN)
-def test_efforts_are_those_of_an_independent_program(
-    seed: int, target: float, effort: float
-) -> None:
-    rng = np.random.default_rng([seed, 90])
-    kind = str(rng.choice(["universal", "hinged"]))
-    law = cdsm.LinearElasticity(float(10.0 ** rng.uniform(3.7, 5.0)))
-    arm = arms.random_arm(seed, int(rng.integers(2, 6)), kind, law)
-    pose, u = arms.random_posture(arm, seed, 0.4), rng.normal(size=3)
-    low, high = float(rng.choice([10.0, 35.0])), float(rng.choice([200.0, 500.0]))
-    plan = cdsm.plan_stiffness(pose, u, target, low, high)
-    assert plan.achieved == pytest.approx(target, rel=1e-6)
-    assert np.linalg.norm(plan.tension) <= 1.005 * effort
-
-
 @pytest.mark.parametrize("name", [name for name in ARMS if name != "universal-5-strand"])
 def test_unreachable_targets_are_refused_with_the_range(name: str) -> None:
     pose, low, high = posture(name)
@@ -184,26 +156,6 @@ def test_every_stiffness_of_a_hinge_beside_its_kinks_is_reached() -> None:
         assert plan.tension.values[0] == pytest.approx(F, rel=1e-8)
     plan = cdsm.plan_stiffness(soft_hinge().at([0.0]), DOWN, soft(33.0) / LENGTH**2, 10.0)
     np.testing.assert_allclose(plan.tension.values, 33.0, rtol=1e-9)
-
-
-def test_one_cable_on_one_hinge_has_one_stiffness() -> None:
-    pair = hinge(law=cdsm.LinearElasticity(2e5)).geometry.replace(
-        links=(cdsm.Link(length=0.05, mass=0.2),)
-    )
-    arm = cdsm.Manipulator(pair, cdsm.LinearElasticity(2e5))
-    arm = arm.with_cables(arm.cables[:1])
-    pose = arm.at([0.0])
-    only = cdsm.stiffness(pose, cdsm.distribute_tension(pose)).along(DOWN)
-    found = cdsm.stiffness_range(pose, DOWN)
-    assert found.low == found.high == pytest.approx(only, rel=1e-12)
-    plan = cdsm.plan_stiffness(pose, DOWN, found.low)
-    assert plan.achieved == pytest.approx(only, rel=1e-12)
-    with pytest.raises(cdsm.UnreachableStiffness) as caught:
-        cdsm.plan_stiffness(pose, DOWN, 1e4)
-    assert (caught.value.low, caught.value.high) == pytest.approx((found.low, found.high))
-    path = cdsm.plan_path(arm, DOWN, [found.low, 1e4, found.low], angles=np.zeros((3, 1)))
-    assert path.planned == (0, 2)
-    assert path.infeasible[0].status == "stiffness"
 
 
 def test_several_directions_are_hit_at_once_if_they_can_be() -> None:

@@ -1,7 +1,6 @@
 """Ranges and plans of arms that slide, hang slack, hold forces, have own laws or few cables."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,21 +95,3 @@ def test_unstable_least_tensions_do_not_hide_stable_ones() -> None:
     for pull in (found.low_tension, found.high_tension):
         assert cdsm.stiffness(pose, pull).margin >= found.floor * (1.0 - 1e-9)
     assert found.low < 0.01 * found.high
-
-
-def test_arm_of_force_controlled_cables_is_told_why_nothing_holds_it() -> None:
-    arm = presets.virtual_prototype()
-    cables = [replace(cable, control="force") for cable in arm.cables]
-    pose = cdsm.Manipulator(arm.geometry, cables=cables, gravity=arm.gravity).at(np.full(10, 0.1))
-    with pytest.raises(cdsm.SingularStiffness, match='control="position"'):
-        cdsm.stiffness_range(pose, DOWN, 50.0, 500.0)
-
-
-@pytest.mark.parametrize("gravity", [-9.81, 0.0])
-def test_too_few_cables_are_counted(gravity: float) -> None:
-    whole = arms.random_arm(1, 6, "universal", STRAND)
-    arm = cdsm.Manipulator(whole.geometry, cables=whole.cables[-6:], gravity=(0.0, 0.0, gravity))
-    error = cdsm.InfeasibleTension if gravity else cdsm.SingularStiffness
-    said = "6 cables alone cannot hold 12 joints: .* at least 13"
-    with pytest.raises(error, match=said):
-        cdsm.stiffness_range(arm.at(np.full(12, 0.05)), DOWN, 10.0, 200.0)

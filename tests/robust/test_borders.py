@@ -2,7 +2,6 @@
 
 import errno
 import os
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from tests.support.arms import random_arm, random_posture
 ARM = random_arm(1, 3)
 POSE = random_posture(ARM, 1)
 PULL = cdsm.distribute_tension(POSE, minimum=10.0)
-UP = (0.0, 0.0, 1.0)
 
 
 def test_a_full_disk_leaves_the_file_as_it_was(tmp_path: Path) -> None:
@@ -52,16 +50,6 @@ COUNTS: tuple[tuple[Callable[[Any], object], str], ...] = (
 def test_a_count_is_bounded(call: Callable[[Any], object], said: str, given: object) -> None:
     with pytest.raises(cdsm.InvalidInput, match=f"^{said} is needed"):
         call(given)
-
-
-@pytest.mark.parametrize("target", [1e15, 1e-12])
-def test_targets_at_the_ends_of_what_is_taken_have_an_answer(target: float) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with pytest.raises(cdsm.UnreachableStiffness):
-            cdsm.plan_stiffness(POSE, UP, target, 10.0, 100.0)
-        with pytest.raises(cdsm.InvalidInput, match=r"^target: "):
-            cdsm.plan_stiffness(POSE, UP, target**1.1, 10.0, 100.0)
 
 
 def test_tables_of_pandas_are_the_numbers_they_hold() -> None:

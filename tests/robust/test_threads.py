@@ -1,6 +1,5 @@
 """Many threads, many processes: the numbers of one thread, and nothing shared that could change."""
 
-import gc
 import multiprocessing
 import threading
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
@@ -49,26 +48,3 @@ def test_processes_with_a_pickled_arm_give_the_same_bits() -> None:
         jobs = {w: pool.submit(one_by_one, arm, w, seeds) for w in dict.fromkeys(MIXED)}
         for work, job in jobs.items():
             assert job.result() == one_by_one(arm, work, seeds)
-
-
-def resident() -> int:
-    """Memory of this process [bytes]."""
-    with open("/proc/self/statm", encoding="ascii") as file:
-        return int(file.read().split()[1]) * 4096
-
-
-def test_scratch_memory_ends_with_its_thread() -> None:
-    try:
-        resident()
-    except OSError:
-        pytest.skip("needs /proc to see the memory of this process")
-    arm = random_arm(1, 20)
-    q = np.zeros(arm.nv)
-    before = 0
-    for i in range(250):
-        thread = threading.Thread(target=arm.at, args=(q,))
-        thread.start()
-        thread.join()
-        before = resident() if i == 50 else before
-    gc.collect()
-    assert resident() - before < 10e6  # 200 times what one needs would be 40 MB

@@ -205,18 +205,6 @@ def test_two_spools_and_disks_drilled_together() -> None:
     assert run.standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.03)
 
 
-def test_the_tolerances_of_an_arm_are_those_of_its_budgets() -> None:
-    pose, tension = posture()
-    with pytest.raises(cdsm.InvalidInput, match=r"tolerances: none given, and the arm has none"):
-        cdsm.uncertainty(pose, tension, direction="z")
-    own = pose.arm.with_tolerances(WORKSHOP).at(pose.q)
-    mine = cdsm.uncertainty(own, tension.values, direction="z")
-    theirs = cdsm.uncertainty(pose, tension, WORKSHOP, direction="z")
-    assert mine.contributions == theirs.contributions
-    assert own.arm != pose.arm
-    assert own.arm.with_tolerances(cdsm.Tolerances()) == pose.arm
-
-
 def test_friction_does_not_enter_the_frictionless_stiffness() -> None:
     pose, tension = posture()
     rough = pose.arm.with_friction(0.1).at(pose.q)

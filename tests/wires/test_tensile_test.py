@@ -26,10 +26,6 @@ def written(tmp_path: Path, text: str, encoding: str = "utf-8") -> Path:
     return path
 
 
-def rows(mark: str = ",") -> str:
-    return "".join(f"{k}{mark}{50 * k}\n" for k in range(9))
-
-
 @pytest.mark.parametrize(
     ("path", "given", "length", "points"),
     [(INSTRON, {}, 0.3, 396), (ZWICK, {"columns": GERMAN, **HALF}, 0.5, 244)],
@@ -84,17 +80,6 @@ def test_dialects(head: str, given: dict[str, Any], tmp_path: Path) -> None:
     np.testing.assert_allclose(test.displacement, [0.0, 1.5e-3], rtol=1e-9)
     np.testing.assert_allclose(test.force, [0.0, 100.0], rtol=1e-9)
     assert test.gauge_length == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("titles", [0, 12, 48])
-def test_the_header_is_within_the_first_50_lines(titles: int, tmp_path: Path) -> None:
-    results = '"Extension [mm]","Load [N]"\n"4.5","812.3"\n' if titles == 12 else ""
-    text = "A title, of words\n" * titles + results + "Extension,Load\nmm,N\n" + rows()
-    test = cdsm.read_tensile_csv(written(tmp_path, text), gauge_length=0.4)
-    np.testing.assert_allclose(test.force, 50.0 * np.arange(9))
-    path = written(tmp_path, "A title, of words\n" * (52 - titles) + text)
-    with pytest.raises(cdsm.FileError, match="first 50 lines"):
-        cdsm.read_tensile_csv(path, gauge_length=0.4)
 
 
 def test_of_two_gauges_none_is_chosen_silently() -> None:
