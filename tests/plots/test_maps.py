@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 import cdsm
@@ -75,25 +75,6 @@ def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
     assert 0 < len(inside) < len(tips)
     order = [np.lexsort(each.T) for each in (shown, inside[:, [0, 2]])]
     np.testing.assert_allclose(shown[order[0]], inside[:, [0, 2]][order[1]], rtol=1e-12)
-
-
-def test_cells_show_the_statistic_of_their_tips(planar: xr.Dataset) -> None:
-    statistic = "min"
-    one = planar.isel(minimum=0)
-    figure = plots.plot_map(one, "softest", statistic="min", bins=4)
-    (mesh,) = (each for each in figure.axes[0].collections if isinstance(each, QuadMesh))
-    shown: Any = np.ma.asarray(mesh.get_array())
-    corners: Any = mesh.get_coordinates()
-    tips = 1e3 * one.tip_position.values.reshape(-1, 3)[:, [0, 2]]
-    values = 1e-3 * one.softest.values.ravel()
-    assert 1 < shown.count() < len(values)
-    counted = 0
-    for row, column in np.argwhere(~np.ma.getmaskarray(shown)):
-        low, high = corners[row, column], corners[row + 1, column + 1]
-        inside = ((tips >= low) & (tips < high)).all(axis=1)
-        counted += int(inside.sum())
-        assert shown[row, column] == pytest.approx(getattr(np, statistic)(values[inside]))
-    assert counted == len(values)
 
 
 @pytest.mark.parametrize(

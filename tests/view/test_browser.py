@@ -3,7 +3,6 @@
 import os
 import re
 import shutil
-import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -103,19 +102,3 @@ def test_a_page_shows_the_numbers_of_the_api_and_asks_nobody_else(page: Page, vi
     own = re.compile(f"{re.escape(view.url)}|blob:{re.escape(view.url)}|data:")
     assert [url for url in page.requests if not own.match(url)] == []
     assert page.errors == []
-
-
-def test_a_link_does_not_lead_the_page_to_another_server(browser: Any, view: View) -> None:
-    sync = pytest.importorskip("websockets.sync.server")
-    led = threading.Event()
-    with sync.serve(lambda _: led.set(), "127.0.0.1", 0) as other:
-        threading.Thread(target=other.serve_forever, daemon=True).start()
-        address = f"ws://127.0.0.1:{other.socket.getsockname()[1]}"
-        page = browser.new_page()
-        page.set_default_timeout(PATIENCE)
-        with page.expect_console_message(lambda one: f"Connecting to: {address}" in one.text):
-            page.goto(f"{view.url}/?websocket={address}")
-        page.wait_for_timeout(3000.0)  # a page that may connect has done so at once
-        page.close()
-        other.shutdown()
-    assert not led.is_set()

@@ -92,22 +92,6 @@ def test_a_path_is_played_to_its_end_and_again() -> None:
             np.testing.assert_allclose(view.shown.setting.q, PATH[4], atol=1e-10)
 
 
-def test_a_path_of_tips_is_followed_by_inverse_kinematics() -> None:
-    tips = np.array([[0.2, 0.01 * i, -0.01 * i] for i in range(4)])
-    tips[3] = [0.5, 0.0, 0.0]  # out of reach
-    with serve(soft_arm(), port=0, minimum=STABLE, tips=tips) as view:
-        assert view._player is not None
-        for i in range(4):
-            view._player.sample.value = float(i + 1)  # type: ignore[misc]
-            assert view.shown.posture is not None
-            off = float(np.linalg.norm(view.shown.posture.tip[:3, 3] - tips[i]))
-            told = f"{1e3 * off:.3g} mm away from the handle" in view._panel._text.content
-            assert told == (off > 1e-9) == (i == 3)
-        view._panel.joints[0].value = 5.0  # type: ignore[misc]
-        assert view.shown.posture is not None
-        assert "away from the handle" not in view._panel._text.content  # forgotten elsewhere
-
-
 def test_a_port_in_use_is_named_and_nothing_is_left_running() -> None:
     threads = threading.active_count()
     with socket.create_server(("127.0.0.1", 0)) as other:

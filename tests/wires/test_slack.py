@@ -54,21 +54,6 @@ def test_within_the_law_all_is_the_same_to_the_bit(name: str) -> None:
     np.testing.assert_array_equal(K_slack.joint, K.joint)
 
 
-def test_a_load_test_that_ended_at_the_low_end_runs_on() -> None:
-    pose, pull = pulled(STRAND, 3.0)
-    force = np.array([0.0, 0.0, -4.0])
-    with pytest.raises(cdsm.ElasticityRangeError, match=r"slack_below"):
-        cdsm.weight_test(pose, pull, force, steps=20)
-    pose, pull = pulled(STRAND.slack_below(), 3.0)
-    test = cdsm.weight_test(pose, pull, force, steps=20)
-    least = np.array([each.tension.min() for each in test.states])
-    assert least[0] > 2.2 > least[-1] > 0.0
-    assert abs(np.diff(least)).max() < 0.3  # no jump where the law begins
-    assert all(each.stable for each in test.states)
-    assert "on the slack branch of its wire" in str(test.states[-1])
-    assert "on the slack branch" not in str(test.states[0])
-
-
 def test_slack_branch_of_a_constant_rigidity_is_the_linear_law() -> None:
     """l_0 at 5 N is l_0 (1 + 5/EA) at rest, so EA + 5 N from 5 N on is EA from 0 N on.
 
