@@ -210,7 +210,7 @@ def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:
     assert arm == cdsm.read_caspr(tmp_path, elasticity=LAW)
     with pytest.raises(cdsm.InvalidInput, match="file of the cables"):
         cdsm.read_caspr(tmp_path / "toy_bodies.xml", elasticity=LAW)
-    with pytest.raises(cdsm.InvalidInput, match="set of cables"):
+    with pytest.raises(cdsm.FileError, match="no set of cables is called 'al'"):
         cdsm.read_caspr(tmp_path, elasticity=LAW, cable_set="al")
     with pytest.raises(cdsm.FileError, match="holds no cables; sets with cables are 'all'"):
         cdsm.read_caspr(tmp_path, elasticity=LAW, cable_set="none")
