@@ -291,7 +291,7 @@ PARTS: tuple[tuple[Callable[[], object], str], ...] = (
     (lambda: cdsm.Variable("end", 1, 3), "name of a cable"),
     (lambda: cdsm.Objective("stiffness"), "direction: is needed"),
     (lambda: cdsm.Constraint("mass"), "at_least or at_most"),
-    (lambda: cdsm.Objective("beauty"), "no quantity of a design is called .beauty"),  # type: ignore[arg-type]
+    (lambda: cdsm.Objective("beauty"), "no quantity of a design is called .beauty"),
 )
 
 

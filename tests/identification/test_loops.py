@@ -109,7 +109,7 @@ def test_bad_loops_name_the_offender_and_the_remedy() -> None:
         ({"minimum": None}, "tension.*neither"),
     ):
         with pytest.raises(cdsm.InvalidInput, match=said):
-            replace(PLANNED[0], **changes)  # type: ignore[arg-type]
+            replace(PLANNED[0], **changes)
     one = replace(PLANNED[0], forces=(0.0, 5.0)).simulated(hinge())
     for loops, free, said in (
         (PLANNED, FREE, r"measurements\[0\]: at 0.45 has no readings"),
@@ -117,7 +117,7 @@ def test_bad_loops_name_the_offender_and_the_remedy() -> None:
         (measured(0), {"viscosity": (0.0, 1.0)}, "viscosity"),
     ):
         with pytest.raises(cdsm.InvalidInput, match=said):
-            identify(hinge, loops, free)  # type: ignore[arg-type]
+            identify(hinge, loops, free)
     assert PLANNED[0].simulated(hinge(), 3) == PLANNED[0].simulated(
         hinge(), np.random.default_rng(3)
     )

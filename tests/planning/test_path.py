@@ -43,7 +43,7 @@ def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
     assert abs(np.diff(plan.angles, axis=0)).max() < 0.05
     again = cdsm.plan_path(ARM, DOWN, 80e3, 50.0, angles=plan.angles)
     np.testing.assert_allclose(again.tensions, plan.tensions, rtol=1e-12)
-    tips[1] = (ARM.geometry.length + 0.25, 0.0, 0.0)
+    tips[1] = np.array([ARM.geometry.length + 0.25, 0.0, 0.0])
     plan = cdsm.plan_path(ARM, DOWN, 80e3, 50.0, tips=tips[:3], guess=q[0])
     assert plan.planned == (0, 2)
     assert plan.infeasible[0].status == "posture"

@@ -62,7 +62,7 @@ def manipulator(*args: Any, **options: Any) -> Callable[[], object]:
 
 
 def cable(*sites: cdsm.Site, **options: Any) -> Callable[[], object]:
-    given = {"name": "a", "elasticity": STEEL} | options
+    given: dict[str, Any] = {"name": "a", "elasticity": STEEL} | options
     return lambda: cdsm.Cable(sites=sites or (BASE, END), **given)
 
 

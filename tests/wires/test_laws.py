@@ -172,7 +172,7 @@ def strand(*coefficients: tuple[float, ...], joins: Any = (), low: float = 0.0) 
 
 
 BAD: tuple[tuple[Callable[[], object], str], ...] = (
-    *[(lambda EA=EA: cdsm.LinearElasticity(EA), "rigidity") for EA in (0, -1.0, math.nan, "5")],  # type: ignore[misc]
+    *[(lambda EA=EA: cdsm.LinearElasticity(EA), "rigidity") for EA in (0, -1.0, math.nan, "5")],
     (lambda: cdsm.LinearElasticity.of_wire(200e9, 0.0), "diameter"),
     (lambda: cdsm.LinearElasticity.of_wire(-1.0, 1e-3), "young_modulus"),
     (strand, "coefficients"),
@@ -190,7 +190,7 @@ BAD: tuple[tuple[Callable[[], object], str], ...] = (
     (lambda: own(lambda _: "stiff"), "fails at"),
     (lambda: own(lambda F: np.where(F < 50.0, 1e4, 1.1e4)), "jumps"),
     *[
-        (lambda F=F, e=e: cdsm.TabulatedElasticity(F, e), "tensions|strains")  # type: ignore[misc]
+        (lambda F=F, e=e: cdsm.TabulatedElasticity(F, e), "tensions|strains")
         for F, e in (
             ((1.0,), (0.0,)),
             ((1.0, 1.0), (0.0, 1.0)),
