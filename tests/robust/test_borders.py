@@ -57,6 +57,6 @@ def test_tables_of_pandas_are_the_numbers_they_hold() -> None:
     q, tension = np.tile(POSE.q, (3, 1)), np.tile(PULL.values, (3, 1))
     angles = pandas.DataFrame(q, columns=ARM.joint_names)
     found = cdsm.evaluate(ARM, angles, pandas.DataFrame(tension))
-    np.testing.assert_array_equal(found["joint"], cdsm.evaluate(ARM, q, tension)["joint"])
+    np.testing.assert_array_equal(found["tip"], cdsm.evaluate(ARM, q, tension)["tip"])
     with pytest.raises(cdsm.InvalidInput, match="q: holds object entries, such as"):
         cdsm.evaluate(ARM, angles.astype(object), tension)
