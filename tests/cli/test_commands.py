@@ -282,6 +282,7 @@ friction = 0.2
 """
 
 
+@pytest.mark.slow  # a fit with friction and its profiles
 def test_identify(tmp_path: Path) -> None:
     """The loops are those of another arm than the one that is described."""
     arm, loops = tmp_path / "arm.toml", tmp_path / "loops.csv"

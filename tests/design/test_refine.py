@@ -52,7 +52,7 @@ def test_the_motors_of_the_paper_s_arm_may_be_smaller_at_the_same_stiffness() ->
     assert again["held"] == 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.long  # 400 evaluations, a minute
 def test_a_refinement_goes_from_the_paper_s_routing_to_a_better_one() -> None:
     problem = routing()
     found = cdsm.refine_design(problem)

@@ -32,7 +32,9 @@ def _drawn(figure: Figure) -> Figure:
     figure.draw_without_rendering()
     for axes in figure.axes:
         for label in (axes.get_xlabel(), axes.get_ylabel()):
-            assert not label or re.search(r"\[.+\]|number|sample|factor|measurement", label), label
+            assert not label or re.search(r"\[.+\]|number|sample|factor|measurement|σ", label), (
+                label
+            )
     return figure
 
 
