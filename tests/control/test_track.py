@@ -140,6 +140,7 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
     assert np.isfinite(run.tips).all()
 
 
+@pytest.mark.slow  # each step searches for tensions that are not there
 def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() -> None:
     plan = small_path()
     run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, max_change_per_step=20.0)
