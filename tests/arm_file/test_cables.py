@@ -27,7 +27,7 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     cables = list(presets.virtual_prototype().cables)
     cables[1] = replace(cables[1], elasticity=TABLE, series_stiffness=1.89e3, lead=0.25)
     cables[2] = replace(cables[2], elasticity=cdsm.LinearElasticity(1e4), control="force")
-    cables[3] = replace(cables[3], minimum=2.5, maximum=310.0, name='odd "name"\\ü')
+    cables[3] = replace(cables[3], minimum=2.5, maximum=310.0, name=' 😀="n"\\ü')
     path = cdsm.write_cables(cables, tmp_path / "cables.toml")
     assert cdsm.read_cables(path) == tuple(cables)
     # one table per wire that has neither a name nor a constant rigidity
@@ -50,37 +50,13 @@ def test_what_is_left_out_is_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        (
-            'wire = "rope"',
-            'wire = "rape"',
-            "wire: no wire is called 'rape'; did you",
-        ),
         ('wire = "rope"', "wire = -3.0", "cables[1].wire: -3 N given"),
-        ('wire = "rope"', "wire = true", "cables[1].wire: True given; give a name, EA in N"),
-        ('wire = "rope"', 'wier = "rope"', "cables[1].wier: is not a key that is known here; did"),
         ("48e3", "-1.0", "wires.rope.rigidity"),
         ('kind = "linear"', 'kind = "rubber"', "wires.rope.kind: must be one of linear"),
-        ("[wires.rope]", '[wires."1x19-1.2mm"]', "cdsm knows a wire of this name"),
-        ("[0, 0.01, 0.0]", "[0, 0.01]", "sites[1].xyz"),
         ("[0, 0.01, 0.0]", "[0, nan, 0.0]", "sites[1].xyz[2]"),
-        (', {link = "b", xyz = [0.1, 0.01, 0.0]}', "", "sites"),
-        ('name = "left"', 'name = ""', "cables[1].name"),
-        ('name = "left"', 'name = "left"\nlead = -1.0', "cables[1].lead"),
-        ('name = "left"', 'name = "left"\ncontrol = "feel"', "cables[1].control"),
-        (
-            'name = "left"',
-            'name = "left"\nminimum = 5.0\nmaximum = 2.0',
-            "cables[1].maximum: 2 N given, below",
-        ),
+        ('name = "left"', 'name = "left"\nminimum = 5.0\nmaximum = 2.0', "maximum: 2 N given"),
         ('name = "left"', 'name = "left"\nfriction = 2.5', "cables[1].friction: 2.5 given"),
         ("{link", "{friction = 0.1, link", "site 1 has friction or wrap"),
-        ("{link", "{wrap = 20.0, link", "wrap: 20 rad given"),
-        ("[[cables]]", "[[cable]]", "cable: is not a key that is known here; did you mean cables?"),
-        ("[[cables]]", "[cables]", "cables: give tables [[cables]]"),
-        ("[wires.rope]", "lead = 0.1\n[wires.rope]", "lead: is not a key that is known here"),
-        ('name = "left"', 'name = "left"\nwires = 1', "cables[1].wires: is not a key that is"),
-        ("[wires.rope]", "wires = 3\n[wire]", "wires: input should be a table"),
-        ("[[cables]]", "[[cables]", "is not TOML"),
     ],
 )
 def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) -> None:
@@ -94,65 +70,13 @@ def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) ->
 
 
 def test_friction_of_a_cable_is_that_of_its_holes_without_one_of_their_own(tmp_path: Path) -> None:
-    sites = [
-        {"friction": 0.1},
-        {"friction": 0.1, "wrap": 0.05},
-        {"friction": 0.3},
-        {"friction": 0.0},
-    ]
-    given = ["", ", wrap = 0.05", ", friction = 0.3", ""]
-    lines = [
-        f'    {{link = "link{i}", xyz = [0.0, 0.02, 0.0]{more}}},' for i, more in enumerate(given)
-    ]
-    text = ONE[: ONE.index("[[cables]]")]
-    text += '[[cables]]\nname = "a"\nwire = "rope"\nfriction = 0.1\n'
     path = tmp_path / "cables.toml"
-    path.write_text(text + "lead = 0.2\nsites = [\n" + "\n".join(lines) + "\n]\n")
+    third = '{link = "c", xyz = [0.2, 0.01, 0.0]}]'
+    text = ONE.replace("sites =", "friction = 0.1\nlead = 0.2\nsites =")
+    text = text.replace("0.01, 0.0]}]", "0.01, 0.0], wrap = 0.05, friction = 0.3}, " + third)
+    path.write_text(text)
     (cable,) = cdsm.read_cables(path)
-    for i, (site, own) in enumerate(zip(cable.sites, sites, strict=True)):
-        assert site == cdsm.Site(f"link{i}", (0.0, 0.02, 0.0), **own)
-    assert cable.friction == (0.1, 0.1, 0.3)
+    assert [site.friction for site in cable.sites] == [0.1, 0.3, 0.0]
+    assert cable.sites[1].wrap == 0.05
+    assert cable.friction == (0.1, 0.3)
     assert cdsm.read_cables(cdsm.write_cables([cable], path)) == (cable,)
-
-
-def test_names_used_twice_are_a_fault(tmp_path: Path) -> None:
-    path = tmp_path / "cables.toml"
-    path.write_text(ONE + ONE[ONE.index("[[cables]]") :], encoding="utf-8")
-    with pytest.raises(cdsm.FileError, match="'left' is used twice"):
-        cdsm.read_cables(path)
-
-
-def test_nothing_and_strange_wires_cannot_be_written(tmp_path: Path) -> None:
-    path = tmp_path / "cables.toml"
-    with pytest.raises(cdsm.InvalidInput, match="none given"):
-        cdsm.write_cables([], path)
-    assert not path.exists()
-
-
-@pytest.mark.parametrize(
-    ("low", "high"), [(-1.0, 5.0), (5.0, 4.0), (0.0, math.nan), (math.inf, math.inf)]
-)
-def test_bounds_of_a_cable_that_cannot_be_are_refused(low: float, high: float) -> None:
-    cable = presets.virtual_prototype().cables[0]
-    with pytest.raises(cdsm.InvalidInput, match="cable1_1"):
-        replace(cable, minimum=low, maximum=high)
-
-
-def test_wire_of_all_cables_stands_at_the_top_or_is_given(tmp_path: Path) -> None:
-    path = tmp_path / "cables.toml"
-    without = ONE.replace('wire = "rope"\n', "")
-    path.write_text(without, encoding="utf-8")
-    with pytest.raises(cdsm.FileError) as caught:
-        cdsm.read_cables(path)
-    assert caught.value.path == str(path)
-    assert cdsm.read_cables(path, "1x19-1.2mm")[0].elasticity == presets.STRAND_1X19
-    assert cdsm.read_cables(path, 48e3)[0].elasticity == cdsm.LinearElasticity(48e3)
-    path.write_text('wire = "solid-1.2mm"\nminimum = 3.0\n' + without, encoding="utf-8")
-    (cable,) = cdsm.read_cables(path)
-    assert (cable.elasticity, cable.minimum) == (presets.STEEL_WIRE_200GPA, 3.0)
-
-
-@pytest.mark.parametrize("name", ["😀", "ü'''", 'q"\\n', " a, b=#"])
-def test_any_name_is_written_and_read(name: str, tmp_path: Path) -> None:
-    cable = replace(presets.virtual_prototype().cables[0], name=name)
-    assert cdsm.read_cables(cdsm.write_cables([cable], tmp_path / "c.toml")) == (cable,)

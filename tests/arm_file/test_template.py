@@ -53,14 +53,3 @@ def test_every_key_behind_a_hash_may_be_used(name: str, tmp_path: Path) -> None:
     used = cdsm.Manipulator.read(path)
     assert used.cables[0].minimum == 20.0
     assert len(used.tolerances.given) == 8
-
-
-@pytest.mark.filterwarnings("default::cdsm.CdsmWarning")
-def test_a_command_shows_a_warning_in_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "arm.toml"
-    text = (EXAMPLES / "alternating_hinges.toml").read_text(encoding="utf-8")
-    path.write_text(text.replace("\nspread", "\n#spread"), encoding="utf-8")
-    told = call("stiffness", path, "--angles", 3)
-    assert told.exit_code == 0
-    (line,) = told.stderr.splitlines()
-    assert line.startswith("warning: arm: cables share holes: cable1_1 and cable3_2 and cable5_1; ")

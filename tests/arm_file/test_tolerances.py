@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 import cdsm
-from tests.cli.test_commands import call
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "arm.toml"
 
@@ -36,18 +35,10 @@ def test_a_file_of_tolerances(tmp_path: Path) -> None:
     [
         ("rigidty = 0.05", "rigidty: .*did you mean 'rigidity'"),
         ("lead = -1.0", "lead: .*-1 given; a tolerance is not negative"),
-        ("lead = true", "lead: "),
         ("lead = {within = 1.0, standard = 2.0}", "one of standard and within"),
-        (
-            "lead = {width = 1.0}",
-            "lead.width: is not a key .*; did you mean within",
-        ),
-        ("lead = {standard = 1.0, of = 3}", "lead.of: input should be a valid string"),
+        ("lead = {width = 1.0}", "lead.width: is not a key .*; did you mean within"),
         ("lead = {standard = 1e-3, distribution = 'gauss'}", "'gauss'"),
-        ("lead = {standard = 1e-3, correlation = 1.5}", "a number from 0 to 1 is needed"),
         ("lead = {within = 1e-3, distribution = 'normal'}", "within is uniform"),
-        ("rigidity = 5", "up to 0.5 is a tolerance"),
-        ("lead =", "TOML"),
     ],
 )
 @pytest.mark.parametrize("whole", [False, True])
@@ -61,16 +52,6 @@ def test_faults_are_named(text: str, said: str, whole: bool, tmp_path: Path) -> 
         (cdsm.Manipulator if whole else cdsm.Tolerances).read(path)
 
 
-def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
-    path = tmp_path / "t.toml"
-    path.write_text("lead = -1\nrigidty = 1\n")
-    with pytest.raises(cdsm.FileError, match="does not hold tolerances"):
-        cdsm.Tolerances.read(path)
-    path.write_text("tolerances = 3\n" + EXAMPLE.read_text(encoding="utf-8"))
-    with pytest.raises(cdsm.FileError, match=r"give a table \[tolerances\]"):
-        cdsm.Manipulator.read(path)
-
-
 def test_every_kind_comes_back_to_the_last_bit(tmp_path: Path) -> None:
     assert cdsm.Tolerances.read(ALL_KINDS.write(tmp_path / "t.toml")) == ALL_KINDS
     arm = cdsm.Manipulator.read(EXAMPLE).with_tolerances(ALL_KINDS)
@@ -78,17 +59,3 @@ def test_every_kind_comes_back_to_the_last_bit(tmp_path: Path) -> None:
     assert again == arm
     assert again.tolerances == ALL_KINDS
     assert again.with_gravity("-y").with_friction(0.1).tolerances == ALL_KINDS
-
-
-def test_stiffness_uses_the_table_of_the_arm(tmp_path: Path) -> None:
-    arm = tmp_path / "arm.toml"
-    text = EXAMPLE.read_text(encoding="utf-8")
-    assert "±" not in call("stiffness", EXAMPLE, "--angles", 5).stdout
-    table = text[text.index("#[tolerances]") :]
-    arm.write_text(text.replace(table, table.replace("\n#", "\n")[1:]), encoding="utf-8")
-    own = call("stiffness", arm, "--angles", 5).stdout
-    assert own.count("±") == 3
-    assert "  hole radius" in own
-    given = call("stiffness", EXAMPLE, "--angles", 5, "--set", "tolerances.rigidity=0.1").stdout
-    assert "  rigidity" in given
-    assert "  hole radius" not in given

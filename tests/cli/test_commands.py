@@ -224,25 +224,13 @@ def test_new_writes_the_arm_of_the_readme(tmp_path: Path) -> None:
     assert {cable.minimum for cable in arm.cables} == {10.0}
     assert found == {"warnings": [], "name": "arm", "length_m": arm.length, "written": [str(path)]}
     assert call("new", path).exit_code == 2
-    said = call("new", path, "--overwrite", "--wire", "48e3").stdout.splitlines()[-1]
-    assert said == f"written: {path}; try cdsm stiffness {path} --angles 10 --check"
-    assert call(*said.partition("cdsm ")[2].split()).exit_code == 0
-
-
-@pytest.mark.parametrize("text", ["nan", "2.6", "2.6,1", "3,x", "0", "3,-1", ""])
-def test_new_takes_whole_numbers_of_joints(text: str, tmp_path: Path) -> None:
-    result = call("new", tmp_path / "ARM.toml", "--joints", text)
-    assert result.exit_code == 2
-    assert "give a whole number, or several: 4 or 3,3" in result.stderr
-    assert not [*tmp_path.iterdir()]
+    assert call("new", path, "--overwrite", "--joints", "2.6").exit_code == 2
 
 
 def test_new_makes_an_arm_file_of_a_robot(tmp_path: Path) -> None:
     robot, cables, arm = (tmp_path / name for name in ("r.urdf", "c.toml", "ARM.toml"))
     robot.write_text(ROBOT, encoding="utf-8")
     cables.write_text(CABLES, encoding="utf-8")
-    said = call("stiffness", robot).stderr
-    assert f"`cdsm new ARM.toml --from {robot} --cables CABLES.toml --tip LINK`" in said
     assert call("new", arm, "--from", robot).exit_code == 2
     assert call("new", arm, "--from", robot, "--cables", cables, "--tip", "car").exit_code == 0
     expected = cdsm.Manipulator.from_urdf(robot, cables, tip="car")
@@ -256,16 +244,12 @@ def test_new_makes_an_arm_file_of_a_robot(tmp_path: Path) -> None:
     assert "check_inertia = false in [urdf] of ARM.toml, or cdsm new --no-check-inertia" in said
     assert call(*asked, "--no-check-inertia").exit_code == 0
     assert call("stiffness", arm).exit_code == 0
-    refused = call("stiffness", arm, "--set", "urdf.check_inertia=true")
-    assert "principal moments of inertia" in refused.stderr
 
 
 def test_new_makes_an_arm_file_of_a_caspr_model(tmp_path: Path) -> None:
     links = link(1, "R_Z") + link(2, "U_XY")
     model = folder(tmp_path, links, "".join(cable(name=f"c{i}") for i in range(2)))
     arm = tmp_path / "ARM.toml"
-    assert "cdsm new ARM.toml --from" in call("stiffness", model).stderr
-    assert call("new", arm, "--from", model).exit_code == 2
     assert call("new", arm, "--from", model, "--wire", "2e4").exit_code == 0
     law = cdsm.LinearElasticity(2e4)
     assert cdsm.Manipulator.read(arm) == cdsm.read_caspr(model, elasticity=law)
@@ -298,7 +282,9 @@ def test_fit_and_its_law_as_wire(probe: Path, tmp_path: Path) -> None:
         K["along_N_per_m"], told(*asked, "--set", "wire=48e3")["along_N_per_m"], rtol=0.01
     )
     assert call("fit", test).exit_code == 1
-    assert "gauge_length" in call("fit", test).stderr
+    given = ["--columns", "displacement,force", "--units", "mm,N", "--gauge-length", "500"]
+    part = told("fit", test, *given, "--between", "50,250")
+    assert 50.0 <= part["domain_N"][0] < part["domain_N"][1] <= 250.0
 
 
 LOOPS_ARM = """
@@ -316,13 +302,14 @@ friction = 0.2
 """
 
 
+@pytest.mark.slow  # a fit with friction and its profiles
 def test_identify(tmp_path: Path) -> None:
     """The loops are those of another arm than the one that is described."""
     arm, loops = tmp_path / "arm.toml", tmp_path / "loops.csv"
     arm.write_text(LOOPS_ARM, encoding="utf-8")
     true = {"friction": 0.1, "rigidity": 1.1}
     truth = cdsm.ArmParameters(cdsm.Manipulator.read(arm), tuple(true))(**true)
-    random, forces = np.random.default_rng(2), (0.0, 8.0, 16.0, 24.0, 16.0, 8.0, 0.0)
+    random, forces = np.random.default_rng(2), (0.0, 12.0, 24.0, 12.0, 0.0)
     lines = ["test,joint1 [deg],direction,minimum [N],force [N],displacement [mm]"]
     for angle in (25.0, -23.0):
         bent: Any = {"direction": "-z", "angles": (np.deg2rad(angle),), "minimum": 200.0}
@@ -346,7 +333,7 @@ def test_design(tmp_path: Path) -> None:
     (tmp_path / "arm.toml").write_bytes((EXAMPLES / "arm.toml").read_bytes())
     problem, out = tmp_path / "design.toml", tmp_path / "out"
     text = (EXAMPLES / "design.toml").read_text(encoding="utf-8")
-    for key, value in (("generations", 5), ("population", 8)):
+    for key, value in (("generations", 2), ("population", 8)):
         text = "\n".join(
             f"{key} = {value}" if line.lstrip("#").startswith(f"{key} =") else line
             for line in text.splitlines()
@@ -355,12 +342,12 @@ def test_design(tmp_path: Path) -> None:
     found = told("design", problem, "--out", out)
     names = "designs.csv front.csv front.pdf arm.pdf arm.toml arm.urdf arm.xml holes.csv cables.csv"
     assert {path.name for path in out.iterdir()} == {*names.split()}
-    assert found["designs"] == 40
+    assert found["designs"] == 16
     assert found["chosen"] == found["compromise"]
     assert max(found["front"]["deflection [m]"]) <= 0.001
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # all figures of the paper, in a process of their own: some ten seconds
 def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:
     result = call("reproduce", "--out", tmp_path / "new")
     assert result.exit_code == 0, result.output

@@ -1,4 +1,4 @@
-"""Motor laws: no command is slack or overload, and each pulls the right way."""
+"""Sensors, and motor laws: no command is slack or overload, and each pulls the right way."""
 
 from collections.abc import Callable
 
@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import cdsm
 from cdsm import control
+from cdsm.control import Measurement
 from cdsm.control.laws import INTEGRAL, LAWS, ControlInput, Reference
-from cdsm.control.sensors import Measurement
 from cdsm.support.values import Array
 
 CABLES = 4
@@ -102,12 +103,6 @@ def test_a_change_of_length_that_the_plan_makes_is_no_change_of_tension() -> Non
         assert not command.saturated.any()
 
 
-def test_feedforward_needs_no_sensor() -> None:
-    one, other = control.feedforward(held(5.0)), control.feedforward(held(-300.0))
-    assert one.paid_out[0] == other.paid_out[0] == 0.4
-    assert one.tension[0] == 50.0
-
-
 def test_feedforward_of_an_overload_pays_the_wire_out_that_is_too_tense() -> None:
     wanted = held(0.0)
     wanted = wanted._replace(reference=wanted.reference._replace(tension=np.array([240.0])))
@@ -115,3 +110,29 @@ def test_feedforward_of_an_overload_pays_the_wire_out_that_is_too_tense() -> Non
     assert command.tension[0] == 200.0
     assert command.paid_out[0] == pytest.approx(0.4 + 40.0 / 2e4)
     assert command.saturated.all()
+
+
+TRUTH = [Measurement(np.full(3, 0.1234567 * k), np.full(3, 50.0 + k)) for k in (1, 2, 3)]
+
+
+def test_encoders_count_and_are_half_a_count_off_at_most() -> None:
+    reading = cdsm.Sensors(encoder=1e-4).measure(TRUTH, np.random.default_rng(0))
+    np.testing.assert_allclose(
+        reading.paid_out / 1e-4, np.round(reading.paid_out / 1e-4), atol=1e-9
+    )
+    assert 0.0 < abs(reading.paid_out - TRUTH[-1].paid_out).max() <= 0.5e-4
+
+
+def test_noise_and_bias_stay_within_their_bound() -> None:
+    sensors = cdsm.Sensors(tension_noise=0.5, tension_bias=-1.0)
+    random = np.random.default_rng(1)
+    errors = np.array([sensors.measure(TRUTH, random).tension for _ in range(4000)]) - 53.0
+    assert errors.mean() == pytest.approx(-1.0, abs=0.02)
+    assert errors.std() == pytest.approx(0.5, rel=0.02)
+    assert abs(errors).max() <= 3.0
+
+
+def test_readings_are_late_by_the_delay() -> None:
+    for delay, wanted in ((0, 53.0), (1, 52.0), (2, 51.0), (9, 51.0)):
+        reading = cdsm.Sensors(delay=delay).measure(TRUTH, np.random.default_rng(0))
+        assert reading.tension[0] == wanted

@@ -1,9 +1,10 @@
-"""The quasi-static plant against the loads and equilibria that it is made of."""
+"""Both plants against loads and equilibria; what the observer finds of them."""
 
 import numpy as np
 import pytest
 
 import cdsm
+from cdsm import control
 from cdsm.control import Command
 from cdsm.planning.path_plan import PathPlan
 from tests.support.tracking import paid_out, small_path
@@ -14,14 +15,6 @@ NONE = np.zeros(6)
 def moved(plan: PathPlan, by: float) -> Command:
     wire = paid_out(plan)[0] + by * np.arange(6)
     return Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
-
-
-def test_plant_begins_with_the_wire_that_a_plan_pays_out() -> None:
-    plan = small_path()
-    state = cdsm.QuasiStaticPlant(plan.arm).initial(plan.angles[0], plan.tensions[0], NONE)
-    np.testing.assert_allclose(state.true_values.paid_out, paid_out(plan)[0], rtol=1e-14)
-    np.testing.assert_allclose(state.true_values.tension, plan.tensions[0], rtol=1e-14)
-    np.testing.assert_array_equal(state.pose.q, plan.angles[0])
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1])
@@ -43,16 +36,6 @@ def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
     np.testing.assert_array_equal(before.pose.q, plan.angles[0])  # a state does not change
 
 
-def test_paying_wire_out_slackens_its_cable() -> None:
-    plan = small_path()
-    plant = cdsm.QuasiStaticPlant(plan.arm)
-    state = plant.initial(plan.angles[0], plan.tensions[0], NONE)
-    wire = paid_out(plan)[0].copy()
-    wire[2] += 1e-4
-    command = Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
-    assert plant.step_to(state, command, NONE).true_values.tension[2] < plan.tensions[0, 2] - 1.0
-
-
 def test_stretched_lengths_are_refused() -> None:
     arm = small_path().arm
     stretched = cdsm.Manipulator(
@@ -62,15 +45,41 @@ def test_stretched_lengths_are_refused() -> None:
         cdsm.QuasiStaticPlant(stretched)
 
 
-def test_plant_of_something_else_than_an_arm_is_refused() -> None:
-    with pytest.raises(cdsm.InvalidInput, match="arm: None given; a Manipulator is needed"):
-        cdsm.QuasiStaticPlant(None)  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="substeps: 0 given"):
-        cdsm.QuasiStaticPlant(small_path().arm, substeps=0)
+pytest.importorskip("mujoco")
+
+PAYLOAD = np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
 
 
-def test_plant_with_other_cables_is_refused() -> None:
+def test_both_plants_rest_at_the_same_place() -> None:
+    """Far from where the model was linearised, and under a load: within a thousandth."""
     plan = small_path()
-    fewer = cdsm.QuasiStaticPlant(plan.arm.with_cables(plan.arm.cables[:-1]))
-    with pytest.raises(cdsm.InvalidInput, match=f"cables: {plan.arm.cables[-1].name}"):
-        cdsm.track(plan, plant=fewer)
+    wire = paid_out(plan)[-1] + 2e-5 * np.arange(6)
+    command = Command(wire, plan.tensions[-1], np.zeros(6, dtype=np.bool_))
+    slow, fast = cdsm.QuasiStaticPlant(plan.arm), cdsm.MuJoCoPlant(plan.arm, damping_ratio=0.7)
+    begin = plan.angles[0], plan.tensions[0], np.zeros(6)
+    wanted = slow.step_to(slow.initial(*begin), command, PAYLOAD)
+    state = fast.initial(*begin)
+    for _ in range(40):
+        state = fast.step_to(state, command, PAYLOAD)
+    moved = wanted.pose.q - plan.angles[0]
+    assert np.linalg.norm(moved) > np.deg2rad(2.0)
+    assert np.linalg.norm(state.pose.q - wanted.pose.q) < 1e-3 * np.linalg.norm(moved)
+    np.testing.assert_allclose(state.true_values.tension, wanted.true_values.tension, rtol=1e-3)
+    assert abs(state.velocity).max() < 1e-3
+
+
+def test_stiffness_loop_holds_an_arm_with_inertia() -> None:
+    plan = small_path()
+    plant = cdsm.MuJoCoPlant(control.with_rigidity(plan.arm, 0.9))
+    sensors = cdsm.Sensors(tension_noise=0.2)
+    bounds = {"minimum": 10.0, "maximum": 250.0}
+    run = cdsm.track(plan, "stiffness", plant, sensors, steps=10, payload=0.1, **bounds)
+    assert run.outcome == "completed"
+    assert run.rigidity[-1] == pytest.approx(0.9, abs=5e-3)
+    assert abs(run.stiffness_error[8:]).max() < 0.03
+    assert run.tip_error[8:].max() < 5e-4
+
+
+def test_friction_is_refused_by_mujoco() -> None:
+    with pytest.raises(cdsm.InvalidInput, match="friction"):
+        cdsm.MuJoCoPlant(small_path(0.1).arm)

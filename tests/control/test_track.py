@@ -1,7 +1,5 @@
 """The closed loop: what it holds, what it survives, and what it says when it fails."""
 
-import dataclasses
-import math
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +42,7 @@ def steep_path() -> PathPlan:
 
 
 @pytest.mark.parametrize("law", ["feedforward", "tension", "mixed", "stiffness"])
-@pytest.mark.parametrize("steps", [1, 5, 50])
+@pytest.mark.parametrize("steps", [1, 5])
 def test_every_law_holds_the_plan_of_the_arm_it_believes_in(law: str, steps: int) -> None:
     """However coarse the steps are, none is clamped: all tensions are far from their bounds."""
     given: Any = {"sensors": cdsm.Sensors(encoder=0.0), "minimum": 10.0, "maximum": 200.0}
@@ -70,10 +68,8 @@ def test_same_seed_same_bits() -> None:
         return cdsm.track(small_path(0.1), sensors=sensors, steps=2, **BOUNDS)
 
     one, again, other = run(3), run(3), run(4)
-    for field in dataclasses.fields(one):
-        value = getattr(one, field.name)
-        if isinstance(value, np.ndarray):
-            np.testing.assert_array_equal(value, getattr(again, field.name), err_msg=field.name)
+    np.testing.assert_array_equal(one.measured_tension, again.measured_tension)
+    np.testing.assert_array_equal(one.angles, again.angles)
     assert (one.measured_tension != other.measured_tension).any()
 
 
@@ -104,43 +100,24 @@ def test_payload_that_nobody_told_of_is_felt() -> None:
     assert abs(run.stiffness_error[5:]).max() < 0.02
 
 
-def test_own_law_is_called_with_what_is_wanted_and_measured() -> None:
-    seen = []
-
-    def patient(given: control.ControlInput) -> control.Command:
-        seen.append(given)
-        return control.limited(given, given.measurement.paid_out)
-
-    run = cdsm.track(small_path(), patient, steps=2, **BOUNDS)
-    assert run.law == "patient"
-    assert len(seen) == 5
-    np.testing.assert_array_equal(seen[-1].reference.angles, small_path().angles[-1])
-    assert run.tip_error[-1] > 1e-3  # it never pays out any wire
-
-
-@pytest.mark.parametrize(
-    ("law", "said"),
-    [
+def test_wrong_arguments_are_refused() -> None:
+    laws: tuple[tuple[Any, str], ...] = (
         (lambda given: given.paid_out, "law: returned array.* return limited"),
-        (lambda given: None, "law: returned None"),
-        (lambda given: control.limited(given, given.paid_out * math.nan), "wire of the law"),
         (lambda given: control.limited(given, given.paid_out[:2]), "wire of the law"),
-        (
-            lambda at: control.Command(0.0 * at.paid_out, at.maximum, at.tension_controlled),
-            "0 m of wire for cable1_1; .* a positive length",
-        ),
         (
             lambda at: control.Command(at.paid_out, at.maximum + 1.0, at.tension_controlled),
             "law: commanded 251 N .* from 10 to 250 N .* Return limited",
         ),
-    ],
-)
-def test_own_law_that_motors_cannot_follow_is_refused(law: Any, said: str) -> None:
-    with pytest.raises(cdsm.InvalidInput, match=said):
-        cdsm.track(small_path(), law, **BOUNDS)
-
-
-# --- loops that fail ------------------------------------------------------------------------
+    )
+    for law, said in laws:
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            cdsm.track(small_path(), law, **BOUNDS)
+    with pytest.raises(cdsm.InvalidInput, match="payload"):
+        cdsm.track(small_path(), payload=-1.0)
+    plan = small_path()
+    broken = cdsm.plan_path(plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2])
+    with pytest.raises(cdsm.InvalidInput, match=r"1 of 2 samples are not planned.*sample 1"):
+        cdsm.track(broken)
 
 
 def test_unstable_loop_is_an_answer_with_its_time() -> None:
@@ -159,52 +136,11 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
     assert run.outcome == "diverged"
     assert run.tip_error[-1] > 0.1 * plan.arm.length > run.tip_error[-2]
     assert run.time[-1] == pytest.approx(0.05 * (len(run.time) - 1))
-    assert run.warnings[0].startswith(f"UNSTABLE at {run.time[-1]:.4g} s: the tip is ")
     assert "UNSTABLE" in str(run).splitlines()[0]
     assert np.isfinite(run.tips).all()
 
 
-def test_payload_that_is_too_heavy_is_named() -> None:
-    run = cdsm.track(small_path(), payload=40.0, steps=4, **BOUNDS)
-    assert run.outcome in ("diverged", "no_equilibrium", "elasticity_range")
-    assert run.warnings
-    assert run.reason
-    assert len(run.time) >= 4  # what came before is kept
-
-
-def tabulated_path(friction: float) -> PathPlan:
-    """The small path with a wire from a table: it can be slack, and ends at 500 N."""
-    wire = cdsm.TabulatedElasticity((0.0, 50.0, 200.0, 500.0), (0.0, 0.0015, 0.004, 0.009))
-    arm = cdsm.Manipulator(small_path().arm.geometry, wire).with_friction(friction)
-    angles = small_path().angles
-    K = cdsm.stiffness(arm.at(angles[0]), cdsm.distribute_tension(arm.at(angles[0]), 10.0))
-    target = 1.05 * K.along("z")
-    return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles)
-
-
-@pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("friction", [0.0, 0.1])
-def test_a_payload_that_slackens_cables_is_followed(friction: float) -> None:
-    run = cdsm.track(tabulated_path(friction), payload=1.0, **BOUNDS)
-    assert run.outcome == "completed"
-    assert run.tension.min() == 0.0
-    assert np.isfinite(run.estimated_angles).all()
-
-
-def test_tensions_beyond_the_law_of_the_plant_end_the_loop() -> None:
-    """A true wire that breaks at 40 N, and a plan that needs more."""
-    plan = tabulated_path(0.1)
-    weak = cdsm.TabulatedElasticity((0.0, 50.0), (0.0, 0.0015))
-    assert plan.tensions.max() < 50.0
-    plant = cdsm.QuasiStaticPlant(cdsm.Manipulator(plan.arm.geometry, weak).with_friction(0.1))
-    run = cdsm.track(plan, "feedforward", plant, **BOUNDS)
-    assert run.outcome == "completed"
-    run = cdsm.track(plan, "feedforward", plant, payload=2.0, **BOUNDS)
-    assert run.outcome == "elasticity_range"
-    assert "after the step" in run.reason
-    assert run.tension.max() <= 50.0
-
-
+@pytest.mark.slow  # each step searches for tensions that are not there
 def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() -> None:
     plan = small_path()
     run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, max_change_per_step=20.0)
@@ -216,45 +152,10 @@ def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() 
         cdsm.plan_stiffness(
             plan.arm.at(plan.angles[-1]), plan.direction, plan.target[-1], 10.0, 60.0
         )
-    assert run.warnings[0].startswith(
-        f"OUT OF REACH at {run.target_unreachable.sum()} of {len(run.time)} steps"
-    )
-    assert set(run.saturated_motors) <= set(plan.arm.cables.names)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        ({"law": "pid"}, "law"),
-        ({"payload": -1.0}, "payload"),
-        ({"steps": 0}, "steps"),
-        ({"period": 0.0}, "period"),
-        ({"max_change_per_step": 0.0}, "max_change_per_step"),
-        ({"payload": float("nan")}, "payload"),
-        ({"plant": small_path().arm}, r"plant: .* such as QuasiStaticPlant"),
-    ],
-)
-def test_wrong_arguments_are_refused(wrong: dict[str, object], said: str) -> None:
-    with pytest.raises(cdsm.CdsmError, match=said):
-        cdsm.track(small_path(), **wrong)  # type: ignore[arg-type]
-
-
-def test_plan_with_gaps_is_refused() -> None:
-    plan = small_path()
-    broken = cdsm.plan_path(plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2])
-    with pytest.raises(cdsm.InvalidInput, match=r"1 of 2 samples are not planned.*sample 1"):
-        cdsm.track(broken)
-
-
-def test_payload_that_no_tensions_within_the_bounds_balance_is_named() -> None:
-    plan = small_path()
-    run = cdsm.track(plan, payload=4.0, steps=6, minimum=10.0, maximum=150.0)
-    assert run.replan_failed
-    assert any(text.startswith("NOT PLANNED at ") for text in run.warnings)
-    assert (run.commanded_tension <= 150.0).all()
-
-
-# --- the result -----------------------------------------------------------------------------
+    assert "OUT OF REACH" in run.warnings[0]
+    heavy = cdsm.track(plan, payload=4.0, steps=2, minimum=10.0, maximum=150.0)
+    assert heavy.replan_failed
+    assert any(text.startswith("NOT PLANNED at ") for text in heavy.warnings)
 
 
 def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
@@ -268,36 +169,13 @@ def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
     with xr.open_dataset(path) as again:
         np.testing.assert_array_equal(again["tips"], run.tips)
         assert again.attrs["outcome"] == "completed"
-    with pytest.raises(cdsm.InvalidInput, match=r"\.nc"):
-        run.write(tmp_path / "run.txt")
     assert run.inside.all()
-    assert "100 % of 5 steps" in str(run)
-    assert data["band"].attrs["units"] == "m"
+    path_again = read_path(run.write(tmp_path / "run.csv"), run.plan.arm)
+    assert path_again.angles is not None
+    np.testing.assert_allclose(path_again.angles, run.angles, rtol=1e-15)
 
 
-def test_table_over_time_is_a_path_that_can_be_played(tmp_path: Path) -> None:
-    run = cdsm.track(small_path(), steps=2, **BOUNDS)
-    path = read_path(run.write(tmp_path / "run.csv"), run.plan.arm)
-    assert path.angles is not None
-    np.testing.assert_allclose(path.angles, run.angles, rtol=1e-15)
-
-
-def test_figure_and_animation_are_drawn(tmp_path: Path) -> None:
-    run = cdsm.track(small_path(0.1), steps=2, **BOUNDS)
-    figure = run.plot(tmp_path / "run.gif")
-    assert (tmp_path / "run.gif").read_bytes()[:3] == b"GIF"
-    assert [axes.get_ylabel() for axes in figure.axes] == [
-        "tip error [mm]",
-        "frictionless\nstiffness [N/mm]",
-        "displacement from\nfrictionless\nequilibrium [mm]",
-        "tension [N]",
-    ]
-
-
-# --- what it must show ----------------------------------------------------------------------
-
-
-@pytest.mark.slow
+@pytest.mark.slow  # three loops of sixty steps
 def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() -> None:
     """10 % wrong EA, μ = 0.1, 0.5 N of noise, and 200 g hung on it half-way.
 

@@ -1,7 +1,7 @@
 """Problems, their evaluation, searches and refinements."""
 
 import itertools
-import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -135,47 +135,6 @@ def test_deflection_is_that_of_payload_and_of_a_small_weight_on_locked_motors() 
     assert errors[1] < 0.11 * errors[0]
 
 
-def test_without_the_load_an_arm_that_is_not_held_has_no_finite_deflection() -> None:
-    task = problem(
-        variables=(cdsm.Variable("hole_radius", 0.014, 0.0151),),
-        objectives=(cdsm.Objective("deflection"),),
-        loads=(0.0, 0.0, 1.5, 0.0, 0.0, 0.0),  # it carries much of the arm
-        minimum=5.0,
-        maximum=12.0,
-        postures=np.zeros((1, 6)),
-    )
-    found = cdsm.evaluate_designs(task, [[0.015]])
-    assert (found["held"][0], found["deflection"][0]) == (1.0, np.inf)
-    with pytest.raises(InfeasibleDesign, match="misses: largest first-order deflection") as e:
-        cdsm.search_designs(task, generations=1, population=4)
-    assert e.value.constraints == ("deflection",)
-
-
-def test_all_quantities_of_a_posture_count_the_postures_that_are_held() -> None:
-    arm = small_arm()
-    wide = np.vstack([np.zeros(6), arm.upper * np.array([1, 1, 1, 1, -1, 1])])
-    task = problem(
-        arm=arm,
-        objectives=(
-            cdsm.Objective("payload", "-z"),
-            cdsm.Objective("tension_factor"),
-            cdsm.Objective("cable_clearance"),
-        ),
-        constraints=(cdsm.Constraint("held", at_least=0.1),),
-        postures=wide,
-        loads=np.zeros(6),
-        minimum=10.0,
-    )
-    row = [[0.02, 2.0, 1.0]]
-    both = cdsm.evaluate_designs(task, row)
-    assert both["held"][0] == 0.5
-    first = cdsm.evaluate_designs(replace(task, postures=wide[:1]), row)
-    for key in {*first.keys()} - {"held"}:
-        assert both[key][0] == first[key][0], key
-    poses = [task.arm_of(row[0]).at(q) for q in wide]
-    assert cdsm.tension_factor(poses[0]) > cdsm.tension_factor(poses[1])
-
-
 def test_a_link_keeps_its_mass_per_length_and_joints_have_values_of_their_own() -> None:
     task = problem(
         variables=(
@@ -232,8 +191,6 @@ def test_a_posture_that_the_worst_friction_takes_is_not_held() -> None:
             held.append(0.0)
     assert cdsm.evaluate_designs(rough, row)["held"][0] == np.mean(held)
     assert np.mean(held) < cdsm.evaluate_designs(free, row)["held"][0]
-    narrow = problem(maximum=20.1, worst_friction=True)  # less than friction takes
-    assert cdsm.evaluate_designs(narrow, row)["held"][0] == 0.0
 
 
 def test_tolerances_take_a_margin() -> None:
@@ -252,39 +209,6 @@ def test_tolerances_take_a_margin() -> None:
     asked = (poses[worst], pulls[worst], tolerances)
     u = cdsm.uncertainty(*asked, direction=(0.0, 0.0, 1.0), redistribute=True)
     assert sure[key][0] == pytest.approx(plain[key][0] - 2.0 * u.standard_uncertainty, rel=1e-9)
-    assert f"{key} - 2 u [N/m]" in sure.to_csv()
-    assert (
-        problem(arm=small_arm().with_tolerances(tolerances)).arm_of(row[0]).tolerances == tolerances
-    )
-    assert f"{key} [N/m]" in plain.to_csv()
-
-
-def rough(arm: cdsm.Manipulator) -> cdsm.Manipulator:
-    """Return the arm with another friction coefficient in each hole."""
-    rng = np.random.default_rng(5)
-    cables = []
-    for cable in arm.cables:
-        *passed, end = cable.sites
-        sites = [replace(site, friction=rng.uniform(0.02, 0.3)) for site in passed]
-        cables.append(replace(cable, sites=(*sites, end)))
-    return arm.with_cables(cables)
-
-
-def test_holes_keep_their_friction_in_every_design() -> None:
-    arm = rough(small_arm(friction=0.0))
-    more = problem(arm=arm, variables=(cdsm.Variable("end@cable2_1", 1, 3),))
-    for end in (1, 2, 3):
-        made = more.arm_of([float(end)])
-        for old, new in zip(arm.cables, made.cables, strict=True):
-            count = min(len(old.friction), len(new.friction))
-            assert new.friction[:count] == old.friction[:count]
-            # a hole that the cable did not pass before is as its last one
-            assert set(new.friction[count:]) <= {old.friction[-1]}
-    even = problem(
-        arm=small_arm(friction=(0.1, 0.2, 0.3)),
-        variables=(cdsm.Variable("cables_per_joint", 3, 5),),
-    )
-    assert [c.friction[0] for c in even.arm_of([4.0]).cables] == 4 * [0.1] + 4 * [0.2] + 4 * [0.3]
 
 
 # --- searches --------------------------------------------------------------------------------
@@ -293,11 +217,10 @@ def test_holes_keep_their_friction_in_every_design() -> None:
 def test_a_front_has_the_bits_of_its_seed() -> None:
     once = cdsm.search_designs(problem(), generations=4, population=8, seed=3)
     again = cdsm.search_designs(problem(), generations=4, population=8, seed=3)
-    other = cdsm.search_designs(problem(), generations=4, population=8, seed=4)
     np.testing.assert_array_equal(once.evaluated.designs, again.evaluated.designs)
-    np.testing.assert_array_equal(once.evaluated.values, again.evaluated.values)
     np.testing.assert_array_equal(once.front, again.front)
-    assert not np.array_equal(once.evaluated.designs, other.evaluated.designs)
+    other = cdsm.search_designs(problem(), generations=1, population=8, seed=4)
+    assert not np.array_equal(once.evaluated.designs[:8], other.evaluated.designs)
 
 
 def test_no_design_of_the_front_is_beaten() -> None:
@@ -317,18 +240,6 @@ def test_no_design_of_the_front_is_beaten() -> None:
     head, *rows = best.to_csv().splitlines()
     assert len(rows) == len(found.front)
     assert head.startswith("design,hole_radius [m],end@cable2_1,wire,motor_force [N],")
-    assert head.endswith(",feasible,fault")
-    assert all(row.endswith(",1,") for row in rows)
-    json.dumps(found.to_dict(), allow_nan=False)
-
-
-@pytest.mark.slow
-def test_processes_change_nothing() -> None:
-    task = problem()
-    rows = np.array([[0.016, 1.0, 0.0], [0.02, 2.0, 1.0], [0.03, 3.0, 1.0]])
-    one, two = (cdsm.evaluate_designs(task, rows, jobs=n) for n in (1, 2))
-    # one process may have compiled the kernels, the others may not
-    np.testing.assert_allclose(one.values, two.values, rtol=1e-12)
 
 
 def test_an_infeasible_problem_is_named() -> None:
@@ -345,22 +256,11 @@ def test_an_infeasible_problem_is_named() -> None:
     weak = problem(maximum=21.0)
     with pytest.raises(InfeasibleDesign, match=r"not held: posture \d: no tension within"):
         cdsm.search_designs(weak, generations=1, population=4)
-    short = problem(variables=(cdsm.Variable("disk_offset", 0.04, 0.05),))
-    with pytest.raises(InfeasibleDesign, match="none of 4 designs is an arm"):
-        cdsm.search_designs(short, generations=1, population=4)
+    with pytest.raises(cdsm.InvalidInput, match="end@cable2_1 is not continuous"):
+        cdsm.refine_design(problem())
 
 
 # --- refinement --------------------------------------------------------------------------
-
-CONTINUOUS = (
-    cdsm.Variable("hole_radius", 0.012, 0.04),
-    cdsm.Variable("disk_offset@2", 0.005, 0.02),
-    cdsm.Variable("link_length@2", 0.05, 0.1),
-    cdsm.Variable("lead", 0.0, 0.5),
-    cdsm.Variable("phase@3", -1.0, 1.0),
-    cdsm.Variable("hole_angle@cable1_2", -1.0, 6.0),
-    cdsm.Variable("minimum", 5.0, 50.0),
-)
 
 
 def test_refinement_finds_what_a_fine_search_finds() -> None:
@@ -381,27 +281,33 @@ def test_refinement_finds_what_a_fine_search_finds() -> None:
 START = 1.5e4
 
 
-def test_problems_that_cannot_be_refined_say_why() -> None:
-    with pytest.raises(cdsm.InvalidInput, match="end@cable2_1 is not continuous"):
-        cdsm.refine_design(problem())
-    two = problem(variables=CONTINUOUS)
-    with pytest.raises(cdsm.InvalidInput, match="several objectives"):
-        cdsm.refine_design(two)
-
-
 # --- bad problems ----------------------------------------------------------------------------
+
+
+PARTS: tuple[tuple[Callable[[], object], str], ...] = (
+    (lambda: cdsm.Variable("hole_radius", 0.03, 0.02), "give low < high"),
+    (lambda: cdsm.Variable("hole_radius", -0.03, 0.03), r"-0.03 m given; 0, or 1e-06 to"),
+    (lambda: cdsm.Variable("minimum", -5.0, 5.0), "cables only pull"),
+    (lambda: cdsm.Variable("end", 1, 3), "name of a cable"),
+    (lambda: cdsm.Objective("stiffness"), "direction: is needed"),
+    (lambda: cdsm.Constraint("mass"), "at_least or at_most"),
+    (lambda: cdsm.Objective("beauty"), "no quantity of a design is called .beauty"),
+)
+
+
+@pytest.mark.parametrize(("make", "said"), PARTS)
+def test_bad_parts_name_what_is_wrong(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(cdsm.CdsmError, match=said):
+        make()
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"variables": ()}, "one variable"),
         ({"variables": (cdsm.Variable("end@cable2_1", 1, 4),)}, "end@cable2_1.high: 4"),
         ({"variables": (cdsm.Variable("hole_radius@9", 0.01, 0.02),)}, "joints 1 to 3"),
         ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead of a joint twice"),
         ({"loads": np.zeros((1, 5))}, "loads: shape"),
-        ({"diameter": 1.2}, "diameter: 1.2 m given; 0, or 1e-06 to 0.5 m"),
-        ({"coverage": -3.0}, "coverage: -3 given; give 0 or more"),
         (
             {"objectives": (cdsm.Objective("force_radius"),), "maximum": np.inf},
             "force_radius needs a finite one",
@@ -415,45 +321,6 @@ def test_problems_that_cannot_be_refined_say_why() -> None:
 def test_bad_problems_name_what_is_wrong(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(cdsm.InvalidInput, match=said):
         problem(**changes)
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: cdsm.Variable("hole_radius", 0.03, 0.02), "give low < high"),
-        (lambda: cdsm.Variable("hole_radius", 0.03), "needs both"),
-        (lambda: cdsm.Variable("hole_radius", -0.03, 0.03), r"-0.03 m given; 0, or 1e-06 to"),
-        (lambda: cdsm.Variable("minimum", -5.0, 5.0), "cables only pull"),
-        (lambda: cdsm.Variable("wire", 1.0, 2.0), "needs low and high, or|has no range"),
-        (lambda: cdsm.Variable("end", 1, 3), "name of a cable"),
-        (lambda: cdsm.Variable("minimum@1", 1.0, 3.0), "one value for the arm"),
-        (lambda: cdsm.Objective("stiffness"), "direction: is needed"),
-        (lambda: cdsm.Objective("mass", "z"), "direction: has no meaning"),
-        (lambda: cdsm.Constraint("mass"), "at_least or at_most"),
-        (lambda: cdsm.Objective("beauty"), "no quantity of a design is called .beauty"),
-    ],
-)
-def test_bad_parts_name_what_is_wrong(make: Any, said: str) -> None:
-    with pytest.raises(cdsm.CdsmError, match=said):
-        make()
-
-
-@pytest.mark.parametrize(
-    ("of", "low", "high", "said"),
-    [("hole_radius", 20.0, 30.0, "hole_radius is 30 m: it looks as if lengths are in mm"),
-     ("phase", -360.0, 0.0, "360 rad: it looks as if it is in degrees")],
-)  # fmt: skip
-def test_ranges_in_other_units_are_doubted(of: Any, low: float, high: float, said: str) -> None:
-    with pytest.warns(cdsm.CdsmWarning, match=said):
-        cdsm.Variable(of, low, high)
-
-
-def test_a_posture_beyond_the_limits_is_named_without_remedies_that_a_search_lacks() -> None:
-    beyond = problem(postures=np.vstack([BENT, np.full(6, 2.0)]))
-    with pytest.raises(InfeasibleDesign, match=r"posture 4: q: joint1_1") as caught:
-        cdsm.search_designs(beyond, generations=1, population=4)
-    assert "check_limits" not in str(caught.value)
-    assert ".." not in str(caught.value)
 
 
 def test_files_for_the_workshop(tmp_path: Path) -> None:
@@ -496,16 +363,3 @@ def test_a_cable_is_cut_for_all_postures_within_the_joint_limits() -> None:
     assert (cut >= high - 1e-7).all()
     np.testing.assert_allclose(shortest, low, atol=2e-4)  # the grid ends before the limits
     np.testing.assert_allclose(cut, high, atol=2e-4)
-
-
-def test_the_axis_counts_designs_in_whole_numbers() -> None:
-    task = problem(objectives=(cdsm.Objective("motor_force"),))
-    (axes,) = cdsm.search_designs(task, generations=2, population=4).plot().axes
-    assert (axes.get_xticks() % 1.0 == 0.0).all()
-
-
-def test_leads_that_are_not_those_of_the_geometry_are_refused() -> None:
-    arm = small_arm()
-    cables = [replace(each, lead=each.lead + 0.1 * (i == 1)) for i, each in enumerate(arm.cables)]
-    with pytest.raises(cdsm.InvalidInput, match=f"lead or the holes of {cables[1].name} are not"):
-        problem(arm=arm.with_cables(cables))

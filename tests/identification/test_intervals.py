@@ -1,16 +1,14 @@
 """Intervals by profile likelihood: where they can be written down, and how often they hold."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binom, norm
+from scipy.stats import norm
 
 import cdsm
 from cdsm.identification import Measurement, identify
 from cdsm.support.values import Array
-from tests.support.arms import readme_geometry
 
 GEOMETRY = cdsm.Geometry.hinged(
     joints=1,
@@ -68,7 +66,7 @@ BOUNDS = {"softness": (1e-4, 1e-1), "gravity": (-500.0, 500.0)}
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.3])
-@pytest.mark.parametrize("level", [0.95, 0.68, 0.99])
+@pytest.mark.parametrize("level", [0.95, 0.68])
 def test_interval_of_a_reciprocal_is_the_reciprocal_of_the_interval(
     noise: float, level: float
 ) -> None:
@@ -103,18 +101,6 @@ def test_interval_that_the_measurements_do_not_end_is_open() -> None:
     assert narrow.confidence()["softness"] == (-math.inf, math.inf)
 
 
-def test_interval_that_the_model_ends_is_open() -> None:
-    def model_of(softness: float) -> cdsm.Manipulator:
-        if softness > 2.05e-3:
-            raise cdsm.InvalidInput("softness", "no such wire is sold.")
-        return hinge(softness)
-
-    found = identify(
-        model_of, readings(0.3), {"softness": (1e-4, 1e-1)}, start={"softness": 1.9e-3}
-    )
-    assert found.confidence()["softness"][1] == math.inf
-
-
 def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
     measured = readings(0.1)
     (rigidity, _), _, _ = line(measured)
@@ -136,53 +122,3 @@ def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
 
     assert chi_square(high) - chi_square(beyond) == pytest.approx(norm.ppf(0.975) ** 2, rel=5e-3)
     assert any(each.startswith("softness is at its lower bound") for each in found.warnings)
-
-
-def test_fit_and_profiles_cost_about_as_many_predictions_as_stated() -> None:
-    calls = 0
-
-    def counted(softness: float, gravity: float) -> cdsm.Manipulator:
-        nonlocal calls
-        calls += 1
-        return hinge(softness, gravity)
-
-    found = identify(counted, readings(0.1), BOUNDS, start={"softness": 3e-3, "gravity": 5.0})
-    assert calls < 10 * 2 + 10
-    calls = 0
-    found.confidence()
-    assert calls < 30 * 2**2
-
-
-# --- how often they hold --------------------------------------------------------------------
-
-
-def strand_arm(hole_radius: float, drive: float, lead: float) -> cdsm.Manipulator:
-    """Of universal joints; its three parameters correlate at 0.99."""
-    geometry = readme_geometry(hole_radius=hole_radius, lead=lead)
-    cables = cdsm.serpentine_cables(geometry, cdsm.presets.STRAND_1X19, series_stiffness=drive)
-    return cdsm.Manipulator(geometry, cables=cables)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("noise", [0.02, 0.1])
-def test_intervals_of_correlated_parameters_hold_as_often_as_they_say(
-    noise: float,
-) -> None:
-    true = {"hole_radius": 0.025, "drive": 4e4, "lead": 0.3}
-    free = {"hole_radius": (0.01, 0.06), "drive": (1e3, 1e6), "lead": (0.0, 3.0)}
-    arm, rng, exact = strand_arm(**true), np.random.default_rng([0, 14]), []
-    for _ in range(14):
-        q, level = rng.uniform(-0.35, 0.35, arm.nv), rng.uniform(20.0, 120.0)
-        pull, u = level * rng.uniform(0.8, 1.2, 12), rng.normal(size=3)
-        K = cdsm.stiffness(arm.at(q), pull).along(u)
-        exact.append(Measurement(K, tuple(u), tuple(q), tuple(pull), std=noise * K))
-    seeds, counts = 120, np.zeros(3, dtype=int)
-    for seed in range(seeds):
-        z = np.random.default_rng([seed, 7]).normal(size=14)
-        noisy = [replace(m, value=m.value + m.std * e) for m, e in zip(exact, z, strict=True)]
-        found = identify(strand_arm, noisy, free, start=true)
-        intervals = found.confidence()
-        counts += [low <= true[name] <= high for name, (low, high) in intervals.items()]
-    # of the intervals value ± q·std some 80 to 90 % hold
-    fewest, most = binom.interval(0.998, seeds, 0.95)
-    assert ((fewest <= counts) & (counts <= most)).all(), counts / seeds

@@ -1,16 +1,13 @@
 """Loops of weight tests: friction and rigidity from loads that come and go."""
 
-import math
-import pickle
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import binom
 
 import cdsm
-from cdsm.identification import Measurement, WeightLoop, identify
+from cdsm.identification import WeightLoop, identify
 from cdsm.identification.problem import Problem
 from tests.support.coverage import Experiment
 
@@ -55,9 +52,6 @@ def measured(seed: int, planned: list[WeightLoop] = PLANNED) -> list[WeightLoop]
 FOUND = identify(hinge, measured(0), FREE, start={"friction": 0.3, "rigidity": 3e4})
 
 
-# --- what is found --------------------------------------------------------------------------
-
-
 def test_friction_and_rigidity_come_back_within_five_per_cent() -> None:
     # linearised, σ is 1.3 % and 0.2 %: 5 % is four σ
     for name, (low, high) in FOUND.confidence().items():
@@ -66,12 +60,6 @@ def test_friction_and_rigidity_come_back_within_five_per_cent() -> None:
     assert not FOUND.warnings
     assert FOUND.freedom == 2 * (len(FORCES) - 1) - 2
     assert 0.1 * FOUND.freedom < FOUND.chi_square < 3.0 * FOUND.freedom
-
-
-@pytest.mark.slow
-def test_a_search_from_the_middle_of_the_bounds_finds_it() -> None:
-    found = identify(hinge, measured(0), FREE)
-    np.testing.assert_allclose(found.values, FOUND.values, rtol=1e-4)
 
 
 def test_loops_of_a_load_cycle_give_the_arm_that_made_them() -> None:
@@ -92,27 +80,6 @@ def test_loops_of_a_load_cycle_give_the_arm_that_made_them() -> None:
     assert found.freedom == 2 * 3 * (len(FORCES) - 1) - 2
 
 
-@pytest.mark.slow
-def test_loops_and_stiffnesses_determine_together_what_neither_does_alone() -> None:
-    # a loop tells rigidity over length; the stiffness of another arm's posture tells as little
-    free = {**FREE, "lead": (0.1, 1.0)}
-    start = {**TRUE, "lead": 0.25}
-    exact = [PLANNED[0].simulated(hinge())]
-    alone = identify(hinge, exact, free, start=start)
-    assert alone.correlation[1, 2] > 0.99
-    assert any("rigidity and lead are correlated" in warning for warning in alone.warnings)
-    length = Measurement(
-        value=cdsm.stiffness(hinge().at((0.0,)), (40.0, 40.0)).along("z"),
-        direction="z",
-        angles=(0.0,),
-        tension=(40.0, 40.0),
-        std=1.0,
-    )
-    both = identify(hinge, [*exact, length], free, start=start)
-    assert both.freedom == alone.freedom + 1
-    assert both.std[1] < alone.std[1]
-
-
 def test_jacobian_is_the_derivative_of_the_residuals() -> None:
     problem = Problem(hinge, None, measured(1), FREE)
     true = np.array(list(TRUE.values()))
@@ -125,97 +92,32 @@ def test_jacobian_is_the_derivative_of_the_residuals() -> None:
         np.testing.assert_allclose(jacobian[:, i], expected, atol=1e-4 * abs(expected).max())
 
 
-def experiment() -> Experiment:
-    return Experiment(hinge, PLANNED, TRUE, FREE)
-
-
 @pytest.mark.long
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
-    seeds, planned = 240, experiment()
-    held = [planned.held(np.random.default_rng([seed, 20])) for seed in range(seeds)]
-    counts = np.sum([list(each.values()) for each in held], axis=0)
-    fewest, most = binom.interval(0.998, seeds, 0.95)
-    assert ((fewest <= counts) & (counts <= most)).all(), counts
+    """Of friction and of rigidity, in 200 experiments of two loops each."""
+    planned = [replace(loop, forces=(0.0, 12.0, 24.0, 12.0, 0.0)) for loop in PLANNED]
+    seeds, arm = 200, Experiment(hinge, planned, TRUE, FREE)
+    held = [arm.held(np.random.default_rng([seed, 20])) for seed in range(seeds)]
+    shares = np.mean([list(each.values()) for each in held], axis=0)
+    assert ((shares >= 0.91) & (shares <= 0.98)).all(), shares
 
 
-# --- what cannot be told --------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_without_wrap_friction_is_not_determined_and_that_is_said() -> None:
-    # lead, disks and link in one line: nothing presses the cable against a hole
-    straight = [replace(PLANNED[0], angles=(0.0,)).simulated(hinge())]
-    found = identify(hinge, straight, FREE, start=TRUE)
-    low, high = found.confidence()["friction"]
-    assert math.isinf(high) or high - low > 0.1
-    product = {"area": (1e-6, 1e-5), "modulus": (1e9, 1e11)}
-    loops = [loop.simulated(hinge()) for loop in PLANNED]
-    found = identify(
-        lambda area, modulus: hinge(rigidity=area * modulus),
-        loops,
-        product,
-        start={"area": 3e-6, "modulus": 1.6e10},
-    )
-    assert found.rank == 1
-    assert any("not identifiable (rank 1 of 2)" in warning for warning in found.warnings)
-
-
-# --- what is shown --------------------------------------------------------------------------
-
-
-def test_a_loop_is_a_plain_value() -> None:
-    loop = measured(0)[0]
-    assert pickle.loads(pickle.dumps(loop)) == loop
-    assert hash(loop) == hash(replace(loop))
-    assert loop.direction == (0.0, 0.0, -1.0)
-
-
-# --- bad input ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"forces": (5.0, 5.0, 5.0)}, ("forces", "at least two sizes")),
-        ({"forces": (0.0, math.nan)}, ("forces", "nan")),
-        ({"displacement_std": -5e-6}, ("displacement_std", "-5e-06", "positive")),
-        ({"displacements": (1e-3, 2e-3)}, ("displacements", "(2,)", "(7,)", "(7, 3)")),
-        ({"minimum": None}, ("tension", "neither")),
-    ],
-)
-def test_bad_loops_name_the_offender_and_the_remedy(
-    changes: dict[str, Any], said: tuple[str, ...]
-) -> None:
-    with pytest.raises(cdsm.InvalidInput) as caught:
-        replace(PLANNED[0], **changes)
-    for part in said:
-        assert part in str(caught.value)
-
-
-def test_a_loop_is_simulated_from_a_generator_or_its_seed() -> None:
-    drawn = PLANNED[0].simulated(hinge(), np.random.default_rng(3))
-    assert PLANNED[0].simulated(hinge(), 3) == drawn != PLANNED[0].simulated(hinge())
-    for bad in (-1, 0.5, "3"):
-        with pytest.raises(cdsm.InvalidInput, match="random"):
-            PLANNED[0].simulated(hinge(), bad)  # type: ignore[arg-type]
-
-
-def test_bad_experiments_name_the_offender_and_the_remedy() -> None:
-    with pytest.raises(cdsm.InvalidInput, match=r"measurements\[0\]: at 0.45 has no readings"):
-        identify(hinge, PLANNED, FREE)
-    with pytest.raises(cdsm.InvalidInput, match="0 independent readings given for 2 parameters"):
-        identify(hinge, [], FREE)
-    with pytest.raises(cdsm.InvalidInput, match="WeightLoop is needed"):
-        identify(hinge, ["loop"], FREE)  # type: ignore[list-item]
-    one = replace(PLANNED[0], forces=(0.0, 5.0)).simulated(hinge())
-    with pytest.raises(
-        cdsm.InvalidInput, match="1 independent reading given for 2 parameters, friction"
+def test_bad_loops_name_the_offender_and_the_remedy() -> None:
+    for changes, said in (
+        ({"forces": (5.0, 5.0, 5.0)}, "forces.*at least two sizes"),
+        ({"displacements": (1e-3, 2e-3)}, r"displacements.*\(2,\).*\(7,\).*\(7, 3\)"),
+        ({"minimum": None}, "tension.*neither"),
     ):
-        identify(hinge, [one], FREE)
-    with pytest.raises(cdsm.InvalidInput, match="viscosity"):
-        identify(hinge, measured(0), {"viscosity": (0.0, 1.0)})
-    other = replace(measured(0)[0], angles=(0.1, 0.1))
-    with pytest.raises(cdsm.InvalidInput, match="2"):
-        identify(hinge, [other], FREE)
-    with pytest.raises(cdsm.InvalidInput, match="arm"):
-        PLANNED[0].simulated("arm")  # type: ignore[arg-type]
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            replace(PLANNED[0], **changes)
+    one = replace(PLANNED[0], forces=(0.0, 5.0)).simulated(hinge())
+    for loops, free, said in (
+        (PLANNED, FREE, r"measurements\[0\]: at 0.45 has no readings"),
+        ([one], FREE, "1 independent reading given for 2 parameters, friction"),
+        (measured(0), {"viscosity": (0.0, 1.0)}, "viscosity"),
+    ):
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            identify(hinge, loops, free)
+    assert PLANNED[0].simulated(hinge(), 3) == PLANNED[0].simulated(
+        hinge(), np.random.default_rng(3)
+    )

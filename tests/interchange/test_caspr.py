@@ -40,8 +40,7 @@ DOCTYPE = '<!DOCTYPE {0} SYSTEM "../../../templates/{1}.dtd">\n'
 
 
 def link(num: int, kind: str, parent: int | None = None, **changes: object) -> str:
-    count = {"R": 1, "U": 2, "S_": 3, "P_A": 1, "PL": 3, "T": 3, "SP": 6, "P_X": len(kind) - 2}
-    size = next(n for key, n in count.items() if kind.startswith(key) or key == "P_X")
+    size = caspr_models.coordinates(kind)
     fields = {
         "num": num,
         "name": f"part {num}",
@@ -76,13 +75,6 @@ def folder(path: Path, links: str, cables: str, doctype: bool = True) -> Path:
     )
     return path
 
-
-def toy(path: Path, second: str = "U_XZ", first: str = "R_Y") -> cdsm.Manipulator:
-    links = link(1, first) + link(2, second)
-    return cdsm.read_caspr(folder(path, links, cable()), elasticity=LAW)
-
-
-# --- q is that of the file --------------------------------------------------------------------
 
 BRANCHES = (
     ("trunk", "U_XZ", 0),
@@ -154,9 +146,6 @@ def test_coordinates_of_each_joint_type_are_the_files(kind: str, tmp_path: Path)
 
 def test_coordinates_across_branches_are_the_files(tmp_path: Path) -> None:
     arm = assert_is_the_files(tree(tmp_path, BRANCHES))
-    assert arm.joint_names[:8] == (
-        *("trunk_x", "trunk_z", "right_x", "right_y", "right_z", "left_x", "left_y", "left_z"),
-    )
     assert arm.joint_names[11:15] == (
         *("right hand_turn", "left hand_slide_x", "left hand_slide_z", "left hand_y"),
     )
@@ -184,52 +173,10 @@ def test_derivatives_hold_whatever_the_order_of_q(tip: str, tmp_path: Path) -> N
     assert_second_order(lambda y: arm.at(y).gravity_torque, K.gravity, q)
     assert_second_order(lambda y: -arm.at(y).jacobian.T @ W, K.load, q)
     assert_second_order(lambda y: arm.at(y).tip[:3, 3], pose.jacobian[:3], q)
-    heights = np.array([arm._body.potential_energy(q)])
-    assert_second_order(
-        lambda y: np.array([arm._body.potential_energy(y)]),
-        pose.gravity_torque[None],
-        q,
-        size=float(abs(heights).max()),
-        tolerance=1e-9,
-    )
-    np.testing.assert_allclose(pose.tip, pose.link_pose(tip), rtol=0.0, atol=1e-15)
-    of_pose = ("tip", "jacobian", "gravity_torque", "length_jacobian")
-    terms = ("active", "passive", "gravity", "load", "joint")
-    batch = cdsm.evaluate(arm, q[None], F[None], W[None], (*of_pose, *terms))
-    for name in of_pose:
-        np.testing.assert_allclose(batch[name][0], getattr(pose, name), rtol=0.0, atol=1e-14)
-    for name in terms:
-        term = getattr(K, name)
-        np.testing.assert_allclose(batch[name][0], term, rtol=0.0, atol=1e-13 * abs(term).max())
-
-
-def test_order_of_q_changes_the_order_of_answers_and_nothing_else(tmp_path: Path) -> None:
-    arm = cdsm.read_caspr(tree(tmp_path, BRANCHES), elasticity=LAW)
-    plain = cdsm.Manipulator.from_urdf(arm.urdf, arm.cables, tip="tool0")
-    assert plain != arm
-    assert sorted(plain.joint_names) == sorted(arm.joint_names)
-    place = [arm.joint_names.index(name) for name in plain.joint_names]
-    assert place != sorted(place)
-    q = np.random.default_rng(3).uniform(arm.lower, arm.upper) / 2.0
-    F, W = np.linspace(20.0, 60.0, 6), np.array([3.0, -2.0, 5.0, 0.4, -0.3, 0.2])
-    ours, theirs = arm.at(q), plain.at(q[place])
-    np.testing.assert_allclose(ours.joint_positions[place], theirs.joint_positions, atol=1e-15)
-    assert len(ours.bones) == len(theirs.bones)
-    assert len(ours.brackets) == len(theirs.brackets)
-    pairs = [
-        (ours.length_hessian[0], theirs.length_hessian[0]),
-        (cdsm.stiffness(ours, F, wrench=W).joint, cdsm.stiffness(theirs, F, wrench=W).joint),
-        (arm._body.mass_matrix(q), plain._body.mass_matrix(q[place])),
-    ]
-    for matrix, other in pairs:
-        matrix = matrix[np.ix_(place, place)]
-        np.testing.assert_allclose(matrix, other, rtol=0.0, atol=1e-13 * abs(other).max())
-    np.testing.assert_array_equal(arm.slides[place], plain.slides)
-
-    for same in (pickle.loads(pickle.dumps(arm)), arm.with_cables(arm.cables)):
-        assert same == arm
-        assert same.joint_names == arm.joint_names
-        np.testing.assert_array_equal(same.cable_lengths(q), arm.cable_lengths(q))
+    joint = cdsm.evaluate(arm, q[None], F[None], W[None], ("joint",))["joint"][0]
+    np.testing.assert_allclose(joint, K.joint, rtol=0.0, atol=1e-13 * abs(K.joint).max())
+    same = pickle.loads(pickle.dumps(arm))
+    assert (same, same.joint_names) == (arm, whole.joint_names)
 
 
 @pytest.mark.parametrize("reference", ["joint", "com"])
@@ -263,7 +210,7 @@ def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:
     assert arm == cdsm.read_caspr(tmp_path, elasticity=LAW)
     with pytest.raises(cdsm.InvalidInput, match="file of the cables"):
         cdsm.read_caspr(tmp_path / "toy_bodies.xml", elasticity=LAW)
-    with pytest.raises(cdsm.InvalidInput, match="set of cables"):
+    with pytest.raises(cdsm.FileError, match="no set of cables is called 'al'"):
         cdsm.read_caspr(tmp_path, elasticity=LAW, cable_set="al")
     with pytest.raises(cdsm.FileError, match="holds no cables; sets with cables are 'all'"):
         cdsm.read_caspr(tmp_path, elasticity=LAW, cable_set="none")
@@ -276,16 +223,8 @@ def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:
         (link(1, "R_Y") + link(3, "R_X"), cable(), "numbered ['1', '3']; 1 to"),
         (link(1, "R_Y") + link(2, "R_X", parent=2), cable(), "its parent is link 2; one of 0 to 1"),
         (link(1, "R_Y", mass=-1), cable(), "<mass> -1 kg"),
-        (link(1, "R_Y", mass="heavy"), cable(), "<mass>"),
         (link(1, "R_Y", ref="moon"), cable(), "com or joint is needed"),
         (link(1, "R_Y", low="0.7"), cable(), "q_min 0.7 is above q_max 0.6"),
-        (link(1, "R_Y", low="0 0"), cable(), "joint q_min: '0 0' given; a number is needed"),
-        (
-            link(1, "R_Y").replace("link_rigid", "link_soft"),
-            cable(),
-            "only <link_rigid> is supported",
-        ),
-        ("", cable(), "numbered []; 1 to"),
         (link(1, "R_Y"), cable(), "one: <link> is link 2; one of 0 to 1"),
         (
             link(1, "R_Y") + link(2, "R_X"),
@@ -299,9 +238,7 @@ def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:
             .replace("</attachment>", "</base_rotating_pulley>", 1),
             "<base_rotating_pulley> is not supported",
         ),
-        (link(1, "R_Y") + link(2, "R_X"), cable(ref="sky"), "attachment_reference 'sky'"),
         (link(1, "R_Y") + link(2, "R_X"), cable(low=9, high=4), "tensions from 9 to 4 N"),
-        (link(1, "R_Y") + link(2, "R_X"), cable(low="x"), "<force_min>: 'x' given"),
     ],
 )
 def test_what_cannot_be_mapped_is_named(links: str, cables: str, said: str, tmp_path: Path) -> None:
@@ -315,7 +252,6 @@ def test_what_cannot_be_mapped_is_named(links: str, cables: str, said: str, tmp_
     [
         '<!DOCTYPE bodies_system SYSTEM "file:///etc/passwd">',
         '<!DOCTYPE bodies_system [<!ENTITY a "b">]>',
-        '<!DOCTYPE bodies_system PUBLIC "" "/etc/passwd">',
         '<!-- <!DOCTYPE bodies_system PUBLIC "" "../templates/bodies.dtd"> -->'
         '<!DOCTYPE bodies_system PUBLIC "" "/etc/passwd">',
     ],
@@ -327,14 +263,3 @@ def test_no_other_doctype_is_let_pass(doctype: str, tmp_path: Path) -> None:
     file.write_text(doctype + text, encoding="utf-8")
     with pytest.raises(cdsm.FileError, match="DOCTYPE"):
         cdsm.read_caspr(path, elasticity=LAW)
-
-
-def test_folder_must_hold_one_of_each(tmp_path: Path) -> None:
-    with pytest.raises(cdsm.FileError, match=r"holds none where one \*_bodies.xml is needed"):
-        cdsm.read_caspr(tmp_path, elasticity=LAW)
-    with pytest.raises(cdsm.FileError, match="does not exist"):
-        cdsm.read_caspr(tmp_path / "absent.xml", tmp_path / "b.xml", elasticity=LAW)
-    with pytest.raises(cdsm.InvalidInput, match="path of a file"):
-        cdsm.read_caspr(None, elasticity=LAW)  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="Elasticity is needed"):
-        cdsm.read_caspr(tmp_path, elasticity=3.0)  # type: ignore[arg-type]

@@ -25,7 +25,6 @@ BODIES = {
     "of a rod": '<inertia ixx="0" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
     "of a plate": '<inertia ixx="3e-4" iyy="1e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
     "of a needle": '<inertia ixx="1e-15" iyy="7e-2" izz="7.00001e-2" ixy="0" ixz="0" iyz="0"/>',
-    "of a long needle": '<inertia ixx="1e-9" iyy="7" izz="7" ixy="0" ixz="0" iyz="0"/>',
     "of nothing real": '<inertia ixx="1e-4" iyy="1e-4" izz="9e-4" ixy="0" ixz="0" iyz="2e-5"/>',
     "negative": '<inertia ixx="-1e-4" iyy="1e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/>',
 }
@@ -108,20 +107,11 @@ def soft() -> tuple[cdsm.Posture, Array]:
     return pose.arm.with_cables(cables).at(pose.q), pull
 
 
-def held(arm: cdsm.Manipulator, q: Any, least: float) -> tuple[cdsm.Posture, Array]:
-    pose = arm.at(np.asarray(q))
-    return pose, cdsm.distribute_tension(pose, least).values
-
-
 ARMS: dict[str, Any] = {
     **{kind: lambda kind=kind: serpentine(kind) for kind in ("universal", "hinged", "mixed")},
     "tree with slides": lambda: (crab(gravity=(1.0, -2.0, -9.0)).at(POSTURE), TENSION),
     "soft and force-controlled": soft,
     "finger": finger,
-    "virtual prototype": lambda: held(
-        cdsm.presets.virtual_prototype(), np.deg2rad(np.full(10, 10.0)), 50.0
-    ),
-    "robot from a URDF": lambda: held(two_links(BODIES["of a plate"]), [0.1, -0.2], 10.0),
 }
 
 
@@ -188,33 +178,15 @@ def universal(joints: int, link_mass: float) -> cdsm.Manipulator:
 
 HELD: dict[str, tuple[cdsm.Manipulator, Array, float]] = {
     "README's arm": (universal(4, 0.12), np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]), 50.0),
-    "virtual prototype": (cdsm.presets.virtual_prototype(), np.deg2rad(np.full(10, 10.0)), 50.0),
     "finger": (hinged(3), np.deg2rad([20.0, 30.0, 20.0]), 5.0),
-    "1 joint": (hinged(1), np.deg2rad([20.0]), 5.0),
-    "8 joints": (universal(8, 0.05), np.deg2rad(np.tile([5.0, -3.0], 8)), 20.0),
-    "twisted hinges": (hinged(4, twist=np.deg2rad(30.0)), np.deg2rad([10.0, -5, 8, 12]), 8.0),
     "heavy and soft": (
         hinged(2, link_mass=20.0, link_length=0.4, hole_radius=0.1, disk_offset=0.05),
         np.deg2rad([5.0, 5.0]),
         10.0,
     ),
-    "robot from a URDF": (two_links(BODIES["of a plate"]), np.array([0.1, -0.2]), 10.0),
     "massless links": (universal(2, 0.0), np.deg2rad([5.0, -3, 5, -3]), 20.0),
 }
-SECONDS = 2.0
-
-
-def test_simulation_under_a_weight_settles_where_the_weight_test_says() -> None:
-    """Stiff linear cables that stay taut: MuJoCo's springs and ours are the same far away, too."""
-    arm = hinged(3, twist=0.5, link_length=0.05, disk_offset=0.01, hole_radius=0.02, link_mass=0.3)
-    pose, force = arm.at([0.1, -0.1, 0.2]), np.array([0.0, 1.0, -2.0])
-    pull = cdsm.distribute_tension(pose, 20.0)
-    test = cdsm.weight_test(pose, pull, force)
-    model, data = loaded(arm, pose, pull, damping=0.05)
-    data.xfrc_applied[model.body("tool0").id, :3] = force
-    mujoco.mj_step(model, data, round(8.0 / model.opt.timestep))
-    assert abs(data.qvel).max() < 1e-9
-    np.testing.assert_allclose(data.body("tool0").xpos, test.states[-1].pose.tip[:3, 3], atol=1e-8)
+SECONDS = 0.5
 
 
 def mass(model: Any, data: Any) -> Array:
@@ -249,67 +221,13 @@ def test_time_step_is_a_tenth_of_what_the_fastest_motion_bears(stable: Any) -> N
 
 
 def test_stable_arm_stays_where_it_is(stable: Any) -> None:
-    """A second or two are hundreds of periods: what diverges has grown from rounding by then.
-
-    What holds moves by rounding alone; 1e-3 rad is less than any joint of a real arm shows.
-    """
+    """Half a second is a hundred periods: what diverges has grown from rounding by then."""
     _, model, data, _, _ = stable
     steps = min(round(SECONDS / model.opt.timestep), 40_000)
     mujoco.mj_step(model, data, steps)
     assert data.time == pytest.approx(steps * model.opt.timestep)  # it never began again
     assert abs(data.qpos - model.key_qpos[0]).max() < 1e-9 < 1e-3
     assert abs(data.qvel).max() < 1e-6
-
-
-def test_energy_of_a_vibration_does_not_grow(stable: Any) -> None:
-    """Knocked so that every mode swings by 0.1 mrad, without damping.
-
-    Semi-implicit Euler keeps p²/2 + ω²q²/2 − ω²·dt·p·q/2, so the energy of a mode, which is that of
-    the knock first, stays below it by 1/(1 − ω·dt/2); that of all modes too.
-    """
-    K, model, data, squares, shapes = stable
-    amplitudes = 1e-4 / abs(shapes).max(axis=0)
-    data.qvel[:] = shapes @ (amplitudes * np.sqrt(squares))
-    start, M = data.qpos.copy(), mass(model, data)
-    stiff = np.linalg.inv(shapes).T @ np.diag(squares) @ np.linalg.inv(shapes)
-
-    def energy() -> float:
-        away = data.qpos - start
-        return float(data.qvel @ M @ data.qvel + away @ stiff @ away) / 2.0
-
-    knock = energy()
-    steps = min(round(SECONDS / model.opt.timestep), 40_000)
-    most = 0.0
-    for _ in range(steps // 37):
-        mujoco.mj_step(model, data, 37)
-        most = max(most, energy())
-    bound = knock / (1.0 - math.sqrt(squares[-1]) * model.opt.timestep / 2.0)
-    assert 0.5 * knock < most < 1.02 * bound  # 2 % for what is not linear
-    assert K.is_stable
-
-
-def test_unstable_arm_is_named_on_top_and_leaves() -> None:
-    arm = hinged(3)
-    arm = arm.with_cables([replace(cable, control="force") for cable in arm.cables])
-    pose = arm.at(np.deg2rad([20.0, 30.0, 20.0]))
-    pull = cdsm.distribute_tension(pose, 5.0)
-    K = cdsm.stiffness(pose, pull)
-    assert not K.is_stable
-    with pytest.warns(UserWarning, match="UNSTABLE: the arm buckles"):
-        text = cdsm.to_mjcf(arm, pose, pull, damping=0.0)
-    assert f"eigenvalue of K_θ is {K.margin:.4g} N m/rad" in text
-    assert text.index("UNSTABLE") < text.index("<option")
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    rate = cdsm.modes(pose, K).growth_rates[0]
-    assert rate * model.opt.timestep <= 0.2
-    shape = cdsm.modes(pose, K).growth_shapes[:, 0]
-    data.qpos[:] = pose.q + 1e-6 * shape / abs(shape).max()
-    mujoco.mj_step(model, data, round(math.log(1e3) / rate / model.opt.timestep))
-    # from rest it is cosh(rate·t), half of 1e3; the step makes it a few per cent slower
-    assert abs(data.qpos - pose.q).max() == pytest.approx(5e-4, rel=0.1)
-    stable = hinged(3).at(pose.q)
-    assert "UNSTABLE" not in cdsm.to_mjcf(stable.arm, stable, cdsm.distribute_tension(stable, 5.0))
 
 
 @pytest.mark.parametrize("body", [*BODIES, "crab", "mixed", "massless"])
@@ -326,33 +244,11 @@ def test_mass_matrix_is_that_of_mujoco(body: str) -> None:
     np.testing.assert_allclose(mass_matrix(pose, masses) / units, theirs / units, atol=1e-12)
 
 
-@pytest.mark.parametrize("body", ["of a rod", "of a plate", "of a needle", "of a long needle"])
-def test_real_bodies_keep_their_moments_of_inertia(body: str) -> None:
-    """MuJoCo wants no moment above the sum of the others, which rounding leaves of thin bodies."""
-    arm = two_links(BODIES[body])
-    inertia = etree.fromstring(arm.urdf).find(".//inertia")
-    wanted = sorted(float(inertia.get(key)) for key in ("ixx", "iyy", "izz"))
-    found = sorted(loaded(arm)[0].body("hand").inertia)
-    np.testing.assert_allclose(found, wanted, rtol=1e-8, atol=1e-5 * wanted[-1])
-
-
 def test_motion_without_any_mass_is_named() -> None:
     """Two hinges on one axis: only the stand-in of the link between turns against the heavy one."""
     arm = two_links(BODIES["of a plate"], mass=1e6, far=0.0, center=5.0)
     with pytest.raises(cdsm.SingularStiffness, match="no link of any mass"):
         cdsm.to_mjcf(arm, arm.at([0.0, 0.0]), np.full(6, 20.0))
-
-
-def test_without_a_posture_the_tendons_only_lie_there() -> None:
-    arm = cdsm.presets.virtual_prototype()
-    model, data = loaded(arm)
-    assert model.nkey == 0
-    assert not model.tendon_stiffness.any()
-    assert model.ntendon == 15
-    assert model.opt.timestep == 2e-3
-    lengths = arm.at(np.zeros(10)).cable_lengths
-    np.testing.assert_allclose(data.ten_length, lengths, atol=1e-15)
-    assert model.site("tool0").id >= 0
 
 
 # --- motors and damping ---------------------------------------------------------------------
@@ -387,24 +283,6 @@ def test_locked_motors_hold_a_load_where_the_equilibrium_is(force: Any, slack: b
     np.testing.assert_allclose(-data.actuator_force, rest.tension, atol=1e-7)
 
 
-def test_motor_pays_wire_out() -> None:
-    """δq = K_θ⁻¹ J_Lᵀ k u, to first order: paying the flexor out lets the finger stretch."""
-    pose, pull = finger()
-    K = cdsm.stiffness(pose, pull)
-    model, data = loaded(pose.arm, pose, pull, damping_ratio=0.5)
-    c = [cable.name for cable in pose.arm.cables].index("middle_flexor")
-    k = np.eye(len(pose.arm.cables))[c] * K.cable_stiffness[c]
-    slope = np.linalg.solve(K.joint, pose.length_jacobian.T @ k)
-    moved = []
-    for u in (2e-5, -2e-5):
-        mujoco.mj_resetData(model, data)
-        data.ctrl[c] = u
-        run(model, data, 0.5)
-        moved.append(ours(model, pose.arm, data.qpos) - pose.q)
-    assert slope[1] < 0.0  # less bent
-    np.testing.assert_allclose((moved[0] - moved[1]) / 4e-5, slope, rtol=1e-4, atol=1e-3)
-
-
 def test_motors_pull_with_the_tension_they_are_told() -> None:
     pose, pull = finger()
     with pytest.warns(UserWarning, match="UNSTABLE"):
@@ -416,14 +294,12 @@ def test_motors_pull_with_the_tension_they_are_told() -> None:
     mujoco.mj_forward(model, data)
     torque = ours(model, pose.arm, data.qfrc_actuator)
     np.testing.assert_allclose(torque, -pose.length_jacobian.T @ pull, atol=1e-15)
-    assert abs(data.qfrc_actuator - data.qfrc_bias + data.qfrc_passive).max() < 1e-14
     data.ctrl[:] = -1.0
     mujoco.mj_forward(model, data)
     assert not data.qfrc_actuator.any()  # cables only pull
 
 
-@pytest.mark.parametrize("ratio", [None, 0.01])
-@pytest.mark.parametrize("mode", [0, 1, 2])
+@pytest.mark.parametrize(("mode", "ratio"), [(0, None), (2, 0.01)])
 def test_modes_decay_as_stated(mode: int, ratio: float | None) -> None:
     """Released in the shape of a mode, the energy falls by e^(−2 ζ ω t), with ζ ∝ ω."""
     pose, pull = finger()
@@ -448,24 +324,6 @@ def test_modes_decay_as_stated(mode: int, ratio: float | None) -> None:
     assert decay == pytest.approx(wanted, rel=0.05 + omega * model.opt.timestep)
 
 
-def test_file_says_what_is_missing_for_balance() -> None:
-    pose, pull = finger()
-    assert "balance " not in cdsm.to_mjcf(pose.arm, pose, pull)
-    loaded = cdsm.distribute_tension(pose, 5.0, wrench=(0, 0, -1.5, 0, 0, 0))
-    text = cdsm.to_mjcf(pose.arm, pose, loaded)
-    assert (
-        "load       (0, 0, -1.5) N, (0, 0, 0) N m is not in the model: apply it to finger" in text
-    )
-    assert "balance " not in text
-    wrong = pull + 3.0 * np.eye(6)[0]
-    left = 3.0 * abs(pose.length_jacobian[0, 0])
-    text = cdsm.to_mjcf(pose.arm, pose, wrong)
-    assert f"balance    {left:.4g} N m are missing, most at proximal_joint" in text
-    urdf = pose.arm.urdf.replace("proximal_joint", "proximal--joint")
-    arm = cdsm.Manipulator.from_urdf(urdf, pose.arm.cables, tip="fingertip")
-    assert "most at proximal- -joint" in cdsm.to_mjcf(arm, arm.at(pose.q), wrong)
-
-
 def test_bad_input_is_named(tmp_path: Path) -> None:
     pose, pull = finger()
     path = cdsm.write_mjcf(pose.arm, tmp_path / "arm.xml", pose, pull)
@@ -477,10 +335,11 @@ def test_bad_input_is_named(tmp_path: Path) -> None:
     ):
         with pytest.raises(cdsm.CdsmError, match=said):
             cdsm.to_mjcf(pose.arm, pose, pull, **options)
-    for options in ({"actuators": "length"}, {"damping_ratio": 0.1}):
-        with pytest.raises(cdsm.InvalidInput, match="give pose and tension"):
-            cdsm.to_mjcf(pose.arm, **options)
-    with pytest.raises(cdsm.InvalidInput, match="pose and tension, or neither"):
-        cdsm.to_mjcf(pose.arm, pose)
+    with pytest.raises(cdsm.InvalidInput, match="give pose and tension"):
+        cdsm.to_mjcf(pose.arm, actuators="length")
     with pytest.raises(cdsm.InvalidInput, match="another arm"):
         cdsm.to_mjcf(mixed_arm(), pose, pull)
+    bare = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(pose.arm))  # its tendons only lie there
+    assert not bare.tendon_stiffness.any()
+    wrong = cdsm.to_mjcf(pose.arm, pose, pull + 3.0 * np.eye(6)[0])
+    assert f"balance    {3.0 * abs(pose.length_jacobian[0, 0]):.4g} N m are missing" in wrong

@@ -7,32 +7,10 @@ import pytest
 
 import cdsm
 from cdsm.support.values import Array
-from tests.support import arms
 from tests.support.differences import assert_second_order, central_difference
-from tests.support.locked import ARMS, STRAND, TABLE, balanced, original_lengths
+from tests.support.locked import ARMS, TABLE, balanced, original_lengths
 
 U = np.array([0.3, -0.5, 0.8])
-
-
-# --- dEA/dF ---------------------------------------------------------------------------------
-
-LAWS: dict[str, tuple[cdsm.Elasticity, Array]] = {
-    "linear": (cdsm.LinearElasticity(48e3), np.array([0.5, 30.0, 400.0])),
-    "strand below 31 N": (STRAND, np.array([4.0, 12.0, 29.0])),
-    "strand above 31 N": (STRAND, np.array([33.0, 90.0, 600.0])),
-    "table between its points": (TABLE, np.array([11.0, 100.0, 400.0, 800.0])),
-}
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_slope_of_rigidity_is_its_derivative(name: str) -> None:
-    law, F = LAWS[name]
-    slope = law.rigidity_slope(F)
-    size = float(law.rigidity(F).max())
-    assert_second_order(law.rigidity, np.diag(slope), F, step=2.0**-3, size=size, tolerance=1e-8)
-
-
-# --- stiffness ------------------------------------------------------------------------------
 
 
 def pulled(name: str, moment: bool) -> cdsm.Stiffness:
@@ -68,21 +46,9 @@ def test_gradients_are_derivatives(name: str, moment: bool) -> None:
     assert_gradient(K, lambda K: K.joint, gradient.joint)
     assert_gradient(K, lambda K: np.array(K.along(U)), gradient.along(U))
     assert_gradient(K, lambda K: np.array(K.margin), gradient.margin)
-
-
-@pytest.mark.parametrize("moment", [False, True])
-@pytest.mark.parametrize("name", [name for name in ARMS if "-1-" not in name and "-2-" not in name])
-def test_gradient_of_the_cartesian_matrix_is_its_derivative(name: str, moment: bool) -> None:
-    K = pulled(name, moment)
-    assert_gradient(K, lambda K: K.cartesian, cdsm.stiffness_gradient(K).cartesian)
-
-
-def test_force_controlled_cables_change_the_active_part_alone() -> None:
-    K = pulled("mixed-3-0-all", moment=False)
-    gradient = cdsm.stiffness_gradient(K)
+    if K.posture.arm.nv > 2:
+        assert_gradient(K, lambda K: K.cartesian, gradient.cartesian)
     force = np.array([cable.control == "force" for cable in K.posture.arm.cables])
-    assert force.any()
-    assert (gradient.cable_stiffness[force] == 0.0).all()
     np.testing.assert_array_equal(gradient.joint[force], K.posture.length_hessian[force])
 
 
@@ -105,41 +71,3 @@ def test_gradient_at_an_equilibrium_is_that_at_its_posture() -> None:
     slope = cdsm.stiffness_gradient(rest.stiffness).cable_stiffness
     # second differences of a strand leave 1e-6 of its third derivative
     np.testing.assert_allclose(slope, expected, rtol=1e-6, atol=1e-9 * abs(expected).max())
-
-
-def test_multiple_eigenvalue_has_bounds_for_gradients() -> None:
-    """Eq. 19 levels off above 31 N: λ_min is concave in F, with an edge where two are equal."""
-    geometry = cdsm.Geometry.universal(
-        joints=1,
-        cables_per_joint=4,
-        link_length=0.05,
-        base_length=0.02,
-        disk_offset=0.01,
-        hole_radius=0.03,
-        link_mass=0.0,
-    )
-    pose = cdsm.Manipulator(geometry, STRAND).at([0.0, 0.0])
-    F = np.full(4, 90.0)
-    K = cdsm.stiffness(pose, F)
-    assert np.ptp(np.linalg.eigvalsh(K.joint)) < 1e-12 * K.margin
-    slope = cdsm.stiffness_gradient(K).margin
-    fell = []
-    for step in np.random.default_rng(0).normal(0.0, 10.0, (30, 4)):
-        change = cdsm.stiffness(pose, F + step).margin - K.margin
-        assert change <= slope @ step + 1e-12 * K.margin
-        fell.append(slope @ step - change)
-    assert max(fell) > 1e-3 * K.margin
-
-
-def test_where_the_tip_cannot_move_there_is_no_gradient() -> None:
-    geometry = cdsm.presets.experimental_prototype_geometry()
-    pose = cdsm.Manipulator(geometry, arms.STEEL).at(np.zeros(3))
-    gradient = cdsm.stiffness_gradient(cdsm.stiffness(pose, np.full(6, 50.0)))
-    with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
-        gradient.along([1.0, 0.0, 0.0])
-    with pytest.raises(cdsm.SingularStiffness):
-        _ = gradient.cartesian
-    with pytest.raises(cdsm.InvalidInput, match="zero vector"):
-        gradient.along([0.0, 0.0, 0.0])
-    with pytest.raises(cdsm.InvalidInput, match="Stiffness"):
-        cdsm.stiffness_gradient("K")  # type: ignore[arg-type]

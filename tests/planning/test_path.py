@@ -15,21 +15,17 @@ from tests.support import arms
 from tests.support.locked import BUCKLING, LENGTH, STRAND, TABLE, soft, soft_hinge, some_arm
 from tests.support.paths import ARM, DOWN, assert_holds, waving
 
-# --- the targets are hit --------------------------------------------------------------------
 
-
-@pytest.mark.parametrize("law", [STRAND, cdsm.LinearElasticity(20e3)], ids=["strand", "linear"])
-def test_samples_have_the_efforts_of_plans_from_scratch(law: cdsm.Elasticity) -> None:
-    arm = presets.virtual_prototype(law)
-    q = waving(24)
+def test_samples_have_the_efforts_of_plans_from_scratch() -> None:
+    arm, q = presets.virtual_prototype(STRAND), waving(12)
     found = [cdsm.stiffness_range(arm.at(each), DOWN, 40.0, 400.0, starts=3) for each in q]
-    parts = 0.2 + 0.5 * np.sin(np.linspace(0.0, math.pi, 24))
+    parts = 0.2 + 0.5 * np.sin(np.linspace(0.0, math.pi, 12))
     targets = [each.low + x * (each.high - each.low) for each, x in zip(found, parts, strict=True)]
     plan = cdsm.plan_path(arm, DOWN, targets, 40.0, 400.0, angles=q)
     assert plan.complete
     assert_holds(plan, 40.0, 400.0)
     np.testing.assert_array_equal(plan.angles, q)
-    for i in range(0, 24, 2):
+    for i in range(0, 12, 2):
         alone = cdsm.plan_stiffness(arm.at(q[i]), DOWN, targets[i], 40.0, 400.0)
         effort = np.linalg.norm(plan.tensions[i])
         assert effort == pytest.approx(np.linalg.norm(alone.tension.values), rel=1e-7)
@@ -47,56 +43,15 @@ def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
     assert abs(np.diff(plan.angles, axis=0)).max() < 0.05
     again = cdsm.plan_path(ARM, DOWN, 80e3, 50.0, angles=plan.angles)
     np.testing.assert_allclose(again.tensions, plan.tensions, rtol=1e-12)
+    tips[1] = np.array([ARM.geometry.length + 0.25, 0.0, 0.0])
+    plan = cdsm.plan_path(ARM, DOWN, 80e3, 50.0, tips=tips[:3], guess=q[0])
+    assert plan.planned == (0, 2)
+    assert plan.infeasible[0].status == "posture"
+    assert "than 250 mm" in plan.infeasible[0].reason
 
 
-@pytest.mark.slow
-def test_several_directions_are_hit_at_every_sample() -> None:
-    q = waving(3)
-    held = [cdsm.stiffness(ARM.at(a), cdsm.distribute_tension(ARM.at(a), 60.0)) for a in q]
-    directions = np.eye(3)[1:]
-    several = [[K.along(u) for u in directions] for K in held]
-    plan = cdsm.plan_path(ARM, directions, several, 30.0, 300.0, angles=q)
-    np.testing.assert_allclose(plan.achieved, several, rtol=1e-9)
-    one = cdsm.plan_path(ARM, directions, several[0], 30.0, 300.0, angles=q[[0, 0]])
-    np.testing.assert_array_equal(one.target, [several[0]] * 2)
-    for k in (0, 1):  # with nothing to go on from, and with something
-        hard = np.array([[held[0].along(u) for u in np.eye(3)]] * 2)
-        hard[k] *= [1.5, 0.7, 1.5]
-        part = cdsm.plan_path(ARM, np.eye(3), hard, 30.0, 300.0, angles=q[[0, 0]])
-        assert [(each.index, each.status) for each in part.infeasible] == [(k, "stiffness")]
-        assert "all targets at once" in part.infeasible[0].reason
-
-
-def test_hung_weight_measures_what_was_planned_while_the_arm_carries_another() -> None:
-    """Soft, stiff with 10 N in the hand, soft; measured up and down with locked motors."""
-    s = np.arange(24)
-    stiff = np.interp(s, [6, 10, 14, 18], [0.0, 1.0, 1.0, 0.0])
-    W = np.zeros((24, 6))
-    W[:, 2] = -10.0 * (stiff == 1.0)
-    plan = cdsm.plan_path(ARM, DOWN, 70e3 + 25e3 * stiff, 50.0, 800.0, W, angles=waving(24))
-    assert plan.complete
-    assert_holds(plan, 50.0, 800.0)
-    for K, load in zip(plan.stiffness, W, strict=True):
-        np.testing.assert_array_equal(K.wrench, load)
-        # torque of cables, weight and load by the joint angles alone: a wrong sign leaves newtons
-        pose = K.posture
-        torque = pose.length_jacobian.T @ K.tension + pose.gravity_torque - pose.jacobian.T @ load
-        assert abs(torque).max() < 1e-9
-    for k in (2, 12, 20):
-        force = 1e-7 * plan.target[k] * np.array(DOWN)
-        load = plan.stiffness[k].wrench
-        soft = [
-            1.0
-            / cdsm.weight_test(
-                ARM.at(plan.angles[k]), plan.tensions[k], sign * force, wrench=load
-            ).stiffness
-            for sign in (1.0, -1.0)
-        ]
-        assert 2.0 / sum(soft) == pytest.approx(plan.target[k], rel=1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 5, 9])
+@pytest.mark.slow  # a search from many starts at every sample
+@pytest.mark.parametrize("seed", [1, 5])
 def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
     """Strands, tables and straight wires; wrenches with a moment."""
     rng = np.random.default_rng(seed)
@@ -120,9 +75,6 @@ def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
             assert each.status == "rate"
 
 
-# --- what cannot be -------------------------------------------------------------------------
-
-
 def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
     q = waving(9)
     q[2, 3] = 2.0
@@ -140,8 +92,6 @@ def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
         6: "stiffness",
     }
     assert isinstance(told[2].error, cdsm.InvalidInput)
-    assert "widen joint_limit" in told[2].reason
-    assert "check_limits" not in told[2].reason  # which a path does not have
     assert isinstance(told[4].error, cdsm.InfeasibleTension)
     error = told[6].error
     assert isinstance(error, cdsm.UnreachableStiffness)
@@ -152,32 +102,14 @@ def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
     assert_holds(plan, 50.0, 500.0)
 
 
-def test_tip_out_of_reach_is_named_with_how_near_it_comes() -> None:
-    q = waving(3)
-    tips = np.array([ARM.at(each).tip[:3, 3] for each in q])
-    far = ARM.geometry.length + 0.25
-    tips[1] = (far, 0.0, 0.0)
-    plan = cdsm.plan_path(ARM, DOWN, 80e3, 50.0, tips=tips, guess=q[0])
-    assert plan.planned == (0, 2)
-    assert plan.infeasible[0].status == "posture"
-    assert "no nearer" in plan.infeasible[0].reason
-    assert "than 250 mm" in plan.infeasible[0].reason
-
-
 def test_samples_that_no_tension_holds_are_named() -> None:
     unstable = cdsm.plan_path(soft_hinge(), DOWN, 1e3, 1.01 * BUCKLING, angles=[[0.0], [0.0]])
     assert [each.status for each in unstable.infeasible] == ["singular"] * 2
     assert unstable.planned == ()
-    assert unstable.tensions.shape == unstable.cable_lengths.shape == (0, 2)
-    assert unstable.rest_lengths.shape == (0, 2)
-    assert unstable.steps.size == 0
     rigid = cdsm.plan_path(soft_hinge(), (1.0, 0.0, 0.0), 1e3, 10.0, angles=[[0.0]])
     assert "cannot move along" in rigid.infeasible[0].reason
     beyond = cdsm.plan_path(ARM, DOWN, 80e3, 900.0, angles=waving(1))
     assert beyond.infeasible[0].status == "elasticity"
-
-
-# --- the largest change ---------------------------------------------------------------------
 
 
 def along_hinge(F: float) -> float:
@@ -185,7 +117,7 @@ def along_hinge(F: float) -> float:
     return soft(F) / LENGTH**2
 
 
-@pytest.mark.parametrize(("rate", "late"), [(10.0, 4), (12.5, 3), (12.4, 4), (39.9, 1), (50.1, 0)])
+@pytest.mark.parametrize(("rate", "late"), [(12.5, 3), (12.4, 4), (50.1, 0)])
 def test_target_that_jumps_is_hit_again_when_the_motors_are_there(rate: float, late: int) -> None:
     """From 20 N to 70 N and back: 50 N, which take 50/rate steps, the first of them allowed."""
     F = np.full(20, 20.0)
@@ -204,49 +136,6 @@ def test_target_that_jumps_is_hit_again_when_the_motors_are_there(rate: float, l
         assert f"{rate:g} N are allowed" in plan.infeasible[0].reason
 
 
-@pytest.mark.parametrize("rate", [math.inf, 121.0, 119.0])
-def test_tensions_that_would_buckle_the_arm_are_not_gone_on_from(rate: float) -> None:
-    """Pushed by P from its tip a straight hinge is softer by P·lever, and buckles."""
-    F, P = np.array([170.0, 50.0]), np.array([0.0, 4.0])
-    stiff = np.array([soft(each) for each in F]) - P * LENGTH
-    assert stiff[0] - P[1] * LENGTH < 0.0
-    W = np.zeros((2, 6))
-    W[:, 0] = -P
-    plan = cdsm.plan_path(
-        soft_hinge(),
-        DOWN,
-        stiff / LENGTH**2,
-        10.0,
-        wrench=W,
-        angles=[[0.0], [0.0]],
-        max_change_per_sample=rate,
-    )
-    assert plan.tensions[0] == pytest.approx(F[0], rel=1e-9)
-    if rate >= 120.0:
-        assert plan.complete
-        assert plan.tensions[1] == pytest.approx(F[1], rel=1e-9)
-    else:
-        assert [each.status for each in plan.infeasible] == ["rate"]
-
-
-def test_balance_that_the_rate_does_not_allow_is_named() -> None:
-    """A load of 30 N on the lever asks for 3 N m, 100 N more in one cable than in the other."""
-    W = np.zeros((3, 6))
-    W[1, 2] = 30.0
-    plan = cdsm.plan_path(
-        soft_hinge(),
-        DOWN,
-        along_hinge(200.0),
-        10.0,
-        wrench=W,
-        angles=np.zeros((3, 1)),
-        max_change_per_sample=20.0,
-    )
-    assert plan.planned == (0, 2)
-    assert [each.status for each in plan.infeasible] == ["rate"]
-    assert "50 N in 1 sample" in plan.infeasible[0].reason
-
-
 def test_rate_of_each_cable_is_its_own() -> None:
     q = waving(30)
     targets = 75e3 + 15e3 * np.sin(np.linspace(0.0, math.pi, 30))
@@ -257,9 +146,6 @@ def test_rate_of_each_cable_is_its_own() -> None:
     assert plan.complete
     assert_holds(plan, 50.0, math.inf)
     assert abs(np.diff(plan.tensions[:, 4])).max() == pytest.approx(rate[4], rel=1e-9)
-
-
-# --- what motors are told -------------------------------------------------------------------
 
 
 def test_rest_length_and_elongation_make_the_length() -> None:
@@ -290,15 +176,6 @@ def test_rest_length_and_elongation_make_the_length() -> None:
                 assert free + float(cable.elongation(F, free)) == pytest.approx(L, rel=1e-14)
 
 
-def test_motors_pay_out_the_unstrained_length_whatever_the_stiffness_takes_for_it() -> None:
-    s = np.linspace(0.0, math.pi, 5)
-    for name in ("unstrained", "stretched"):
-        arm = presets.virtual_prototype(original_length=name)
-        plan = cdsm.plan_path(arm, DOWN, 70e3 + 20e3 * np.sin(s), 50.0, angles=waving(5))
-        lengths = plan.rest_lengths * (1.0 + STRAND.strain(plan.tensions))
-        np.testing.assert_allclose(lengths, plan.cable_lengths, rtol=1e-14)
-
-
 def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> None:
     cables = [replace(c, control="force") if c.name == "cable2_1" else c for c in ARM.cables]
     arm = cdsm.Manipulator(ARM.geometry, cables=cables, gravity=ARM.gravity)
@@ -308,9 +185,7 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["status"] for row in rows] == ["planned", "stiffness", "planned"]
-    assert [row["sample"] for row in rows] == ["0", "1", "2"]
     assert rows[1]["reason"] == plan.infeasible[0].reason
-    assert rows[1]["tensions cable1_1 [N]"] == rows[0]["reason"] == ""
     names = [cable.name for cable in arm.cables]
     held = [name for name in names if name != "cable2_1"]
     columns = {
@@ -325,29 +200,18 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
             told = [float(row[f"{kind} {name} [{unit}]".strip()]) for name in each]
             np.testing.assert_array_equal(told, values[k])
         assert float(row["achieved [N/m]"]) == plan.achieved[k]
-    assert [float(row["target [N/m]"]) for row in rows] == targets
     assert not any("rest_lengths cable2_1" in column for column in rows[0])
-    with pytest.raises(cdsm.FileError, match="does not exist"):
-        plan.write(tmp_path / "absent" / "motors.csv")
 
-
-# --- the border -----------------------------------------------------------------------------
 
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"angles": None}, "angles: neither of angles= and tips="),
-    ({"tips": np.zeros((2, 3))}, "angles: both of angles= and tips="),
     ({"angles": np.zeros(10)}, r"angles: shape \(10,\) given; \(S, 10\)"),
-    ({"angles": None, "tips": np.zeros((2, 2))}, r"tips: shape \(2, 2\) given; \(S, 3\)"),
-    ({"angles": None, "tips": np.zeros((1, 3)), "guess": [9.0] * 10}, "guess"),
     ({"guess": np.zeros(10)}, "guess: given with angles="),
     ({"target": [1e4] * 5}, r"target: shape \(5,\) given; \(\) for all samples or \(2,\)"),
     ({"target": [8e4, -1.0]}, "target: -1 N/m given"),
     ({"direction": np.eye(3)}, r"target: shape \(\) given; \(3,\)"),
     ({"max_change_per_sample": 0.0}, "max_change_per_sample: 0 N given"),
-    ({"max_change_per_sample": [1.0, 2.0]}, "max_change_per_sample: shape"),
-    ({"wrench": np.zeros((3, 6))}, "wrench: shape"),
     ({"minimum": 80.0, "maximum": 70.0, "angles": np.full((2, 10), 9.0)}, "maximum: 70 N"),
-    ({"arm": "this one"}, "arm"),
 ]
 
 

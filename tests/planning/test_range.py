@@ -16,7 +16,6 @@ from tests.support.locked import (
     BUCKLING,
     EA,
     LENGTH,
-    RISING,
     STRAND,
     H,
     R,
@@ -107,76 +106,25 @@ def test_brute_force_beats_neither_end_and_comes_near_both(case: str, moment: bo
         np.testing.assert_array_equal(pull.wrench, wrench)
 
 
-def test_where_tension_buckles_the_arm_brute_force_along_rays_beats_neither_end() -> None:
-    """The softest tensions lie where λ_min is just what stability asks for."""
-    arm = arms.random_arm(0, 3, "hinged", cdsm.LinearElasticity(5e3))
-    pose = arms.random_posture(arm, 0, reach=0.4)
-    low, high = 20.0, 300.0
-    u = np.random.default_rng(0).normal(size=3)
-    found = cdsm.stiffness_range(pose, u, low, high)
-    assert cdsm.stiffness(pose, found.low_tension).margin == pytest.approx(found.floor, rel=1e-9)
-    ends = corners(pose, low, high, np.zeros(6))
-    start = cdsm.distribute_tension(pose, low).values
-    K = cdsm.stiffness(pose, start)
-    assert found.floor == pytest.approx(0.01 * K.margin, rel=1e-12)
-    # K_θ is affine in F, so a ray leaves the stable tensions once: where λ_min is the floor
-    values, softest = [K.along(u)], start
-
-    def judge(end: Array) -> None:
-        nonlocal softest
-        rate = cdsm.stiffness(pose, end).joint - K.joint
-        way = np.where(end == start, 1e-300, end - start)
-        a, b = 0.0, float(np.where(way > 0.0, (high - start) / way, (low - start) / way).min())
-        for _ in range(40):
-            middle = (a + b) / 2.0
-            stable = np.linalg.eigvalsh(K.joint + middle * rate)[0] >= found.floor
-            a, b = (middle, b) if stable else (a, middle)
-        values.append(cdsm.stiffness(pose, start + a * (end - start)).along(u))
-        softest = end if values[-1] == min(values) else softest
-
-    rng = np.random.default_rng(2)
-    for reach in (1.0, 0.3, 0.1, 0.03, 0.01, 0.003):
-        centre = softest
-        for end in rng.dirichlet(np.full(len(ends), 0.3), 100) @ ends:
-            judge(centre + reach * (end - centre))
-    assert found.low * (1.0 - 1e-9) <= min(values) <= 1.01 * found.low
-    assert found.high * 0.99 <= max(values) <= found.high * (1.0 + 1e-9)
-
-
-# --- one hinge: the null space is a line ----------------------------------------------------
-
-
-def straight(F: float) -> float:
-    """along(z) of the straight soft hinge, both cables at F: K over the lever squared."""
-    return soft(F) / LENGTH**2
-
-
 def test_hinge_has_its_closed_form_at_both_ends() -> None:
-    found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0, 70.0)
-    assert found.low == pytest.approx(straight(70.0), rel=1e-12)
-    assert found.high == pytest.approx(straight(10.0), rel=1e-12)
-    np.testing.assert_allclose(found.low_tension.values, 70.0, rtol=1e-12)
-    np.testing.assert_allclose(found.high_tension.values, 10.0, rtol=1e-12)
-    assert straight(40.0) in found
-    assert straight(71.0) not in found
+    """Soft cables: tension softens. Without a lead k = (EA + F)/2h, and 2 k R² outweighs F h.
 
-
-def test_hinge_without_a_lead_has_its_ends_the_other_way_round() -> None:
-    """K = 2 k R² − F h, with k = (EA + F)/2h: R²/h is more than h, so that tension stiffens."""
-    found = cdsm.stiffness_range(hinge().at([0.0]), DOWN, 10.0, 70.0)
-    ends = [(2.0 * (EA + F) / (2.0 * H) * R**2 - F * H) / LENGTH**2 for F in (10.0, 70.0)]
-    np.testing.assert_allclose([found.low, found.high], ends, rtol=1e-12)
-    np.testing.assert_allclose(found.low_tension.values, 10.0, rtol=1e-12)
-    np.testing.assert_allclose(found.high_tension.values, 70.0, rtol=1e-12)
-
-
-def test_without_a_maximum_buckling_ends_the_range() -> None:
-    """K falls with F until it is the margin's part of what it is under the least tensions."""
-    found = cdsm.stiffness_range(soft_hinge().at([0.0]), DOWN, 10.0)
-    assert found.high == pytest.approx(straight(10.0), rel=1e-12)
-    assert found.low == pytest.approx(0.01 * straight(10.0), rel=1e-9)
-    expected = BUCKLING - 0.01 * (BUCKLING - 10.0)
-    np.testing.assert_allclose(found.low_tension.values, expected, rtol=1e-9)
+    Without a maximum K falls until it is a hundredth of what it is under the least tensions.
+    """
+    soft_end = BUCKLING - 0.01 * (BUCKLING - 10.0)
+    stiff = [(2.0 * (EA + F) / (2.0 * H) * R**2 - F * H) / LENGTH**2 for F in (10.0, 70.0)]
+    falling = [soft(F) / LENGTH**2 for F in (70.0, 10.0, soft_end)]
+    for arm, high, ends, tensions in (
+        (soft_hinge(), 70.0, falling[:2], (70.0, 10.0)),
+        (hinge(), 70.0, stiff, (10.0, 70.0)),
+        (soft_hinge(), math.inf, falling[:0:-1], (soft_end, 10.0)),
+    ):
+        found = cdsm.stiffness_range(arm.at([0.0]), DOWN, 10.0, high)
+        np.testing.assert_allclose([found.low, found.high], ends, rtol=1e-9)
+        for pull, F in zip((found.low_tension, found.high_tension), tensions, strict=True):
+            np.testing.assert_allclose(pull.values, F, rtol=1e-9)
+        assert sum(ends) / 2.0 in found
+        assert 1.01 * max(ends) not in found
 
 
 def stayed() -> cdsm.Posture:
@@ -208,66 +156,14 @@ def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
         cdsm.plan_stiffness(pose, DOWN, 0.9 * found.low, 10.0)
 
 
-def test_end_of_the_elasticity_bounds_the_tensions() -> None:
-    arm = presets.virtual_prototype(RISING)
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    found = cdsm.stiffness_range(pose, DOWN, 50.0)
-    assert found.high_tension.values.max() == pytest.approx(810.0, rel=1e-12)
-
-
-def test_strand_whose_rigidity_levels_off_is_stiffest_before_its_end() -> None:
-    """EA of Eq. 19, filled in, has its largest value between 400 N and 810 N."""
-    places = np.linspace(400.0, 810.0, 500)
-    assert 401.0 < places[STRAND.rigidity(places).argmax()] < 809.0
-    arm = presets.virtual_prototype(STRAND)
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    found = cdsm.stiffness_range(pose, DOWN, 50.0)
-    assert found.high_tension.values.max() < 809.0
-    for bound in np.linspace(50.0, 700.0, 60):
-        pull = cdsm.distribute_tension(pose, bound)
-        if pull.values.max() <= 810.0:
-            assert cdsm.stiffness(pose, pull).along(DOWN) < found.high
-
-
-def test_range_of_an_arm_without_redundancy_is_a_point() -> None:
-    """Bounds that pin one cable of each pair leave nothing to choose."""
-    arm = arms.random_arm(2, 3, "hinged", STRAND)
-    pose = arms.random_posture(arm, 2, reach=0.4)
-    pull = cdsm.distribute_tension(pose, 60.0)
-    pinned = np.array([cable.name.endswith("_1") for cable in arm.cables])
-    low = np.where(pinned, pull.values, 0.0)
-    high = np.where(pinned, pull.values, 800.0)
-    found = cdsm.stiffness_range(pose, DOWN, low, high)
-    expected = cdsm.stiffness(pose, pull).along(DOWN)
-    assert found.low == pytest.approx(expected, rel=1e-9)
-    assert found.high == pytest.approx(expected, rel=1e-9)
-    np.testing.assert_allclose(found.high_tension.values, pull.values, rtol=1e-9)
-
-
-def test_domain_of_a_force_controlled_cable_bounds_nothing() -> None:
-    """Its elasticity does not matter; a tension beyond it is no fault."""
-    arm = presets.experimental_prototype(gravity=(0.0, 0.0, 9.81))
-    pose = arm.at(np.zeros(3))
-    held = np.array([cable.control == "position" for cable in arm.cables])
-    low = np.full(6, 50.0)
-    low[3] = 815.0
-    assert not held[3]
-    found = cdsm.stiffness_range(pose, DOWN, low, 1000.0)
-    for pull in (found.low_tension, found.high_tension):
-        assert pull.values[held].max() <= 810.0 < 815.0 <= pull.values[3]
-
-
 BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
     ({"direction": (0.0, 1.0)}, cdsm.InvalidInput, "direction"),
     ({"minimum": 80.0, "maximum": 70.0}, cdsm.InvalidInput, "maximum: 70 N"),
-    ({"minimum": -1.0}, cdsm.InvalidInput, "minimum"),
-    ({"wrench": (1.0, 2.0)}, cdsm.InvalidInput, "wrench"),
     ({"wrench": (0.0, 0.0, 1e5, 0.0, 0.0, 0.0)}, cdsm.InfeasibleTension, "balances the arm"),
     ({"minimum": 50.0, "maximum": 50.1}, cdsm.InfeasibleTension, "balances the arm"),
     ({"minimum": 1000.0, "maximum": 2e3}, cdsm.ElasticityRangeError, "lower minimum="),
-    ({"maximum": 2.0}, cdsm.CdsmError, "minimum|balances"),
     ({"starts": 0}, cdsm.InvalidInput, "starts"),
-    ({"pose": "here"}, cdsm.InvalidInput, "pose"),
+    ({"pose": hinge().at([0.0]), "direction": "x"}, cdsm.SingularStiffness, "cannot move along"),
 ]
 
 
@@ -285,18 +181,6 @@ def test_bad_input_is_named(
             cdsm.plan_stiffness(**given, target=1e5)
 
 
-def test_direction_in_which_the_tip_cannot_move_has_no_range() -> None:
-    pose = hinge().at([0.0])
-    for ask in (cdsm.stiffness_range, cdsm.saturation):
-        with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
-            ask(pose, (1.0, 0.0, 0.0), 10.0, 50.0)
-    with pytest.raises(cdsm.SingularStiffness, match="cannot move along"):
-        cdsm.plan_stiffness(pose, (1.0, 0.0, 0.0), 1e4, 10.0, 50.0)
-
-
-# --- laws of which nothing is known ---------------------------------------------------------
-
-
 def bump(F: Array) -> Array:
     """A rigidity that rises to 120 N and falls from there on."""
     return np.asarray(5e3 + 2e4 * np.exp(-(((F - 120.0) / 40.0) ** 2)))
@@ -305,18 +189,9 @@ def bump(F: Array) -> Array:
 BUMP = cdsm.Elasticity.from_rigidity(bump, 0.0, 500.0)
 
 
-def measured_bump() -> cdsm.TabulatedElasticity:
-    """The same as a table of the library."""
-    F = np.array([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0, 220.0, 300.0, 400.0, 500.0])
-    EA = bump(F)
-    strain = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(F) / (EA[1:] + EA[:-1]))])
-    return cdsm.TabulatedElasticity(tuple(F), tuple(strain))
-
-
-@pytest.mark.parametrize("law", [BUMP, measured_bump()], ids=["own", "table"])
-def test_no_sample_is_stiffer_where_the_rigidity_falls_again(law: cdsm.Elasticity) -> None:
+def test_no_sample_is_stiffer_where_the_rigidity_falls_again() -> None:
     """The stiffest tensions lie inside, and many searches stop at others."""
-    pose = arms.random_posture(arms.random_arm(19, 3, "hinged", law), 19, 0.4)
+    pose = arms.random_posture(arms.random_arm(19, 3, "hinged", BUMP), 19, 0.4)
     u = np.array([1.0, -0.5, 0.3])
     found = cdsm.stiffness_range(pose, u, 10.0, 400.0)
     values = []
@@ -353,28 +228,3 @@ def test_stiffest_tensions_of_arms_that_their_least_tensions_do_not_hold(seed: i
     found = cdsm.stiffness_range(pose, u, low, high)
     assert found.high >= known[seed] * (1.0 - 1e-4)
     assert cdsm.stiffness(pose, found.high_tension).margin >= found.floor * (1.0 - 1e-9)
-
-
-def test_corners_beside_the_softest_one_are_searched() -> None:
-    """Tension can buckle this arm, so that it is softest at the limit of stability."""
-    geometry = cdsm.Geometry.hinged(
-        joints=5,
-        twist=0.6,
-        cables_per_joint=2,
-        link_length=0.04,
-        base_length=0.02,
-        disk_offset=0.01,
-        hole_radius=0.036,
-        link_mass=0.38,
-        lead=0.3,
-    )
-    arm = cdsm.Manipulator(geometry, elasticity=cdsm.presets.STRAND_1X19)
-    pose = arm.at([0.03, 0.13, 0.06, 0.0, -0.13])
-    found = cdsm.stiffness_range(pose, (-1.1, 1.5, -0.1), 10.0, 600.0)
-    assert found.low == pytest.approx(713.84, rel=5e-4)  # of 200 searches, one came as low
-    assert found.limited_by_stability == (True, False)
-    assert "limited by stability" in str(found)
-    K = cdsm.stiffness(pose, found.low_tension)
-    assert K.margin == pytest.approx(found.floor, rel=1e-6)
-    least = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0, 600.0))
-    assert found.floor == pytest.approx(0.01 * least.margin, rel=1e-12)

@@ -1,7 +1,6 @@
 """Where more tension stops paying, against the stiffness itself and closed forms."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -48,8 +47,6 @@ def test_hinge_behind_springs_has_its_closed_form_everywhere() -> None:
     end = brentq(closed, 300.0, 400.0)
     assert found.limit == "buckling"
     assert 0.95 * end < found.minimum[-1] < end
-    for part in ("saturates at", "tension makes the arm softer", "limit: buckling"):
-        assert part in str(found)
     np.testing.assert_array_equal(found.stiffness.tension, found.tension.values)
     assert found.stiffness.along(DOWN) == pytest.approx(0.95 * curve.max(), rel=1e-3)
 
@@ -83,32 +80,8 @@ def test_stiffness_that_tension_raises_without_end_never_saturates() -> None:
     found = cdsm.saturation(stayed(), DOWN, 10.0)
     assert (found.limit, found.bound) == ("none", math.inf)
     assert found.stiffest == found.minimum[-1]
-    assert "does not saturate" in str(found)
-
-
-def test_tension_that_only_softens_saturates_at_once() -> None:
-    found = cdsm.saturation(soft_hinge().at([0.0]), DOWN, 10.0)
-    assert found.bound == found.stiffest == 10.0
-    assert found.minimum[-1] == pytest.approx(BUCKLING, rel=0.05)
-
-
-BAD: list[tuple[dict[str, Any], type[cdsm.CdsmError], str]] = [
-    ({"fraction": 0.0}, cdsm.InvalidInput, "fraction: 0 given"),
-    ({"fraction": 1.1}, cdsm.InvalidInput, "fraction: 1.1 given"),
-    ({"direction": (0.0, 0.0, 0.0)}, cdsm.InvalidInput, "zero vector"),
-    ({"minimum": [1.0, 2.0]}, cdsm.InvalidInput, "minimum: shape"),
-    ({"minimum": 60.0, "maximum": 50.0}, cdsm.InvalidInput, "maximum: 50 N"),
-    ({"wrench": (0.0, 0.0, 1e5, 0.0, 0.0, 0.0)}, cdsm.CdsmError, "810 N|balances the arm"),
-    ({"minimum": 900.0}, cdsm.ElasticityRangeError, "domain"),
-    ({"pose": "here"}, cdsm.InvalidInput, "pose"),
-]
-
-
-@pytest.mark.parametrize(("change", "error", "message"), BAD)
-def test_bad_input_is_named(
-    change: dict[str, Any], error: type[cdsm.CdsmError], message: str
-) -> None:
-    arm = presets.virtual_prototype()
-    given = {"pose": arm.at(np.full(arm.nv, 0.1)), "direction": DOWN, "minimum": 5.0, **change}
-    with pytest.raises(error, match=message):
-        cdsm.saturation(**given)
+    only_softer = cdsm.saturation(soft_hinge().at([0.0]), DOWN, 10.0)
+    assert only_softer.bound == only_softer.stiffest == 10.0
+    assert only_softer.minimum[-1] == pytest.approx(BUCKLING, rel=0.05)
+    with pytest.raises(cdsm.InvalidInput, match=r"fraction: 1\.1 given"):
+        cdsm.saturation(stayed(), DOWN, 10.0, fraction=1.1)

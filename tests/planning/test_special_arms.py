@@ -1,8 +1,6 @@
 """Ranges and plans of arms that slide, hang slack, hold forces, have own laws or few cables."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +9,7 @@ import cdsm
 from cdsm import presets
 from tests.planning.test_range import BUMP
 from tests.support import arms, foreign
-from tests.support.locked import BUCKLING, STRAND, soft_hinge, some_arm
+from tests.support.locked import STRAND, some_arm
 from tests.support.paths import DOWN
 
 
@@ -43,13 +41,8 @@ def of_law(law: cdsm.Elasticity) -> cdsm.Posture:
     return arms.random_posture(arms.random_arm(2, 3, "hinged", law), 2, 0.4)
 
 
-def own_law(F: Any) -> Any:
-    return 2e3 + 40.0 * F
-
-
 ARMS: dict[str, Callable[[], cdsm.Posture]] = {
     "slide": finger,
-    "own law": lambda: of_law(cdsm.Elasticity.from_rigidity(own_law, 1.0, 500.0)),
     "law that falls": lambda: of_law(BUMP),
     "slack branch": lambda: of_law(STRAND.slack_below()),
     "forces": lambda: arms.random_posture(some_arm("mixed-3-0-all"), 11, 0.25),
@@ -102,60 +95,3 @@ def test_unstable_least_tensions_do_not_hide_stable_ones() -> None:
     for pull in (found.low_tension, found.high_tension):
         assert cdsm.stiffness(pose, pull).margin >= found.floor * (1.0 - 1e-9)
     assert found.low < 0.01 * found.high
-
-
-def test_end_of_the_range_that_a_crossing_meets_by_rounding_is_reached() -> None:
-    pose = arms.random_posture(arms.random_arm(3, 3, "hinged", STRAND), 3, 0.3)
-    u = (0.0, 1.0, 0.3)
-    found = cdsm.stiffness_range(pose, u, 10.0)
-    plan = cdsm.plan_stiffness(pose, u, found.low, 10.0)
-    assert plan.achieved == pytest.approx(found.low, rel=1e-6)
-    path = cdsm.plan_path(pose.arm, u, [3.0 * found.low, found.low], 10.0, angles=[pose.q] * 2)
-    assert path.complete
-
-
-@pytest.mark.parametrize("above", [-1e-6, 1e-6])
-def test_arm_is_held_exactly_as_long_as_some_tension_holds_it(above: float) -> None:
-    """From the critical tension on no tensions do: all are larger."""
-    pose, minimum = soft_hinge().at([0.0]), BUCKLING * (1.0 + above)
-    if above < 0.0:
-        assert cdsm.stiffness_range(pose, DOWN, minimum).high > 0.0
-    else:
-        with pytest.raises(cdsm.SingularStiffness, match=r"joint1 most.*lower minimum="):
-            cdsm.stiffness_range(pose, DOWN, minimum)
-
-
-def test_arm_of_force_controlled_cables_is_told_why_nothing_holds_it() -> None:
-    arm = presets.virtual_prototype()
-    cables = [replace(cable, control="force") for cable in arm.cables]
-    pose = cdsm.Manipulator(arm.geometry, cables=cables, gravity=arm.gravity).at(np.full(10, 0.1))
-    for plan in (cdsm.stiffness_range, cdsm.saturation):
-        with pytest.raises(cdsm.SingularStiffness, match='control="position"') as caught:
-            plan(pose, DOWN, 50.0, 500.0)
-        assert caught.value.direction.shape == (10,)
-
-
-@pytest.mark.parametrize("gravity", [-9.81, 0.0])
-def test_too_few_cables_are_counted(gravity: float) -> None:
-    whole = arms.random_arm(1, 6, "universal", STRAND)
-    arm = cdsm.Manipulator(whole.geometry, cables=whole.cables[-6:], gravity=(0.0, 0.0, gravity))
-    error = cdsm.InfeasibleTension if gravity else cdsm.SingularStiffness
-    said = "6 cables alone cannot hold 12 joints: .* at least 13"
-    for ask in (cdsm.stiffness_range, cdsm.saturation):
-        with pytest.raises(error, match=said):
-            ask(arm.at(np.full(12, 0.05)), DOWN, 10.0, 200.0)
-
-
-def test_advice_names_the_bound_that_rules() -> None:
-    arm = presets.virtual_prototype(STRAND)
-    first = replace(arm.cables[0], minimum=300.0)
-    pose = arm.with_cables([first, *arm.cables[1:]]).at(np.full(10, 0.1))
-    own = f"lower the minimum of {first.name} itself"
-    with pytest.raises(cdsm.InfeasibleTension, match=own):
-        cdsm.plan_stiffness(pose, DOWN, 8e4, 0.0, [310.0, *[40.0] * 14])
-    with pytest.raises(cdsm.UnreachableStiffness, match="raise maximum="):
-        cdsm.plan_stiffness(pose, DOWN, 1e6, 20.0, 600.0)
-    stretched = replace(first, minimum=900.0)
-    pose = arm.with_cables([stretched, *arm.cables[1:]]).at(np.full(10, 0.1))
-    with pytest.raises(cdsm.ElasticityRangeError, match=own):
-        cdsm.plan_stiffness(pose, DOWN, 8e4, 20.0)

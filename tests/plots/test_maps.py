@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 import cdsm
@@ -45,38 +45,20 @@ def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Datase
     axes: Any = figure.axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [mm]", "z [mm]")
     assert axes.get_aspect() == 1.0
-    assert axes.get_title() == "minimum 5 N"
-    assert figure.axes[-1].get_ylabel() == "stiffness in the softest direction [N/mm]"
-
-
-def test_a_path_is_seen_whole_along_each_axis() -> None:
-    ends = np.array([[0.3, -0.2, 0.1, 0.2, -0.1, 0.3], [-0.1, 0.2, 0.2, 0.3, 0.2, -0.2]])
-    found = cdsm.sweep(short_arm(), cdsm.PathPoses(ends, 20), minimum=20.0)
-    figure = plots.plot_map(found, "softest")
-    tips = 1e3 * found.tip_position.values
-    for panel, (axis, shown) in enumerate((("y", [0, 2]), ("z", [0, 1]), ("x", [1, 2]))):
-        (colors,) = drawn(figure, panel)
-        np.testing.assert_allclose(places(colors), tips[:, shown], rtol=1e-12)
-        assert figure.axes[panel].get_title() == f"seen along {axis}"
+    assert "[N/mm]" in figure.axes[-1].get_ylabel()
 
 
 def test_unstable_entries_are_marked_and_have_a_margin(planar: xr.Dataset) -> None:
     tips = 1e3 * planar.tip_position.values.reshape(-1, 3)[:, [0, 2]]
-    for quantity in ("softest", "along"):
-        data = planar.isel(direction=[2]) if quantity == "along" else planar
-        figure = plots.plot_map(data, quantity)
-        marked, colors = drawn(figure, 2)
-        np.testing.assert_allclose(places(marked), tips)
-        assert not len(places(colors))
-        assert [text.get_text() for text in figure.legends[0].get_texts()] == ["unstable"]
+    marked, colors = drawn(plots.plot_map(planar, "softest"), 2)
+    np.testing.assert_allclose(places(marked), tips)
+    assert not len(places(colors))
     figure = plots.plot_map(planar, "margin")
     (colors,) = drawn(figure, 2)
     shown, margins = np.asarray(colors.get_array()), planar.margin[..., 2].values.ravel()
     assert (shown < 0.0).all()
     np.testing.assert_allclose(shown, margins, rtol=1e-12)
     assert colors.norm.vmin == -colors.norm.vmax  # type: ignore[operator]
-    label = figure.axes[-1].get_ylabel().replace("\n", " ")
-    assert label == "stability margin [N m/rad]; below 0: unstable"
 
 
 def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
@@ -84,9 +66,6 @@ def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
     found = cdsm.sweep(arm, cdsm.RandomPoses(256), minimum=20.0, maximum=400.0)
     figure = plots.plot_map(found, "along")
     figure.draw_without_rendering()
-    titles = [axes.get_title() for axes in figure.axes[:9]]
-    assert [each.split(",")[0] for each in titles[::3]] == [f"direction {u}" for u in "xyz"]
-    assert [each.split(",")[1].strip()[0] for each in titles[:3]] == ["y", "z", "x"]
     assert "no value" in [text.get_text() for text in figure.legends[0].get_texts()]
 
     section = plots.plot_map(found, "softest", section=("y", 0.01, 0.02))
@@ -96,27 +75,6 @@ def test_a_cloud_is_shown_in_slices_and_a_section_has_its_tips_alone() -> None:
     assert 0 < len(inside) < len(tips)
     order = [np.lexsort(each.T) for each in (shown, inside[:, [0, 2]])]
     np.testing.assert_allclose(shown[order[0]], inside[:, [0, 2]][order[1]], rtol=1e-12)
-    assert section.axes[0].get_title() == "y\xa0=\xa010\xa0±\xa020\xa0mm"
-
-
-@pytest.mark.parametrize("statistic", ["median", "min", "max"])
-def test_cells_show_the_statistic_of_their_tips(planar: xr.Dataset, statistic: str) -> None:
-    one = planar.isel(minimum=0)
-    figure = plots.plot_map(one, "softest", statistic=statistic, bins=4)  # type: ignore[arg-type]
-    (mesh,) = (each for each in figure.axes[0].collections if isinstance(each, QuadMesh))
-    shown: Any = np.ma.asarray(mesh.get_array())
-    corners: Any = mesh.get_coordinates()
-    tips = 1e3 * one.tip_position.values.reshape(-1, 3)[:, [0, 2]]
-    values = 1e-3 * one.softest.values.ravel()
-    assert 1 < shown.count() < len(values)
-    counted = 0
-    for row, column in np.argwhere(~np.ma.getmaskarray(shown)):
-        low, high = corners[row, column], corners[row + 1, column + 1]
-        inside = ((tips >= low) & (tips < high)).all(axis=1)
-        counted += int(inside.sum())
-        assert shown[row, column] == pytest.approx(getattr(np, statistic)(values[inside]))
-    assert counted == len(values)
-    assert figure.axes[-1].get_ylabel().startswith(f"{statistic} of a cell: stiffness in the")
 
 
 @pytest.mark.parametrize(
@@ -124,9 +82,6 @@ def test_cells_show_the_statistic_of_their_tips(planar: xr.Dataset, statistic: s
     [
         ({"quantity": "status"}, "quantity: status has the dimensions"),
         ({"quantity": "softness"}, r"no quantity is called 'softness'.*must be among outputs="),
-        ({"quantity": "tip_position"}, "tip_position has the dimensions"),
-        ({"section": ("w", 0.0, 0.1)}, "no axis is called 'w'"),
-        ({"section": 3.0}, "section: 3.0 given"),
         ({"statistic": "mean"}, "no statistic is called 'mean'"),
         ({"bins": 1}, "bins"),
         ({"section": ("y", 5.0, 0.1)}, "section: has no tip to show"),
@@ -137,16 +92,3 @@ def test_what_cannot_be_shown_is_named(
 ) -> None:
     with pytest.raises(cdsm.CdsmError, match=said):
         plots.plot_map(planar, **arguments)
-
-
-def test_sweeps_that_cannot_be_shown_are_refused() -> None:
-    arm = short_arm()
-    many = cdsm.sweep(arm, PLANAR, minimum=np.arange(10.0, 14.0))
-    with pytest.raises(cdsm.InvalidInput, match=r"12 panels, of minimum \(4\), direction \(3\)"):
-        plots.plot_map(many, "along")
-    with pytest.raises(cdsm.CdsmError, match="must be among outputs="):
-        plots.plot_map(cdsm.sweep(arm, PLANAR, minimum=20.0, outputs="margin"), "margin")
-    with pytest.raises(cdsm.InvalidInput, match="the Dataset of a sweep is needed"):
-        plots.plot_map(3)  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="has no tip to show"):
-        plots.plot_map(cdsm.sweep(arm, np.full((2, 6), 3.0), minimum=20.0))

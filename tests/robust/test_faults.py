@@ -4,12 +4,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-import xarray as xr
 
 import cdsm
 from tests.support.patience import HANGS
@@ -33,43 +32,16 @@ def running(*arguments: object) -> Iterator[subprocess.Popen[str]]:
             process.kill()
 
 
-def wait_for(reached: Callable[[], bool], process: subprocess.Popen[str]) -> None:
-    """Until something is there; the process has to be alive until then."""
-    while not reached():
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.002)
-
-
-def blocks_done(path: Path) -> int:
-    return len(list(path.glob("status/c/*")))
-
-
-def pending(path: Path) -> int:
-    return int((cdsm.read_sweep(path).status == cdsm.Status.PENDING).sum())
-
-
-def test_an_interrupted_command_says_so_in_one_line_and_goes_on(tmp_path: Path) -> None:
+def test_an_interrupted_command_says_so_in_one_line(tmp_path: Path) -> None:
     arm, path, out = tmp_path / "arm.toml", tmp_path / "s.zarr", tmp_path / "s.csv"
     short_arm().geometry.write(arm)
     out.write_text("old", encoding="utf-8")
-    command = (
-        "-m",
-        "cdsm",
-        "sweep",
-        arm,
-        "--set",
-        "wire=1x19-1.2mm",
-        "--minimum",
-        10,
-        "--random",
-        140_000,
-        "--out",
-        out,
-        "--store",
-        path,
-    )
+    command: list[object] = ["-m", "cdsm", "sweep", arm, "--set", "wire=1x19-1.2mm"]
+    command += ["--minimum", 10, "--random", 140_000, "--out", out, "--store", path]
     with running(*command) as process:
-        wait_for(lambda: blocks_done(path) >= 1, process)
+        while not list(path.glob("status/c/*")):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.002)
         process.send_signal(signal.SIGINT)
         said, complained = process.communicate(timeout=HANGS)
     assert process.returncode == 130, complained
@@ -77,32 +49,7 @@ def test_an_interrupted_command_says_so_in_one_line_and_goes_on(tmp_path: Path) 
     told = [line.partition(":")[0] for line in complained.splitlines()]
     assert {*told[:-1]} <= {"sweep"}  # how far it was
     assert told[-1] == "interrupted"
-    left = pending(path)
-    assert 0 < left < 140_000
+    left = int((cdsm.read_sweep(path).status == cdsm.Status.PENDING).sum())
+    assert 0 < left < 140_000  # tests/sweeps/test_store.py goes on from there
     assert out.read_text(encoding="utf-8") == "old"
     assert {each.name for each in tmp_path.iterdir()} == {"arm.toml", "s.zarr", "s.csv"}
-    poses = cdsm.RandomPoses(140_000, 0)
-    described = cdsm.Manipulator(cdsm.Geometry.read(arm), cdsm.presets.STRAND_1X19)
-    again = cdsm.sweep(described, poses, minimum=10.0, store=path, progress=False)
-    assert pending(path) == 0
-    xr.testing.assert_allclose(
-        again, cdsm.sweep(described, poses, minimum=10.0, progress=False), rtol=1e-10
-    )
-
-
-def test_reproduce_that_is_killed_leaves_whole_files(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "reproduction.json").write_text("old", encoding="utf-8")
-    with running("-m", "cdsm", "reproduce", "--out", out) as process:
-        wait_for(lambda: len(list(out.glob("fig*.png"))) >= 2, process)
-        process.kill()
-        process.wait()
-    shown = [path for path in out.iterdir() if not path.name.startswith(".")]
-    assert (out / "reproduction.json").read_text(encoding="utf-8") == "old"
-    for picture in out.glob("fig*.png"):
-        data = picture.read_bytes()
-        assert data.startswith(b"\x89PNG"), picture
-        assert data.endswith(b"IEND\xaeB`\x82"), picture  # the mark at the end of every PNG
-    # what the kill caught in writing lies aside, under a name of its own
-    assert len(list(out.iterdir())) - len(shown) <= 1

@@ -66,7 +66,6 @@ def _path(path: Path) -> None:
 
 READERS: dict[str, Reader] = {
     "geometry": Reader("full.toml", _geometry),
-    "short geometry": Reader("short.toml", _geometry),
     "arm": Reader("arm.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
     "arm of a urdf": Reader("finger.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
     "cables": Reader("cables.toml", lambda path: _arm(crab().with_cables(cdsm.read_cables(path)))),
@@ -91,11 +90,6 @@ READERS: dict[str, Reader] = {
 def whole_files(path: Path) -> Path:
     """Fill a folder with a whole file for every reader."""
     mixed_arm().geometry.write(path / "full.toml")
-    (path / "short.toml").write_text(
-        "[universal]\njoints = 5\ncables_per_joint = 3\nlink_length = 0.04\nbase_length = 0.02\n"
-        "disk_offset = 0.01\nhole_radius = 0.03\nlink_mass = 0.5\n",
-        encoding="utf-8",
-    )
     mixed_arm().write(path / "arm.toml")
     crab().write(path / "finger.toml")
     cdsm.write_cables(crab().cables, path / "cables.toml")
@@ -114,8 +108,6 @@ def whole_files(path: Path) -> Path:
     (path / "path.csv").write_text(f"# a path\n{joints},target [N/mm]\n{rows}\n", encoding="utf-8")
     return path
 
-
-# --- mutations ------------------------------------------------------------------------------
 
 TOKENS = (
     *("nan", "inf", "-1", "1e400", "1e-320", "0", "0 0 0", "1 2", "9" * 25, "true", "é", "\n"),

@@ -19,7 +19,7 @@ from tests.support.patience import HANGS
 from tests.support.sweeps import CASES, EVERYTHING, GRID, short_arm
 
 ROOT = Path(__file__).parents[2]
-POSES = cdsm.RandomPoses(4000, 1)
+POSES = cdsm.RandomPoses(1000, 1)
 
 
 def swept(q: Any = GRID, **changes: Any) -> xr.Dataset:
@@ -48,9 +48,9 @@ def test_a_chunked_sweep_is_lazy_and_has_the_same_numbers(whole: xr.Dataset) -> 
     np.testing.assert_array_equal(q.compute(), POSES.angles(short_arm()))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # two processes start, seconds each
 def test_a_cluster_of_two_workers_has_the_same_numbers(tmp_path: Path) -> None:
-    q, options = POSES.angles(short_arm(), 1000), {"minimum": 20.0, "outputs": ("along", "tension")}
+    q, options = POSES.angles(short_arm(), 250), {"minimum": 20.0, "outputs": ("along", "tension")}
     alone = cdsm.sweep(short_arm(), POSES, **options)  # type: ignore[arg-type]
     workers = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0")
     with workers, Client(workers):
@@ -92,11 +92,11 @@ import sys
 import cdsm
 from tests.support.sweeps import short_arm
 arm = short_arm()
-cdsm.sweep(arm, cdsm.RandomPoses(4000, 1).angles(arm, 20), minimum=20.0, store=sys.argv[1])
+cdsm.sweep(arm, cdsm.RandomPoses(1000, 1).angles(arm, 20), minimum=20.0, store=sys.argv[1])
 """
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # a process that writes fifty chunks
 def test_a_killed_run_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
     path = tmp_path / "s.zarr"
     with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], cwd=ROOT) as process:
@@ -107,7 +107,7 @@ def test_a_killed_run_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
             time.sleep(0.002)
         os.kill(process.pid, signal.SIGKILL)
     left = cdsm.read_sweep(path).status == cdsm.Status.PENDING
-    assert 0 < left.sum() < 4000
+    assert 0 < left.sum() < 1000
     again = cdsm.sweep(short_arm(), POSES, minimum=20.0, store=path)
     assert same(again, cdsm.sweep(short_arm(), POSES, minimum=20.0))
 
@@ -116,14 +116,10 @@ def test_a_killed_run_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
     ("changes", "said"),
     [
         ({"minimum": [1.0, 20.0, 61.0]}, r"minimum(?s:.*)60\.0(?s:.*)61\.0"),
-        ({"minimum": 20.0}, "minimum"),
         ({"maximum": 99.0}, r"maximum(?s:.*)inf(?s:.*)99\.0"),
-        ({"wrench": np.zeros(6)}, "wrench"),
         ({"outputs": "margin"}, "outputs"),
-        ({"diameter": 1e-3}, "diameter"),
         ({"arm": short_arm(spring=1e6)}, "Differing attributes(?s:.*)arm"),
         ({"q": cdsm.GridPoses({"joint1_1": [0.1]})}, "joint3_2"),
-        ({"q": np.zeros((1, 6))}, "pose"),
         ({"q": np.full((1, 6), 0.1)}, "pose"),
     ],
 )
@@ -135,39 +131,10 @@ def test_a_store_of_another_sweep_is_refused_with_the_difference(
         swept(store=path)
     with pytest.raises(cdsm.FileError, match=f"shared.zarr: contains another sweep(?s:.*){said}"):
         swept(**changes, store=path)
-
-
-def test_other_postures_of_the_same_number_are_another_sweep(tmp_path: Path) -> None:
-    q = np.full((3, 6), 0.1)
-    swept(q, store=tmp_path / "s.zarr")
-    q[2, 5] += 1e-9
-    with pytest.raises(cdsm.FileError, match=r"contains another sweep(?s:.*) q "):
-        swept(q, store=tmp_path / "s.zarr")
-
-
-def test_a_law_of_another_function_is_another_sweep(tmp_path: Path) -> None:
-    def kept(EA: float) -> xr.Dataset:
-        law = cdsm.Elasticity.from_rigidity(lambda F: EA + 50.0 * F, 0.0, 5e3)
-        arm = cdsm.Manipulator(short_arm().geometry, law)
-        return cdsm.sweep(arm, GRID, minimum=20.0, outputs="margin", store=tmp_path / "s.zarr")
-
-    np.testing.assert_array_equal(kept(1e5).margin, kept(1e5).margin)
-    with pytest.raises(cdsm.FileError, match="another sweep"):
-        kept(1e5 * (1.0 + 1e-9))
-
-
-def test_what_is_no_store_is_named_and_left_alone(tmp_path: Path) -> None:
-    for name in ("folder.zarr", "file.zarr"):
-        path = tmp_path / name
-        path.mkdir() if name == "folder.zarr" else path.write_text("no store", encoding="utf-8")
-        with pytest.raises(cdsm.FileError, match=name):
-            swept(store=path)
-    assert {each.name for each in tmp_path.rglob("*")} == {"folder.zarr", "file.zarr"}
-    with pytest.raises(cdsm.FileError, match=r"the folder .*absent does not exist"):
-        swept(store=tmp_path / "absent" / "s.zarr")
-
-
-# --- files -----------------------------------------------------------------------------------
+    folder = path.with_name("folder.zarr")
+    folder.mkdir(exist_ok=True)
+    with pytest.raises(cdsm.FileError, match="folder"):
+        swept(store=folder)
 
 
 def test_netcdf_gives_the_same_sweep_back(tmp_path: Path, whole: xr.Dataset) -> None:
@@ -206,15 +173,6 @@ def test_csv_has_a_row_for_each_entry_and_a_column_for_each_component(
 def test_what_is_no_sweep_is_named(tmp_path: Path, whole: xr.Dataset) -> None:
     with pytest.raises(cdsm.InvalidInput, match=r"ends neither in \.nc \(NetCDF\) nor in \.csv"):
         cdsm.write_sweep(whole, tmp_path / "s.txt")
-    with pytest.raises(cdsm.InvalidInput, match="the Dataset of a sweep is needed"):
-        cdsm.write_sweep(3, tmp_path / "s.nc")  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="has no status"):
-        cdsm.write_sweep(xr.Dataset({"a": 1.0}), tmp_path / "s.nc")
-    with pytest.raises(cdsm.FileError, match=r"absent\.nc: does not exist"):
-        cdsm.read_sweep(tmp_path / "absent.nc")
-    (tmp_path / "text.nc").write_text("no", encoding="utf-8")
-    with pytest.raises(cdsm.FileError, match=r"text\.nc: cannot be read"):
-        cdsm.read_sweep(tmp_path / "text.nc")
     xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
     with pytest.raises(cdsm.FileError, match=r"other\.nc: is not a sweep of cdsm"):
         cdsm.read_sweep(tmp_path / "other.nc")

@@ -1,6 +1,5 @@
 """Budgets: what correlations do, what first order is worth, what is refused."""
 
-import inspect
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.tolerances import SOURCES, Distribution
+from cdsm.tolerances import Distribution
 from cdsm.tolerancing.inputs import inputs_of
 from tests.support import arms
 from tests.support.arms import readme_geometry
@@ -40,21 +39,13 @@ WORKSHOP = cdsm.Tolerances(
 )
 
 
-def test_contributions_add_as_squares_and_are_ranked() -> None:
-    pose, tension = posture()
-    budget = cdsm.uncertainty(pose, tension, WORKSHOP, direction=[0, 1, 0])
-    parts = list(budget.contributions.values())
-    assert parts == sorted(parts, reverse=True)
-    assert budget.standard_uncertainty == pytest.approx(math.hypot(*parts), rel=1e-15)
-    low, high = budget.interval(0.95)
-    assert high - low == pytest.approx(2 * 1.959963984540054 * budget.standard_uncertainty)
-    (source, name, u), *_ = budget.largest_inputs()
-    assert (source, u > 0.0) == ("rigidity", True)
-    assert name.startswith("cable")
-
-
 def test_correlation_decides_between_root_and_sum() -> None:
     pose, tension = posture()
+    whole = cdsm.uncertainty(pose, tension, WORKSHOP, direction=[0, 1, 0])
+    parts = list(whole.contributions.values())
+    assert whole.standard_uncertainty == pytest.approx(math.hypot(*parts), rel=1e-15)
+    low, high = whole.interval(0.95)
+    assert high - low == pytest.approx(2 * 1.959963984540054 * whole.standard_uncertainty)
 
     def u(correlation: float) -> float:
         tolerance = cdsm.Tolerance(0.05, correlation=correlation)
@@ -75,7 +66,7 @@ def test_correlation_decides_between_root_and_sum() -> None:
 
 
 def _asked(of: str, seed: int) -> dict[str, Any]:
-    """Pose, tension and what else a reading needs, for one of ten arms."""
+    """Pose, tension and what else a reading needs, for one of several arms."""
     arm = arms.random_arm(seed, 3, "universal" if seed % 2 else "hinged")
     pose, F = arms.random_posture(arm, seed), arms.random_tension(arm, seed)
     along = pose.jacobian[:3] @ np.ones(arm.nv)  # a way the tip can go
@@ -91,18 +82,13 @@ def _asked(of: str, seed: int) -> dict[str, Any]:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("of", "angle", "least"),
-    [
-        ("along", 0.5, 9),
-        ("margin", 0.5, 8),
-        ("tip", 0.5, 10),
-        ("tension", 0.1, 7),
-    ],
+    [("along", 0.5, 3), ("margin", 0.5, 3), ("tip", 0.5, 4), ("tension", 0.1, 2)],
 )
 def test_first_order_is_monte_carlo_where_it_says_so(of: str, angle: float, least: int) -> None:
-    """Ten arms; on ``least`` of them at least, first order says that it holds."""
+    """Four arms; on ``least`` of them at least, first order says that it holds."""
     tolerances = replace(WORKSHOP, joint_angle=math.radians(angle))
     held = []
-    for seed in range(10):
+    for seed in range(4):
         given = _asked(of, seed)
         budget = cdsm.uncertainty(**given, tolerances=tolerances)
         held.append(budget.is_linear)
@@ -113,12 +99,6 @@ def test_first_order_is_monte_carlo_where_it_says_so(of: str, angle: float, leas
                 budget.standard_uncertainty, rel=0.05
             ), seed
     assert sum(held) >= least
-
-
-def _near_straight() -> dict[str, Any]:
-    """Straight along x the stiffness is infinite, and near it far from linear in the angles."""
-    pose = readme_arm().at(np.full(8, math.radians(0.7)))
-    return {"pose": pose, "tension": np.full(12, 50.0), "direction": "x"}
 
 
 def _two_least() -> dict[str, Any]:
@@ -134,32 +114,12 @@ def _at_a_bound() -> dict[str, Any]:
     return {"pose": pose, "tension": tension, "of": "tension", "cable": "cable3_1"}
 
 
-def _wild_angles() -> dict[str, Any]:
-    """A tip moves on circles: 0.3 rad are far on them."""
-    pose, tension = posture()
-    far = cdsm.Tolerances(joint_angle=0.3)
-    return {"pose": pose, "tension": tension, "of": "tip", "direction": "z", "tolerances": far}
-
-
-@pytest.mark.parametrize("case", [_near_straight, _two_least, _at_a_bound, _wild_angles])
+@pytest.mark.parametrize("case", [_two_least, _at_a_bound])
 def test_first_order_says_where_it_does_not_hold(case: Callable[[], dict[str, Any]]) -> None:
     given = {"tolerances": WORKSHOP} | case()
     budget = cdsm.uncertainty(**given)
     assert not budget.is_linear
     assert "use Monte Carlo" in str(budget)
-    assert budget.to_dict()["is_linear"] is False
-
-
-def test_more_draws_begin_with_the_same_draws() -> None:
-    pose, tension = posture()
-    question: dict[str, Any] = {"direction": [0, 0, 1], "seed": 5, "progress": False}
-    whole = cdsm.monte_carlo(pose, tension, WORKSHOP, **question, draws=2500)
-    part = cdsm.monte_carlo(pose, tension, WORKSHOP, **question, draws=1500)
-    np.testing.assert_array_equal(whole.values[:1500], part.values)
-    data = whole.to_xarray()
-    assert data.sizes["draw"] == 2500
-    assert data["values"].attrs["units"] == "N/m"
-    assert whole.errors["hole_radius"].std() == pytest.approx(1e-4, rel=0.02)
 
 
 def test_a_sum_of_four_rectangular_errors_is_that_of_jcgm_101() -> None:
@@ -184,20 +144,8 @@ def test_draws_without_a_stiffness_are_left_out_and_counted() -> None:
     run = cdsm.monte_carlo(pose, np.full(12, 4.0), own, **asked)
     assert run.failed / 20_000 == pytest.approx(0.0359, abs=0.005)
     assert run.values.size + run.failed == run.status.size == 20_000
-    assert run.errors["tension"].min() >= -1.8
     assert np.isfinite(run.values).all()
-    assert f"{run.failed} more draws, left out: OUTSIDE_ELASTICITY" in str(run)
     assert not run.budget.is_linear
-    assert f"does not exist for {run.budget.failed} of 100 random arms" in str(run.budget)
-    with pytest.raises(cdsm.InvalidInput, match=r"of 20000 draws; most others are OUTSIDE_ELAST"):
-        cdsm.monte_carlo(pose, np.full(12, 2.2), own, **(asked | {"seed": 4}))
-
-
-def test_at_the_end_of_a_law_a_difference_is_one_sided() -> None:
-    arm = cdsm.Manipulator(readme_geometry(), cdsm.presets.STRAND_1X19)
-    pose, least = arm.at(np.full(8, 0.1)), cdsm.Tolerances(tension=1e-5)
-    end, inside = (cdsm.uncertainty(pose, [F] * 12, least, direction="z") for F in (2.2, 2.20001))
-    assert end.standard_uncertainty == pytest.approx(inside.standard_uncertainty, rel=1e-3)
 
 
 def test_the_tensions_of_an_arm_on_paper_follow_its_dimensions() -> None:
@@ -254,20 +202,7 @@ def test_two_spools_and_disks_drilled_together() -> None:
     assert sum(on_link) == 12 + 9
     common = abs(budget.sensitivities["hole_radius"][on_link].sum())
     assert budget.contributions["hole_radius"] == pytest.approx(1e-4 * common, rel=1e-5)
-    assert "2 to 5 %" in str(budget)
     assert run.standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.03)
-
-
-def test_the_tolerances_of_an_arm_are_those_of_its_budgets() -> None:
-    pose, tension = posture()
-    with pytest.raises(cdsm.InvalidInput, match=r"tolerances: none given, and the arm has none"):
-        cdsm.uncertainty(pose, tension, direction="z")
-    own = pose.arm.with_tolerances(WORKSHOP).at(pose.q)
-    mine = cdsm.uncertainty(own, tension.values, direction="z")
-    theirs = cdsm.uncertainty(pose, tension, WORKSHOP, direction="z")
-    assert mine.contributions == theirs.contributions
-    assert own.arm != pose.arm
-    assert own.arm.with_tolerances(cdsm.Tolerances()) == pose.arm
 
 
 def test_friction_does_not_enter_the_frictionless_stiffness() -> None:
@@ -277,75 +212,35 @@ def test_friction_does_not_enter_the_frictionless_stiffness() -> None:
     budget = cdsm.uncertainty(rough, tension.values, tolerances, direction="z")
     assert budget.contributions["friction"] == 0.0
     assert "without influence on it: friction" in str(budget)
-    with pytest.raises(cdsm.InvalidInput, match="friction: arm has no friction in its holes"):
-        cdsm.uncertainty(pose, tension, tolerances, direction="z")
 
 
-def test_tolerances_show_their_sources_in_help_and_completion() -> None:
-    assert tuple(inspect.signature(cdsm.Tolerances).parameters) == SOURCES
+def two(of: str) -> cdsm.Tolerances:
+    spools = (cdsm.Tolerance(0.05, of="cable1*"), cdsm.Tolerance(0.02, of=of))
+    return cdsm.Tolerances(rigidity=spools)
 
 
-def test_bad_input_is_named() -> None:
-    pose, tension = posture()
-    with pytest.raises(cdsm.InvalidInput, match=r"lead: .*-0.001 given; a tolerance is not neg"):
-        cdsm.Tolerances(lead=-1e-3)
-    with pytest.raises(cdsm.InvalidInput, match=r"rigidity: .*relative"):
-        cdsm.Tolerances(rigidity=5.0)
-    with pytest.raises(cdsm.InvalidInput, match=r"correlation: -0.5 given; a number from 0 to 1"):
-        cdsm.Tolerance(1.0, correlation=-0.5)
-    with pytest.raises(cdsm.InvalidInput, match="gauss"):
-        cdsm.Tolerance(1.0, distribution="gauss")  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="direction: is needed"):
-        cdsm.uncertainty(pose, tension, WORKSHOP)
-    with pytest.raises(cdsm.InvalidInput, match="direction: has no meaning"):
-        cdsm.uncertainty(pose, tension, WORKSHOP, of="margin", direction=[0, 0, 1])
-    with pytest.raises(cdsm.InvalidInput, match="cable"):
-        cdsm.uncertainty(pose, tension, WORKSHOP, of="tension", cable="cable9")
-    with pytest.raises(cdsm.InvalidInput, match="spring: arm has no springs in series; see ser"):
-        cdsm.uncertainty(pose, tension, cdsm.Tolerances(spring=0.1), direction="z")
-    with pytest.raises(cdsm.InvalidInput, match="tension: is distributed again: give a least"):
-        cdsm.uncertainty(pose, tension.values, WORKSHOP, direction="z", redistribute=True)
-    straight = pose.arm.at(np.zeros(8))
-    with pytest.raises(cdsm.SingularStiffness, match="infinite"):
-        cdsm.uncertainty(straight, np.full(12, 50.0), WORKSHOP, direction=[1, 0, 0])
-    for spool, said in (
-        ("cabel*", "no input is called 'cabel\\*'; the first of 12 is 'cable1_1'"),
-        ("cable1_1", "cable1_1 has two tolerances"),
-    ):
-        twice = cdsm.Tolerances(
-            rigidity=[cdsm.Tolerance(0.05, of="cable1*"), cdsm.Tolerance(0.02, of=spool)]
-        )
-        with pytest.raises(cdsm.InvalidInput, match=said):
-            cdsm.uncertainty(pose, tension, twice, direction=[0, 0, 1])
-    with pytest.raises(cdsm.InvalidInput, match=r"rigidity: .*a list or tuple of Tolerance"):
-        cdsm.Tolerances(rigidity=[0.05])  # type: ignore[list-item]
-    with pytest.raises(cdsm.InvalidInput, match="all zero"):
-        cdsm.monte_carlo(pose, tension, cdsm.Tolerances(), direction=[0, 0, 1])
+BAD: tuple[tuple[Callable[[], object], str], ...] = (
+    (lambda: cdsm.Tolerances(lead=-1e-3), r"lead: .*-0.001 given; a tolerance is not neg"),
+    (lambda: cdsm.Tolerances(rigidity=5.0), "rigidity: .*relative"),
+    (lambda: cdsm.Tolerance(1.0, correlation=-0.5), "correlation: -0.5 given; a number from 0"),
+    (lambda: cdsm.Tolerance(1.0, distribution="gauss"), "gauss"),  # type: ignore[arg-type]
+    (lambda: budget(direction=None), "direction: is needed"),
+    (lambda: budget(of="margin"), "direction: has no meaning"),
+    (lambda: budget(of="tension", direction=None, cable="cable9"), "cable"),
+    (lambda: budget(cdsm.Tolerances(spring=0.1)), "spring: arm has no springs in series; see"),
+    (lambda: budget(two("cabel*")), r"no input is called 'cabel\*'; the first of 12 is 'cable1_1'"),
+    (lambda: budget(two("cable1_1")), "cable1_1 has two tolerances"),
+)
 
 
-def test_an_arm_from_a_urdf_has_sites_but_no_holes() -> None:
-    serpentine = readme_arm()
-    arm = cdsm.Manipulator.from_urdf(serpentine.urdf, serpentine.cables, tip="tool0")
-    pose = arm.at(np.full(8, 0.1))
-    with pytest.raises(cdsm.InvalidInput, match=r"hole_radius: .*give site"):
-        cdsm.uncertainty(pose, np.full(12, 50.0), WORKSHOP, direction=[0, 0, 1])
-    budget = cdsm.uncertainty(
-        pose, np.full(12, 50.0), cdsm.Tolerances(site=1e-4, rigidity=0.05), direction=[0, 0, 1]
-    )
-    assert 0.0 < budget.contributions["site"] < budget.contributions["rigidity"]
+def budget(tolerances: cdsm.Tolerances = WORKSHOP, **given: Any) -> object:
+    return cdsm.uncertainty(*posture(), tolerances, **({"direction": "z"} | given))
 
 
-def test_reading_of_an_unstable_arm_says_so_first() -> None:
-    arm = cdsm.Manipulator(readme_geometry(), cdsm.LinearElasticity(300.0)).with_friction(0.1)
-    pose = arm.at(np.full(arm.nv, 0.1))
-    tension, own = cdsm.distribute_tension(pose, 30.0), cdsm.Tolerances(rigidity=0.05)
-    verdict = cdsm.stiffness(pose, tension).warnings[0]
-    budget = cdsm.uncertainty(pose, tension, own, direction="z")
-    assert budget.warnings[0] == verdict
-    drawn = cdsm.monte_carlo(pose, tension, own, direction="z", draws=100)
-    band = cdsm.rest_band(pose, tension, "z")
-    for said in (budget, drawn, band):
-        assert str(said).splitlines()[0] == verdict
+@pytest.mark.parametrize(("ask", "said"), BAD)
+def test_bad_input_is_named(ask: Callable[[], object], said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        ask()
 
 
 # % of K along x, y, z of one sigma; common errors but of angles and tensions

@@ -60,14 +60,12 @@ def covered(count: int, seed: int, axis: str) -> int:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("axis", ["y", "z"])
-def test_intervals_cover_the_truth(axis: str) -> None:
+def test_intervals_cover_the_truth() -> None:
     """Within what 200 arms of 95 % may give, once in 10⁴ runs less."""
     low, high = binom.interval(1.0 - 1e-4, 200, 0.95)
-    assert low <= covered(200, 1, axis) <= high
+    assert low <= covered(200, 1, "y") <= high
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("axis", ["y", "z"])
-def test_intervals_cover_ten_thousand_truths(axis: str) -> None:
-    assert covered(10_000, 2, axis) / 10_000 == pytest.approx(0.95, abs=0.01)
+def test_intervals_cover_three_thousand_truths() -> None:
+    assert covered(3000, 2, "z") / 3000 == pytest.approx(0.95, abs=0.01)

@@ -10,7 +10,7 @@ import pytest
 import cdsm
 from cdsm.support.status import Status
 from cdsm.tolerancing.budget import Uncertainty
-from cdsm.tolerancing.measurand import Measurand, MeasurandName, measurand_of
+from cdsm.tolerancing.measurand import MeasurandName, measurand_of
 from tests.support import arms
 
 U = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
@@ -140,12 +140,3 @@ def test_errors_of_sites_and_rigidities_are_those_of_other_cables(
         assert found[n, 0] == pytest.approx(
             cdsm.stiffness(built, tension, wrench).along(U), rel=1e-10
         )
-
-
-def test_all_tensions_at_once_are_those_of_each_cable() -> None:
-    given = asked("tension")
-    K = cdsm.stiffness(given["pose"], given["tension"])
-    every, one = (Measurand("tension", K, None, cable, redistribute=True) for cable in (None, 4))
-    errors = {"hole_radius": np.random.default_rng(1).normal(0.0, 1e-4, (3, 36))}
-    np.testing.assert_array_equal(every.of_arms(errors)[0][:, [4]], one.of_arms(errors)[0])
-    np.testing.assert_array_equal(every.value(), K.tension)

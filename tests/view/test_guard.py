@@ -4,6 +4,7 @@ import math
 import socket
 import threading
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -126,9 +127,6 @@ def is_refused(view: View, **options: Any) -> bool:
         return bool(error.response.status_code == 403)
 
 
-# --- who may connect ----------------------------------------------------------------------------
-
-
 def test_a_page_of_another_origin_reads_nothing(view: View) -> None:
     port = port_of(view)
     for origin in (
@@ -162,7 +160,12 @@ def test_this_machine_is_served_under_all_its_names(view: View, host: str) -> No
         assert friend.control("force z [N]")
 
 
-# --- what they may send -------------------------------------------------------------------------
+def test_a_page_may_connect_to_its_own_server_only(view: View) -> None:
+    with urllib.request.urlopen(view.url) as page:
+        policy = str(page.headers["Content-Security-Policy"])
+    sources = policy.partition(";")[0].split()[1:]
+    own = ("'self'", "data:", "blob:", f"ws://127.0.0.1:{port_of(view)}")
+    assert {*sources} <= {*own}, policy
 
 
 def test_a_client_changes_nothing_of_a_control_but_its_value(view: View) -> None:

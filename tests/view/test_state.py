@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,17 +13,8 @@ from cdsm.view.panel import python_text, results_text, tensions_text
 from cdsm.view.scene import Scene
 from cdsm.view.state import Condition, Setting, Shown, show
 from tests.support import foreign
+from tests.support.arms import readme_geometry
 
-GEOMETRY: dict[str, Any] = {
-    "joints": 3,
-    "cables_per_joint": 3,
-    "link_length": 0.06,
-    "base_length": 0.03,
-    "disk_offset": 0.012,
-    "hole_radius": 0.02,
-    "link_mass": 0.1,
-    "lead": 0.3,
-}
 DEGREES = [10.0, 5.0, -8.0, 12.0, 6.0, -4.0]
 STABLE, UNSTABLE, INFEASIBLE = 20.0, 60.0, 150.0
 """Least tensions [N] at which the soft arm is each of them, none above 200 N."""
@@ -34,7 +24,7 @@ FORCE = (0.2, -0.3, -0.5)
 
 def soft_arm() -> cdsm.Manipulator:
     """Springs in series: it buckles before the tensions are infeasible."""
-    geometry = cdsm.Geometry.universal(**GEOMETRY)
+    geometry = readme_geometry(joints=3, hole_radius=0.02, link_mass=0.1)
     law = cdsm.LinearElasticity(2e5)
     cables = cdsm.serpentine_cables(geometry, law, series_stiffness=8000.0)
     return cdsm.Manipulator(geometry, cables=cables)
@@ -71,9 +61,6 @@ def along(K: cdsm.Stiffness) -> str:
     return ", ".join(f"{K.along(u) / 1e3:.4g}" for u in np.eye(3))
 
 
-# --- tensions that balance the force ------------------------------------------------------------
-
-
 def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     arm = soft_arm()
     shown = show(arm, setting(arm, force=(0.5, -1.0, -2.0)))
@@ -87,12 +74,13 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     assert said["tip"] == ", ".join(f"{1000.0 * x:.1f}" for x in pose.tip[:3, 3])
     tensions = {name: value for name, value in said.items() if "tension" in name}
     assert [*tensions.values()] == [f"{end:.4g}" for end in (pull.values.min(), pull.values.max())]
-    # the softest direction is one in which K.along is least, of all directions
-    (softest,) = (float(value) for name, value in said.items() if name.startswith("softest"))
-    directions = np.random.default_rng(0).normal(size=(500, 3))
-    assert 0.99 * softest < min(K.along(u) for u in directions) / 1e3 < 1.1 * softest
     largest = 1e3 * np.linalg.norm(K.compliance[:3, :3], 2)
-    assert said["largest compliance"] == f"{1e3 * largest / 1e3:.3g}"
+    assert said["largest compliance"] == f"{largest:.3g}"
+    (softest,) = (float(value) for name, value in said.items() if name.startswith("softest"))
+    assert softest == pytest.approx(1.0 / largest, rel=2e-3)
+    beyond = show(arm, setting(arm, q=np.full(6, 3.0)))
+    assert (beyond.condition, numbers(beyond)) == (Condition.NO_POSTURE, {})
+    assert "joint1_1" in beyond.problem
 
 
 @pytest.mark.parametrize(
@@ -101,9 +89,7 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
         (UNSTABLE, 0.0, Condition.UNSTABLE),
         (STABLE, -20.0, Condition.UNSTABLE),
         (INFEASIBLE, 0.0, Condition.INFEASIBLE),
-        (-1.0, 0.0, Condition.INVALID),
         (201.0, 0.0, Condition.INVALID),
-        (1e16, 0.0, Condition.INVALID),
         (STABLE, 1e16, Condition.INVALID),
     ],
 )
@@ -124,23 +110,6 @@ def test_where_the_arm_does_not_hold_no_stiffness_of_the_tip_is_said(
         assert "it would hold with" in shown.problem
 
 
-def test_a_posture_beyond_a_limit_shows_nothing_but_why() -> None:
-    shown = show(soft_arm(), setting(soft_arm(), q=np.full(6, 3.0)))
-    assert shown.condition is Condition.NO_POSTURE
-    assert numbers(shown) == {}
-    assert "joint1_1" in shown.problem
-    assert tensions_text(shown) == "unknown"
-
-
-def test_cables_outside_their_elasticity_keep_their_tensions() -> None:
-    arm = cdsm.Manipulator(cdsm.Geometry.universal(**GEOMETRY), cdsm.presets.STRAND_1X19)
-    shown = show(arm, setting(arm, 1.0))
-    assert shown.condition is Condition.OUTSIDE_ELASTICITY
-    assert shown.tensions is not None
-    assert shown.stiffness is None
-    assert "smallest joint stiffness" not in numbers(shown)
-
-
 def test_names_and_messages_are_text_and_not_markup() -> None:
     law = cdsm.LinearElasticity(3e4)
     cables = [cdsm.Cable(f"<b>*{c.name}*|", c.sites, law) for c in foreign.cables(law)]
@@ -150,9 +119,6 @@ def test_names_and_messages_are_text_and_not_markup() -> None:
     for written in (text(shown), tensions_text(shown)):
         assert "<b>*" not in written
         assert "&#60;b&#62;&#42;" in written
-
-
-# --- locked motors ------------------------------------------------------------------------------
 
 
 def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force() -> None:
@@ -165,46 +131,17 @@ def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force
     assert shown.condition is Condition.STABLE
     assert shown.rest is not None
     # both stop where the imbalance is rounding; the softest mode makes 1e-12 m of it at most
-    for moved in (rest.displacement, test.displacements[-1]):
-        np.testing.assert_allclose(shown.rest.displacement, moved, atol=1e-9)
+    for by in (rest.displacement, test.displacements[-1]):
+        np.testing.assert_allclose(shown.rest.displacement, by, atol=1e-9)
     said = numbers(shown)
     assert said["displacement"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.displacement)
     assert said["stiffness along x, y, z"] == along(rest.stiffness)
     listed = re.findall(r"\| (\S+) \| &nbsp;N", tensions_text(shown))
     assert listed == [f"{F:.4g}" for F in rest.tension]
-    # it moves, and by more than a stiff arm would: the direction of a wrong sign fails here
     assert float(rest.displacement @ FORCE) > 0.0
-    assert 1e3 * np.linalg.norm(rest.displacement) > 0.5
-
-
-def test_an_unstable_reference_is_left_and_that_is_said() -> None:
-    shown = sagged(soft_arm(), UNSTABLE, (0.0, 0.0, 0.0))
-    assert shown.condition is Condition.MOVED
-    assert shown.rest is not None
-    assert np.linalg.norm(shown.rest.displacement) > 1e-3
-    assert "moved to another equilibrium" in text(shown)
-    assert "stiffness along x, y, z" in numbers(shown)  # of the place where it rests
-    assert shown.rest.stiffness.is_stable
-
-
-def test_without_an_equilibrium_there_is_no_number() -> None:
-    strand = cdsm.Manipulator(soft_arm().geometry, elasticity=cdsm.presets.STRAND_1X19)
-    shown = sagged(strand, 3.0, (0.0, 0.0, -20.0))  # a cable would get slack: no law says how
-    assert shown.condition is Condition.OUTSIDE_ELASTICITY
-    assert shown.rest is None
-    assert shown.tensions is None
-    assert set(numbers(shown)) == {"tip"}
-    assert len(set(shown.cable_colors)) == 1  # grey
-
-
-def test_joints_on_their_stops_are_named_and_do_not_yield() -> None:
-    shown = sagged(soft_arm(), 5.0, (0.0, 0.0, -12.0))
-    assert shown.rest is not None
-    assert shown.rest.at_limit
-    said = numbers(shown)
-    assert said["joint limit reached"].replace("&#95;", "_") == ", ".join(shown.rest.at_limit)
-    C = shown.rest.compliance[:3, :3]
-    assert said["stiffness along x, y, z"] == ", ".join(f"{1e-3 / c:.4g}" for c in np.diag(C))
+    moved = sagged(arm, UNSTABLE, (0.0, 0.0, 0.0))
+    assert moved.condition is Condition.MOVED
+    assert "moved to another equilibrium" in text(moved)
 
 
 def test_an_arm_with_friction_sags_less_and_shows_which_holes_slide() -> None:
@@ -223,14 +160,8 @@ def test_an_arm_with_friction_sags_less_and_shows_which_holes_slide() -> None:
     slides = np.flatnonzero(history.sliding[0])
     assert 0 < slides.size == len(sliding)
     assert len(sticking) + len(sliding) == len(history.holes)
-    name, _, site = history.holes[slides[0]].partition(" site ")
-    path = history.pose(0).cable_paths[arm.cables.names.index(name)]
-    np.testing.assert_allclose(sliding[0].mean(axis=0), path[int(site) - 1], atol=1e-9)
     assert f"{len(sticking)} holes stick" in text(shown)
     assert numbers(shown)["stiffness along x, y, z"] == along(history.stiffness(0))
-    # a held arm has no history: nothing slides
-    assert [len(each) for each in show(arm, setting(arm)).holes] == [len(history.holes), 0]
-    assert [len(each) for each in free.holes] == [0, 0]
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])

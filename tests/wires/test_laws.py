@@ -1,10 +1,8 @@
 """Strain, tension, energy and rigidity of a wire belong together, whatever the law is made from."""
 
 import math
-import pickle
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,16 +38,6 @@ LAWS: dict[str, cdsm.Elasticity] = {
 }
 METHODS = ("rigidity", "strain", "secant_rigidity", "rigidity_slope", "energy")
 F = np.array([[6.0, 12.0, 28.0, 34.0], [60.0, 150.0, 250.0, 290.0]])
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_shape_is_kept_and_scalars_give_what_arrays_give(name: str) -> None:
-    for method in METHODS:
-        ask = getattr(LAWS[name], method)
-        assert ask(F).shape == F.shape
-        assert ask(F[:0]).shape == (0, 4)
-        assert ask(7).shape == ()
-        np.testing.assert_allclose(ask(float(F[1, 2])), ask(F)[1, 2], rtol=1e-13)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -107,67 +95,17 @@ def test_strain_out_of_reach_is_refused_with_the_reach(name: str) -> None:
         assert e.value.indices == (1,)
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, "50", None, 1j, True], ids=repr)
-def test_what_is_no_tension_is_invalid_input(bad: Any) -> None:
-    for method in METHODS:
-        with pytest.raises(cdsm.InvalidInput, match="tension"):
-            getattr(STRAND, method)(bad)
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_tension_outside_the_law_is_an_error_with_data(method: str) -> None:
     with pytest.raises(cdsm.ElasticityRangeError) as caught:
         getattr(STRAND, method)([[50.0, 2.1], [900.0, 31.0]])
     assert caught.value.tension == (2.1, 900.0)
     assert caught.value.indices == (1, 2)
-    for part in (
-        "2.1 N, 900 N",
-        "[2.2 N, 810 N]",
-        "minimum=",
-        "slack_below() (in ARM.toml: slack_below = true) continues one to 0 N",
-    ):
-        assert part in str(caught.value)
-    with pytest.raises(cdsm.ElasticityRangeError, match=r"\[0 N, inf N\)"):
-        getattr(STEEL, method)(-1.0)
+    assert "2.1 N, 900 N" in str(caught.value)
+    assert "[2.2 N, 810 N]" in str(caught.value)
+    with pytest.raises(cdsm.InvalidInput, match="tension"):
+        getattr(STRAND, method)(math.nan)
     getattr(STRAND, method)([2.2, 810.0])
-
-
-def test_long_list_of_offenders_is_cut_in_the_message_not_in_the_data() -> None:
-    with pytest.raises(cdsm.ElasticityRangeError, match="and 996 more") as caught:
-        STRAND.rigidity(np.full(1000, 900.0))
-    assert len(caught.value.tension) == 1000
-    assert len(str(caught.value)) < 400
-
-
-# --- equality, files ------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_equal_laws_are_equal_in_memory_and_in_files(name: str, tmp_path: Path) -> None:
-    law = LAWS[name]
-    again = pickle.loads(pickle.dumps(law))
-    assert again == law
-    assert hash(again) == hash(law)
-    assert repr(again) == repr(law)
-    np.testing.assert_array_equal(again.energy(F), law.energy(F))
-    if name == "function":
-        assert law == cdsm.Elasticity.from_rigidity(ramp, 0.0, 1000.0)
-        with pytest.raises(cdsm.InvalidInput, match="Tabulate its strain"):
-            law.write(tmp_path / "wire.toml")
-        return
-    assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
-    names = {"StrandElasticity": cdsm.StrandElasticity, "LinearElasticity": cdsm.LinearElasticity}
-    assert eval(repr(law), names | {"TabulatedElasticity": cdsm.TabulatedElasticity}) == law
-
-
-def test_laws_of_other_values_differ_and_cannot_be_changed() -> None:
-    assert len({*LAWS.values(), cdsm.LinearElasticity(226_195)}) == len(LAWS)
-    assert repr(cdsm.LinearElasticity(5.0)) == "LinearElasticity(rigidity=5.0)"
-    with pytest.raises(AttributeError, match="high"):
-        STRAND.high = 900.0  # type: ignore[misc]
-
-
-# --- constructors ---------------------------------------------------------------------------
 
 
 def test_linear_law_is_exact() -> None:
@@ -177,9 +115,6 @@ def test_linear_law_is_exact() -> None:
         np.testing.assert_array_equal(law.rigidity(tension), EA)
         np.testing.assert_array_equal(law.strain(tension), tension / EA)
         np.testing.assert_allclose(law.energy(tension), tension**2 / (2.0 * EA), rtol=1e-15)
-        assert law.scaled(2.0) == cdsm.LinearElasticity(2.0 * EA if EA < 1e12 else EA).scaled(
-            1.0 if EA < 1e12 else 2.0
-        )
     wire = cdsm.LinearElasticity.of_wire(200e9, 1.2e-3)
     np.testing.assert_allclose(wire.rigidity(5.0), 200e9 * math.pi * 1.2e-3**2 / 4.0, rtol=1e-15)
 
@@ -191,8 +126,8 @@ def test_rigidity_in_a_wrong_unit_is_doubted_once() -> None:
         assert len(caught) == 1
 
 
-@pytest.mark.parametrize("join", [31.0])
-def test_corner_of_eq19_is_bridged_and_nothing_else_changes(join: float) -> None:
+def test_corner_of_eq19_is_bridged_and_nothing_else_changes() -> None:
+    join = 31.0
     away = np.concatenate([np.linspace(2.2, join - 1.4, 500), np.linspace(join + 1.4, 810.0, 500)])
     np.testing.assert_allclose(STRAND.rigidity(away), STRAND.polynomial(away), rtol=1e-8)
     near = np.linspace(join - 1.4, join + 1.4, 400)
@@ -223,70 +158,6 @@ def own(rigidity: Callable[[Array], Any]) -> cdsm.Elasticity:
     return cdsm.Elasticity.from_rigidity(rigidity, 0.0, 500.0)
 
 
-BAD: dict[str, tuple[Callable[[], object], str]] = {
-    **{
-        f"rigidity {value!r:.20}": (lambda value=value: cdsm.LinearElasticity(value), "rigidity")  # type: ignore[misc]
-        for value in (0, -1.0, math.nan, math.inf, "5", None, [5.0], 1j, True, 1e13, 5e-324)
-    },
-    **{
-        f"diameter {value!r}": (
-            lambda value=value: cdsm.LinearElasticity.of_wire(200e9, value),  # type: ignore[misc]
-            "diameter",
-        )
-        for value in (0.0, -1.0, math.nan, math.inf, "5", None, [5.0])
-    },
-    "young": (lambda: cdsm.LinearElasticity.of_wire(-1.0, 1e-3), "young_modulus"),
-    "no range": (lambda: cdsm.StrandElasticity((), (), 0.0, 1.0), "coefficients"),
-    "empty range": (lambda: cdsm.StrandElasticity(((),), (), 0.0, 1.0), "coefficients"),
-    "nan": (lambda: cdsm.StrandElasticity(((math.nan,),), (), 0.0, 1.0), "coefficients"),
-    "number": (lambda: cdsm.StrandElasticity(3, (), 0.0, 1.0), "coefficients"),  # type: ignore[arg-type]
-    "flat": (lambda: cdsm.StrandElasticity((1.0, 2.0), (), 0.0, 1.0), "coefficients"),  # type: ignore[arg-type]
-    "joins": (lambda: cdsm.StrandElasticity(((1.0,),), (0.5,), 0.0, 1.0), "joins"),
-    "join outside": (lambda: cdsm.StrandElasticity(((1.0,), (1.0,)), (2.0,), 0.0, 1.0), "rise"),
-    "ranges apart": (
-        lambda: cdsm.StrandElasticity(((10.0,), (20.0,)), (5.0,), 0.0, 9.0),
-        "do not meet at 5 N: 10 N below, 20 N above",
-    ),
-    "not positive": (
-        lambda: cdsm.StrandElasticity(((10.0, -1.0), (-20.0, 1.0)), (15.0,), 2.2, 100.0),
-        "Narrow the domain",
-    ),
-    "empty domain": (lambda: cdsm.StrandElasticity(((1.0,),), (), 1.0, 1.0), "rise"),
-    "negative low": (lambda: cdsm.StrandElasticity(((1.0,),), (), -1.0, 1.0), "0 <= low"),
-    "high inf": (lambda: cdsm.StrandElasticity(((1.0,),), (), 0.0, math.inf), "high"),
-    "function nan": (lambda: own(lambda F: F * math.nan), "is nan N at"),
-    "function negative": (lambda: own(lambda F: 1e3 - 10.0 * F), "Narrow the domain"),
-    "function of three": (lambda: own(lambda _: np.ones(3)), "fails at .*array"),
-    "function of one": (lambda: own(lambda F: 1.0 if F < 3.0 else 2.0), "fails at .*array"),
-    "function of text": (lambda: own(lambda _: "stiff"), "fails at"),
-    "function jumps": (lambda: own(lambda F: np.where(F < 50.0, 1e4, 1.1e4)), "jumps"),
-    "function's ends": (lambda: cdsm.Elasticity.from_rigidity(ramp, 5.0, 5.0), "low < high"),
-    **{
-        f"table {n}": (lambda a=a, b=b: cdsm.TabulatedElasticity(a, b), "tensions|strains")  # type: ignore[misc]
-        for n, (a, b) in enumerate(
-            [
-                ((1.0,), (0.0,)),
-                ((1.0, 1.0), (0.0, 1.0)),
-                ((1.0, 2.0), (1.0, 0.0)),
-                ((1.0, 2.0), (0.0, 1.0, 2.0)),
-                ((-1.0, 2.0), (0.0, 1.0)),
-                ((1.0, math.nan), (0.0, 1.0)),
-                ((0.0, 5e-324, 100.0), (0.0, 0.002, 0.005)),  # a slope beyond float64
-            ]
-        )
-    },
-    "factor": (lambda: STRAND.scaled(0.0), "factor"),
-    "factor text": (lambda: STEEL.scaled("x"), "factor"),  # type: ignore[arg-type]
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_constructor_input_names_the_argument(case: str) -> None:
-    make, said = BAD[case]
-    with pytest.raises(cdsm.InvalidInput, match=said):
-        make()
-
-
 def test_scaled_law_is_as_many_times_as_rigid_and_stretches_as_many_times_less() -> None:
     for law in LAWS.values():
         stiffer = law.scaled(1.25)
@@ -296,7 +167,47 @@ def test_scaled_law_is_as_many_times_as_rigid_and_stretches_as_many_times_less()
         assert (stiffer.low, stiffer.high, stiffer.rest) == (law.low, law.high, law.rest)
 
 
-# --- the curve between the points of a table ------------------------------------------------
+def strand(*coefficients: tuple[float, ...], joins: Any = (), low: float = 0.0) -> object:
+    return cdsm.StrandElasticity(coefficients, joins, low, 100.0)
+
+
+BAD: tuple[tuple[Callable[[], object], str], ...] = (
+    *[(lambda EA=EA: cdsm.LinearElasticity(EA), "rigidity") for EA in (0, -1.0, math.nan, "5")],
+    (lambda: cdsm.LinearElasticity.of_wire(200e9, 0.0), "diameter"),
+    (lambda: cdsm.LinearElasticity.of_wire(-1.0, 1e-3), "young_modulus"),
+    (strand, "coefficients"),
+    (lambda: strand(()), "coefficients"),
+    (lambda: strand((math.nan,)), "coefficients"),
+    (lambda: strand((1.0,), joins=(0.5,)), "joins"),
+    (lambda: strand((1.0,), (1.0,), joins=(200.0,)), "rise"),
+    (lambda: strand((10.0,), (20.0,), joins=(5.0,)), "do not meet at 5 N: 10 N below, 20 N ab"),
+    (lambda: strand((-20.0, 1.0), low=2.2), "Narrow the domain"),
+    (lambda: strand((1.0,), low=100.0), "rise"),
+    (lambda: strand((1.0,), low=-1.0), "0 <= low"),
+    (lambda: own(lambda F: F * math.nan), "is nan N at"),
+    (lambda: own(lambda F: 1e3 - 10.0 * F), "Narrow the domain"),
+    (lambda: own(lambda _: np.ones(3)), "fails at .*array"),
+    (lambda: own(lambda _: "stiff"), "fails at"),
+    (lambda: own(lambda F: np.where(F < 50.0, 1e4, 1.1e4)), "jumps"),
+    *[
+        (lambda F=F, e=e: cdsm.TabulatedElasticity(F, e), "tensions|strains")
+        for F, e in (
+            ((1.0,), (0.0,)),
+            ((1.0, 1.0), (0.0, 1.0)),
+            ((1.0, 2.0), (1.0, 0.0)),
+            ((1.0, 2.0), (0.0, 1.0, 2.0)),
+            ((0.0, 5e-324, 100.0), (0.0, 0.002, 0.005)),  # a slope beyond float64
+        )
+    ],
+    (lambda: STRAND.scaled(0.0), "factor"),
+)
+
+
+@pytest.mark.parametrize(("make", "said"), BAD)
+def test_bad_constructor_input_names_the_argument(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        make()
+
 
 EXACT: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
     "Eq. 19": (STRAND.strain, STRAND.rigidity),
@@ -333,20 +244,3 @@ def test_curve_meets_its_points_and_rises(law: cdsm.TabulatedElasticity) -> None
         assert (np.diff(law.strain(tension)) >= 0.0).all()
     above = np.nextafter(points[1:-1], np.inf)
     np.testing.assert_allclose(law.rigidity(above), law.rigidity(points[1:-1]), rtol=1e-6)
-
-
-def test_two_points_are_a_straight_line() -> None:
-    law, tension = cdsm.TabulatedElasticity((10.0, 60.0), (0.1, 0.2)), np.linspace(10.0, 60.0, 7)
-    np.testing.assert_allclose(law.rigidity(tension), 500.0, rtol=1e-13)
-    np.testing.assert_allclose(law.energy(tension), (tension**2 - 100.0) / 1000.0, atol=1e-12)
-
-
-def test_own_law_works_in_single_postures_and_batches() -> None:
-    law = cdsm.Elasticity.from_rigidity(lambda F: 1e3 + F, 0.0, 1e3)
-    arm = cdsm.presets.virtual_prototype(elasticity=law)
-    tension = np.full(len(arm.cables), 50.0)
-    K = cdsm.stiffness(arm.at(np.zeros(arm.nv)), tension)
-    l0 = K.posture.cable_lengths / (1.0 + np.log(1.05))  # ε = ∫ dF/(1 kN + F)
-    np.testing.assert_allclose(K.cable_stiffness, 1050.0 / l0, rtol=1e-9)
-    batch = cdsm.evaluate(arm, np.zeros((2, arm.nv)), tension=tension, outputs=("joint",))
-    np.testing.assert_allclose(batch["joint"][1], K.joint, rtol=1e-10, atol=1e-12)

@@ -50,9 +50,6 @@ def strand_test(noise: float, seed: int) -> tuple[Array, Array]:
     return shaken, test.force + noise * random.normal(size=test.force.size)
 
 
-# --- recovery -------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.long)])
 def test_laws_come_back_and_bands_hold_them(count: int) -> None:
     """Five wires, 60 to 2000 points, 0.1 to 1 N, 1 to 10 µm, 40 tensions from 10 to 780 N."""
@@ -73,19 +70,9 @@ def test_laws_come_back_and_bands_hold_them(count: int) -> None:
     assert 0.91 < np.mean(held) < (0.98 if count > 100 else 1.0)
 
 
-def test_example_data_are_eq_19_integrated() -> None:
-    test = cdsm.read_tensile_csv(STRAND_TEST)
-    assert (test.gauge_length, test.force.size) == (GAUGE, 400)
-    assert (test.force[0], test.force[-1]) == (2.3, 810.0)
-    apart = abs(test.displacement - GAUGE * (STRAND.strain(test.force) - STRAND.strain(2.3)))
-    assert apart.max() < 1e-7  # between the two polynomials, whose corner the law bridges
-    assert np.sort(apart)[-3] < 2e-12  # as printed: 1e-9 mm
-
-
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("noise", "spread"), [(0.0, 0.06), (0.5, 0.15), (2.0, 0.3)])
-def test_stages_of_eq_19_against_the_paper(noise: float, spread: float, seed: int) -> None:
-    fit = cdsm.fit_tensile_test(*strand_test(noise, seed), GAUGE)
+def test_stages_of_eq_19_against_the_paper(noise: float, spread: float) -> None:
+    fit = cdsm.fit_tensile_test(*strand_test(noise, 0), GAUGE)
     first, second = fit.stages
     assert (first.name, second.name) == ("pre-tensioning", "elastic")
     assert first.high == second.low == pytest.approx(120.0, rel=spread)  # the paper's
@@ -95,10 +82,14 @@ def test_stages_of_eq_19_against_the_paper(noise: float, spread: float, seed: in
     error = fit.elasticity.rigidity(F) / STRAND.rigidity(F) - 1.0
     assert np.sqrt(np.mean(error**2)) < 0.03 + 0.02 * noise
     assert fit.rms == pytest.approx(noise, rel=0.15, abs=0.05)
+    law = fit.elasticity
+    assert (law.rigidity(np.linspace(law.low, law.high, 20_001)) > 0.0).all()
+    again = cdsm.fit_tensile_test(*strand_test(noise, 0), GAUGE)
+    np.testing.assert_array_equal(again.band.low, fit.band.low)
 
 
-@pytest.mark.parametrize("points", [12, 200, 2000])
-@pytest.mark.parametrize("noise", [0.0, 0.1, 1.0, 4.0])
+@pytest.mark.parametrize("points", [12, 200])
+@pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_linear_wire_is_recovered(points: int, noise: float) -> None:
     fit = cdsm.fit_tensile_test(*linear_test(points, noise), GAUGE)
     assert [stage.name for stage in fit.stages] == ["elastic"]
@@ -106,23 +97,7 @@ def test_linear_wire_is_recovered(points: int, noise: float) -> None:
     assert any("fewer than 41" in note for note in fit.notes) is (points < 41)
 
 
-@pytest.mark.parametrize("points", [60, 1000])
-@pytest.mark.parametrize("noise", [0.0, 0.5, 2.0])
-def test_toe_and_linear_are_recovered_away_from_the_bend(points: int, noise: float) -> None:
-    bend = 60.0 / 8e3
-    strain = np.linspace(0.0, bend + 740.0 / EA, points)
-    force = np.where(strain < bend, 8e3 * strain, 60.0 + EA * (strain - bend))
-    force += noise * np.random.default_rng(points).normal(size=points)
-    fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE)
-    assert fit.elasticity.rigidity(np.linspace(150.0, 750.0, 50)) == pytest.approx(EA, rel=0.1)
-    lower = fit.elasticity.rigidity(np.linspace(20.0, 40.0, 20))
-    assert np.mean(lower) == pytest.approx(8e3, rel=0.2)
-    assert fit.stages[0].name == "pre-tensioning"
-    assert 50.0 < fit.stages[0].high < 110.0
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.5, 2.0])
-@pytest.mark.parametrize("points", [100, 1000])
+@pytest.mark.parametrize(("points", "noise"), [(100, 0.0), (1000, 2.0)])
 def test_yield_ends_the_law(points: int, noise: float) -> None:
     strain = np.linspace(0.0, 1.6 * 600.0 / EA, points)
     force = np.where(strain < 600.0 / EA, EA * strain, 600.0 + 0.1 * (EA * strain - 600.0))
@@ -133,24 +108,6 @@ def test_yield_ends_the_law(points: int, noise: float) -> None:
     assert any("plastic" in note for note in fit.notes)
     inner = np.linspace(20.0, 500.0, 50)
     assert fit.elasticity.rigidity(inner) == pytest.approx(EA, rel=0.05)
-
-
-def test_the_law_is_a_table_with_positive_rigidity(tmp_path: Path) -> None:
-    law = cdsm.fit_tensile_test(*strand_test(2.0, 0), GAUGE).elasticity
-    assert isinstance(law, cdsm.TabulatedElasticity)
-    assert cdsm.Elasticity.read(law.write(tmp_path / "wire.toml")) == law
-    assert (law.rigidity(np.linspace(law.low, law.high, 20_001)) > 0.0).all()
-
-
-def test_the_law_does_not_depend_on_how_long_the_wire_was() -> None:
-    displacement, force = strand_test(0.5, 3)
-    one = cdsm.fit_tensile_test(displacement, force, GAUGE).elasticity
-    other = cdsm.fit_tensile_test(3.0 * displacement, force, 3.0 * GAUGE).elasticity
-    F = np.linspace(10.0, 800.0, 50)
-    np.testing.assert_allclose(other.rigidity(F), one.rigidity(F), rtol=1e-4)
-
-
-# --- what machines record -------------------------------------------------------------------
 
 
 def test_cycles_that_bed_the_wire_in_are_left_out() -> None:
@@ -164,20 +121,6 @@ def test_cycles_that_bed_the_wire_in_are_left_out() -> None:
     part = cdsm.fit_tensile_test(test.displacement, test.force, GAUGE, between=(60.0, 300.0))
     assert 60.0 <= part.elasticity.low < 65.0 < 295.0 < part.elasticity.high <= 301.0
     assert part.elasticity.rigidity(part.tension) == pytest.approx(20e3, rel=0.05)
-
-
-def test_between_chooses_another_branch() -> None:
-    """A first pull to 200 N with 12 kN, then one to 600 N, and another to 250 N, with 48 kN."""
-    force = np.concatenate([np.linspace(a, b, 100) for a, b in ((0, 200), (200, 20), (20, 600))])
-    strain = np.where(np.arange(300) < 100, force / 12e3, 200 / 12e3 + (force - 200) / EA)
-    back = np.concatenate([np.linspace(600, 30, 100), np.linspace(30, 250, 100)])
-    strain = np.append(strain, strain[-1] + (back - 600) / 24e3)
-    force = np.append(force, back) + 0.1 * np.random.default_rng(0).normal(size=500)
-    for between, wanted in (((-np.inf, np.inf), EA), ((30.0, 600.0), EA), ((40.0, 250.0), 24e3)):
-        fit = cdsm.fit_tensile_test(GAUGE * strain, force, GAUGE, between=between)
-        assert fit.elasticity.rigidity([60.0, 200.0]) == pytest.approx(wanted, rel=0.02)
-    first = cdsm.fit_tensile_test(GAUGE * strain[:150], force[:150], GAUGE)
-    assert first.elasticity.rigidity([60.0, 150.0]) == pytest.approx(12e3, rel=0.02)
 
 
 def test_slack_and_lone_points_are_left_out() -> None:
@@ -202,25 +145,6 @@ def test_rupture_is_left_out_and_repeated_points_are_averaged() -> None:
     assert fit.elasticity.rigidity([50.0, 700.0]) == pytest.approx(EA, rel=2e-3)
 
 
-def test_drift_is_told() -> None:
-    displacement, force = linear_test(300, 0.2)
-    fit = cdsm.fit_tensile_test(displacement, force + 3.0 * np.sin(displacement * 2e4), GAUGE)
-    assert any("neighbouring residuals go together" in note for note in fit.notes)
-
-
-# --- band, report, figure -------------------------------------------------------------------
-
-
-def test_band_contains_its_own_fit_with_18_points_written_by_hand() -> None:
-    strain = [0, 2, 4, 6, 8, 10, 13, 16, 20, 25, 30, 35, 40, 50, 60, 70, 80, 90]  # 1e-4
-    first = [0, 2.1, 5.2, 9.5, 15, 21.8, 33.5, 47, 66.5]
-    force = [*first, 93, 121, 150, 179.5, 240, 301, 363, 425, 488]
-    fit = cdsm.fit_tensile_test(1e-4 * np.array(strain), force, 1.0)
-    assert (fit.band.low <= fit.rigidity).all()
-    assert (fit.rigidity <= fit.band.high).all()
-    assert any(note.startswith("18 points, fewer than 41") for note in fit.notes)
-
-
 def test_the_uncertainty_is_that_of_the_band_where_the_cables_work() -> None:
     fit = cdsm.fit_tensile_test(*strand_test(0.5, 0), GAUGE)
     F = np.linspace(300.0, 330.0, 1000)
@@ -232,35 +156,6 @@ def test_the_uncertainty_is_that_of_the_band_where_the_cables_work() -> None:
         fit.relative_uncertainty(50.0, 900.0)
 
 
-def test_fit_reports_itself_and_is_reproducible() -> None:
-    displacement, force = strand_test(0.5, 0)
-    fit = cdsm.fit_tensile_test(displacement, force, GAUGE)
-    again = cdsm.fit_tensile_test(displacement, force, GAUGE)
-    np.testing.assert_array_equal(fit.band.low, again.band.low)
-    assert fit.elasticity == again.elasticity
-    for text in ("400 points", "500 mm", "pre-tensioning", "elastic", "rms", "%"):
-        assert text in str(fit)
-    told = fit.to_dict()
-    np.testing.assert_array_equal(told["rigidity_N"], fit.rigidity)
-    assert {"rms_N", "start_m", "tension_N", "rigidity_low_N", "rigidity_high_N"} <= set(told)
-    assert not fit.band.low.flags.writeable
-    assert not np.shares_memory(fit.test.force, force)
-
-
-def test_figure_shows_data_fit_band_and_stages_over_strain_and_in_kn() -> None:
-    displacement, force = strand_test(0.5, 0)
-    left, right = cdsm.fit_tensile_test(displacement, force, GAUGE).plot().axes
-    assert (left.get_xlabel(), left.get_ylabel()) == ("strain [%]", "force [N]")
-    assert (right.get_xlabel(), right.get_ylabel()) == ("tension [N]", "tangent rigidity EA [kN]")
-    shown, fitted = (np.asarray(line.get_xydata()).T for line in left.get_lines())
-    np.testing.assert_array_equal(shown, (100.0 * displacement / GAUGE, force))
-    off = np.interp(shown[0], *fitted) - force  # the fitted line runs through the points
-    assert abs(off[shown[0] > 2.4]).max() < 3.0
-    assert {text.get_text() for text in right.texts} == {"pre-tensioning", "elastic"}
-
-
-# --- bad input ------------------------------------------------------------------------------
-
 RAMP = np.linspace(0.0, 0.01, 100)
 PULL = np.linspace(0.0, 500.0, 100)
 NOISE = np.random.default_rng(0)
@@ -271,20 +166,14 @@ NOISE = np.random.default_rng(0)
     [
         ([0.0, 1e-3], [0.0, 100.0], {}, "2 points given; at least 8"),
         (RAMP, PULL[:-1], {}, "a point needs both"),
-        (RAMP, np.where(PULL > 300.0, np.nan, PULL), {}, "force: entry"),
         (RAMP, PULL, {"gauge_length": -0.5}, "gauge_length: -0.5 m given"),
         (RAMP, PULL, {"between": (300.0, 200.0)}, "between: "),
-        (RAMP, PULL, {"between": (300.0, 310.0)}, "2 points of loading"),
         (RAMP, 100.0 + 50.0 * NOISE.normal(size=100), {}, "does not rise"),
-        (RAMP, PULL[::-1], {}, "does not rise"),
         (NOISE.permutation(RAMP), PULL, {}, "order recorded"),
         (RAMP, -PULL, {}, "compression"),
-        (RAMP, PULL - 100.0, {}, "compression"),
         (1e3 * RAMP, PULL, {}, "Check the units"),
         (RAMP, PULL / 1e6, {}, "Check the units"),
-        (RAMP / 1e9, PULL, {}, "Check the units"),
         (RAMP, PULL + 100.0 * (RAMP > 0.006), {}, "discontinuous near"),
-        (RAMP[::5], PULL[::5] + 1e3 * (RAMP[::5] > 0.006), {}, "discontinuous near"),
         (0.0 * RAMP, PULL, {}, "displacement and force change"),
         (RAMP[::5], 500.0 * (RAMP[::5] / RAMP[-1]) ** 0.1, {}, "Sample more finely"),  # plastic
     ],

@@ -11,10 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import cdsm
-from cdsm.cli import app
 
 DATA = Path(__file__).parents[1] / "data"
 INSTRON, ZWICK = DATA / "instron_strand.csv", DATA / "zwick_seil.csv"
@@ -26,10 +24,6 @@ def written(tmp_path: Path, text: str, encoding: str = "utf-8") -> Path:
     path = tmp_path / "test.csv"
     path.write_bytes(text.encode(encoding))
     return path
-
-
-def rows(mark: str = ",") -> str:
-    return "".join(f"{k}{mark}{50 * k}\n" for k in range(9))
 
 
 @pytest.mark.parametrize(
@@ -48,10 +42,6 @@ def test_machine_file_gives_the_law_it_was_made_with(
     )
 
 
-def test_source_names_what_was_read() -> None:
-    assert cdsm.read_tensile_csv(INSTRON).source == "'Extension' and 'Load' of line 8"
-
-
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "cp1252", "utf-16"])
 def test_encodings(encoding: str, tmp_path: Path) -> None:
     path = written(tmp_path, ZWICK.read_text(encoding="cp1252"), encoding)
@@ -62,7 +52,6 @@ def test_encodings(encoding: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("head", "given"),
     [
-        ("displacement [mm],force [N]\n0,0\n1.5,100\n", HALF),
         ("Gauge length;500,0;mm\n\nStroke (mm);Load (kN)\n0;0\n1,5;0,1\n", {}),
         ("# gauge-length = 50,0 cm\nExtension (mm)\tLoad (daN)\n0\t0\n1,5\t10,0\n", {}),
         ("Gage Length (in): 19.68504\nPosition in mm,force_cN\n0,0\n1.5,1e4\n", {}),
@@ -74,11 +63,6 @@ def test_encodings(encoding: str, tmp_path: Path) -> None:
         ("Tensile strain (Extension) [%],Extension [mm],Load [N]\n0,0,0\n9,1.5,100\n", HALF),
         ("Displacement (Strain 1)\tLoad\n(mm)\t(N)\n0\t0\n1.5\t100\n", HALF),
         ("Extension at Maximum Load [mm];Extension [mm];Load [N]\n9;0;0\n9;1.5;100\n", HALF),
-        ("Load rate [N/s],Load [N],Extension [mm]\n9,0,0\n9,100,1.5\n", HALF),
-        (
-            "made,by\n1,2\ns,F\n0,0\n1.5,0.1\n",
-            {"columns": ("s", "F"), "units": ("mm", "kN"), **HALF},
-        ),
         (
             "Extension [in];Extension [mm];Load [N]\n9;0;0\n9;1,5;100\n",
             {"columns": ("extension [mm]", "Load"), **HALF},
@@ -98,26 +82,6 @@ def test_dialects(head: str, given: dict[str, Any], tmp_path: Path) -> None:
     assert test.gauge_length == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("titles", [0, 12, 48])
-def test_the_header_is_within_the_first_50_lines(titles: int, tmp_path: Path) -> None:
-    results = '"Extension [mm]","Load [N]"\n"4.5","812.3"\n' if titles == 12 else ""
-    text = "A title, of words\n" * titles + results + "Extension,Load\nmm,N\n" + rows()
-    test = cdsm.read_tensile_csv(written(tmp_path, text), gauge_length=0.4)
-    np.testing.assert_allclose(test.force, 50.0 * np.arange(9))
-    path = written(tmp_path, "A title, of words\n" * (52 - titles) + text)
-    with pytest.raises(cdsm.FileError, match="first 50 lines"):
-        cdsm.read_tensile_csv(path, gauge_length=0.4)
-
-
-def test_a_strain_needs_no_gauge_length(tmp_path: Path) -> None:
-    path = written(tmp_path, "strain [%],force [N]\n" + rows())
-    test = cdsm.read_tensile_csv(path)
-    np.testing.assert_allclose(test.displacement / test.gauge_length, 1e-2 * np.arange(9))
-    assert test.source.endswith("no gauge length: displacements are those of 1 m of wire")
-    law = cdsm.fit_tensile_test(test.displacement, test.force, test.gauge_length).elasticity
-    np.testing.assert_allclose(law.rigidity([50.0, 350.0]), 5000.0, rtol=1e-6)
-
-
 def test_of_two_gauges_none_is_chosen_silently() -> None:
     path = DATA / "tensile_two_gauges.csv"
     with pytest.raises(cdsm.FileError, match=r"Crosshead \[mm\] and Extensometer \[mm\] may both"):
@@ -133,25 +97,19 @@ def test_of_two_gauges_none_is_chosen_silently() -> None:
     ("text", "given", "said"),
     [
         ("", {}, "no header that names displacement and force in its first 50 lines"),
-        ("0,0\n1,2\n", {}, "no header"),
         ("weight [N],force [N]\n0,0\n", {}, "there are weight [N], force [N]. Choose two by"),
         ("s,F\n0,0\n", {"columns": ("Weg", "F")}, "names Weg and F"),
         ("force [N],load [N],stroke [mm]\n0,0,0\n", {}, "force [N] and load [N] may both"),
         ("displacement,force [N]\n0,0\n", {}, "the displacement 'displacement' in no unit"),
         ("displacement [mm],force\n0,0\n", {}, "give one of N, cN, mN, daN, kN, MN, lbf, kgf"),
-        ("displacement [inch],force [N]\n0,0\n", {}, "in inch"),
         ("stroke [mm],force [N]\n0,0\n", {"units": ("mm", "kN")}, "in N, and units= says kN"),
         ("displacement [mm],force [N]\n0,0\n1,nan\n2,2\n", {}, "line 3: '1,nan' needs a number"),
-        ("displacement [mm],force [N]\n0,0\n1,\n2,2\n", {}, "line 3"),
         ("displacement [mm],force [N]\n0,1,0,2\n0,2,0,3\n", {}, "line 2"),
         ("stroke [mm];force [N]\n0;998\n1;1,002.32\n2;1100\n", {}, "line 3"),
         ("stroke [mm];force [N]\n0,1;998\n1;1.004\n", {}, "commas and with points; decimal= tells"),
-        ("stroke [mm],force [N]\n0,0\n", {"columns": (1, 2)}, "columns: (1, 2) given"),
         ("displacement [mm],force [N]\n0,0\n1,2\n", {}, "gauge_length="),
         ("# gauge_length = 500\ndisplacement [mm],force [N]\n0,0\n", {}, "gauge_length ="),
         ("displacement [mm],force [N]\n" + "1" * 200_000 + ",2\n", {}, "line 2"),
-        ("stroke [mm],force [N]\n0,0\n", {"columns": ("stroke",)}, "columns: ('stroke',) given"),
-        ("stroke [mm],force [N]\n0,0\n", {"units": "mm"}, "units: 'mm' given; a list or tuple"),
         ("stroke [mm],force [N]\n0,0\n", {"decimal": "·"}, "decimal: '·' given"),
     ],
 )  # fmt: skip
@@ -160,24 +118,3 @@ def test_faulty_files_are_refused_with_a_remedy(
 ) -> None:
     with pytest.raises(cdsm.CdsmError, match=re.escape(said)):
         cdsm.read_tensile_csv(written(tmp_path, text), **given)
-
-
-def test_command_line_speaks_of_its_options(tmp_path: Path) -> None:
-    def said(*arguments: object) -> str:
-        result = CliRunner().invoke(app, ["fit", *map(str, arguments)])
-        assert result.exit_code != 0
-        return " ".join(result.stderr.split())
-
-    bare = written(tmp_path, "s;F\n" + rows(";"))
-    assert "by columns=" in said(bare)
-    assert "units= says nothing" in said(bare, "--columns", "s,F")
-    assert "gauge_length=" in said(bare, "--columns", "s,F", "--units", "mm,N")
-    assert "--columns" in said(bare, "--columns", "s")
-    assert "--between" in said(INSTRON, "--between", "5,x")
-    assert "between" in said(INSTRON, "--between", "5,1")
-    assert "Check the units" in said(INSTRON, "--gauge-length", 0.3)
-    given = ["--columns", "s,F", "--units", "µm,cN", "--gauge-length", "500"]
-    found = CliRunner().invoke(app, ["fit", str(bare), *given, "--between", "0.1,1e6"])
-    assert found.exit_code == 0, found.output
-    assert f"{bare}: 's' and 'F' of line 1" in found.output
-    assert "points outside 0.1 to 1e+06 N left out: 1" in found.output
