@@ -205,7 +205,7 @@ def test_what_motors_pull_gives_the_posture_and_its_numbers() -> None:
     assert said["stiffness along x, y, z"] == along(rest.stiffness)
     assert said["tip"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.pose.tip[:3, 3])
     assert "slack" in tensions_text(shown)
-    names: dict[str, Any] = {"arm": rod(), "cdsm": cdsm}
+    names: dict[str, object] = {"arm": rod(), "cdsm": cdsm}
     exec(python_text(rod(), shown.setting).split("```")[1], names)
     np.testing.assert_allclose(names["rest"].pose.q, rest.pose.q, atol=1e-12)
 
