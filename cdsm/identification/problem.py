@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from cdsm.errors import CdsmError, InvalidInput
+from cdsm.errors import CdsmError, CdsmWarning, InvalidInput
 from cdsm.identification.measurement import Measurement, WeightLoop, name_of, tension_before
 from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
@@ -101,7 +102,9 @@ class Problem:
         parameters = dict(zip(self.names, self.values(x).tolist(), strict=True))
         where, numbers = "model_of: ", list[Array]()
         try:
-            arm = self.model_of(**parameters)
+            with warnings.catch_warnings():  # a trial value may look like one in another unit
+                warnings.simplefilter("ignore", CdsmWarning)
+                arm = self.model_of(**parameters)
             where = ""
             instance("model_of", arm, Manipulator)
             for i, each in enumerate(self.measurements):
