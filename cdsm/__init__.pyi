@@ -50,12 +50,10 @@ from cdsm.identification import read_loops as read_loops
 from cdsm.identification import read_tip_positions as read_tip_positions
 from cdsm.interchange.caspr import read_caspr as read_caspr
 from cdsm.interchange.mjcf import to_mjcf as to_mjcf
-from cdsm.interchange.mjcf import write_mjcf as write_mjcf
 from cdsm.kinematics import inverse_kinematics as inverse_kinematics
 from cdsm.kinematics import solve_joint_angles as solve_joint_angles
 from cdsm.manipulator import Manipulator as Manipulator
 from cdsm.measures.clearance import clearance as clearance
-from cdsm.measures.indices import has_wrench_closure as has_wrench_closure
 from cdsm.measures.indices import isotropy as isotropy
 from cdsm.measures.indices import tension_factor as tension_factor
 from cdsm.measures.payload import payload as payload
@@ -78,7 +76,6 @@ from cdsm.stiffness_matrix import Stiffness as Stiffness
 from cdsm.stiffness_matrix import stiffness as stiffness
 from cdsm.support.status import Status as Status
 from cdsm.sweeps.files import read_sweep as read_sweep
-from cdsm.sweeps.files import write_sweep as write_sweep
 from cdsm.sweeps.poses import GridPoses as GridPoses
 from cdsm.sweeps.poses import PathPoses as PathPoses
 from cdsm.sweeps.poses import RandomPoses as RandomPoses

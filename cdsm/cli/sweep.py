@@ -64,8 +64,10 @@ def sweep(
         outputs=names,
         store=store,
     )
+    from cdsm.sweeps.files import write_sweep
+
     head, numbers = header(robot, low)
-    written = [] if out is None else [str(cdsm.write_sweep(dataset, out))]
+    written = [] if out is None else [str(write_sweep(dataset, out))]
     status = dataset["status"].values
     counts = {word: int((status == value).sum()) for value, word in status_names(dataset).items()}
     listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)

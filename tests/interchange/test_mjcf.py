@@ -11,6 +11,7 @@ from lxml import etree
 from scipy.linalg import eigh
 
 import cdsm
+from cdsm.interchange.mjcf import write_mjcf
 from cdsm.interchange.mjcf_bodies import add_bodies, mass_matrix
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture, random_wrench, readme_geometry
@@ -326,7 +327,7 @@ def test_modes_decay_as_stated(mode: int, ratio: float | None) -> None:
 
 def test_bad_input_is_named(tmp_path: Path) -> None:
     pose, pull = finger()
-    path = cdsm.write_mjcf(pose.arm, tmp_path / "arm.xml", pose, pull)
+    path = write_mjcf(pose.arm, tmp_path / "arm.xml", pose, pull)
     assert path.read_text(encoding="utf-8") == cdsm.to_mjcf(pose.arm, pose, pull)
     for options, said in (
         ({"actuators": "lenght"}, "did you mean 'length'"),

@@ -15,6 +15,7 @@ from distributed import Client, LocalCluster
 
 import cdsm
 from cdsm.batch import Batch
+from cdsm.sweeps.files import write_sweep
 from tests.support.patience import HANGS
 from tests.support.sweeps import CASES, EVERYTHING, GRID, short_arm
 
@@ -138,9 +139,9 @@ def test_a_store_of_another_sweep_is_refused_with_the_difference(
 
 
 def test_netcdf_gives_the_same_sweep_back(tmp_path: Path, whole: xr.Dataset) -> None:
-    path = cdsm.write_sweep(whole, tmp_path / "s.nc")
+    path = write_sweep(whole, tmp_path / "s.nc")
     xr.testing.assert_identical(cdsm.read_sweep(path), whole)
-    path = cdsm.write_sweep(swept(store=tmp_path / "s.zarr"), path)
+    path = write_sweep(swept(store=tmp_path / "s.zarr"), path)
     assert same(cdsm.read_sweep(path), whole)
 
 
@@ -149,7 +150,7 @@ def test_csv_has_a_row_for_each_entry_and_a_column_for_each_component(
 ) -> None:
     import pandas
 
-    table = pandas.read_csv(cdsm.write_sweep(whole, tmp_path / "s.csv"))
+    table = pandas.read_csv(write_sweep(whole, tmp_path / "s.csv"))
     names = whole.status.attrs["flag_meanings"].split()
     assert table["status"].tolist() == [names[i] for i in whole.status.values.ravel()]
     for header, variable in (
@@ -172,7 +173,7 @@ def test_csv_has_a_row_for_each_entry_and_a_column_for_each_component(
 
 def test_what_is_no_sweep_is_named(tmp_path: Path, whole: xr.Dataset) -> None:
     with pytest.raises(cdsm.InvalidInput, match=r"ends neither in \.nc \(NetCDF\) nor in \.csv"):
-        cdsm.write_sweep(whole, tmp_path / "s.txt")
+        write_sweep(whole, tmp_path / "s.txt")
     xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
     with pytest.raises(cdsm.FileError, match=r"other\.nc: is not a sweep of cdsm"):
         cdsm.read_sweep(tmp_path / "other.nc")
