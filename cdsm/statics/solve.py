@@ -172,16 +172,20 @@ def _descend(
     for _ in range(_STEPS):
         if home is not None and abs(f.inside(here.x) - home).max() > FAR:
             break
-        lowest, mode = _softest(f, here)
+        values = np.linalg.eigvalsh(K := _symmetric(f, here))
+        # an eigenvalue that is rounding is 0
+        lowest = 0.0 if abs(values[0]) <= FLAT * abs(values).max() else float(values[0])
         saddle = here.off <= BALANCED
         if saddle and (lowest >= 0.0 or kicks == 2):
             return _polished(f, here), True
         if saddle:  # leave it to where f pushes; if it is where the last kick began, the other way
+            mode = np.linalg.eigh(K)[1][:, 0]
+            mode *= np.sign(mode[abs(mode).argmax()])
             side = -1.0 if here.value @ mode > _NOISE * f.k else 1.0
             step, kicks = side * (-1.0) ** kicks * _KICK * mode, kicks + 1
         else:
-            K = here.slope + max(shift, -1.5 * lowest) * identity
-            step = f.limited(here.x, -np.asarray(np.linalg.lstsq(K, here.value, rcond=None)[0]))
+            shifted = here.slope + max(shift, -1.5 * lowest) * identity
+            step = f.limited(here.x, -_solved(shifted, here.value))
             kicks *= bool(abs(step).max() < _KICK)
         there, gain = f.attempt(here.x + step), float(here.value @ step)
         if there and (saddle or 0.0 > 0.5 * gain > (here.value + there.value) @ step):
@@ -196,23 +200,25 @@ def _polished(f: Balance, here: Point) -> Point:
     for _ in range(4):
         there = None
         if here.off > 10.0 * _NOISE:
-            step = np.linalg.lstsq(here.slope, here.value, rcond=None)[0]
-            there = f.attempt(here.x - step)
+            there = f.attempt(here.x - _solved(here.slope, here.value))
         if there is None or there.off >= here.off:
             break
         here = there
     return here
 
 
-def _softest(f: Balance, point: Point) -> tuple[float, Array]:
-    """Return the smallest eigenvalue of K of the joints off their stops, and its motion (nv,).
-
-    An eigenvalue that is rounding is returned as 0.
-    """
+def _symmetric(f: Balance, point: Point) -> Array:
+    """Return the symmetric part of K of the joints off their stops; others have f.k."""
     K = np.where(point.out | point.out[:, None], 0.0, (point.slope + point.slope.T) / 2.0)
-    values, vectors = np.linalg.eigh(K + np.diag(f.k * point.out))
-    mode, rounding = vectors[:, 0], abs(values[0]) <= FLAT * abs(values).max()
-    return 0.0 if rounding else float(values[0]), mode * np.sign(mode[abs(mode).argmax()])
+    return np.asarray(K + np.diag(f.k * point.out))
+
+
+def _solved(K: Array, torque: Array) -> Array:
+    """Solve K x = torque, or come nearest to it with the least x where K is singular."""
+    try:
+        return np.asarray(np.linalg.solve(K, torque))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(K, torque, rcond=None)[0])
 
 
 def _flow(f: Balance, x: Array) -> Array:
