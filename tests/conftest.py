@@ -1,4 +1,4 @@
-"""What several test files share and is worth computing once; and which tests are quick."""
+"""What several test files share and is worth computing once."""
 
 import os
 import pickle
@@ -35,18 +35,6 @@ settings.load_profile("cdsm")
 # a shell that starts the tests in the background has Ctrl-C ignored, in what they start as well
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-
-NOT_QUICK = ("slow", "long", "speed", "notebooks", "browser")
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark ``quick`` every test that nothing else is said of; the paper is slow."""
-    for item in items:
-        if "results" in getattr(item, "fixturenames", ()):
-            item.add_marker("slow")
-        if not any(item.get_closest_marker(name) for name in NOT_QUICK):
-            item.add_marker("quick")
 
 
 @pytest.fixture(scope="session")

@@ -44,7 +44,6 @@ def test_snippets_print_what_the_page_shows(
         assert all(line in notebook for line in printed.splitlines())
 
 
-@pytest.mark.slow
 def test_its_commands_run_as_printed(tmp_path: Path) -> None:
     """All but those that make the environment; and the view, which does not end."""
     text = README.read_text(encoding="utf-8")

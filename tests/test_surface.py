@@ -104,7 +104,6 @@ json.dump(answer, sys.stdout)
 """
 
 
-@pytest.mark.slow
 def test_numbers_are_the_same_without_compilation() -> None:
     pose = random_posture(mixed_arm(), 3)
     stiff = cdsm.stiffness(pose, random_tension(pose.arm, 3), random_wrench(3))

@@ -302,7 +302,7 @@ friction = 0.2
 """
 
 
-@pytest.mark.slow  # a fit with friction and its profiles
+# takes seconds: a fit with friction and its profiles
 def test_identify(tmp_path: Path) -> None:
     """The loops are those of another arm than the one that is described."""
     arm, loops = tmp_path / "arm.toml", tmp_path / "loops.csv"
@@ -328,7 +328,6 @@ def test_identify(tmp_path: Path) -> None:
     assert "give bounds, spring=LOW:HIGH" in call(*asked, "--free", "spring").stderr
 
 
-@pytest.mark.slow
 def test_design(tmp_path: Path) -> None:
     (tmp_path / "arm.toml").write_bytes((EXAMPLES / "arm.toml").read_bytes())
     problem, out = tmp_path / "design.toml", tmp_path / "out"
@@ -347,7 +346,7 @@ def test_design(tmp_path: Path) -> None:
     assert max(found["front"]["deflection [m]"]) <= 0.001
 
 
-@pytest.mark.slow  # all figures of the paper, in a process of their own: some ten seconds
+# takes seconds: all figures of the paper, in a process of their own: some ten seconds
 def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:
     result = call("reproduce", "--out", tmp_path / "new")
     assert result.exit_code == 0, result.output

@@ -140,7 +140,7 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
     assert np.isfinite(run.tips).all()
 
 
-@pytest.mark.slow  # each step searches for tensions that are not there
+# takes seconds: each step searches for tensions that are not there
 def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() -> None:
     plan = small_path()
     run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, max_change_per_step=20.0)
@@ -175,7 +175,7 @@ def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
     np.testing.assert_allclose(path_again.angles, run.angles, rtol=1e-15)
 
 
-@pytest.mark.slow  # three loops of sixty steps
+# takes seconds: three loops of sixty steps
 def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() -> None:
     """10 % wrong EA, μ = 0.1, 0.5 N of noise, and 200 g hung on it half-way.
 

@@ -126,7 +126,6 @@ def test_covariance_is_the_inverse_of_the_normal_matrix() -> None:
     np.testing.assert_allclose(NOISY.correlation, NOISY.covariance / scale, rtol=1e-12)
 
 
-@pytest.mark.slow
 def test_a_tension_offset_is_found_through_tension_of() -> None:
     def tension_of(
         pose: cdsm.Posture, measurement: Measurement, *, offset: float, **rest: float

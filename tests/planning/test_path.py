@@ -50,7 +50,7 @@ def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
     assert "than 250 mm" in plan.infeasible[0].reason
 
 
-@pytest.mark.slow  # a search from many starts at every sample
+# takes seconds: a search from many starts at every sample
 @pytest.mark.parametrize("seed", [1, 5])
 def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
     """Strands, tables and straight wires; wrenches with a moment."""

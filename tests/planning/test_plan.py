@@ -100,7 +100,6 @@ def test_tensions_satisfy_the_conditions_of_first_order(name: str, part: float) 
     assert z[at_high].max(initial=0.0) < 1e-6 * np.linalg.norm(F)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("part", [0.1, 0.9])
 @pytest.mark.parametrize("name", [name for name in ARMS if name.startswith("hinged")])
 def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: float) -> None:

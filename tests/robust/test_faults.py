@@ -8,13 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
-
 import cdsm
 from tests.support.patience import HANGS
 from tests.support.sweeps import short_arm
-
-pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 

@@ -105,7 +105,6 @@ for name, inside in ROBOTS.items():
 """
 
 
-@pytest.mark.slow
 def test_robots_that_crash_pinocchio_are_refused() -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", _CRASH],

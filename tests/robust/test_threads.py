@@ -6,7 +6,6 @@ from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import cache
 
 import numpy as np
-import pytest
 
 import cdsm
 from tests.support.arms import mixed_arm, random_arm
@@ -40,7 +39,6 @@ def test_threads_that_do_different_things_with_two_arms_give_the_serial_bits() -
     assert_same_bits(arms, jobs)
 
 
-@pytest.mark.slow
 def test_processes_with_a_pickled_arm_give_the_same_bits() -> None:
     arm, seeds = mixed_arm(), range(6)
     pool: Executor

@@ -80,7 +80,6 @@ def single(
     return status, found
 
 
-@pytest.mark.slow
 def test_every_entry_is_what_the_single_functions_say(everything: xr.Dataset) -> None:
     seen: set[int] = set()
     springy = short_arm(spring=1500.0).with_friction(0.1)

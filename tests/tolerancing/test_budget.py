@@ -79,7 +79,6 @@ def _asked(of: str, seed: int) -> dict[str, Any]:
     }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("of", "angle", "least"),
     [("along", 0.5, 3), ("margin", 0.5, 3), ("tip", 0.5, 4), ("tension", 0.1, 2)],

@@ -59,7 +59,6 @@ def covered(count: int, seed: int, axis: str) -> int:
     return held
 
 
-@pytest.mark.slow
 def test_intervals_cover_the_truth() -> None:
     """Within what 200 arms of 95 % may give, once in 10⁴ runs less."""
     low, high = binom.interval(1.0 - 1e-4, 200, 0.95)

@@ -18,7 +18,6 @@ def table() -> list[numbers.Row]:
     return numbers.rows()
 
 
-@pytest.mark.slow
 def test_numbers_are_met_within_what_they_leave_open(table: list[numbers.Row]) -> None:
     known = [row for row in table if not math.isnan(row.uncertainty)]
     assert len(known) == 14
@@ -26,7 +25,6 @@ def test_numbers_are_met_within_what_they_leave_open(table: list[numbers.Row]) -
         assert abs(row.ours - row.theirs) <= row.uncertainty, row
 
 
-@pytest.mark.slow
 def test_the_papers_numbers_are_near_and_never_fitted_here(table: list[numbers.Row]) -> None:
     """Fig. 6 within 2 %; Figs. 4 and 7 in sign and size, but not at the stated 200 GPa."""
     paper = [row for row in table if math.isnan(row.uncertainty)]
@@ -36,7 +34,6 @@ def test_the_papers_numbers_are_near_and_never_fitted_here(table: list[numbers.R
     assert all(abs(row.ours - row.theirs) < 0.02 * row.theirs for row in increments)
 
 
-@pytest.mark.slow
 def test_the_page_shows_the_table(table: list[numbers.Row]) -> None:
     assert numbers.markdown(table) in PAGE.read_text(encoding="utf-8")
 
