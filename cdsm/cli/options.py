@@ -154,13 +154,17 @@ def joint_scales(arm: cdsm.Manipulator) -> Array:
 
 def coordinates(text: str, arm: cdsm.Manipulator) -> Array:
     """Return the joint coordinates of --angles (nv,) in SI."""
+    from cdsm.support.validation import number_array
+
     names, form = arm.joint_names, "an angle"
     if "=" in text:
         named = by_joint("--angles", text, arm, "JOINT=DEG,...")
         each = {name: numbers("--angles", value, (1,), form)[0] for name, value in named.items()}
-        return joint_scales(arm) * [each.get(name, 0.0) for name in names]
-    form = f"one angle, one for each of {', '.join(names)}, or some by name: {names[-1]}=10"
-    return joint_scales(arm) * numbers("--angles", text, (1, arm.nv), form)
+        given = [each.get(name, 0.0) for name in names]
+    else:
+        form = f"one angle, one for each of {', '.join(names)}, or some by name: {names[-1]}=10"
+        given = numbers("--angles", text, (1, arm.nv), form)
+    return joint_scales(arm) * number_array("--angles", given)
 
 
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:

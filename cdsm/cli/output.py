@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
@@ -72,7 +73,7 @@ def header(
     ``minimum`` is the bound that was given, one for each case; ``friction`` says what becomes of
     the arm's friction.
     """
-    from cdsm.support.format import coordinates, place
+    from cdsm.support.format import coordinates, place, without_rounding
     from cdsm.wires.catalogue import wires_text
 
     arm = of.arm if isinstance(of, cdsm.Posture) else of
@@ -86,7 +87,7 @@ def header(
     words += [] if arm.original_length == "unstrained" else ["stretched lengths"]
     lines = [f"with {'; '.join(words)}; friction {rough}", str(arm)]
     if isinstance(of, cdsm.Posture):
-        joints = ", ".join(map(place, of.q.tolist(), arm.joint_units))
+        joints = ", ".join(map(place, without_rounding(of.q).tolist(), arm.joint_units))
         lines.append(f"at {joints}; tip at {coordinates(1e3 * of.tip[:3, 3])} mm")
     told = {"wire": wires_text(arm.cables), "gravity_m_per_s2": arm.gravity}
     told |= {
@@ -113,6 +114,17 @@ def _show(message: Warning | str, *_: object, **__: object) -> None:
     typer.secho(f"warning: {message}", fg="yellow", err=True)
 
 
+def _with_options(message: str, options: Iterable[str]) -> str:
+    """Call the arguments that a message asks for, such as ``minimum=``, as the ``options`` are."""
+    named = {name: f"--{name.replace('_', '-')}" for name in options}
+
+    def renamed(found: re.Match[str]) -> str:
+        name, value = found.groups(default="")
+        return f"{named[name]}{value and '='}{value}" if name in named else found[0]
+
+    return re.sub(r"\b(\w+)=(?:(\d)|(?![^\s,.;)]))", renamed, message)
+
+
 def reported(function: Callable[..., int]) -> Callable[..., None]:
     """Wrap a command, which returns its exit code: turn errors into a message (JSON with --json).
 
@@ -136,11 +148,11 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
         except (cdsm.CdsmError, OSError) as error:  # OSError: of the terminal or pipe
             if debug_wanted.get():
                 raise
-            kind = type(error).__name__
+            kind, message = type(error).__name__, _with_options(str(error), given)
             if given["as_json"]:
-                print_json({"error": kind, "message": str(error), "data": vars(error)})
+                print_json({"error": kind, "message": message, "data": vars(error)})
             else:
-                typer.secho(f"error: {error}", fg="red", err=True)
+                typer.secho(f"error: {message}", fg="red", err=True)
             code = UNMET if kind in _CANNOT else FAILED
         raise typer.Exit(code)
 

@@ -196,7 +196,8 @@ def plan_tests(
     values = np.array([scalar(f"parameters[{name!r}]", x) for name, x in parameters.items()])
     names, most = tuple(parameters), whole_number("tests", tests, 1, _MOST)
     if not values.all():
-        said = "0 given; intervals are judged relative to the expected value. Give a small one."
+        said = "0 given; intervals are judged relative to the expected value. Give a small one "
+        said += "(commands: in ARM.toml or by --set)."
         raise InvalidInput(f"parameters[{names[int(abs(values).argmin())]!r}]", said)
     bounds = {n: (min(0.0, 2.0 * v), max(0.0, 2.0 * v)) for n, v in zip(names, values, strict=True)}
     usable, rows, failures = list[WeightLoop](), list[Array](), list[tuple[str, str]]()

@@ -20,7 +20,8 @@ from cdsm.identification.measurement import Measurement, WeightLoop, name_of
 from cdsm.identification.problem import Problem, Test
 from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
-from cdsm.support.format import MODEL, aligned, coordinates
+from cdsm.stiffness_matrix.prints import frictionless_model
+from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import scalar
@@ -216,7 +217,7 @@ class Identification(Result):
             elif isinstance(each, TipPosition):
                 names = ", ".join(each.axes)
                 said = [
-                    f"{names} {coordinates(1e3 * p[own], '.4g')} mm"
+                    f"{names} {coordinates(1e3 * without_rounding(p[own]))} mm"
                     for p in (self.measured, self.predicted)
                 ]
             else:
@@ -224,7 +225,8 @@ class Identification(Result):
                 said = [f"{off.size} readings", f"off by {rms:.3g} µm rms"]
             tests.append((name_of(i, each.label), *said, worst))
         note = "(95 % from the std of the linear model; confidence() profiles χ²)"
-        model = f"({MODEL}; secant where a force is given; loops with friction; tips at rest)"
+        model = f"({frictionless_model(self.arm)}; secant where a force is given; "
+        model += "loops with friction; tips at rest)"
         shown = [*aligned(lines), note, "", *aligned(tests), model, "", self._verdict]
         return "\n".join([*shown, *(f"warning: {sentence}" for sentence in self.warnings)])
 

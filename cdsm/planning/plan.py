@@ -15,8 +15,9 @@ from cdsm.planning.goal import REACHED, Goal
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.directions import Direction, unit_directions
-from cdsm.support.format import MODEL, coordinates
+from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, SMALLEST, flag, number_array
 from cdsm.support.values import Array, frozen
@@ -93,7 +94,8 @@ class StiffnessPlan(Result):
             for u, (value, target) in zip(self.direction.reshape(-1, 3), pairs, strict=True)
         ]
         margin = f"{self.stiffness.margin:.4g} {self.posture.arm.stiffness_unit()}"
-        return "\n".join([str(self.tension), *rows, f"smallest joint stiffness {margin} ({MODEL})"])
+        model = frictionless_model(self.posture.arm)
+        return "\n".join([str(self.tension), *rows, f"smallest joint stiffness {margin} ({model})"])
 
 
 def plan_stiffness(

@@ -14,8 +14,9 @@ from cdsm.errors import InvalidInput
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
+from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.directions import Direction, unit_direction
-from cdsm.support.format import MODEL, coordinates, span
+from cdsm.support.format import coordinates, span
 from cdsm.support.progress import progress_bar
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, whole_number
@@ -96,7 +97,8 @@ class StiffnessRange(Result):
     def __str__(self) -> str:
         (low, high), limited = self.ends / 1e3, self.limited_by_stability
         said = f"along {coordinates(self.direction)} the stiffness can be {low:.4g} to {high:.4g}"
-        lines, unit = [f"{said} N/mm ({MODEL})"], self.posture.arm.stiffness_unit()
+        arm = self.posture.arm
+        lines, unit = [f"{said} N/mm ({frictionless_model(arm)})"], arm.stiffness_unit()
         tensions = {"softest": self.low_tension, "stiffest": self.high_tension}
         for (name, F), stops in zip(tensions.items(), limited, strict=True):
             margin = f"smallest joint stiffness {stiffness(self.posture, F).margin:.4g} {unit}"

@@ -15,8 +15,9 @@ from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput
 from cdsm.planning.tension_space import FAR, unstable
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
+from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.directions import Direction, unit_direction
-from cdsm.support.format import MODEL, coordinates
+from cdsm.support.format import coordinates
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import NO_WRENCH, bound, instance, scalar
 from cdsm.support.values import Array, frozen
@@ -84,7 +85,8 @@ class Saturation(Result):
             lines.append(f"saturates at {self.bound:.4g} N: {100.0 * self.fraction:.3g} % of that")
         if self.minimum[0] < self.stiffest < end:
             lines.append(f"above {self.stiffest:.4g} N tension makes the arm softer")
-        return "\n".join([*lines, f"looked at up to {end:.4g} N, limit: {self.limit} ({MODEL})"])
+        model = frictionless_model(self.posture.arm)
+        return "\n".join([*lines, f"looked at up to {end:.4g} N, limit: {self.limit} ({model})"])
 
 
 def saturation(

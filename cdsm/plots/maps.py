@@ -145,7 +145,8 @@ def plot_map(
             bar.ax.yaxis.set_major_formatter("{x:g}")
             bar.ax.yaxis.set_minor_formatter(NullFormatter())
     else:
-        title += f": {name} exists at none of these tips"
+        known = "is finite" if np.isinf(every).any() else "exists"
+        title += f": {name} {known} at none of these tips"
     style.heading(figure, title)
     style.legend_below(figure, grid, 2)
     return figure

@@ -131,8 +131,10 @@ class Equilibrium(Result):
         if self.branch < 1.0:
             part = f"at {100.0 * self.branch:.4g} % of load and pull its branch of equilibria ends"
             said.append(f"JUMPED: {part}; from there the arm moves to this other one")
-        if self.neutral or not self.stable:
+        if not self.stable:
             said.append("NEUTRAL: not every joint is brought back")
+        elif self.neutral:
+            said.append("NEUTRAL: a motion of the joints meets hardly any resistance")
         return tuple(said)
 
     @quantity("1")

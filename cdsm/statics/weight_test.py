@@ -16,8 +16,9 @@ from cdsm.posture import Posture
 from cdsm.statics.at_rest import Equilibrium
 from cdsm.statics.equilibrium import as_equilibrium, equilibrium, followed
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
+from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.directions import unit_direction
-from cdsm.support.format import MODEL, coordinates, plural, without_rounding
+from cdsm.support.format import coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import vector, whole_number
 from cdsm.support.values import Array, frozen
@@ -175,10 +176,11 @@ class WeightTest(Result):
         moves = without_rounding(np.vstack([self.displacements, self.tangent_displacement]))
         for name, moved in zip(names, moves, strict=True):
             rows.append(f"{name:>10}" + "".join(f"{1e3 * x:>12.4g}" for x in moved))
+        model = frictionless_model(self._posture.arm)
         rows += [
             f"stiffness along the force: measured {self.stiffness / 1e3:.4g} N/mm, "
             f"linear {self.tangent / 1e3:.4g} N/mm",
-            f"(linear is {MODEL}; measured the secant over this weight)",
+            f"(linear is {model}; measured the secant over this weight)",
             *self._about_friction(),
         ]
         if self.unloaded.at_limit:

@@ -14,6 +14,7 @@ from cdsm.support.format import MODEL, coordinates, span
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
+    from cdsm.manipulator import Manipulator
     from cdsm.stiffness_matrix.value import Stiffness
 
 _PARTS = ("passive", "active", "gravity", "load", "springs")
@@ -71,17 +72,21 @@ def missing_leads(K: Stiffness) -> tuple[str, ...]:
 
 def model_of(K: Stiffness) -> str:
     """Return the assumptions behind the stiffness ``K`` in words, such as locked motors."""
-    arm, model = K.posture.arm, MODEL
-    if arm.is_serpentine and (
-        any(link.bending_stiffness for link in arm.geometry.links)
-        or any(joint.bending_stiffness for joint in arm.geometry.joints)
-    ):
-        model = MODEL.replace("rigid links", "links that bend")
+    model = frictionless_model(K.posture.arm)
     if K.friction == "frictionless":
         return model
     mu = K.posture.segments.chains.friction
     said = span(mu, "{:g}".format) if mu.size else "0"
     return model.replace("frictionless", f"cables {K.friction}, μ = {said}")
+
+
+def frictionless_model(arm: Manipulator) -> str:
+    """Return the assumptions behind every stiffness of ``arm`` without friction, in words."""
+    bends = arm.is_serpentine and (
+        any(link.bending_stiffness for link in arm.geometry.links)
+        or any(joint.bending_stiffness for joint in arm.geometry.joints)
+    )
+    return MODEL.replace("rigid links", "links that bend") if bends else MODEL
 
 
 def axis_of(u: Array) -> str:

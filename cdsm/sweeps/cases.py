@@ -18,8 +18,9 @@ from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures import rows as measures
 from cdsm.stiffness_matrix.principal import principal_stiffness
+from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.directions import XYZ
-from cdsm.support.format import MODEL, JointUnits
+from cdsm.support.format import JointUnits
 from cdsm.support.progress import progress_bar
 from cdsm.support.status import Status
 from cdsm.support.values import Array
@@ -237,7 +238,8 @@ class Cases:
         except InvalidInput:  # laws made from functions cannot be written
             arm = f"{self.arm.__getstate__() | {'cables': [*self.arm.cables]}}"
         about = {"Conventions": "CF-1.11", "title": f"stiffness sweep of {self.arm.name}"}
-        about |= {"source": f"cdsm {version('cdsm-stiffness')}", "model": MODEL, "arm": arm}
+        about |= {"source": f"cdsm {version('cdsm-stiffness')}", "arm": arm}
+        about["model"] = frictionless_model(self.arm)
         if self.worst_friction:
             about["worst_friction"] = "all segments stay within the bounds, whatever came before"
         return about

@@ -60,7 +60,8 @@ def loading(strain: Array, force: Array, between: tuple[float, float]) -> Loadin
         refuse(f"{lowest:.4g} N is compression. Tare the load cell, or change the sign.")
     padded = np.pad(force, 1, constant_values=-np.inf)
     peaks = find_peaks(padded, prominence=max(_FALL * reach, 8.0 * noise))[0] - 1
-    top = _REACHED * min(float(force.max()), between[1])
+    most = float(force.max())
+    top = _REACHED * min(most, between[1])
     rise = int(np.flatnonzero(force[peaks] >= top)[-1])
     first, last, after = 0, peaks[rise] + 1, len(force) - peaks[rise] - 1
     if rise:
@@ -74,8 +75,10 @@ def loading(strain: Array, force: Array, between: tuple[float, float]) -> Loadin
     in_order = force[np.argsort(strain, kind="stable")]
     rising = isotonic_regression(in_order).x if len(force) else in_order
     if len(force) < FEWEST or not np.std(in_order - rising) < 0.1 * np.ptp(rising):
+        narrow = "" if np.isinf(between).all() else f" from {between[0]:g} to {between[1]:g} N"
         refuse(
-            f"the force does not rise with the displacement in {len(force)} points of loading. "
+            f"the force does not rise with the displacement in {len(force)} points of loading"
+            f"{narrow}; the largest force is {most:.4g} N. "
             f"Give {FEWEST} or more in the order recorded; check that the columns belong together."
         )
     chord = np.ptp(force) / np.ptp(strain)
