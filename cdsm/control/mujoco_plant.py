@@ -16,11 +16,10 @@ import numpy as np
 from cdsm.control.laws import Command
 from cdsm.control.plants import require_unstrained, tensions_of
 from cdsm.control.sensors import Measurement
-from cdsm.errors import InvalidInput, solver_failed
+from cdsm.errors import InvalidInput, need, solver_failed
 from cdsm.interchange.mjcf import to_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.support.extras import need
 from cdsm.support.validation import quantity
 from cdsm.support.values import Array, frozen
 

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from cdsm.errors import FileError, InvalidInput
 from cdsm.identification.measurement import WeightLoop
 from cdsm.manipulator import Manipulator
-from cdsm.support.directions import AXES
 from cdsm.support.tables import ANGLE, column_in, named_columns, read_table
-from cdsm.support.validation import instance
+from cdsm.support.validation import AXES, instance
 
 _LENGTH: Final = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _FORCE: Final = {"N": 1.0}

@@ -8,8 +8,8 @@ from cdsm.errors import solver_failed
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.stiffness_matrix.principal import principal_stiffness
-from cdsm.support.linear_program import OPTIMAL, least
 from cdsm.support.validation import instance
+from cdsm.tension.solvers import OPTIMAL, least
 
 _CLOSED = 1e-9  # smaller ratios are rounding of the linear program
 

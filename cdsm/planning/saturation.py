@@ -15,10 +15,9 @@ from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput
 from cdsm.planning.tension_space import FAR, unstable
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import MODEL, coordinates
 from cdsm.support.result import Result, unit
-from cdsm.support.validation import NO_WRENCH, bound, instance, scalar
+from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 

@@ -16,10 +16,9 @@ from cdsm.posture import Posture
 from cdsm.statics.at_rest import Equilibrium
 from cdsm.statics.equilibrium import as_equilibrium, equilibrium, followed
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
-from cdsm.support.directions import unit_direction
 from cdsm.support.format import MODEL, coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import vector, whole_number
+from cdsm.support.validation import unit_direction, vector, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 
