@@ -17,7 +17,7 @@ from cdsm.batch.evaluation import OUTPUTS, evaluate
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures import rows as measures
-from cdsm.stiffness_matrix.principal import principal_stiffness
+from cdsm.measures.indices import principal_stiffness
 from cdsm.support.format import MODEL, JointUnits
 from cdsm.support.progress import progress_bar
 from cdsm.support.status import Status
