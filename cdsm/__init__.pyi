@@ -11,7 +11,7 @@ from cdsm.batch import distribute_tensions as distribute_tensions
 from cdsm.batch import evaluate as evaluate
 from cdsm.cable import Cable as Cable
 from cdsm.cable import Site as Site
-from cdsm.control.mujoco_plant import MuJoCoPlant as MuJoCoPlant
+from cdsm.control.plants import MuJoCoPlant as MuJoCoPlant
 from cdsm.control.plants import QuasiStaticPlant as QuasiStaticPlant
 from cdsm.control.sensors import Sensors as Sensors
 from cdsm.control.track import track as track

@@ -1,4 +1,4 @@
-"""All errors of the library; each one is a subclass of :class:`CdsmError`.
+"""All errors of the library, each one a subclass of :class:`CdsmError`, and its warnings.
 
 An error stores its data as attributes; its message names the fault, the allowed values and the
 remedy.
@@ -7,7 +7,10 @@ remedy.
 from __future__ import annotations
 
 import difflib
+import importlib
 import math
+import sys
+import warnings
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -224,3 +227,24 @@ def _distinct(values: Numbers) -> list[str]:
         if len(set(texts)) == len(set(values)):
             break
     return texts
+
+
+_OURS = {"cdsm", "pydantic", "dataclasses", "contextlib"}
+
+
+def warn(message: str) -> None:
+    """Issue a :class:`CdsmWarning` that names the line of the first caller outside cdsm."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in _OURS:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, CdsmWarning, stacklevel=level + 1)
+
+
+def need(extra: str, *packages: str) -> None:
+    """Raise :class:`~cdsm.CdsmError` if one of the ``packages`` of ``extra`` is missing."""
+    for package in packages:
+        try:
+            importlib.import_module(package)
+        except ImportError:
+            said = f"{package} is missing; run pip install -e '.[{extra}]' in cdsm's clone."
+            raise CdsmError(said) from None

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cdsm.cable import Cable, Cables
 from cdsm.cable_laws import CableLaws, OriginalLength
-from cdsm.errors import InvalidInput, listed
+from cdsm.errors import InvalidInput, listed, warn
 from cdsm.geometry import LONGEST, Geometry, doubts_about_units
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.posture import Posture
@@ -28,13 +28,19 @@ from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
 from cdsm.springs import Spring, Springs, springs_of
-from cdsm.support.directions import Direction, gravity_vector
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
 from cdsm.support.status import Status
-from cdsm.support.validation import flag, instance, one_of, sequence_of, vector
+from cdsm.support.validation import (
+    Direction,
+    flag,
+    gravity_vector,
+    instance,
+    one_of,
+    sequence_of,
+    vector,
+)
 from cdsm.support.values import Array, Printed, frozen
-from cdsm.support.warning import warn
 from cdsm.tolerances import Tolerances
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf

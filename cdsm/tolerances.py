@@ -11,8 +11,7 @@ from typing import Any, Final, Literal, Self, final, get_args
 
 from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
-from cdsm.support.records import Number, parse, read_toml, record
-from cdsm.support.toml import toml_text
+from cdsm.support.records import Number, parse, read_toml, record, toml_text
 from cdsm.support.validation import one_of, scalar, sequence_of, text
 
 Distribution = Literal["normal", "uniform"]

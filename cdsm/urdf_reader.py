@@ -17,13 +17,12 @@ import numpy as np
 from lxml import etree
 from lxml.builder import E
 
-from cdsm.errors import LINES, GeometryError, InvalidInput, listed
+from cdsm.errors import LINES, GeometryError, InvalidInput, listed, warn
 from cdsm.geometry import MAXIMUM_JOINTS
 from cdsm.rigid_body import RigidBody, accepts
 from cdsm.support.files import read_text
 from cdsm.support.validation import RANGES, flag
 from cdsm.support.values import Array
-from cdsm.support.warning import warn
 from cdsm.support.xml import XmlFault, numbers, parse_xml
 
 _INSTEAD = {

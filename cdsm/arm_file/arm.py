@@ -17,7 +17,7 @@ from cdsm.errors import FileError, GeometryError
 from cdsm.geometry import Geometry
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
-from cdsm.support.toml import toml_text, verbatim
+from cdsm.support.records import toml_text, verbatim
 from cdsm.tolerances import table_of as tolerance_table
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf

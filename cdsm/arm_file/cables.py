@@ -12,7 +12,7 @@ from cdsm.arm_file.model import SETTINGS, read_model
 from cdsm.cable import Cable, Site
 from cdsm.errors import InvalidInput
 from cdsm.support.files import write_text
-from cdsm.support.toml import one_line_each, toml_text
+from cdsm.support.records import one_line_each, toml_text
 from cdsm.support.validation import sequence_of
 from cdsm.wires.catalogue import Wire, name_of, table_of
 from cdsm.wires.elasticity import Elasticity

@@ -22,9 +22,8 @@ from cdsm.geometry import Geometry, toml
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import GRAVITY
 from cdsm.support import records
-from cdsm.support.directions import Axis, gravity_vector
 from cdsm.support.records import EACH, ONE, CrossFaults, record
-from cdsm.support.validation import one_of
+from cdsm.support.validation import Axis, gravity_vector, one_of
 from cdsm.tolerances import Tolerances
 from cdsm.tolerances import from_table as read_tolerances
 from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table

@@ -9,8 +9,7 @@ from typing import Any, Final
 
 from cdsm.errors import FileError
 from cdsm.support.files import read_text
-from cdsm.support.records import read_toml
-from cdsm.support.toml import laid_over
+from cdsm.support.records import laid_over, read_toml
 from cdsm.wires.catalogue import is_file, read_law, table_of
 
 _FROM: Final = "Write an ARM.toml of it once, `cdsm new ARM.toml --from {path}"

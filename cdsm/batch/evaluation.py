@@ -16,10 +16,9 @@ from cdsm.batch.quantities import DIMENSIONS, OF_POSTURE, Codes, OfPostures
 from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput, unknown
 from cdsm.manipulator import ANOTHER_ARM, Manipulator
-from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.format import coordinates
 from cdsm.support.status import Status, summary
-from cdsm.support.validation import flag, instance, one_of
+from cdsm.support.validation import Direction, flag, instance, one_of, unit_directions
 from cdsm.support.values import Array, Named, frozen
 from cdsm.tension import checked_bounds
 

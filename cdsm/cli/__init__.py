@@ -13,17 +13,14 @@ from typing import Annotated
 import typer
 
 import cdsm
-from cdsm.cli.arm import export, new
-from cdsm.cli.design import design
-from cdsm.cli.identify import identify
+from cdsm.cli.arm import export, new, view
+from cdsm.cli.identify import fit, identify
 from cdsm.cli.options import opt
 from cdsm.cli.output import debug_wanted, reported
-from cdsm.cli.plan import plan
+from cdsm.cli.plan import design, plan
 from cdsm.cli.reproduce import reproduce
 from cdsm.cli.stiffness import buckle, stiffness, weigh
 from cdsm.cli.sweep import sweep
-from cdsm.cli.view import view
-from cdsm.cli.wire import fit
 
 app = typer.Typer(
     name="cdsm",

@@ -76,7 +76,7 @@ AsJson = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, "--j
 
 def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
     """Parse the texts of --set; a value that is no TOML is a number such as .5, or a string."""
-    from cdsm.support.toml import laid_over
+    from cdsm.support.records import laid_over
 
     changes: dict[str, Any] = {}
     for text in texts or ():
@@ -184,7 +184,7 @@ def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[s
 
 def direction_of(text: str) -> Sequence[float]:
     """Return the direction (3,) of --direction: an axis, or three numbers."""
-    from cdsm.support.directions import AXES
+    from cdsm.support.validation import AXES
 
     return AXES.get(text) or numbers("--direction", text, (3,), "an axis such as -y, or X,Y,Z")
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, final
 
 from cdsm.errors import InvalidInput
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
-from cdsm.support.validation import one_of, scalar
+from cdsm.support.validation import Direction, one_of, scalar, unit_direction
 from cdsm.support.values import Array
 
 

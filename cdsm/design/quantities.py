@@ -17,9 +17,9 @@ from cdsm.design.problem import SURE, DesignProblem
 from cdsm.errors import CdsmError, CdsmWarning, GeometryError
 from cdsm.manipulator import Manipulator
 from cdsm.measures.clearance import KINDS as CLEARANCES
+from cdsm.measures.indices import principal_stiffness
 from cdsm.measures.rows import force_radii, friction_losses, measured, narrowed_bounds, payloads
 from cdsm.stiffness_matrix import stiffness
-from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 from cdsm.tension import distribute_tension

@@ -14,10 +14,9 @@ from cdsm.design.problem import DesignProblem
 from cdsm.design.quantities import Found, quiet_arm
 from cdsm.design.result import DesignSearch
 from cdsm.design.variables import WHOLE
-from cdsm.errors import CdsmError
+from cdsm.errors import CdsmError, need
 from cdsm.manipulator import UNCHECKED
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.extras import need
 from cdsm.support.format import plural
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Final, final
 
 from cdsm.cable import Cable
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, warn
 from cdsm.geometry import CableRoute, Geometry
 from cdsm.geometry.cables import serpentine_cables
 from cdsm.geometry.uniform import evenly_spaced, hinge_hole_angles
@@ -18,7 +18,6 @@ from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS, ArmParameters, holes_like
 from cdsm.support.format import place
 from cdsm.support.validation import instance, one_of, quantity, scalar, whole_number
-from cdsm.support.warning import warn
 from cdsm.wires.catalogue import as_wire
 
 Value = float | int | str

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from cdsm.friction.stick import breakaway
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
+from cdsm.support.validation import Direction, unit_direction
 from cdsm.support.values import Array
 from cdsm.tension import Tension
 

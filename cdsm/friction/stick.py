@@ -17,10 +17,9 @@ from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
 from cdsm.posture import Posture
 from cdsm.segments import STRAIGHT
 from cdsm.stiffness_matrix import Friction, Stiffness, assemble, checked_tension
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, unit
-from cdsm.support.validation import SMALLEST
+from cdsm.support.validation import SMALLEST, Direction, unit_direction
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 

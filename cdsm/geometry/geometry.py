@@ -16,7 +16,7 @@ from typing import Annotated, Any, ParamSpec, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from cdsm.errors import GeometryError, listed
+from cdsm.errors import GeometryError, listed, warn
 from cdsm.geometry import toml
 from cdsm.geometry.beams import Backbone, backbone_fields
 from cdsm.geometry.chain import STEEPEST, Chain, chain_of
@@ -28,7 +28,6 @@ from cdsm.support.format import plural
 from cdsm.support.records import CrossFaults, Length, LengthOrZero, Name, read_toml, record
 from cdsm.support.validation import instance, scalar, sequence_of
 from cdsm.support.values import Printed
-from cdsm.support.warning import warn
 
 _Keywords = ParamSpec("_Keywords")
 _Sizes = TypeVar("_Sizes")

@@ -16,11 +16,17 @@ from cdsm.identification.determination import Determination
 from cdsm.identification.measurement import WeightLoop
 from cdsm.identification.problem import Problem
 from cdsm.manipulator import Manipulator
-from cdsm.support.directions import AXES, Direction, unit_directions
 from cdsm.support.format import aligned, coordinates
 from cdsm.support.progress import track
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import number_array, scalar, whole_number
+from cdsm.support.validation import (
+    AXES,
+    Direction,
+    number_array,
+    scalar,
+    unit_directions,
+    whole_number,
+)
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:

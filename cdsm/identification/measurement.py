@@ -15,12 +15,14 @@ from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.load_cycle import load_cycle
 from cdsm.statics.weight_test import weight_test
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.directions import Axis, axis_vector, unit_direction
 from cdsm.support.validation import (
     SMALLEST,
+    Axis,
+    axis_vector,
     instance,
     number_array,
     scalar,
+    unit_direction,
     vector,
     whole_number,
     wrench_vector,

@@ -14,8 +14,7 @@ from scipy.special import chdtr, chdtrc, ndtri
 
 import cdsm
 from cdsm.errors import InvalidInput
-from cdsm.identification.determination import Determination
-from cdsm.identification.intervals import interval
+from cdsm.identification.determination import Determination, interval
 from cdsm.identification.measurement import Measurement, WeightLoop, name_of
 from cdsm.identification.problem import Problem, Test
 from cdsm.identification.tip_position import TipPosition

@@ -23,7 +23,7 @@ from lxml import etree
 from numpy.typing import ArrayLike
 
 from cdsm.coupling import Coupling
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, warn
 from cdsm.interchange.mjcf_bodies import Carried, add_bodies, mass_matrix, row
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
@@ -35,7 +35,6 @@ from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.validation import RANGES, instance, one_of, scalar
 from cdsm.support.values import Array
-from cdsm.support.warning import warn
 from cdsm.tension import Tension
 
 Actuators = Literal["length", "tension", "none"]

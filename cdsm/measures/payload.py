@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike
 from cdsm.measures.polytope import Farthest, balanced, force_polytope
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
+from cdsm.support.validation import NO_WRENCH, Direction, instance, unit_direction, wrench_vector
 from cdsm.support.validation import quantity as checked
 from cdsm.support.values import Array, frozen
 from cdsm.tension import bounds_at, distribute_tension

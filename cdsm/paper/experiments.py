@@ -18,8 +18,8 @@ from cdsm import presets
 from cdsm.manipulator import Manipulator
 from cdsm.paper.claims import Claim, Figure, Said, floats
 from cdsm.stiffness_matrix import stiffness
-from cdsm.support.directions import XYZ
 from cdsm.support.result import Result, unit
+from cdsm.support.validation import XYZ
 from cdsm.support.values import Array, frozen
 from cdsm.tension import distribute_tension
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import aligned, without_rounding
 from cdsm.support.result import Result, unit
-from cdsm.support.validation import instance
+from cdsm.support.validation import Direction, instance, unit_direction
 from cdsm.support.values import Array, frozen
 
 

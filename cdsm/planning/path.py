@@ -17,10 +17,16 @@ from cdsm.planning.path_plan import InfeasibleSample, PathPlan, Status
 from cdsm.planning.plan import achieved, checked_targets, per_sample
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.format import coordinates, plural
 from cdsm.support.progress import track
-from cdsm.support.validation import NO_WRENCH, bound, instance, number_array
+from cdsm.support.validation import (
+    NO_WRENCH,
+    Direction,
+    bound,
+    instance,
+    number_array,
+    unit_directions,
+)
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 

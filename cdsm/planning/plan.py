@@ -16,10 +16,16 @@ from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.directions import Direction, unit_directions
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, SMALLEST, flag, number_array
+from cdsm.support.validation import (
+    NO_WRENCH,
+    SMALLEST,
+    Direction,
+    flag,
+    number_array,
+    unit_directions,
+)
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 

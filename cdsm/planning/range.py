@@ -15,11 +15,10 @@ from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates, span
 from cdsm.support.progress import progress_bar
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, whole_number
+from cdsm.support.validation import NO_WRENCH, Direction, unit_direction, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 

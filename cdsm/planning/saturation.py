@@ -16,10 +16,9 @@ from cdsm.planning.tension_space import FAR, unstable
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, unit
-from cdsm.support.validation import NO_WRENCH, bound, instance, scalar
+from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, distribute_tension
 

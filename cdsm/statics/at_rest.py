@@ -18,10 +18,9 @@ from cdsm.statics.solve import (
     FLAT,
 )
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import instance
+from cdsm.support.validation import Direction, instance, unit_direction
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 import cdsm
 from cdsm.batch.evaluation import evaluate
-from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput
+from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput, warn
 from cdsm.geometry.beams import buckling_doubt
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
@@ -24,7 +24,6 @@ from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, bound, instance, wrench_vector
 from cdsm.support.validation import quantity as checked
 from cdsm.support.values import Array, frozen
-from cdsm.support.warning import warn
 from cdsm.tension import distribute_tension
 
 if TYPE_CHECKING:

@@ -17,10 +17,9 @@ from cdsm.statics.at_rest import Equilibrium
 from cdsm.statics.equilibrium import as_equilibrium, equilibrium, followed
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.directions import unit_direction
 from cdsm.support.format import coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import vector, whole_number
+from cdsm.support.validation import unit_direction, vector, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 

@@ -19,10 +19,9 @@ from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.instability import Remedy, find_remedies, verdict
 from cdsm.stiffness_matrix.shares import Shares
-from cdsm.support.directions import Direction, unit_direction, unit_directions
 from cdsm.support.format import coordinates, plain
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import one_of
+from cdsm.support.validation import Direction, one_of, unit_direction, unit_directions
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 

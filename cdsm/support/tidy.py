@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import InvalidInput
-from cdsm.support.extras import need
+from cdsm.errors import InvalidInput, need
 from cdsm.support.files import as_path, write_file
 
 if TYPE_CHECKING:

@@ -17,12 +17,12 @@ from cdsm.batch.evaluation import OUTPUTS, evaluate
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.measures import rows as measures
-from cdsm.stiffness_matrix.principal import principal_stiffness
+from cdsm.measures.indices import principal_stiffness
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.directions import XYZ
 from cdsm.support.format import JointUnits
 from cdsm.support.progress import progress_bar
 from cdsm.support.status import Status
+from cdsm.support.validation import XYZ
 from cdsm.support.values import Array
 from cdsm.sweeps.quantities import CASES, QUANTITIES
 

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdsm.errors import CdsmError, FileError
-from cdsm.support.extras import need
+from cdsm.errors import CdsmError, FileError, need
 from cdsm.support.files import as_path, require_folder
 from cdsm.support.progress import progress_bar
 from cdsm.support.status import Status

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, need
 from cdsm.manipulator import Manipulator
-from cdsm.support.extras import need
 from cdsm.support.validation import instance, number_array, one_of, scalar, whole_number
 from cdsm.support.values import Array, ReadOnlyState, frozen
 

@@ -10,12 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.batch.inputs import given_wrench
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, need
 from cdsm.manipulator import Manipulator
-from cdsm.support.directions import XYZ, Direction, unit_directions
-from cdsm.support.extras import need
 from cdsm.support.files import as_path
-from cdsm.support.validation import NO_WRENCH, flag, instance, one_of, quantity, sequence_of, text
+from cdsm.support.validation import (
+    NO_WRENCH,
+    XYZ,
+    Direction,
+    flag,
+    instance,
+    one_of,
+    quantity,
+    sequence_of,
+    text,
+    unit_directions,
+)
 from cdsm.sweeps.cases import Cases
 from cdsm.sweeps.files import stored
 from cdsm.sweeps.poses import PoseSet, angles_of, distinct

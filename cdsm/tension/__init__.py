@@ -1,5 +1,6 @@
 """Cable tensions that balance an arm: bounds, distribution, solvers, reasons of failure."""
 
+from cdsm.tension.distribution import Tension as Tension
 from cdsm.tension.distribution import bounds_at as bounds_at
 from cdsm.tension.distribution import checked_bounds as checked_bounds
 from cdsm.tension.distribution import distribute_tension as distribute_tension
@@ -8,4 +9,3 @@ from cdsm.tension.infeasibility import advice as advice
 from cdsm.tension.infeasibility import too_few_cables as too_few_cables
 from cdsm.tension.solvers import DEFAULT_SOLVER as DEFAULT_SOLVER
 from cdsm.tension.solvers import installed_solvers as installed_solvers
-from cdsm.tension.value import Tension as Tension

@@ -12,9 +12,8 @@ from cdsm.errors import InfeasibleTension, listed, solver_failed
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.format import plural
-from cdsm.support.linear_program import OPTIMAL, least
 from cdsm.support.values import Array, frozen
-from cdsm.tension.solvers import HINT, OPTIMALITY, Problem
+from cdsm.tension.solvers import HINT, OPTIMAL, OPTIMALITY, Problem, least
 
 
 def explain(

@@ -1,4 +1,4 @@
-"""Programs of cable tensions, solved by qpsolvers.
+"""Programs of cable tensions, solved by qpsolvers, and linear ones by HiGHS.
 
 :func:`solve` minimises ½‖x‖² subject to A x = b and low ≤ x ≤ high, and verifies the solution. The
 problem is strictly convex, so x is its optimum exactly if A x = b and, for some multipliers y,
@@ -11,14 +11,19 @@ from __future__ import annotations
 import math
 import warnings
 from contextlib import nullcontext, suppress
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from cdsm.errors import solver_failed
-from cdsm.support import linear_program
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
+
+OPTIMAL, INFEASIBLE, UNBOUNDED = 0, 2, 3
+"""Status numbers of scipy that decide a program; all others leave it undecided."""
 
 DEFAULT_SOLVER: Final = "daqp"  # exact, and the fastest in measurements
 OPTIMALITY: Final = 1e-9  # largest accepted violation, relative to the largest force
@@ -27,6 +32,7 @@ _ROUNDING: Final = 1e-12  # a solution with a larger violation is corrected
 _CURVATURE: Final = 1e-8  # ε that makes a linear program a quadratic one
 _FARTHEST: Final = 1e4  # variables of a linear program beyond this may be unbounded
 _FEASIBLE: Final = 1e-8  # largest accepted violation of A x = b by a linear program
+_TIGHT: Final = 1e-10  # allowed violation of a constraint of order one; HiGHS's default is 1e-7
 NO_ARM: Final = 1e-15  # moment arms below this part of the arm's length are rounding
 
 # DAQP is three times as fast with 60 cables if it eliminates the balance first; OSQP misses bounds
@@ -114,6 +120,14 @@ def _corrected(problem: Problem, x: Array, y: Array) -> tuple[Array, Array]:
     return x, y - np.linalg.lstsq(A[:, free].T, x[free] + y @ A[:, free])[0]
 
 
+def least(cost: Array, **constraints: Any) -> OptimizeResult:
+    """Minimise cost · x by scipy's ``linprog``, whose keywords are ``constraints``."""
+    from scipy.optimize import linprog  # slow to import
+
+    names = "primal_feasibility_tolerance", "dual_feasibility_tolerance"
+    return linprog(cost, **constraints, method="highs", options=dict.fromkeys(names, _TIGHT))
+
+
 def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[float, Array] | None:
     """Maximise cost · x subject to A x = b and low ≤ x ≤ high; return the maximum and x (n,).
 
@@ -124,10 +138,10 @@ def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[f
     """
     import qpsolvers
 
-    least, most = np.maximum(low, -_FARTHEST), np.minimum(high, _FARTHEST)
+    lowest, highest = np.maximum(low, -_FARTHEST), np.minimum(high, _FARTHEST)
     unit = float(abs(cost).max()) or 1.0
     qp = qpsolvers.Problem(
-        _CURVATURE * np.eye(cost.size), -cost / unit, A=A, b=b, lb=least, ub=most
+        _CURVATURE * np.eye(cost.size), -cost / unit, A=A, b=b, lb=lowest, ub=highest
     )
     with suppress(qpsolvers.SolverError):
         found = qpsolvers.solve_problem(qp, DEFAULT_SOLVER, primal_tol=1e-11, dual_tol=1e-11)
@@ -137,12 +151,12 @@ def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[f
     lever = abs(A).max(axis=0)  # HiGHS drops entries below 1e-9
     lever[lever == 0.0] = 1.0
     bounds = np.column_stack([low * lever, high * lever])
-    program = linear_program.least(-cost / lever, A_eq=A / lever, b_eq=b, bounds=bounds)
-    if program.status == linear_program.INFEASIBLE:
+    program = least(-cost / lever, A_eq=A / lever, b_eq=b, bounds=bounds)
+    if program.status == INFEASIBLE:
         return None
-    if program.status == linear_program.UNBOUNDED:
+    if program.status == UNBOUNDED:
         return math.inf, np.full_like(cost, np.nan)
-    if program.status != linear_program.OPTIMAL:
+    if program.status != OPTIMAL:
         raise solver_failed("highs", f"finds no largest load: {program.message}")
     x = program.x / lever
     return float(cost @ x), x

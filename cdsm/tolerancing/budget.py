@@ -17,11 +17,10 @@ from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix.instability import verdict
-from cdsm.support.directions import Direction
 from cdsm.support.format import span, with_uncertainty
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.status import Status
-from cdsm.support.validation import fraction, instance
+from cdsm.support.validation import Direction, fraction, instance
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension
 from cdsm.tolerances import Tolerances

@@ -16,10 +16,9 @@ from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.support.directions import Direction, unit_direction
 from cdsm.support.format import coordinates
 from cdsm.support.status import Status
-from cdsm.support.validation import flag, one_of
+from cdsm.support.validation import Direction, flag, one_of, unit_direction
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.tension import Tension
 from cdsm.tolerancing.inputs import Errors, Inputs, inputs_of

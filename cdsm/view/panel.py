@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, final
 import numpy as np
 
 from cdsm.manipulator import Manipulator
+from cdsm.measures.indices import principal_stiffness
 from cdsm.plots.style import MM, N_PER_MM
-from cdsm.stiffness_matrix.principal import principal_stiffness
 from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.values import Array

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.errors import CdsmError, InvalidInput
+from cdsm.errors import CdsmError, InvalidInput, need
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_path
-from cdsm.support.extras import need
 from cdsm.support.validation import flag, instance, one_of, quantity, vector, whole_number
 from cdsm.support.values import Array
 from cdsm.tension import DEFAULT_SOLVER, installed_solvers

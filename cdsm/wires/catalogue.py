@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeGuard
 
 from cdsm.errors import FileError, GeometryError, InvalidInput, listed
 from cdsm.support.files import read_text, write_text
-from cdsm.support.records import did_you_mean, read_toml
-from cdsm.support.toml import toml_text
+from cdsm.support.records import did_you_mean, read_toml, toml_text
 from cdsm.support.validation import flag, one_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity, StrandElasticity, TabulatedElasticity

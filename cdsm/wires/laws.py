@@ -12,11 +12,10 @@ from numpy.polynomial.legendre import leggauss
 from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, warn
 from cdsm.support.format import span
 from cdsm.support.validation import LARGEST, RANGES, SMALLEST, number_array, quantity, scalar
 from cdsm.support.values import Array
-from cdsm.support.warning import warn
 from cdsm.wires.elasticity import Elasticity
 
 EQ19: Final = (
