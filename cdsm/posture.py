@@ -114,14 +114,15 @@ class Posture(ReadOnlyState):
 
     @cached_property
     def _placements(self) -> Array:
-        """Poses (nv+1, 4, 4) of the base and of the joints' frames."""
+        """Poses (n+1, 4, 4) of the base and of all joints' frames."""
         body = self.arm._body
-        return frozen(body.joint_placements(self.q, range(body.nv + 1)))
+        return frozen(body.joint_placements(self.q, range(len(body.all_joints) + 1)))
 
     @property
     def joint_positions(self) -> Array:
         """Positions of the joints (nv, 3) [m]: one point on each joint axis."""
-        return self._placements[1:, :3, 3]
+        coupling, every = self.arm._body.coupling, self._placements[1:, :3, 3]
+        return frozen(every[list(coupling.leaders)]) if coupling else every
 
     @property
     def bones(self) -> tuple[Array, ...]:

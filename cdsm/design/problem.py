@@ -92,7 +92,9 @@ class DesignProblem(ReadOnlyState):
         _require_compatible(variables, self.arm)
         loads = np.atleast_2d(number_array("loads", self.loads, "wrench"))
         if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
-            raise InvalidInput("loads", f"shape {loads.shape} given, (n, 6) needed.")
+            raise InvalidInput(
+                "loads", f"shape {loads.shape} given, (n, 6) needed, or in a file (n, 3)."
+            )
         postures = self.postures
         if not isinstance(postures, PoseSet):
             postures = frozen(number_array("postures", postures))

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 ELLIPSOID_GRID: Final = (13, 25)
 """Number of points of a drawn ellipsoid: from pole to pole, and around its axis."""
 
+_CHARACTERS = 60  # of the legend in one line
 _LARGEST = 0.3  # largest half axis of a drawn ellipsoid, as a fraction of the arm's length
 _FLATTEST = 0.35  # smallest range of an axis, as a fraction of the largest
 _PADS: Final = {"x": -3.0, "y": -6.0, "z": -4.0}  # from the numbers of an axis to its label
@@ -177,7 +178,9 @@ def finish(
     up = abs(np.array([*(math.sin(_ELEVATION) * side[[1, 0]]), math.cos(_ELEVATION)]))
     width = style.ONE_COLUMN * (1.0 if colors is None else 0.82)
     scale = (width - 0.95) / float(side @ ranges)  # inch per mm
-    below = 0.3 if axes.get_legend_handles_labels()[0] else 0.05
+    labels = axes.get_legend_handles_labels()[1]
+    columns = 3 if sum(map(len, labels)) < _CHARACTERS else 1
+    below = 0.1 + 0.2 * -(-len(labels) // columns) if labels else 0.05
     height = scale * float(up @ ranges) + 0.4
     total = height + below + 0.25
     figure.set_size_inches(style.ONE_COLUMN, total)
@@ -187,8 +190,8 @@ def finish(
     for artist in (*axes.lines, *axes.collections):
         artist.set_clip_on(False)  # the box is wider than the square of the axes
     style.heading(figure, title)
-    if below > 0.1:
-        figure.legend(loc="lower center", ncols=3, frameon=False)
+    if labels:
+        figure.legend(loc="lower center", ncols=columns, frameon=False)
     if colors is not None:
         bar = figure.add_axes((0.83, 0.2, 0.025, 0.6))
         figure.colorbar(colors, cax=bar, label="cable tension [N]")
