@@ -177,8 +177,10 @@ class Equilibrium(Result):
 
     @property
     def _paid_out(self) -> Array:
-        """How much longer than straight the slack wires are (C,) [m]."""
+        """How much longer than straight the slack wires are (C,) [m], if motors hold lengths."""
         pose, F = self.pose, self.tension
+        if self.motors == "tension":
+            return np.zeros(F.size)
         more = self.stiffness.free_lengths - pose.arm._laws.original_lengths(pose.cable_lengths, F)
         return np.where(F == 0.0, np.maximum(more, 0.0), 0.0)
 

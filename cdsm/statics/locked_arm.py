@@ -89,7 +89,8 @@ class LockedArm:
         F, k = self._tensions(pose)
         for law, of, _ in self._laws:
             require_domain(pose.arm, law, of, F[of])
-        return assemble(pose, frozen(F), self.wrench, frozen(k), free_length=self.rest_length)
+        lengths = pose.cable_lengths if self.tension_held else self.rest_length
+        return assemble(pose, frozen(F), self.wrench, frozen(k), free_length=lengths)
 
     def _tensions(self, pose: Posture) -> tuple[Array, Array]:
         F, k = self.tension.copy(), np.zeros(self.tension.size)

@@ -150,3 +150,8 @@ def test_motors_that_hold_tensions_need_no_law_below_its_domain() -> None:
         rest = cdsm.forward_statics(arm, tension=np.full(15, F))
         np.testing.assert_array_equal(rest.tension, F)
         assert not rest.stiffness.cable_stiffness.any()
+        assert "stable" in str(rest.stiffness)
+        load = [0.0, 0.0, -0.1, 0.0, 0.0, 0.0]
+        history = cdsm.load_cycle(rest.pose, rest, [load])
+        moved = cdsm.forward_statics(arm, tension=rest.tension, wrench=load)
+        np.testing.assert_allclose(history.tip[0], moved.pose.tip[:3, 3], atol=1e-9)
