@@ -215,9 +215,13 @@ class Chunk:
 
     def _joint_springs(self) -> Array:
         """Return the stiffness of springs (n, 1), or (B, n, W) if the rows differ."""
-        if self._rows.joint_springs is None:
-            return self._table.spring[:, None]
-        return side_by_side(self._rows.joint_springs[self._part][:, self._table.order], self._width)
+        k = self._own_springs()
+        return self._table.spring[:, None] if k is None else side_by_side(k, self._width)
+
+    def _own_springs(self) -> Array | None:
+        """Return the springs of each row (N, n), or None if all have those of the arm."""
+        k = self._rows.joint_springs
+        return None if k is None else k[self._part][:, self._table.order]
 
     def _with_springs(self, terms: Array, rows: NDArray[np.intp] | None = None) -> Array:
         """Return the terms (n, 4 or 5, nv, nv) of K_θ, from the kernels' of some ``rows``."""
@@ -226,8 +230,7 @@ class Chunk:
         if not self._rows.arm.has_springs and "springs" not in self._names:
             return terms
         springs = self._table.springs[None]
-        if self._rows.joint_springs is not None:
-            k = self._rows.joint_springs[self._part][:, self._table.order]
+        if (k := self._own_springs()) is not None:
             k = k if rows is None else k[rows]
             S = np.eye(k.shape[1]) if S is None else S
             springs = S.T @ (k[:, :, None] * S)

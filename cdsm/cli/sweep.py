@@ -48,6 +48,7 @@ def sweep(
     if out is None and figure is None and store is None:
         raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
     from cdsm.support.tidy import status_names
+    from cdsm.sweeps.files import write_sweep
     from cdsm.sweeps.quantities import DEFAULT
 
     robot = options.read(arm, changes)
@@ -64,8 +65,6 @@ def sweep(
         outputs=names,
         store=store,
     )
-    from cdsm.sweeps.files import write_sweep
-
     head, numbers = header(robot, low)
     written = [] if out is None else [str(write_sweep(dataset, out))]
     status = dataset["status"].values

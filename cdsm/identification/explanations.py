@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from typing import final
 
 import numpy as np
-from scipy.special import chdtrc
 
 from cdsm.errors import InvalidInput, listed
 from cdsm.identification.identify import check_measurements, identify, independent_readings
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.problem import Problem, Test
-from cdsm.identification.result import UNLIKELY, Identification
+from cdsm.identification.result import Identification, likely
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import aligned, plural
 from cdsm.support.progress import progress_allowed, track
@@ -66,7 +65,7 @@ class Explanations(Result):
 
         It does if at least one in a thousand right models would leave more χ².
         """
-        return tuple(_likely(fit.chi_square, fit.freedom) for fit in self.alone)
+        return tuple(likely(fit.chi_square, fit.freedom) for fit in self.alone)
 
     @property
     def exclusive(self) -> tuple[str, ...]:
@@ -90,29 +89,21 @@ class Explanations(Result):
     def __str__(self) -> str:
         in_mm = not any(isinstance(each, Measurement) for each in self.alone[0].measurements)
         rows = [("free", "value [own unit]", "χ²", "RMSE [mm]" if in_mm else "rms [σ]", "explains")]
-        fits = [
-            (name, f"{fit.values[0]:.4g}", fit.residuals, fit.freedom)
-            for name, fit in self._rows_of
-        ]
-        nothing = ("nothing", "", self.unexplained, self.unexplained.size)
-        for name, value, r, freedom in (nothing, *fits):
+        fits = [("nothing", "", self.unexplained, self.unexplained.size)]
+        for name, fit in zip(self.names, self.alone, strict=True):
+            fits.append((name, f"{fit.values[0]:.4g}", fit.residuals, fit.freedom))
+        for name, value, r, freedom in fits:
             off = 1e3 * self._deviations * r if in_mm else r
-            yes = "yes" if _likely(float(r @ r), freedom) else "no"
+            yes = "yes" if likely(float(r @ r), freedom) else "no"
             rows.append((name, value, f"{r @ r:.4g}", f"{np.sqrt(np.mean(off**2)):.3g}", yes))
         return "\n".join([*aligned(rows), "", *self.verdict])
 
     @property
-    def _rows_of(self) -> list[tuple[str, Identification]]:
-        return [*zip(self.names, self.alone, strict=True)]
-
-    @property
     def _deviations(self) -> Array:
-        each = self.alone[0].measurements
-        sizes, sigma = (
-            [one._readings.size for one in each],
-            [one._errors(one._readings)[1] for one in each],
-        )
-        return np.repeat(sigma, sizes)
+        readings = [each._readings for each in self.alone[0].measurements]
+        pairs = zip(self.alone[0].measurements, readings, strict=True)
+        sigma = [each._errors(own)[1] for each, own in pairs]
+        return np.repeat(sigma, [own.size for own in readings])
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -121,7 +112,7 @@ class Explanations(Result):
         good = [name for name, each in zip(self.names, yes, strict=True) if each]
         bad = [name for name, each in zip(self.names, yes, strict=True) if not each]
         said = list[str]()
-        if _likely(float(r @ r), r.size):
+        if likely(float(r @ r), r.size):
             said.append("The arm as it is explains these measurements; nothing need be changed.")
         if good:
             said.append(f"{_verb(good, 'explains', 'each explain')} these measurements.")
@@ -244,10 +235,6 @@ def _as_it_is(model_of: Callable[..., Manipulator], measurements: Sequence[Test]
     if isinstance(reason := problem.predict(point), str):
         raise InvalidInput("model_of", f"the arm as it is has no prediction: {reason}")
     return problem.residuals(point)
-
-
-def _likely(chi_square: float, freedom: int) -> bool:
-    return float(chdtrc(freedom, chi_square)) >= UNLIKELY
 
 
 def _verb(names: Sequence[str], one: str, many: str) -> str:

@@ -74,10 +74,9 @@ def identify(
     if informative < len(bounds):
         said = f"{plural(informative, 'independent reading')} given for "
         said += f"{plural(len(bounds), 'parameter')}, {', '.join(bounds)}; give at least as many, "
-        said += (
-            "or free fewer parameters. A stiffness or a coordinate counts as one, a loop as its "
-        )
-        raise InvalidInput("measurements", f"{said}readings minus one, as its offset is unknown.")
+        said += "or free fewer parameters. A stiffness or a coordinate counts as one, a loop as "
+        said += "its readings minus one, as its offset is unknown."
+        raise InvalidInput("measurements", said)
     problem = Problem(model_of, tension_of, measurements, bounds)
     first = _start(problem, start)
     with progress_allowed(progress), progress_bar("identifying parameters"):

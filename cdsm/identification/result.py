@@ -30,8 +30,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
-UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
+_UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
 _OWN, _MIXED = "own unit", "N/m or m"
+
+
+def likely(chi_square: float, freedom: int) -> bool:
+    """Whether right models leave this χ² or more in one of a thousand experiments, or oftener."""
+    return not freedom or float(chdtrc(freedom, chi_square)) >= _UNLIKELY
 
 
 @final
@@ -149,7 +154,7 @@ class Identification(Result):
                         f"{name} is at its {side} bound, {limit:g}: the optimum lies there or "
                         "beyond. Widen the bounds, or doubt the model."
                     )
-        if self.freedom and chdtrc(self.freedom, self.chi_square) < UNLIKELY:
+        if not likely(self.chi_square, self.freedom):
             k = int(abs(self.residuals).argmax())
             said.append(
                 f"the model does not explain the measurements within their σ: {self._verdict}, "

@@ -12,7 +12,7 @@ from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import positive
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.forward import forward_statics
+from cdsm.statics.forward import forward_statics, home_angles
 from cdsm.support.validation import (
     NO_WRENCH,
     number_array,
@@ -66,6 +66,7 @@ class TipPosition:
     def __post_init__(self) -> None:
         if not self.axes:
             raise InvalidInput("x", "none of x, y and z given; give the coordinates measured [m].")
+        own: dict[str, object] = {}
         for axis in self.axes:
             remedy = "Leave out a coordinate that was not measured."
             try:
@@ -74,21 +75,16 @@ class TipPosition:
                 raise InvalidInput(
                     axis, f"{str(error).removeprefix(f'{axis}: ')} {remedy}"
                 ) from None
-            object.__setattr__(self, axis, value)
+            own[axis] = value
         std = positive("std", self.std, "m")
-        given = [name for name in _MOTORS if getattr(self, name) is not None]
-        if len(given) != 1:
+        if len(given := self._given) != 1:
             said = f"give one of {', '.join(_MOTORS)}; {' and '.join(given) or 'none'} given."
             raise InvalidInput("pull", said)
         (name,) = given
         if not isinstance(self.label, str):
             raise InvalidInput("label", f"{self.label!r} given; a text is needed.")
-        wrench = tuple(wrench_vector("wrench", self.wrench).tolist())
-        own: dict[str, object] = {
-            name: _numbers(name, getattr(self, name)),
-            "std": std,
-            "wrench": wrench,
-        }
+        own |= {name: _numbers(name, getattr(self, name)), "std": std}
+        own["wrench"] = tuple(wrench_vector("wrench", self.wrench).tolist())
         for key, kept in own.items():
             object.__setattr__(self, key, kept)
 
@@ -98,25 +94,30 @@ class TipPosition:
         return tuple(axis for axis in "xyz" if getattr(self, axis) is not None)
 
     @property
+    def _given(self) -> list[str]:
+        """Names of what the motors did that are given: one, once it is checked."""
+        return [name for name in _MOTORS if getattr(self, name) is not None]
+
+    @property
     def _readings(self) -> Array:
         return np.array([getattr(self, axis) for axis in self.axes], dtype=np.float64)
 
     @property
     def _conditions(self) -> tuple[object, ...]:
         """What the motors did: equal for readings of which one prediction is enough."""
-        each = [getattr(self, name) for name in _MOTORS]
-        return (*(tuple(x.items()) if isinstance(x, dict) else x for x in each), self.wrench)
+        (name,) = self._given
+        given = getattr(self, name)
+        return name, tuple(given.items()) if isinstance(given, dict) else given, self.wrench
 
     def _rest(self, arm: Manipulator, near: Posture | None = None) -> Posture:
         """Compute where a model of the arm rests, sought from a posture ``near``."""
-        name = next(each for each in _MOTORS if getattr(self, each) is not None)
+        (name,) = self._given
         given = getattr(self, name)
         if isinstance(given, dict):
             names = arm.cables.names
-            home = np.clip(arm.springs.rest, arm.lower, arm.upper)
             loose = {
                 "pull": [-arm.length / cable.gain for cable in arm.cables],
-                "rest_lengths": arm.cable_lengths(home) + arm.length,
+                "rest_lengths": arm.cable_lengths(home_angles(arm)) + arm.length,
                 "tension": np.zeros(len(names)),
             }
             values = np.array(loose[name])

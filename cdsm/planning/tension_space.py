@@ -82,8 +82,7 @@ class TensionSpace:
         K, J = stiffness(pose, self.least), pose.length_jacobian
         for u in self.directions:
             K._require_mobile(u)
-        parts = abs(K.active) + abs(K.passive) + abs(K.gravity) + abs(K.load) + abs(K.springs)
-        self._size = max(float(parts.diagonal().min()), SMALLEST)
+        self._size = max(float(K._magnitudes.diagonal().min()), SMALLEST)
         self._constant = K.gravity + K.load + K.springs
         torque = pose.jacobian.T @ self.least.wrench - pose._own_torque
         self._balance = nondimensional(J, torque, low, high, pose.arm.length)

@@ -14,9 +14,7 @@ import cdsm
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import (
-    FLAT,
-)
+from cdsm.statics.solve import FLAT
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
@@ -104,8 +102,7 @@ class Equilibrium(Result):
         It is False for a neutral state, for example if all cables are slack. A joint that touches
         its stop without a torque counts as free, even if this stop blocks the unstable motion.
         """
-        K = self.stiffness.joint[np.ix_(self._free, self._free)]
-        values = np.linalg.eigvalsh((K + K.T) / 2.0)
+        values = self._motions[0]
         return bool((values > 1e-2 * FLAT * abs(values).max(initial=0.0)).all())
 
     @quantity("1")
@@ -116,12 +113,13 @@ class Equilibrium(Result):
         eigenvalue. A straight round rod beyond its buckling load rests in any direction around its
         axis; the small stiffness of a model of it is that of its joints, and holds nothing.
         """
-        K, of = self.stiffness, np.ix_(self._free, self._free)
-        values, vectors = np.linalg.eigh((K.joint[of] + K.joint[of].T) / 2.0)
+        values, vectors = self._motions
         if not values.size:
             return False
-        v, terms = vectors[:, 0], (K.active, K.passive, K.gravity, K.load, K.springs)
-        return bool(values[0] <= _NEUTRAL * sum(abs(v @ each[of] @ v) for each in terms))
+        v, of = vectors[:, 0], np.ix_(self._free, self._free)
+        return bool(
+            values[0] <= _NEUTRAL * sum(abs(v @ each[of] @ v) for each in self.stiffness._terms)
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -188,6 +186,13 @@ class Equilibrium(Result):
     def _free(self) -> NDArray[np.intp]:
         """Indices (n,) of the joints that no stop pushes."""
         return np.flatnonzero(self.stop_torque == 0.0)
+
+    @cached_property
+    def _motions(self) -> tuple[Array, Array]:
+        """Eigenvalues of the symmetric part of K_θ of those joints, ascending, and vectors."""
+        K = self.stiffness.joint[np.ix_(self._free, self._free)]
+        values, vectors = np.linalg.eigh((K + K.T) / 2.0)
+        return values, vectors
 
     @cached_property
     def compliance(self) -> Array:

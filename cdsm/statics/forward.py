@@ -67,8 +67,7 @@ def forward_statics(
         said = f"give exactly one of {', '.join(given)}; {' and '.join(named) or 'none'} given."
         raise InvalidInput("forward_statics", said)
     W = wrench_vector("wrench", wrench)
-    free = np.clip(arm.springs.rest, arm.lower, arm.upper)
-    home = arm.at(free)
+    home = arm.at(home_angles(arm))
     begin = home if start is None else arm.at(start)
     value = given[named[0]]
     assert value is not None
@@ -77,6 +76,11 @@ def forward_statics(
         return locked_equilibrium(model(1.0))
     _require_held(model(0.0), home)
     return _raised(model, home)
+
+
+def home_angles(arm: Manipulator) -> Array:
+    """Return the angles q_0 of the springs (nv,), or the joint limits next to them."""
+    return np.clip(arm.springs.rest, arm.lower, arm.upper)
 
 
 def _model(

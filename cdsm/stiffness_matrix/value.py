@@ -176,11 +176,20 @@ class Stiffness(Result):
         A, V = self._decompose(np.eye(3))
         return frozen(A @ (V @ matrix @ V.T) @ A.T)
 
+    @property
+    def _terms(self) -> tuple[Array, ...]:
+        """The five terms of K_θ, each (nv, nv)."""
+        return self.active, self.passive, self.gravity, self.load, self.springs
+
+    @property
+    def _magnitudes(self) -> Array:
+        """Sum of the magnitudes of the terms (nv, nv): the size of their rounding errors."""
+        return np.asarray(sum(map(abs, self._terms)))
+
     @cached_property
     def _inverse(self) -> Array:
         """K_θ⁻¹ (nv, nv), or SingularStiffness with the joint motion."""
-        P = abs(self.active) + abs(self.passive) + abs(self.gravity) + abs(self.load)
-        P += abs(self.springs)
+        P = self._magnitudes
         D = P.diagonal()
         if not D.min() > 0.0:
             raise _singular("next to nothing holds the arm", np.eye(D.size)[D.argmin()])
