@@ -21,17 +21,9 @@ def hinge(
     friction: float = 0.1, rigidity: float = 48e3, lead: float = 0.3, hole_radius: float = 0.025
 ) -> cdsm.Manipulator:
     geometry = cdsm.Geometry.hinged(
-        joints=1,
-        twist=0.0,
-        cables_per_joint=2,
-        link_length=0.15,
-        base_length=0.02,
-        disk_offset=0.02,
-        hole_radius=hole_radius,
-        link_mass=0.1,
-        lead=lead,
-        friction=friction,
-    )
+        joints=1, twist=0.0, cables_per_joint=2, link_length=0.15, base_length=0.02,
+        disk_offset=0.02, hole_radius=hole_radius, link_mass=0.1, lead=lead, friction=friction,
+    )  # fmt: skip
     return cdsm.Manipulator(geometry, elasticity=cdsm.LinearElasticity(rigidity))
 
 

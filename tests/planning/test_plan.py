@@ -170,8 +170,6 @@ def test_several_directions_are_hit_at_once_if_they_can_be() -> None:
         # there may be smaller tensions than those the targets are from
         assert np.linalg.norm(plan.tension.values) <= np.linalg.norm(least.values) * (1.0 + 1e-9)
         assert_admissible(plan, 30.0, 300.0)
-        assert plan.direction is not None
-        np.testing.assert_allclose(np.linalg.norm(plan.direction, axis=1), 1.0, rtol=1e-15)
 
 
 def test_what_cannot_be_hit_is_missed_by_less_than_any_sample() -> None:
@@ -209,6 +207,5 @@ BAD: list[tuple[Any, Any, str]] = [
 
 @pytest.mark.parametrize(("direction", "target", "message"), BAD)
 def test_targets_that_make_no_sense_are_named(direction: Any, target: Any, message: str) -> None:
-    pose = presets.virtual_prototype().at(np.full(10, 0.1))
     with pytest.raises(cdsm.InvalidInput, match=message):
-        cdsm.plan_stiffness(pose, direction, target, 50.0)
+        cdsm.plan_stiffness(hinge().at([0.1]), direction, target, 50.0)

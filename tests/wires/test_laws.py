@@ -35,6 +35,7 @@ LAWS: dict[str, cdsm.Elasticity] = {
     "function": cdsm.Elasticity.from_rigidity(ramp, 0.0, 1000.0),
     "scaled": STRAND.scaled(1.25),
     "slack": STRAND.slack_below(),
+    "slack table": TABLE.slack_below(),
 }
 METHODS = ("rigidity", "strain", "secant_rigidity", "rigidity_slope", "energy")
 F = np.array([[6.0, 12.0, 28.0, 34.0], [60.0, 150.0, 250.0, 290.0]])
@@ -43,31 +44,26 @@ F = np.array([[6.0, 12.0, 28.0, 34.0], [60.0, 150.0, 250.0, 290.0]])
 @pytest.mark.parametrize("name", LAWS)
 def test_strain_and_energy_are_integrals_of_the_rigidity(name: str) -> None:
     law = LAWS[name]
-    for a, b in ((6.0, 11.0), (33.0, 80.0), (80.0, 290.0)):
-        points = [p for p in POINTS if a < p < b]
+    slack = ((0.0, 1.0), (1.0, 2.2), (0.0, 11.0)) if law.low < 1.0 else ()
+    for a, b in ((6.0, 11.0), (33.0, 80.0), (80.0, 290.0), *slack):
+        points = [p for p in (law.rest, *POINTS) if a < p < b]
         for power, of in enumerate((law.strain, law.energy)):
-            area = quad(
-                lambda f, n=power: f**n / float(law.rigidity(f)),
-                a,
-                b,
-                points=points,
-            )[0]
+
+            def slope(f: float, power: int = power) -> float:
+                return f**power / float(law.rigidity(f))
+
+            area = quad(slope, a, b, points=points, limit=200)[0]
             assert float(of(b) - of(a)) == pytest.approx(area, rel=1e-7)
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_slope_is_the_derivative_of_the_rigidity(name: str) -> None:
+def test_slope_and_secant_follow_from_the_rigidity_and_strain(name: str) -> None:
+    """With S = (F − F_0)/ε the tangent is S²/(S − (F − F_0) S')."""
     law, h = LAWS[name], 1e-4
     slope = (law.rigidity(F + h) - law.rigidity(F - h)) / (2.0 * h)
     atol = 1e-6 * float(law.rigidity(F).max())
     np.testing.assert_allclose(law.rigidity_slope(F), slope, rtol=1e-5, atol=atol)
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_tangent_follows_from_the_secant(name: str) -> None:
-    """With S = (F − F_0)/ε the tangent is S²/(S − (F − F_0) S')."""
-    law, h = LAWS[name], 1e-3
-    S = law.secant_rigidity(F)
+    S, h = law.secant_rigidity(F), 1e-3
     np.testing.assert_allclose(S * law.strain(F), F - law.rest, rtol=1e-12)
     slope = (law.secant_rigidity(F + h) - law.secant_rigidity(F - h)) / (2.0 * h)
     np.testing.assert_allclose(S**2 / (S - (F - law.rest) * slope), law.rigidity(F), rtol=1e-4)
@@ -75,22 +71,15 @@ def test_tangent_follows_from_the_secant(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_tension_inverts_strain_both_ends_included(name: str) -> None:
-    law = LAWS[name]
+def test_tension_inverts_strain_and_nothing_beyond_is_reached(name: str) -> None:
+    law, most = LAWS[name], RANGES["tension"].high
     tension = np.array([law.low, *F.ravel(), min(law.high, 1e4)])
     np.testing.assert_allclose(law.tension(law.strain(tension)), tension, rtol=1e-12, atol=1e-12)
     assert float(law.strain(law.rest)) == pytest.approx(0.0, abs=1e-18)
     assert float(law.tension(0.0)) == pytest.approx(law.rest, abs=1e-12)
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_strain_out_of_reach_is_refused_with_the_reach(name: str) -> None:
-    law = LAWS[name]
-    beyond = float(law.strain(min(law.high, RANGES["tension"].high))) * (1.0 + 1e-9)
+    beyond = float(law.strain(min(law.high, most))) * (1.0 + 1e-9)
     for strain in (float(law.strain(law.low)) - 1e-9, beyond):
-        with pytest.raises(
-            cdsm.ElasticityRangeError, match=r"^no tension .* strain.* reaches"
-        ) as e:
+        with pytest.raises(cdsm.ElasticityRangeError, match=r"strain.* reaches") as e:
             law.tension([0.0, strain])
         assert e.value.indices == (1,)
 
@@ -127,10 +116,9 @@ def test_rigidity_in_a_wrong_unit_is_doubted_once() -> None:
 
 
 def test_corner_of_eq19_is_bridged_and_nothing_else_changes() -> None:
-    join = 31.0
-    away = np.concatenate([np.linspace(2.2, join - 1.4, 500), np.linspace(join + 1.4, 810.0, 500)])
+    away = np.r_[2.2:29.6:500j, 32.4:810.0:500j]  # type: ignore[misc]
     np.testing.assert_allclose(STRAND.rigidity(away), STRAND.polynomial(away), rtol=1e-8)
-    near = np.linspace(join - 1.4, join + 1.4, 400)
+    near = np.linspace(29.6, 32.4, 400)
     np.testing.assert_allclose(STRAND.rigidity(near), STRAND.polynomial(near), rtol=7e-3)
     slope = STRAND.rigidity_slope(near)
     assert (slope > 0.0).all()
