@@ -1,5 +1,6 @@
 """Springs at joints: in the balance, in K_θ, in batches, and in MuJoCo."""
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +16,11 @@ Q = np.array([0.1, -0.2, 0.15, 0.1, -0.1, 0.2])
 
 
 def sprung(**changes: object) -> cdsm.Manipulator:
-    sizes: dict[str, object] = {
-        "joints": 3,
-        "cables_per_joint": 3,
-        "link_length": 0.05,
-        "base_length": 0.02,
-        "disk_offset": 0.01,
-        "hole_radius": 0.02,
-        "link_mass": 0.05,
-        "lead": 0.1,
-        "joint_stiffness": [2.0, 1.0, 0.5],
-        "rest_angle": [0.0, 0.1, 0.0],
-    }
+    sizes: dict[str, Any] = {"joints": 3, "cables_per_joint": 3, "link_length": 0.05}
+    sizes |= {"base_length": 0.02, "disk_offset": 0.01, "hole_radius": 0.02, "link_mass": 0.05}
+    sizes |= {"lead": 0.1, "joint_stiffness": [2.0, 1.0, 0.5], "rest_angle": [0.0, 0.1, 0.0]}
     return cdsm.Manipulator(
-        cdsm.Geometry.universal(**{**sizes, **changes}),  # type: ignore[arg-type]
-        cdsm.LinearElasticity(5e4),
+        cdsm.Geometry.universal(**{**sizes, **changes}), cdsm.LinearElasticity(5e4)
     )
 
 
@@ -47,25 +38,13 @@ def potential(arm: cdsm.Manipulator, K: cdsm.Stiffness, q: Array) -> float:
 
 def test_stiffness_is_the_hessian_of_the_potential() -> None:
     arm = sprung()
-    W = np.append(WRENCH[:3], np.zeros(3))
-    K = cdsm.stiffness(arm.at(Q), np.linspace(5.0, 20.0, 9), W)
+    K = cdsm.stiffness(arm.at(Q), np.linspace(5.0, 20.0, 9), np.append(WRENCH[:3], np.zeros(3)))
     errors = []
     for h in (4e-3, 2e-3):
-        steps = h * np.eye(6)
-        H = np.array(
-            [
-                [
-                    sum(
-                        s * t * potential(arm, K, Q + s * a + t * b)
-                        for s in (1.0, -1.0)
-                        for t in (1.0, -1.0)
-                    )
-                    / (4.0 * h * h)
-                    for b in steps
-                ]
-                for a in steps
-            ]
-        )
+        H = np.zeros((6, 6))
+        for (i, a), (j, b) in product(enumerate(h * np.eye(6)), repeat=2):
+            for s, t in product((1.0, -1.0), repeat=2):
+                H[i, j] += s * t * potential(arm, K, Q + s * a + t * b) / (4.0 * h * h)
         errors.append(abs(H - K.joint).max() / abs(K.joint).max())
     assert errors[1] < 1e-4
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)  # second order
@@ -150,18 +129,19 @@ def test_springs_are_kept_by_files(arm: cdsm.Manipulator, tmp_path: Path) -> Non
     assert cdsm.Manipulator.read(arm.write(tmp_path / "ARM.toml")) == arm
 
 
-def test_springs_that_cannot_be_are_named() -> None:
-    arm = sprung()
-    for given, said in (
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
         ({"joint1_1": -1.0}, r"springs\['joint1_1'\]: -1 N m/rad given"),
         ({"joint1_1": (1.0, 2.0, 3.0)}, "stiffness, or"),
         ({"joint1_1": np.nan}, "joint1_1"),
         ([1.0], "dict of joint names"),
-    ):
-        with pytest.raises(cdsm.InvalidInput, match=said):
-            arm.with_springs(given)  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="joint9_1"):
-        arm.with_springs({"joint9_1": 1.0})
+        ({"joint9_1": 1.0}, "joint9_1"),
+    ],
+)
+def test_springs_that_cannot_be_are_named(given: Any, said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        sprung().with_springs(given)
     with pytest.raises(cdsm.GeometryError, match="joint_stiffness"):
         sprung(joint_stiffness=-1.0)
 
