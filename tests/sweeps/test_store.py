@@ -49,7 +49,7 @@ def test_a_chunked_sweep_is_lazy_and_has_the_same_numbers(whole: xr.Dataset) -> 
     np.testing.assert_array_equal(q.compute(), POSES.angles(short_arm()))
 
 
-# takes seconds: two processes start, seconds each
+
 def test_a_cluster_of_two_workers_has_the_same_numbers(tmp_path: Path) -> None:
     q, options = POSES.angles(short_arm(), 250), {"minimum": 20.0, "outputs": ("along", "tension")}
     alone = cdsm.sweep(short_arm(), POSES, **options)  # type: ignore[arg-type]
@@ -97,7 +97,7 @@ cdsm.sweep(arm, cdsm.RandomPoses(1000, 1).angles(arm, 20), minimum=20.0, store=s
 """
 
 
-# takes seconds: a process that writes fifty chunks
+
 def test_a_killed_run_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
     path = tmp_path / "s.zarr"
     with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], cwd=ROOT) as process:
