@@ -165,14 +165,12 @@ def test_rest_length_and_elongation_make_the_length() -> None:
 def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> None:
     cables = [replace(c, control="force") if c.name == "cable2_1" else c for c in ARM.cables]
     arm = cdsm.Manipulator(ARM.geometry, cables=cables, gravity=ARM.gravity)
-    targets = [80e3, 1e7, 81e3]
-    plan = cdsm.plan_path(arm, DOWN, targets, 50.0, angles=waving(3))
-    path = plan.write(tmp_path / "motors.csv")
-    with path.open(encoding="utf-8", newline="") as file:
+    plan = cdsm.plan_path(arm, DOWN, [80e3, 1e7, 81e3], 50.0, angles=waving(3))
+    with plan.write(tmp_path / "motors.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["status"] for row in rows] == ["planned", "stiffness", "planned"]
     assert rows[1]["reason"] == plan.infeasible[0].reason
-    names = [cable.name for cable in arm.cables]
+    names = [cable.name for cable in cables]
     held = [name for name in names if name != "cable2_1"]
     columns = {
         "": (arm.joint_names, "rad", plan.angles),

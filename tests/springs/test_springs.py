@@ -112,21 +112,18 @@ def test_uncertain_springs_are_springs_of_other_arms(of: str, coupled: bool) -> 
 OVERRIDDEN: tuple[dict[str, Any], ...] = ({"joint1_1": 3.0, "joint2_2": (1.0, 0.2)}, {})
 
 
-def test_springs_are_kept_by_other_cables_and_dimensions() -> None:
-    arm = sprung()
-    again = arm.with_friction(0.1).with_gravity("-y")
-    np.testing.assert_array_equal(again.springs.stiffness, arm.springs.stiffness)
-    assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
-    assert arm.with_springs({}) != arm
-    for each in (arm, *map(arm.with_springs, OVERRIDDEN)):
-        wider = cdsm.ArmParameters(each, ("hole_radius",))(hole_radius=0.021)
-        np.testing.assert_array_equal(wider.springs.stiffness, each.springs.stiffness)
-        np.testing.assert_array_equal(wider.springs.angle, each.springs.angle)
-
-
 @pytest.mark.parametrize("arm", [sprung(), *map(sprung().with_springs, OVERRIDDEN)])
-def test_springs_are_kept_by_files(arm: cdsm.Manipulator, tmp_path: Path) -> None:
+def test_springs_are_kept_by_files_other_cables_and_dimensions(
+    arm: cdsm.Manipulator, tmp_path: Path
+) -> None:
     assert cdsm.Manipulator.read(arm.write(tmp_path / "ARM.toml")) == arm
+    assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
+    assert arm.with_springs({"joint1_1": 9.0}) != arm
+    rough = arm.with_friction(0.1).with_gravity("-y")
+    wider = cdsm.ArmParameters(arm, ("hole_radius",))(hole_radius=0.021)
+    for again in (rough, wider):
+        np.testing.assert_array_equal(again.springs.stiffness, arm.springs.stiffness)
+        np.testing.assert_array_equal(again.springs.angle, arm.springs.angle)
 
 
 @pytest.mark.parametrize(
