@@ -101,8 +101,7 @@ def test_stiffness(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
 def test_stiffness_with_tolerances_and_friction(probe: Path, pose: cdsm.Posture) -> None:
     changes = ("--set", "tolerances.joint_angle=0.01", "--set", "friction=0.1")
     found = told("stiffness", probe, "--angles", 8, "--minimum", 30, *changes)
-    arm = pose.arm.with_friction(0.1)
-    rough, given = arm.at(pose.q), cdsm.Tolerances(joint_angle=0.01)
+    rough, given = pose.arm.with_friction(0.1).at(pose.q), cdsm.Tolerances(joint_angle=0.01)
     tension = cdsm.distribute_tension(rough, 30.0)
     sure = cdsm.uncertainty(rough, tension, given, direction="z")
     assert found["uncertainty"]["z"] == plain(sure.to_dict())
@@ -254,8 +253,7 @@ def test_export(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:
     told("export", probe, urdf)
     assert urdf.read_text(encoding="utf-8") == cdsm.to_urdf(pose.arm.geometry)
     found = told("export", probe, model, "--angles", 8, "--minimum", 20, "--actuators", "none")
-    tension = cdsm.distribute_tension(pose, 20.0)
-    text = cdsm.to_mjcf(pose.arm, pose, tension, actuators="none")
+    text = cdsm.to_mjcf(pose.arm, pose, cdsm.distribute_tension(pose, 20.0), actuators="none")
     assert model.read_text(encoding="utf-8") == text
     assert found["actuators"] == "none"
     soft = ("--set", "wire=1e9", "--set", "series_stiffness=200", "--minimum", 60)

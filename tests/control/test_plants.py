@@ -39,20 +39,17 @@ def test_arms_that_a_plant_does_not_simulate_are_refused() -> None:
 
 pytest.importorskip("mujoco")
 
-PAYLOAD = np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
-
 
 def test_both_plants_rest_at_the_same_place() -> None:
     """Far from where the model was linearised, and under a load: within a thousandth."""
-    plan = small_path()
+    plan, load = small_path(), np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
     wire = paid_out(plan)[-1] + 2e-5 * np.arange(6)
     command = Command(wire, plan.tensions[-1], np.zeros(6, dtype=np.bool_))
     slow, fast = cdsm.QuasiStaticPlant(plan.arm), cdsm.MuJoCoPlant(plan.arm, damping_ratio=0.7)
-    begin = plan.angles[0], plan.tensions[0], np.zeros(6)
-    wanted = slow.step_to(slow.initial(*begin), command, PAYLOAD)
-    state = fast.initial(*begin)
+    begin = plan.angles[0], plan.tensions[0], NONE
+    wanted, state = slow.step_to(slow.initial(*begin), command, load), fast.initial(*begin)
     for _ in range(40):
-        state = fast.step_to(state, command, PAYLOAD)
+        state = fast.step_to(state, command, load)
     moved = wanted.pose.q - plan.angles[0]
     assert np.linalg.norm(moved) > np.deg2rad(2.0)
     assert np.linalg.norm(state.pose.q - wanted.pose.q) < 1e-3 * np.linalg.norm(moved)

@@ -42,8 +42,7 @@ def _elasticity(path: Path) -> None:
 
 def _tensile(path: Path) -> None:
     test = cdsm.read_tensile_csv(path)
-    assert np.isfinite(test.displacement).all()
-    assert np.isfinite(test.force).all()
+    assert np.isfinite([test.displacement, test.force]).all()
 
 
 def _path(path: Path) -> None:
@@ -116,6 +115,12 @@ def _bytes(token: str | bytes) -> bytes:
     return token.encode() if isinstance(token, str) else token
 
 
+def renumbered(whole: bytes, rng: random.Random) -> bytes:
+    """One number replaced by one that is none, or too large, or too small."""
+    found = rng.choice(list(re.finditer(rb"-?\d+\.?\d*(?:e-?\d+)?", whole)))
+    return whole[: found.start()] + _bytes(rng.choice(NUMBERS)) + whole[found.end() :]
+
+
 def shuffled(whole: bytes, rng: random.Random) -> bytes:
     """A few cuts, insertions, flipped bits, changed bytes and repeated pieces."""
     data = bytearray(whole)
@@ -136,12 +141,6 @@ def shuffled(whole: bytes, rng: random.Random) -> bytes:
                 del data[i + len(data) // 4 :]
         data = data or bytearray(b"x")
     return bytes(data)
-
-
-def renumbered(whole: bytes, rng: random.Random) -> bytes:
-    """One number replaced by one that is none, or too large, or too small."""
-    found = rng.choice(list(re.finditer(rb"-?\d+\.?\d*(?:e-?\d+)?", whole)))
-    return whole[: found.start()] + _bytes(rng.choice(NUMBERS)) + whole[found.end() :]
 
 
 def rearranged(whole: bytes, rng: random.Random) -> bytes:

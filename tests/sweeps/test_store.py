@@ -49,7 +49,6 @@ def test_a_chunked_sweep_is_lazy_and_has_the_same_numbers(whole: xr.Dataset) -> 
     np.testing.assert_array_equal(q.compute(), POSES.angles(short_arm()))
 
 
-
 def test_a_cluster_of_two_workers_has_the_same_numbers(tmp_path: Path) -> None:
     q, options = POSES.angles(short_arm(), 250), {"minimum": 20.0, "outputs": ("along", "tension")}
     alone = cdsm.sweep(short_arm(), POSES, **options)  # type: ignore[arg-type]
@@ -95,7 +94,6 @@ from tests.support.sweeps import short_arm
 arm = short_arm()
 cdsm.sweep(arm, cdsm.RandomPoses(1000, 1).angles(arm, 20), minimum=20.0, store=sys.argv[1])
 """
-
 
 
 def test_a_killed_run_goes_on_to_the_same_numbers(tmp_path: Path) -> None:

@@ -72,8 +72,8 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     assert said["stiffness along x, y, z"] == along(K)
     assert said["smallest joint stiffness"] == f"{K.margin:.4g}"
     assert said["tip"] == ", ".join(f"{1000.0 * x:.1f}" for x in pose.tip[:3, 3])
-    tensions = {name: value for name, value in said.items() if "tension" in name}
-    assert [*tensions.values()] == [f"{end:.4g}" for end in (pull.values.min(), pull.values.max())]
+    tensions = [value for name, value in said.items() if "tension" in name]
+    assert tensions == [f"{end:.4g}" for end in (pull.values.min(), pull.values.max())]
     largest = 1e3 * np.linalg.norm(K.compliance[:3, :3], 2)
     assert said["largest compliance"] == f"{largest:.3g}"
     (softest,) = (float(value) for name, value in said.items() if name.startswith("softest"))
