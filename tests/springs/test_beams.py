@@ -92,11 +92,10 @@ def cantilever(pieces: int, **changes: float) -> cdsm.Manipulator:
 
 @pytest.mark.parametrize("n", [1, 2, 4, 8])
 def test_cantilevers_bend_as_beams(n: int) -> None:
-    f, none = 1e-6, np.zeros(3)
-    arm = cantilever(n)
+    f, arm = 1e-6, cantilever(n)
 
-    def tip(*wrench: float) -> Array:
-        return cdsm.forward_statics(arm, tension=none, wrench=wrench).pose.tip
+    def tip(*wrench: float, of: cdsm.Manipulator = arm) -> Array:
+        return cdsm.forward_statics(of, tension=np.zeros(3), wrench=wrench).pose.tip
 
     sag = tip(0.0, 0.0, f, 0.0, 0.0, 0.0)[2, 3] / (f * 0.4**3 / (3.0 * EI))
     assert sag - 1.0 == pytest.approx(1.0 / (12.0 * n * n), rel=1e-6)
@@ -106,8 +105,7 @@ def test_cantilevers_bend_as_beams(n: int) -> None:
     turned = tip(0.0, 0.0, 0.0, 0.0, -moment, 0.0)
     assert math.atan2(turned[2, 0], turned[0, 0]) == pytest.approx(math.radians(60.0), rel=1e-9)
     heavy = cantilever(n, mass_per_length=1e-6).with_gravity("z")
-    sag = cdsm.forward_statics(heavy, tension=none).pose.tip[2, 3]
-    sag /= 1e-6 * 9.81 * 0.4**4 / (8.0 * EI)
+    sag = tip(*[0.0] * 6, of=heavy)[2, 3] / (1e-6 * 9.81 * 0.4**4 / (8.0 * EI))
     assert sag - 1.0 == pytest.approx(1.0 / (6.0 * n * n), rel=0.05)
 
 
