@@ -53,7 +53,8 @@ def test_strain_and_energy_are_integrals_of_the_rigidity(name: str) -> None:
                 return f**power / float(law.rigidity(f))
 
             area = quad(slope, a, b, points=points, limit=200)[0]
-            assert float(of(b) - of(a)) == pytest.approx(area, rel=1e-7)
+            near = 1e-8 if (a, b) in slack else 1e-7
+            assert float(of(b) - of(a)) == pytest.approx(area, rel=near)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -79,7 +80,9 @@ def test_tension_inverts_strain_and_nothing_beyond_is_reached(name: str) -> None
     assert float(law.tension(0.0)) == pytest.approx(law.rest, abs=1e-12)
     beyond = float(law.strain(min(law.high, most))) * (1.0 + 1e-9)
     for strain in (float(law.strain(law.low)) - 1e-9, beyond):
-        with pytest.raises(cdsm.ElasticityRangeError, match=r"strain.* reaches") as e:
+        with pytest.raises(
+            cdsm.ElasticityRangeError, match=r"^no tension .* strain.* reaches"
+        ) as e:
             law.tension([0.0, strain])
         assert e.value.indices == (1,)
 
