@@ -1,6 +1,5 @@
 """The programs of examples/: each runs, and says what cdsm says."""
 
-import math
 from pathlib import Path
 
 import generate
@@ -36,15 +35,12 @@ def test_the_ros_node_says_what_cdsm_says_whatever_the_order_of_the_joints() -> 
 
 
 def test_the_ros_node_names_what_is_wrong() -> None:
-    straight = dict.fromkeys(ARM.joint_names, 0.0)
-    first = ARM.joint_names[0]
-    assert first in answer(ARM, {k: v for k, v in straight.items() if k != first}, 10.0).problem
-    for wrong in (5.0, math.nan):
-        said = answer(ARM, straight | {first: wrong}, 10.0)
+    straight, first = dict.fromkeys(ARM.joint_names, 0.0), ARM.joint_names[0]
+    for wrong in ({k: v for k, v in straight.items() if k != first}, {first: 5.0}, {first: np.nan}):
+        said = answer(ARM, straight | wrong if len(wrong) == 1 else wrong, 10.0)
         assert first in said.problem
         assert not said.tensions
-    unstable = answer(ARM, straight, 1e5)
-    assert unstable.problem
+    assert answer(ARM, straight, 1e5).problem
 
 
 def test_mujoco_comes_to_rest_where_cdsm_says() -> None:

@@ -24,10 +24,8 @@ def test_new_writes_the_examples_and_they_run(name: str, tmp_path: Path) -> None
     told = call("new", path, *KINDS[name])
     assert told.exit_code == 0, told.output
     assert path.read_bytes() == (EXAMPLES / name).read_bytes()
-    text = path.read_text(encoding="utf-8")
-    assert max(map(len, text.splitlines())) <= 110
+    assert max(map(len, path.read_text(encoding="utf-8").splitlines())) <= 110
     arm = cdsm.Manipulator.read(path)
-    assert cdsm.Manipulator.read(arm.write(tmp_path / "again.toml")) == arm
     for angles in (0.0, 8.0):
         pose = arm.at(np.full(arm.nv, np.deg2rad(angles)))
         assert cdsm.stiffness(pose, cdsm.distribute_tension(pose, 10.0)).is_stable

@@ -21,7 +21,12 @@ ALL_KINDS = cdsm.Tolerances(
 )
 
 
-def test_a_file_of_tolerances(tmp_path: Path) -> None:
+def test_every_kind_comes_back_to_the_last_bit(tmp_path: Path) -> None:
+    assert cdsm.Tolerances.read(ALL_KINDS.write(tmp_path / "t.toml")) == ALL_KINDS
+    arm = cdsm.Manipulator.read(EXAMPLE).with_tolerances(ALL_KINDS)
+    again = cdsm.Manipulator.read(arm.write(tmp_path / "arm.toml"))
+    assert (again, again.tolerances) == (arm, ALL_KINDS)
+    assert again.with_gravity("-y").with_friction(0.1).tolerances == ALL_KINDS
     path = tmp_path / "tolerances.toml"
     path.write_text("rigidity = 0.05\nhole_radius = {within = 1e-4, correlation = 0.5}\n")
     assert cdsm.Tolerances.read(path).given == {
@@ -50,12 +55,3 @@ def test_faults_are_named(text: str, said: str, whole: bool, tmp_path: Path) -> 
         path.write_text(text + "\n")
     with pytest.raises(cdsm.FileError, match=said):
         (cdsm.Manipulator if whole else cdsm.Tolerances).read(path)
-
-
-def test_every_kind_comes_back_to_the_last_bit(tmp_path: Path) -> None:
-    assert cdsm.Tolerances.read(ALL_KINDS.write(tmp_path / "t.toml")) == ALL_KINDS
-    arm = cdsm.Manipulator.read(EXAMPLE).with_tolerances(ALL_KINDS)
-    again = cdsm.Manipulator.read(arm.write(tmp_path / "arm.toml"))
-    assert again == arm
-    assert again.tolerances == ALL_KINDS
-    assert again.with_gravity("-y").with_friction(0.1).tolerances == ALL_KINDS

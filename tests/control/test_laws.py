@@ -74,65 +74,52 @@ def held(error: float, *, controlled: bool = True) -> ControlInput:
     return ControlInput(wanted, wanted, measured, missing, measured.paid_out, *bounds, mask)
 
 
-def test_tension_control_takes_wire_in_where_tension_is_missing() -> None:
-    """The integral part of a constant error: I e/k of wire."""
-    command = control.tension_control(held(5.0))
-    assert 0.41 - command.paid_out[0] == pytest.approx(INTEGRAL * 5.0 / 2e4)
-    assert command.tension[0] == pytest.approx(45.0 + INTEGRAL * 5.0)
-    assert control.tension_control(held(-5.0)).paid_out[0] > 0.41
-    assert not command.saturated.any()
+def changed(at: ControlInput, **reference: float) -> ControlInput:
+    numbers = {name: np.array([value]) for name, value in reference.items()}
+    return at._replace(reference=at.reference._replace(**numbers))
 
 
-def test_mixed_law_pays_out_the_wire_of_the_plan_where_it_controls_no_tension() -> None:
-    free = control.mixed(held(5.0, controlled=False))
-    # 10 mm of wire at 20 N/mm are 200 N above the 45 N measured: the clamp lets 155 N through
-    assert free.saturated.all()
-    assert free.tension[0] == 200.0
-    assert free.paid_out[0] == pytest.approx(0.41 - (200.0 - 45.0) / 2e4)
-    assert control.mixed(held(5.0)) == control.tension_control(held(5.0))
+CALM, OFF, FREE = held(0.0), held(5.0), held(5.0, controlled=False)
+MOVED = changed(CALM, tension=52.0, paid_out=0.399)._replace(maximum=np.array([60.0]))
 
 
-def test_a_change_of_length_that_the_plan_makes_is_no_change_of_tension() -> None:
-    """The joint moves by 1 mm of cable, 20 N at constant posture; the plan wants 2 N more."""
-    at = held(0.0)
-    now = at.reference._replace(tension=np.array([52.0]), paid_out=np.array([0.399]))
-    for law in (control.tension_control, control.mixed):
-        command = law(at._replace(reference=now, maximum=np.array([60.0])))
-        assert command.tension[0] == pytest.approx(52.0)
-        assert command.paid_out[0] == pytest.approx(0.409)
-        assert not command.saturated.any()
-
-
-def test_feedforward_of_an_overload_pays_the_wire_out_that_is_too_tense() -> None:
-    wanted = held(0.0)
-    wanted = wanted._replace(reference=wanted.reference._replace(tension=np.array([240.0])))
-    command = control.feedforward(wanted)
-    assert command.tension[0] == 200.0
-    assert command.paid_out[0] == pytest.approx(0.4 + 40.0 / 2e4)
-    assert command.saturated.all()
+@pytest.mark.parametrize(
+    ("law", "at", "tension", "wire", "saturated"),
+    [
+        # the integral part of a constant error: I e/k of wire is taken in where tension is missing
+        (control.tension_control, OFF, 45.0 + 5.0 * INTEGRAL, 0.41 - 5.0 * INTEGRAL / 2e4, False),
+        (control.tension_control, held(-5.0), 55.0 - 5.0 * INTEGRAL, 0.41 + INTEGRAL / 4e3, False),
+        (control.mixed, OFF, 45.0 + 5.0 * INTEGRAL, 0.41 - 5.0 * INTEGRAL / 2e4, False),
+        # 10 mm of wire at 20 N/mm are 200 N above the 45 N measured: the clamp lets 155 N through
+        (control.mixed, FREE, 200.0, 0.41 - (200.0 - 45.0) / 2e4, True),
+        # the joint moves by 1 mm of cable, 20 N at constant posture; the plan wants 2 N more
+        (control.tension_control, MOVED, 52.0, 0.409, False),
+        (control.mixed, MOVED, 52.0, 0.409, False),
+        # wire is paid out that is too tense
+        (control.feedforward, changed(CALM, tension=240.0), 200.0, 0.4 + 40.0 / 2e4, True),
+    ],
+)
+def test_wire_and_tension_of_one_cable_are_those_by_hand(
+    law: control.Law, at: ControlInput, tension: float, wire: float, saturated: bool
+) -> None:
+    command = law(at)
+    assert command.tension[0] == pytest.approx(tension)
+    assert command.paid_out[0] == pytest.approx(wire)
+    assert command.saturated.all() == command.saturated.any() == saturated
 
 
 TRUTH = [Measurement(np.full(3, 0.1234567 * k), np.full(3, 50.0 + k)) for k in (1, 2, 3)]
 
 
-def test_encoders_count_and_are_half_a_count_off_at_most() -> None:
-    reading = cdsm.Sensors(encoder=1e-4).measure(TRUTH, np.random.default_rng(0))
-    np.testing.assert_allclose(
-        reading.paid_out / 1e-4, np.round(reading.paid_out / 1e-4), atol=1e-9
-    )
-    assert 0.0 < abs(reading.paid_out - TRUTH[-1].paid_out).max() <= 0.5e-4
-
-
-def test_noise_and_bias_stay_within_their_bound() -> None:
-    sensors = cdsm.Sensors(tension_noise=0.5, tension_bias=-1.0)
-    random = np.random.default_rng(1)
-    errors = np.array([sensors.measure(TRUTH, random).tension for _ in range(4000)]) - 53.0
+def test_sensors_count_err_and_are_late_as_they_say() -> None:
+    random = np.random.default_rng(0)
+    wire = cdsm.Sensors(encoder=1e-4).measure(TRUTH, random).paid_out
+    np.testing.assert_allclose(wire / 1e-4, np.round(wire / 1e-4), atol=1e-9)
+    assert 0.0 < abs(wire - TRUTH[-1].paid_out).max() <= 0.5e-4
+    noisy = cdsm.Sensors(tension_noise=0.5, tension_bias=-1.0)
+    errors = np.array([noisy.measure(TRUTH, random).tension for _ in range(4000)]) - 53.0
     assert errors.mean() == pytest.approx(-1.0, abs=0.02)
     assert errors.std() == pytest.approx(0.5, rel=0.02)
     assert abs(errors).max() <= 3.0
-
-
-def test_readings_are_late_by_the_delay() -> None:
     for delay, wanted in ((0, 53.0), (1, 52.0), (2, 51.0), (9, 51.0)):
-        reading = cdsm.Sensors(delay=delay).measure(TRUTH, np.random.default_rng(0))
-        assert reading.tension[0] == wanted
+        assert cdsm.Sensors(delay=delay).measure(TRUTH, random).tension[0] == wanted

@@ -8,8 +8,6 @@ from cdsm.control import with_rigidity
 from cdsm.control.laws import Command
 from cdsm.control.observer import Estimate, Observer
 from cdsm.control.plants import QuasiStaticState
-from cdsm.control.sensors import Measurement
-from cdsm.planning.path_plan import PathPlan
 from tests.support.tracking import paid_out, small_path
 
 Pairs = list[tuple[QuasiStaticState, Estimate]]
@@ -19,31 +17,22 @@ EXACT = cdsm.Sensors(encoder=0.0)
 FORCE = np.array([0.3, -0.5, -1.0, 0.0, 0.0, 0.0])
 
 
-def moved(friction: float, rigidity: float = 0.9) -> tuple[PathPlan, list[QuasiStaticState]]:
-    """A plan, and states of an arm with another wire that is driven along it and then loaded."""
+def observed(friction: float) -> Pairs:
+    """What is observed of an arm with another wire that is driven along a plan and then loaded."""
     plan = small_path(friction)
-    plant = cdsm.QuasiStaticPlant(with_rigidity(plan.arm, rigidity))
-    state = plant.initial(plan.angles[0], plan.tensions[0], NONE)
-    states, first = [state], state.true_values.paid_out
-    for wire in paid_out(plan):
-        command = Command(
-            first + wire - paid_out(plan)[0], plan.tensions[0], np.zeros(len(wire), dtype=np.bool_)
-        )
-        state = plant.step_to(state, command, NONE)
-        states.append(state)
-    states.append(plant.step_to(state, command, FORCE))
-    return plan, states
-
-
-def observed(friction: float, sensors: cdsm.Sensors = EXACT, seed: int = 0) -> Pairs:
-    plan, states = moved(friction)
-    random = np.random.default_rng(seed)
-    true_values: list[Measurement] = [states[0].true_values]
-    observer, pairs = Observer(plan.arm, sensors), []
-    estimate = observer.initial(plan.angles[0], sensors.measure(true_values, random))
+    plant = cdsm.QuasiStaticPlant(with_rigidity(plan.arm, 0.9))
+    states = [plant.initial(plan.angles[0], plan.tensions[0], NONE)]
+    planned, free = paid_out(plan), np.zeros(6, dtype=np.bool_)
+    wires = states[0].true_values.paid_out + planned - planned[0]
+    for wire, wrench in (*((each, NONE) for each in wires), (wires[-1], FORCE)):
+        command = Command(wire, plan.tensions[0], free)
+        states.append(plant.step_to(states[-1], command, wrench))
+    true_values, random = [states[0].true_values], np.random.default_rng(0)
+    observer, pairs = Observer(plan.arm, EXACT), []
+    estimate = observer.initial(plan.angles[0], EXACT.measure(true_values, random))
     for state in states:
         true_values.append(state.true_values)
-        estimate = observer.update(estimate, sensors.measure(true_values, random))
+        estimate = observer.update(estimate, EXACT.measure(true_values, random))
         pairs.append((state, estimate))
     return pairs
 

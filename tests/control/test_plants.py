@@ -6,15 +6,9 @@ import pytest
 import cdsm
 from cdsm import control
 from cdsm.control import Command
-from cdsm.planning.path_plan import PathPlan
 from tests.support.tracking import paid_out, small_path
 
 NONE = np.zeros(6)
-
-
-def moved(plan: PathPlan, by: float) -> Command:
-    wire = paid_out(plan)[0] + by * np.arange(6)
-    return Command(wire, plan.tensions[0], np.zeros(6, dtype=np.bool_))
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1])
@@ -22,13 +16,11 @@ def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
     plan = small_path(friction)
     plant, wrench = cdsm.QuasiStaticPlant(plan.arm), np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
     before = plant.initial(plan.angles[0], plan.tensions[0], NONE)
-    command = moved(plan, 1e-5)
+    more = 1e-5 * np.arange(6)
+    command = Command(paid_out(plan)[0] + more, plan.tensions[0], np.zeros(6, dtype=np.bool_))
     state = plant.step_to(before, command, wrench)
-    pose = plan.arm.at(plan.angles[0])
-    taken_in = paid_out(plan)[0] - command.paid_out
-    history = cdsm.load_cycle(
-        pose, plan.tensions[0], [wrench], motors=[taken_in], substeps=plant.substeps
-    )
+    pose, pull = plan.arm.at(plan.angles[0]), plan.tensions[0]
+    history = cdsm.load_cycle(pose, pull, [wrench], motors=[-more], substeps=plant.substeps)
     np.testing.assert_allclose(state.pose.q, history.angles[0], atol=1e-12)
     np.testing.assert_allclose(state.true_values.paid_out, command.paid_out, rtol=1e-14)
     first = [T[0, 0] for T in history.tensions]
@@ -36,31 +28,28 @@ def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
     np.testing.assert_array_equal(before.pose.q, plan.angles[0])  # a state does not change
 
 
-def test_stretched_lengths_are_refused() -> None:
+def test_arms_that_a_plant_does_not_simulate_are_refused() -> None:
     arm = small_path().arm
-    stretched = cdsm.Manipulator(
-        arm.geometry, elasticity=arm.cables[0].elasticity, original_length="stretched"
-    )
+    stretched = cdsm.Manipulator(arm.geometry, cables=arm.cables, original_length="stretched")
     with pytest.raises(cdsm.InvalidInput, match="stretched"):
         cdsm.QuasiStaticPlant(stretched)
+    with pytest.raises(cdsm.InvalidInput, match="friction"):
+        cdsm.MuJoCoPlant(small_path(0.1).arm)
 
 
 pytest.importorskip("mujoco")
 
-PAYLOAD = np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
-
 
 def test_both_plants_rest_at_the_same_place() -> None:
     """Far from where the model was linearised, and under a load: within a thousandth."""
-    plan = small_path()
+    plan, load = small_path(), np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
     wire = paid_out(plan)[-1] + 2e-5 * np.arange(6)
     command = Command(wire, plan.tensions[-1], np.zeros(6, dtype=np.bool_))
     slow, fast = cdsm.QuasiStaticPlant(plan.arm), cdsm.MuJoCoPlant(plan.arm, damping_ratio=0.7)
-    begin = plan.angles[0], plan.tensions[0], np.zeros(6)
-    wanted = slow.step_to(slow.initial(*begin), command, PAYLOAD)
-    state = fast.initial(*begin)
+    begin = plan.angles[0], plan.tensions[0], NONE
+    wanted, state = slow.step_to(slow.initial(*begin), command, load), fast.initial(*begin)
     for _ in range(40):
-        state = fast.step_to(state, command, PAYLOAD)
+        state = fast.step_to(state, command, load)
     moved = wanted.pose.q - plan.angles[0]
     assert np.linalg.norm(moved) > np.deg2rad(2.0)
     assert np.linalg.norm(state.pose.q - wanted.pose.q) < 1e-3 * np.linalg.norm(moved)
@@ -78,8 +67,3 @@ def test_stiffness_loop_holds_an_arm_with_inertia() -> None:
     assert run.rigidity[-1] == pytest.approx(0.9, abs=5e-3)
     assert abs(run.stiffness_error[8:]).max() < 0.03
     assert run.tip_error[8:].max() < 5e-4
-
-
-def test_friction_is_refused_by_mujoco() -> None:
-    with pytest.raises(cdsm.InvalidInput, match="friction"):
-        cdsm.MuJoCoPlant(small_path(0.1).arm)

@@ -9,8 +9,8 @@ import pytest
 import cdsm
 from cdsm import control, presets
 from cdsm.cli.path_file import read_path
-from cdsm.control.run import TrackingRun
 from cdsm.planning.path_plan import PathPlan
+from tests.support.arms import readme_geometry
 from tests.support.tracking import circle, small_path
 
 BOUNDS: Any = {"minimum": 10.0, "maximum": 250.0}
@@ -31,14 +31,10 @@ def test_feedforward_on_the_arm_it_believes_in_follows_to_rounding() -> None:
 
 def steep_path() -> PathPlan:
     """Four joints that bend by 5 degrees from sample to sample, 1.7 mm of cable, 34 N at rest."""
-    geometry = cdsm.Geometry.universal(
-        joints=4, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.005,
-        hole_radius=0.02, link_mass=0.05, lead=0.1,
-    )  # fmt: skip
+    geometry = readme_geometry(disk_offset=0.005, hole_radius=0.02, link_mass=0.05, lead=0.1)
     arm = cdsm.Manipulator(geometry, presets.STRAND_1X19)
     angles = np.deg2rad([[bend, 0.0, bend] + 5 * [0.0] for bend in (0.0, 5.0, 10.0)])
-    target = [3e3, 3e3, 4e3]
-    return cdsm.plan_path(arm, "z", target, 10.0, 200.0, angles=angles)
+    return cdsm.plan_path(arm, "z", [3e3, 3e3, 4e3], 10.0, 200.0, angles=angles)
 
 
 @pytest.mark.parametrize("law", ["feedforward", "tension", "mixed", "stiffness"])
@@ -63,30 +59,28 @@ def test_every_law_holds_the_plan_of_the_arm_it_believes_in(law: str, steps: int
 
 
 def test_same_seed_same_bits() -> None:
-    def run(seed: int) -> TrackingRun:
-        sensors = cdsm.Sensors(tension_noise=0.5, seed=seed)
-        return cdsm.track(small_path(0.1), sensors=sensors, steps=2, **BOUNDS)
-
-    one, again, other = run(3), run(3), run(4)
-    np.testing.assert_array_equal(one.measured_tension, again.measured_tension)
-    np.testing.assert_array_equal(one.angles, again.angles)
-    assert (one.measured_tension != other.measured_tension).any()
+    one, again, other = (
+        cdsm.track(
+            small_path(), sensors=cdsm.Sensors(tension_noise=0.5, seed=seed), steps=2, **BOUNDS
+        ).measured_tension
+        for seed in (3, 3, 4)
+    )
+    np.testing.assert_array_equal(one, again)
+    assert (one != other).any()
 
 
 def test_stiffness_loop_calibrates_its_wire_and_holds_the_stiffness() -> None:
     """A wire a tenth softer than believed; feed-forward loses most of the stiffness."""
-    plan = small_path()
+    plan, noisy = small_path(), cdsm.Sensors(tension_noise=0.5)
     plant = cdsm.QuasiStaticPlant(control.with_rigidity(plan.arm, 0.9))
-    sensors = cdsm.Sensors(tension_noise=0.5)
-    runs = {
-        law: cdsm.track(plan, law, plant, sensors, steps=8, **BOUNDS)
-        for law in ("feedforward", "stiffness")
-    }
-    held = runs["stiffness"]
+    held, lost = (
+        cdsm.track(plan, law, plant, noisy, steps=8, **BOUNDS)
+        for law in ("stiffness", "feedforward")
+    )
     assert held.rigidity[-1] == pytest.approx(0.9, abs=5e-3)
     assert abs(held.stiffness_error[5:]).max() < 0.02
-    assert abs(runs["feedforward"].stiffness_error).min() > 0.3
-    assert held.tip_error[5:].max() < 0.6 * runs["feedforward"].tip_error.min()
+    assert abs(lost.stiffness_error).min() > 0.3
+    assert held.tip_error[5:].max() < 0.6 * lost.tip_error.min()
 
 
 def test_payload_that_nobody_told_of_is_felt() -> None:
@@ -101,38 +95,29 @@ def test_payload_that_nobody_told_of_is_felt() -> None:
 
 
 def test_wrong_arguments_are_refused() -> None:
-    laws: tuple[tuple[Any, str], ...] = (
-        (lambda given: given.paid_out, "law: returned array.* return limited"),
-        (lambda given: control.limited(given, given.paid_out[:2]), "wire of the law"),
-        (
-            lambda at: control.Command(at.paid_out, at.maximum + 1.0, at.tension_controlled),
-            "law: commanded 251 N .* from 10 to 250 N .* Return limited",
-        ),
-    )
-    for law, said in laws:
-        with pytest.raises(cdsm.InvalidInput, match=said):
-            cdsm.track(small_path(), law, **BOUNDS)
-    with pytest.raises(cdsm.InvalidInput, match="payload"):
-        cdsm.track(small_path(), payload=-1.0)
     plan = small_path()
     broken = cdsm.plan_path(plan.arm, "z", [15e3, 90e3], 10.0, 250.0, angles=plan.angles[:2])
-    with pytest.raises(cdsm.InvalidInput, match=r"1 of 2 samples are not planned.*sample 1"):
-        cdsm.track(broken)
+    calls: tuple[tuple[Any, Any, dict[str, float], str], ...] = (
+        (plan, lambda at: at.paid_out, BOUNDS, "law: returned array.* return limited"),
+        (plan, lambda at: control.limited(at, at.paid_out[:2]), BOUNDS, "wire of the law"),
+        (
+            *(plan, lambda at: control.Command(at.paid_out, at.maximum + 1.0, at.paid_out > 0.0)),
+            *(BOUNDS, "law: commanded 251 N .* from 10 to 250 N .* Return limited"),
+        ),
+        (plan, "stiffness", {"payload": -1.0}, "payload"),
+        (broken, "stiffness", {}, r"1 of 2 samples are not planned.*sample 1"),
+    )
+    for given, law, options, said in calls:
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            cdsm.track(given, law, **options)
 
 
 def test_unstable_loop_is_an_answer_with_its_time() -> None:
     """All motors hold tensions that are read late: nothing holds the posture, and it is lost."""
     plan = circle(0.0)
-    wire = presets.STRAND_1X19.slack_below()
-    run = cdsm.track(
-        plan,
-        "tension",
-        cdsm.QuasiStaticPlant(cdsm.Manipulator(plan.arm.geometry, wire)),
-        cdsm.Sensors(delay=4),
-        steps=12,
-        payload=0.3,
-        **BOUNDS,
-    )
+    arm = cdsm.Manipulator(plan.arm.geometry, presets.STRAND_1X19.slack_below())
+    late, plant = cdsm.Sensors(delay=4), cdsm.QuasiStaticPlant(arm)
+    run = cdsm.track(plan, "tension", plant, late, steps=12, payload=0.3, **BOUNDS)
     assert run.outcome == "diverged"
     assert run.tip_error[-1] > 0.1 * plan.arm.length > run.tip_error[-2]
     assert run.time[-1] == pytest.approx(0.05 * (len(run.time) - 1))
@@ -140,20 +125,20 @@ def test_unstable_loop_is_an_answer_with_its_time() -> None:
     assert np.isfinite(run.tips).all()
 
 
-# takes seconds: each step searches for tensions that are not there
 def test_target_that_no_tension_gives_is_named_and_the_last_tensions_are_kept() -> None:
-    plan = small_path()
-    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=3, max_change_per_step=20.0)
+    geometry = readme_geometry(joints=1, hole_radius=0.02, link_mass=0.05, lead=0.1)
+    arm = cdsm.Manipulator(geometry, presets.STRAND_1X19)
+    angles = np.deg2rad([[6.0, -4.0], [7.0, -3.0]])
+    plan = cdsm.plan_path(arm, "z", 40e3, 10.0, 250.0, angles=angles)
+    run = cdsm.track(plan, minimum=10.0, maximum=60.0, steps=1, max_change_per_step=20.0)
     assert (run.commanded_tension <= 60.0).all()
     assert run.saturated.any()
     assert abs(run.stiffness_error).max() > 0.05
     assert run.target_unreachable[-1]  # plan_stiffness finds none either
     with pytest.raises(cdsm.UnreachableStiffness):
-        cdsm.plan_stiffness(
-            plan.arm.at(plan.angles[-1]), plan.direction, plan.target[-1], 10.0, 60.0
-        )
+        cdsm.plan_stiffness(arm.at(angles[-1]), plan.direction, plan.target[-1], 10.0, 60.0)
     assert "OUT OF REACH" in run.warnings[0]
-    heavy = cdsm.track(plan, payload=4.0, steps=2, minimum=10.0, maximum=150.0)
+    heavy = cdsm.track(small_path(), payload=4.0, steps=2, minimum=10.0, maximum=150.0)
     assert heavy.replan_failed
     assert any(text.startswith("NOT PLANNED at ") for text in heavy.warnings)
 
@@ -175,26 +160,24 @@ def test_dataset_has_units_and_is_written_whole(tmp_path: Path) -> None:
     np.testing.assert_allclose(path_again.angles, run.angles, rtol=1e-15)
 
 
-# takes seconds: three loops of sixty steps
 def test_stiffness_loop_holds_four_newtons_per_millimetre_within_five_percent() -> None:
     """10 % wrong EA, μ = 0.1, 0.5 N of noise, and 200 g hung on it half-way.
 
     Feed-forward alone has a fifth of the wanted stiffness, tension control up to 13 % less.
     """
-    plan = circle(0.1)
+    plan = circle(0.1, 7)
     plant = cdsm.QuasiStaticPlant(control.with_rigidity(plan.arm, 0.9))
     sensors = cdsm.Sensors(encoder=1e-5, tension_noise=0.5)
     worst = {}
     for law in ("feedforward", "tension", "stiffness"):
-        run = cdsm.track(plan, law, plant, sensors, payload=0.2, **BOUNDS)
+        run = cdsm.track(plan, law, plant, sensors, payload=0.2, steps=3, **BOUNDS)
         worst[law] = abs(run.stiffness_error[1:]).max()  # the first step does not know the wire
         assert run.outcome == "completed"
         assert (run.commanded_tension >= 10.0).all()
         assert (run.commanded_tension <= 250.0).all()
         assert run.inside.all()
         assert len(run.inside) == len(run.time)
-        if law == "stiffness":
-            assert run.tip_error.max() < 1e-3
+    assert run.tip_error.max() < 1e-3
     assert worst["stiffness"] < 0.05
     assert worst["feedforward"] > 0.7
     assert worst["tension"] > 0.1

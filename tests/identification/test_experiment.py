@@ -51,6 +51,9 @@ def test_a_plan_says_what_it_will_determine() -> None:
     point = problem.point(np.array(list(TRUE.values())))
     J = problem.jacobian(point, central=True) / problem.slope(point)
     np.testing.assert_allclose(PLAN.std, np.sqrt(np.diag(np.linalg.inv(J.T @ J))), rtol=1e-3)
+    plan = cdsm.plan_experiment(hinge, TRUE, **(ASKED | {"postures": [[0.4], [3.0]]}))
+    assert [label for label, _ in plan.failures] == ["posture 2, -z, 6 N", "posture 2, -z, 24 N"]
+    assert "left out: posture 2" in str(plan)
 
 
 def test_what_no_candidate_determines_is_said_before_anything_is_built() -> None:
@@ -68,25 +71,18 @@ def test_what_no_candidate_determines_is_said_before_anything_is_built() -> None
         cdsm.plan_experiment(lambda colour: hinge(), {"colour": 1.0}, **ASKED)
 
 
-def test_candidates_that_fail_are_left_out_with_their_reason() -> None:
-    plan = cdsm.plan_experiment(hinge, TRUE, **(ASKED | {"postures": [[0.4], [3.0]]}))
-    assert [label for label, _ in plan.failures] == ["posture 2, -z, 6 N", "posture 2, -z, 24 N"]
-    assert "left out: posture 2" in str(plan)
-
-
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("values", "changes", "said"),
     [
-        ({"postures": []}, ("postures", "(n, nv)")),
-        ({"postures": [[3.0]]}, ("none of 2 candidates can be tested", "posture 1")),
-        ({"weights": [-5.0]}, ("weights", "positive")),
-        ({"directions": "down"}, ("down",)),
+        (TRUE, {"postures": []}, r"postures.*\(n, nv\)"),
+        (TRUE, {"postures": [[3.0]]}, "none of 2 candidates can be tested.*posture 1"),
+        (TRUE, {"weights": [-5.0]}, "weights.*positive"),
+        (TRUE, {"directions": "down"}, "down"),
+        ({"viscosity": 1.0}, {}, "viscosity"),
     ],
 )
-def test_bad_questions_name_the_offender(changes: dict[str, Any], said: tuple[str, ...]) -> None:
-    with pytest.raises(cdsm.CdsmError) as caught:
-        cdsm.plan_experiment(hinge, TRUE, **(ASKED | changes))
-    for part in said:
-        assert part in str(caught.value)
-    with pytest.raises(cdsm.InvalidInput, match="viscosity"):
-        cdsm.plan_experiment(hinge, {"viscosity": 1.0}, **ASKED)
+def test_bad_questions_name_the_offender(
+    values: dict[str, float], changes: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(cdsm.CdsmError, match=f"(?s){said}"):
+        cdsm.plan_experiment(hinge, values, **(ASKED | changes))

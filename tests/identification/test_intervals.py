@@ -1,6 +1,7 @@
 """Intervals by profile likelihood: where they can be written down, and how often they hold."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,28 +36,26 @@ def stiffnesses(arm: cdsm.Manipulator) -> Array:
     return np.array(along)
 
 
-def readings(noise: float, seed: int = 0) -> list[Measurement]:
-    true = stiffnesses(hinge())
-    z = np.random.default_rng(seed).normal(size=true.size)
+def readings(noise: float) -> list[Measurement]:
+    true, z = stiffnesses(hinge()), np.random.default_rng(0).normal(size=ANGLES.size)
+    pull: Any = {"direction": (0.0, 0.0, 1.0), "tension": (0.0, 0.0)}
     return [
-        Measurement(
-            value=float(K * (1.0 + noise * e)),
-            direction=(0.0, 0.0, 1.0),
-            angles=(float(q),),
-            tension=(0.0, 0.0),
-            std=float(noise * K),
-        )
-        for K, e, q in zip(true, z, ANGLES, strict=True)
+        Measurement(value=K * (1.0 + noise * e), angles=(q,), std=noise * K, **pull)
+        for K, e, q in np.c_[true, z, ANGLES].tolist()
     ]
+
+
+def model() -> tuple[Array, Array]:
+    """What 1 N of rigidity and 1 m/s² of gravity add to the stiffnesses."""
+    base = stiffnesses(hinge(2e-3, 0.0))
+    passive = (stiffnesses(hinge(1e-3, 0.0)) - base) / 500.0
+    return passive, stiffnesses(hinge(2e-3, 1.0)) - base
 
 
 def line(measured: list[Measurement]) -> tuple[Array, Array, float]:
     """Rigidity and gravity by linear least squares, their covariance, and χ²: closed forms."""
-    base, double = stiffnesses(hinge(2e-3, 0.0)), stiffnesses(hinge(1e-3, 0.0))
-    passive = (double - base) / 500.0
-    weight = stiffnesses(hinge(2e-3, 1.0)) - base
     sigma = np.array([each.std for each in measured])
-    A = np.column_stack([passive, weight]) / sigma[:, None]
+    A = np.column_stack(model()) / sigma[:, None]
     b = np.array([each.value for each in measured]) / sigma
     best = np.linalg.solve(A.T @ A, A.T @ b)
     return best, np.linalg.inv(A.T @ A), float(np.sum((A @ best - b) ** 2))
@@ -105,20 +104,22 @@ def test_optimum_on_a_bound_leaves_the_interval_of_the_values_within() -> None:
     measured = readings(0.1)
     (rigidity, _), _, _ = line(measured)
     beyond = 1.2 / rigidity
-    alone = {"softness": (beyond, 1e-1)}
     found = identify(
-        lambda softness: hinge(softness), measured, alone, start={"softness": 2.0 * beyond}
+        lambda softness: hinge(softness),
+        *(measured, {"softness": (beyond, 1e-1)}),
+        start={"softness": 2.0 * beyond},
     )
     low, high = found.confidence()["softness"]
     assert found.values[0] == beyond
     assert low == -math.inf
-    # Δχ² from the bound on, where it already rises
-    passive, sigma = stiffnesses(hinge(2e-3, 0.0)) / 500.0, [each.std for each in measured]
-    weight = stiffnesses(hinge()) - 500.0 * passive
-    values = np.array([each.value for each in measured])
+    assert any(each.startswith("softness is at its lower bound") for each in found.warnings)
 
     def chi_square(softness: float) -> float:
-        return float(np.sum(((passive / softness + weight - values) / sigma) ** 2))
+        passive, weight = model()
+        return sum(
+            ((p / softness + 9.81 * w - each.value) / each.std) ** 2
+            for p, w, each in zip(passive, weight, measured, strict=True)
+        )
 
+    # Δχ² from the bound on, where it already rises
     assert chi_square(high) - chi_square(beyond) == pytest.approx(norm.ppf(0.975) ** 2, rel=5e-3)
-    assert any(each.startswith("softness is at its lower bound") for each in found.warnings)

@@ -41,45 +41,34 @@ def test_loops_come_out_in_si(tmp_path: Path) -> None:
     assert (side.direction, side.minimum) == ((0.0, 0.0, 1.0), 150.0)
 
 
-def test_three_axes_and_measured_tensions(tmp_path: Path) -> None:
+def test_three_axes_measured_tensions_and_tests_without_readings(tmp_path: Path) -> None:
     head = "test,direction,cable1_1 [N],cable1_2 [N],force [N],x [um],y [um],z [um]\n"
     (loop,) = read(tmp_path, f"{head}a,-z,60,50,0,1,2,3\na,,,,5,4,5,6\n")
-    assert loop.tension == (60.0, 50.0)
-    assert loop.minimum is None
-    assert loop.angles == (0.0,)
-    expected = np.array([[1e-6, 2e-6, 3e-6], [4e-6, 5e-6, 6e-6]])
-    np.testing.assert_allclose(np.array(loop.displacements), expected)
-
-
-def test_planned_tests_have_no_readings(tmp_path: Path) -> None:
+    assert (loop.tension, loop.minimum, loop.angles) == ((60.0, 50.0), None, (0.0,))
+    assert loop.displacements is not None
+    np.testing.assert_allclose(loop.displacements, 1e-6 * np.array([[1, 2, 3], [4, 5, 6]]))
     (loop,) = read(tmp_path, "test,direction,force [N]\na,z,0\na,,5\n", minimum=100.0)
-    assert loop.displacements is None
-    assert loop.minimum == 100.0
+    assert (loop.displacements, loop.minimum) == (None, 100.0)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (",8,", ",eight,", ("line 4", "column force", "'eight'")),
-        ("joint1 [deg]", "joint1", ("joint1 [deg]", "joint1 [rad]")),
-        ("force [N]", "force [kg]", ("force", "force [N]")),
-        (",-z,", ",down,", ("line 3", "direction", "'down'", "-z")),
-        ("up,,,,0,", "up,21,,,0,", ("line 5", "column joint1", "'21'", "'20'")),
+        (",8,", ",eight,", "line 4, column force.*'eight'"),
+        ("joint1 [deg]", "joint1", r"joint1 \[deg\].*joint1 \[rad\]"),
+        ("force [N]", "force [kg]", r"force \[N\]"),
+        (",-z,", ",down,", "line 3, column direction.*'down'.*-z"),
+        ("up,,,,0,", "up,21,,,0,", "line 5, column joint1.*'21'.*'20'"),
         (
-            "side,-10,z,150,0,0,\nside,-10,z,150,5",
-            "s,9,z,9,0,0,\ns,,,,5,0,\nup,,,,5",
-            ("line 8", "up", "goes on"),
+            *("side,-10,z,150,0,0,\nside,-10,z,150,5", "s,9,z,9,0,0,\ns,,,,5,0,\nup,,,,5"),
+            "line 8.*up.*goes on",
         ),
-        ("side,-10,z,150,5", "side,-10,z,150,0", ("test side", "two sizes")),
-        ("displacement [mm]", "displacement [m]", ("test up", "0.249 m, more than the arm is")),
-        ("remark", "cable1_1 [N]", ("minimum and cable1_1",)),
-        ("remark", "joint9 [deg]", ("column joint9", "did you mean joint")),
+        ("side,-10,z,150,5", "side,-10,z,150,0", "test side.*two sizes"),
+        ("displacement [mm]", "displacement [m]", "test up.*0.249 m, more than the arm is"),
+        ("remark", "cable1_1 [N]", "minimum and cable1_1"),
+        ("remark", "joint9 [deg]", "column joint9.*did you mean joint"),
     ],
 )
-def test_faults_name_line_and_column(
-    tmp_path: Path, old: str, new: str, said: tuple[str, ...]
-) -> None:
-    with pytest.raises(cdsm.FileError) as caught:
+def test_faults_name_line_and_column(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(cdsm.FileError, match=f"(?s)loops.csv.*{said}"):
         read(tmp_path, GOOD.replace(old, new, 1))
-    for part in ("loops.csv", *said):
-        assert part in str(caught.value)

@@ -1,6 +1,7 @@
 """Measurements with weights that are not small: identification compares a secant with a secant."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,19 +33,10 @@ def weighed(
     for angles in (BENT, tuple(-0.5 * q for q in BENT)):
         pose = arm.at(angles)
         pull = cdsm.distribute_tension(pose, minimum, wrench=wrench)
+        at: Any = {"angles": angles, "tension": tuple(pull.values.tolist()), "wrench": wrench}
         for u in (DOWN, (0.0, 1.0, 0.0), (0.0, 0.6, 0.8)):
-            test = cdsm.weight_test(pose, pull, force * np.array(u))
-            found.append(
-                Measurement(
-                    value=test.stiffness,
-                    direction=u,
-                    angles=angles,
-                    tension=tuple(pull.values.tolist()),
-                    std=0.02 * test.stiffness,
-                    wrench=wrench,
-                    force=force,
-                )
-            )
+            K = cdsm.weight_test(pose, pull, force * np.array(u)).stiffness
+            found.append(Measurement(value=K, direction=u, std=0.02 * K, force=force, **at))
     return found
 
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 import cdsm
 from cdsm import TipPosition
 from cdsm.identification import Identification
+from tests.support.arms import readme_geometry
 
 SECTION = {"length": 0.1, "disks": 3, "hole_angles": [0.0, 2.0, 4.0], "hole_radius": 0.006}
 ROD = cdsm.Manipulator(
@@ -18,12 +20,9 @@ ROD = cdsm.Manipulator(
     cdsm.LinearElasticity(48e3),
 )
 SPRUNG = cdsm.Manipulator(
-    cdsm.Geometry.universal(
-        joints=2, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.012,
-        hole_radius=0.02, link_mass=0.1, joint_stiffness=[2.0, 1.0],
-    ),
+    readme_geometry(joints=2, hole_radius=0.02, link_mass=0.1, lead=0.0, joint_stiffness=[2, 1]),
     cdsm.LinearElasticity(48e3),
-)  # fmt: skip
+)
 
 # D1: pull [m] of one tendon of the Nitinol segment and heights of its tip [mm], measured
 HEIGHTS = {0.005: (233, 235, 233), 0.010: (171, 168, 169)}
@@ -73,49 +72,47 @@ def test_slack_explains_the_nitinol_segment_and_nothing_else_does() -> None:
 
 
 def readings(
-    arm: cdsm.Manipulator, given: list[dict[str, object]], axes: str = "xyz", seed: int = 0
+    arm: cdsm.Manipulator, given: list[dict[str, Any]], axes: str = "xyz"
 ) -> list[TipPosition]:
     """Simulate readings with errors of 0.2 mm."""
-    random, found = np.random.default_rng(seed), []
+    random, found = np.random.default_rng(0), []
     for each in given:
-        tip = cdsm.forward_statics(arm, **each).pose.tip[:3, 3]  # type: ignore[arg-type]
+        tip = cdsm.forward_statics(arm, **each).pose.tip[:3, 3]
         read = dict(zip("xyz", (tip + random.normal(size=3) * 2e-4).tolist(), strict=True))
-        found.append(TipPosition(**{axis: read[axis] for axis in axes}, std=2e-4, **each))  # type: ignore[arg-type]
-    return found
-
-
-def require_recovered(
-    arm: cdsm.Manipulator, true: dict[str, float], tests: list[dict[str, object]]
-) -> Identification:
-    model_of = cdsm.ArmParameters(arm, tuple(true))
-    measured = readings(model_of(**true), tests)
-    free = {name: (0.0 if name == "slack" else 0.3 * x, 3.0 * x) for name, x in true.items()}
-    found = cdsm.identify(model_of, measured, free)
-    for (name, value), std in zip(found.parameters.items(), found.std, strict=True):
-        assert abs(value - true[name]) < 2.58 * std, name  # 99 %
-        assert std < 0.05 * true[name], name
-    assert found.warnings == ()
+        found.append(TipPosition(**{axis: read[axis] for axis in axes}, std=2e-4, **each))
     return found
 
 
 LOOSE = -0.05
+PULLED: list[dict[str, Any]] = [
+    *({"pull": [x, LOOSE, LOOSE]} for x in (0.002, 0.003, 0.004)),
+    *({"tension": [x, 0.0, 0.0]} for x in (1.0, 2.0)),
+]
+HUNG: list[dict[str, Any]] = [
+    {"tension": [x, 0.0, 0.0, 0.0, y, 0.0], "wrench": [0.0, 0.0, z, 0.0, 0.0, 0.0]}
+    for x, y, z in ((8.0, 0.0, 0.0), (0.0, 6.0, 0.0), (5.0, 5.0, -1.0), (0.0, 0.0, 2.0))
+]
 
 
-def test_slack_and_bending_stiffness_are_recovered() -> None:
-    pulls: list[dict[str, object]] = [{"pull": [x, LOOSE, LOOSE]} for x in (0.002, 0.003, 0.004)]
-    tensions: list[dict[str, object]] = [{"tension": [x, 0.0, 0.0]} for x in (1.0, 2.0)]
-    true = {"slack": 7e-4, "bending_stiffness": 0.012}
-    found = require_recovered(ROD, true, [*pulls, *tensions])
+@pytest.mark.parametrize(
+    ("arm", "true", "tests"),
+    [
+        (ROD, {"slack": 7e-4, "bending_stiffness": 0.012}, PULLED),
+        (SPRUNG, {"joint_stiffness@1": 2.3, "joint_stiffness@2": 0.8}, HUNG),
+    ],
+)
+def test_slack_and_stiffnesses_are_recovered(
+    arm: cdsm.Manipulator, true: dict[str, float], tests: list[dict[str, Any]]
+) -> None:
+    model_of = cdsm.ArmParameters(arm, tuple(true))
+    free = {name: (0.0 if name == "slack" else 0.3 * x, 3.0 * x) for name, x in true.items()}
+    found = cdsm.identify(model_of, readings(model_of(**true), tests), free)
+    for (name, value), std in zip(found.parameters.items(), found.std, strict=True):
+        assert abs(value - true[name]) < 2.58 * std, name  # 99 %
+        assert std < 0.05 * true[name], name
+    assert found.warnings == ()
+    assert found.freedom == 3 * len(tests) - 2
     assert "mm" in str(found)
-    assert found.freedom == 15 - 2
-
-
-def test_joint_stiffness_is_recovered() -> None:
-    tests: list[dict[str, object]] = [
-        {"tension": [x, 0.0, 0.0, 0.0, y, 0.0], "wrench": [0.0, 0.0, z, 0.0, 0.0, 0.0]}
-        for x, y, z in ((8.0, 0.0, 0.0), (0.0, 6.0, 0.0), (5.0, 5.0, -1.0), (0.0, 0.0, 2.0))
-    ]
-    require_recovered(SPRUNG, {"joint_stiffness@1": 2.3, "joint_stiffness@2": 0.8}, tests)
 
 
 def test_what_readings_cannot_tell_is_said() -> None:
@@ -145,6 +142,14 @@ def test_names_of_cables_and_all_numbers_are_one() -> None:
 GOOD = TipPosition(x=0.09, pull={"cable3_1": 0.003}, std=1e-3)
 
 
+def fitted(bounds: tuple[float, float] = (0.0, 1e-3), **changes: Any) -> Identification:
+    model_of = cdsm.ArmParameters(ROD, ("slack",))
+    return cdsm.identify(model_of, [replace(GOOD, **changes)], {"slack": bounds})
+
+
+BOTH, TWO = cdsm.ArmParameters(ROD, ("slack", "gain")), {"slack": (0.0, 1e-3), "gain": (0.5, 1.5)}
+
+
 @pytest.mark.parametrize(
     ("bad", "said"),
     [
@@ -154,35 +159,23 @@ GOOD = TipPosition(x=0.09, pull={"cable3_1": 0.003}, std=1e-3)
         (lambda: replace(GOOD, pull=None), "none given"),
         (lambda: replace(GOOD, tension=(1.0,)), "pull and tension given"),
         (lambda: replace(GOOD, pull={"cable3_1": math.nan}), "cable3_1"),
+        (lambda: replace(GOOD, pull=[[1.0]]), r"pull: shape \(1, 1\)"),  # type: ignore[arg-type]
+        (lambda: fitted(x=90.0), r"\[0\] has the tip 90 m from the base.*mm\?"),
+        (lambda: fitted(pull={"cable9_1": 0.0}), "cable9_1"),
+        (lambda: fitted(pull=(0.003, 0.0)), r"pull: shape \(2,\)"),
+        (lambda: fitted(pull=(3.0, 0.0, 0.0)), "leaves -2.* m of cable3_1"),
+        (lambda: fitted((-2e-3, -1e-3)), r"cable3_1.*slack: -0\.0015 m given"),
         (
-            lambda: replace(GOOD, pull=[[1.0]]),  # type: ignore[arg-type]
-            r"pull: shape \(1, 1\)",
+            lambda: cdsm.compare_explanations(BOTH, [GOOD] * 3, {"slack": (0.0, 1e-3)}),
+            "two or more parameters",
         ),
-        (lambda: fitted(replace(GOOD, x=90.0)), r"\[0\] has the tip 90 m from the base.*mm\?"),
-        (lambda: fitted(replace(GOOD, pull={"cable9_1": 0.0})), "cable9_1"),
-        (lambda: fitted(replace(GOOD, pull=(0.003, 0.0))), r"pull: shape \(2,\)"),
-        (lambda: fitted(replace(GOOD, pull=(3.0, 0.0, 0.0))), "leaves -2.* m of cable3_1"),
-        (lambda: fitted(GOOD, (-2e-3, -1e-3)), r"cable3_1.*slack: -0\.0015 m given"),
+        (lambda: cdsm.compare_explanations(BOTH, [GOOD], TWO), "at least three"),
+        (lambda: cdsm.compare_explanations(lambda slack, gain: ROD, [GOOD] * 3, TWO), "model_of"),
     ],
 )
 def test_bad_input_is_named(bad: Callable[[], object], said: str) -> None:
     with pytest.raises(cdsm.CdsmError, match=said):
         bad()
-
-
-def fitted(test: TipPosition, bounds: tuple[float, float] = (0.0, 1e-3)) -> Identification:
-    return cdsm.identify(cdsm.ArmParameters(ROD, ("slack",)), [test], {"slack": bounds})
-
-
-def test_comparisons_that_cannot_be_made_are_named() -> None:
-    model_of = cdsm.ArmParameters(ROD, ("slack", "gain"))
-    free = {"slack": (0.0, 1e-3), "gain": (0.5, 1.5)}
-    with pytest.raises(cdsm.InvalidInput, match="two or more parameters"):
-        cdsm.compare_explanations(model_of, [GOOD] * 3, {"slack": (0.0, 1e-3)})
-    with pytest.raises(cdsm.InvalidInput, match="at least three"):
-        cdsm.compare_explanations(model_of, [GOOD], free)
-    with pytest.raises(cdsm.InvalidInput, match="model_of"):
-        cdsm.compare_explanations(lambda slack, gain: ROD, [GOOD] * 3, free)
 
 
 def test_positions_come_from_files(tmp_path: Path) -> None:

@@ -17,15 +17,15 @@ from tests.support.paths import ARM, DOWN, assert_holds, waving
 
 
 def test_samples_have_the_efforts_of_plans_from_scratch() -> None:
-    arm, q = presets.virtual_prototype(STRAND), waving(12)
+    arm, q = presets.virtual_prototype(STRAND), waving(8)
     found = [cdsm.stiffness_range(arm.at(each), DOWN, 40.0, 400.0, starts=3) for each in q]
-    parts = 0.2 + 0.5 * np.sin(np.linspace(0.0, math.pi, 12))
+    parts = 0.2 + 0.5 * np.sin(np.linspace(0.0, math.pi, 8))
     targets = [each.low + x * (each.high - each.low) for each, x in zip(found, parts, strict=True)]
     plan = cdsm.plan_path(arm, DOWN, targets, 40.0, 400.0, angles=q)
     assert plan.complete
     assert_holds(plan, 40.0, 400.0)
     np.testing.assert_array_equal(plan.angles, q)
-    for i in range(0, 12, 2):
+    for i in range(0, 8, 2):
         alone = cdsm.plan_stiffness(arm.at(q[i]), DOWN, targets[i], 40.0, 400.0)
         effort = np.linalg.norm(plan.tensions[i])
         assert effort == pytest.approx(np.linalg.norm(alone.tension.values), rel=1e-7)
@@ -50,22 +50,22 @@ def test_path_of_tips_is_that_of_the_angles_that_lead_there() -> None:
     assert "than 250 mm" in plan.infeasible[0].reason
 
 
-# takes seconds: a search from many starts at every sample
 @pytest.mark.parametrize("seed", [1, 5])
 def test_random_arms_keep_to_their_targets_and_rates(seed: int) -> None:
-    """Strands, tables and straight wires; wrenches with a moment."""
+    """Tables and straight wires; wrenches with a moment."""
     rng = np.random.default_rng(seed)
     law = (STRAND, cdsm.LinearElasticity(30e3), TABLE)[seed % 3]
     arm = arms.random_arm(seed, 3, ("hinged", "universal")[seed % 2], law)
     ends = arms.random_posture(arm, seed, 0.4).q, arms.random_posture(arm, seed + 100, 0.5).q
-    q = ends[0] + np.linspace(0.0, 0.3, 15)[:, None] * (ends[1] - ends[0])
+    q = ends[0] + np.linspace(0.0, 0.11, 6)[:, None] * (ends[1] - ends[0])
     W = 0.3 * arms.random_wrench(seed)
-    found = cdsm.stiffness_range(arm.at(q[7]), DOWN, 15.0, 400.0, W, starts=4)
-    wave = 0.4 + 0.3 * np.sin(np.linspace(0.0, rng.uniform(2.0, 10.0), 15))
+    found = cdsm.stiffness_range(arm.at(q[5]), DOWN, 15.0, 400.0, W, starts=4)
+    wave = 0.4 + 0.3 * np.sin(np.linspace(0.0, rng.uniform(2.0, 10.0), 6))
     targets = found.low + wave * (found.high - found.low)
     plan = cdsm.plan_path(arm, DOWN, targets, 15.0, 400.0, W, angles=q, max_change_per_sample=20.0)
     assert len(plan.planned) >= 2
     assert_holds(plan, 15.0, 400.0)
+    assert plan.infeasible
     for each in plan.infeasible:  # of a rate only if there are tensions without it
         try:
             cdsm.plan_stiffness(arm.at(q[each.index]), DOWN, targets[each.index], 15.0, 400.0, W)
@@ -85,31 +85,26 @@ def test_every_infeasible_sample_is_named_and_the_path_goes_on() -> None:
     plan = cdsm.plan_path(ARM, DOWN, targets, 50.0, 500.0, W, angles=q)
     assert plan.planned == (0, 1, 3, 5, 7, 8)
     assert not plan.complete
-    told = {each.index: each for each in plan.infeasible}
-    assert {i: each.status for i, each in told.items()} == {
-        2: "posture",
-        4: "balance",
-        6: "stiffness",
-    }
-    assert isinstance(told[2].error, cdsm.InvalidInput)
-    assert isinstance(told[4].error, cdsm.InfeasibleTension)
-    error = told[6].error
-    assert isinstance(error, cdsm.UnreachableStiffness)
+    assert [each.index for each in plan.infeasible] == [2, 4, 6]
+    beyond, loaded, asked = plan.infeasible
+    assert (beyond.status, loaded.status, asked.status) == ("posture", "balance", "stiffness")
+    assert isinstance(beyond.error, cdsm.InvalidInput)
+    assert isinstance(loaded.error, cdsm.InfeasibleTension)
+    assert isinstance(asked.error, cdsm.UnreachableStiffness)
+    assert asked.reason == str(asked.error)
     with pytest.raises(cdsm.UnreachableStiffness) as alone:
         cdsm.plan_stiffness(ARM.at(q[6]), DOWN, 1e6, 50.0, 500.0)
-    assert (error.low, error.high) == (alone.value.low, alone.value.high)
-    assert told[6].reason == str(error)
+    assert (asked.error.low, asked.error.high) == (alone.value.low, alone.value.high)
     assert_holds(plan, 50.0, 500.0)
-
-
-def test_samples_that_no_tension_holds_are_named() -> None:
-    unstable = cdsm.plan_path(soft_hinge(), DOWN, 1e3, 1.01 * BUCKLING, angles=[[0.0], [0.0]])
-    assert [each.status for each in unstable.infeasible] == ["singular"] * 2
-    assert unstable.planned == ()
-    rigid = cdsm.plan_path(soft_hinge(), (1.0, 0.0, 0.0), 1e3, 10.0, angles=[[0.0]])
-    assert "cannot move along" in rigid.infeasible[0].reason
-    beyond = cdsm.plan_path(ARM, DOWN, 80e3, 900.0, angles=waving(1))
-    assert beyond.infeasible[0].status == "elasticity"
+    for arm, u, least, status, said in (
+        (soft_hinge(), DOWN, 1.01 * BUCKLING, "singular", ""),
+        (soft_hinge(), (1.0, 0.0, 0.0), 10.0, "singular", "cannot move along"),
+        (ARM, DOWN, 900.0, "elasticity", ""),
+    ):
+        plan = cdsm.plan_path(arm, u, 1e3, least, angles=np.zeros((2, arm.nv)))
+        assert plan.planned == ()
+        assert [each.status for each in plan.infeasible] == [status] * 2
+        assert said in plan.infeasible[0].reason
 
 
 def along_hinge(F: float) -> float:
@@ -153,40 +148,29 @@ def test_rest_length_and_elongation_make_the_length() -> None:
     arm = some_arm("universal-3-8-all")
     q = np.outer(np.linspace(0.5, 1.0, 4), arms.random_posture(arm, 11, reach=0.25).q)
     found = cdsm.stiffness_range(arm.at(q[2]), DOWN, 40.0, 300.0, starts=4)
-    plan = cdsm.plan_path(
-        arm,
-        DOWN,
-        0.5 * (found.low + found.high),
-        40.0,
-        300.0,
-        angles=q,
-        max_change_per_sample=200.0,
-    )
+    middle = 0.5 * (found.low + found.high)
+    plan = cdsm.plan_path(arm, DOWN, middle, 40.0, 300.0, angles=q, max_change_per_sample=200.0)
     assert len(plan.planned) >= 3
-    held = [cable for cable in arm.cables if cable.control == "position"]
+    held = [c for c, cable in enumerate(arm.cables) if cable.control == "position"]
     assert len(held) < len(arm.cables)
     assert plan.rest_lengths.shape == (len(plan.planned), len(held))
     for k, K in enumerate(plan.stiffness):
         np.testing.assert_array_equal(plan.cable_lengths[k], K.posture.cable_lengths)
-        lengths = iter(plan.rest_lengths[k])
-        for cable, F, L in zip(arm.cables, plan.tensions[k], plan.cable_lengths[k], strict=True):
-            if cable.control == "position":
-                free = float(next(lengths))
-                assert 0.0 < free < L
-                assert free + float(cable.elongation(F, free)) == pytest.approx(L, rel=1e-14)
+        for c, free in zip(held, plan.rest_lengths[k].tolist(), strict=True):
+            L, stretch = plan.cable_lengths[k, c], arm.cables[c].elongation
+            assert 0.0 < free < L
+            assert free + float(stretch(plan.tensions[k, c], free)) == pytest.approx(L, rel=1e-14)
 
 
 def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> None:
     cables = [replace(c, control="force") if c.name == "cable2_1" else c for c in ARM.cables]
     arm = cdsm.Manipulator(ARM.geometry, cables=cables, gravity=ARM.gravity)
-    targets = [80e3, 1e7, 81e3]
-    plan = cdsm.plan_path(arm, DOWN, targets, 50.0, angles=waving(3))
-    path = plan.write(tmp_path / "motors.csv")
-    with path.open(encoding="utf-8", newline="") as file:
+    plan = cdsm.plan_path(arm, DOWN, [80e3, 1e7, 81e3], 50.0, angles=waving(3))
+    with plan.write(tmp_path / "motors.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["status"] for row in rows] == ["planned", "stiffness", "planned"]
     assert rows[1]["reason"] == plan.infeasible[0].reason
-    names = [cable.name for cable in arm.cables]
+    names = [cable.name for cable in cables]
     held = [name for name in names if name != "cable2_1"]
     columns = {
         "": (arm.joint_names, "rad", plan.angles),
@@ -203,19 +187,19 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
     assert not any("rest_lengths cable2_1" in column for column in rows[0])
 
 
-BAD: list[tuple[dict[str, Any], str]] = [
-    ({"angles": None}, "angles: neither of angles= and tips="),
-    ({"angles": np.zeros(10)}, r"angles: shape \(10,\) given; \(S, 10\)"),
-    ({"guess": np.zeros(10)}, "guess: given with angles="),
-    ({"target": [1e4] * 5}, r"target: shape \(5,\) given; \(\) for all samples or \(2,\)"),
-    ({"target": [8e4, -1.0]}, "target: -1 N/m given"),
-    ({"direction": np.eye(3)}, r"target: shape \(\) given; \(3,\)"),
-    ({"max_change_per_sample": 0.0}, "max_change_per_sample: 0 N given"),
-    ({"minimum": 80.0, "maximum": 70.0, "angles": np.full((2, 10), 9.0)}, "maximum: 70 N"),
-]
-
-
-@pytest.mark.parametrize(("change", "message"), BAD)
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"angles": None}, "angles: neither of angles= and tips="),
+        ({"angles": np.zeros(10)}, r"angles: shape \(10,\) given; \(S, 10\)"),
+        ({"guess": np.zeros(10)}, "guess: given with angles="),
+        ({"target": [1e4] * 5}, r"target: shape \(5,\) given; \(\) for all samples or \(2,\)"),
+        ({"target": [8e4, -1.0]}, "target: -1 N/m given"),
+        ({"direction": np.eye(3)}, r"target: shape \(\) given; \(3,\)"),
+        ({"max_change_per_sample": 0.0}, "max_change_per_sample: 0 N given"),
+        ({"minimum": 80.0, "maximum": 70.0, "angles": np.full((2, 10), 9.0)}, "maximum: 70 N"),
+    ],
+)
 def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
     given = {"arm": ARM, "direction": DOWN, "target": 8e4, "minimum": 50.0, "angles": waving(2)}
     with pytest.raises(cdsm.InvalidInput, match=message):

@@ -41,8 +41,7 @@ def assert_admissible(plan: StiffnessPlan, low: float, high: float) -> None:
     F, K = plan.tension.values, plan.stiffness
     assert abs(plan.tension.residual).max() <= 1e-12 * F.max()
     np.testing.assert_allclose(K.residual, plan.tension.residual, atol=1e-15 * F.max())
-    assert (low <= F).all()
-    assert (high >= F).all()
+    assert low <= F.min() <= F.max() <= high
     assert K.margin >= floor(plan, low, high) * (1.0 - 1e-9)
 
 
@@ -170,8 +169,6 @@ def test_several_directions_are_hit_at_once_if_they_can_be() -> None:
         # there may be smaller tensions than those the targets are from
         assert np.linalg.norm(plan.tension.values) <= np.linalg.norm(least.values) * (1.0 + 1e-9)
         assert_admissible(plan, 30.0, 300.0)
-        assert plan.direction is not None
-        np.testing.assert_allclose(np.linalg.norm(plan.direction, axis=1), 1.0, rtol=1e-15)
 
 
 def test_what_cannot_be_hit_is_missed_by_less_than_any_sample() -> None:
@@ -198,17 +195,16 @@ def test_what_cannot_be_hit_is_missed_by_less_than_any_sample() -> None:
         assert min(misfit(centre + reach * (F - centre)) for F in mixtures[:100]) >= plan.misfit
 
 
-BAD: list[tuple[Any, Any, str]] = [
-    (DOWN, 0.0, "target: 0 N/m given"),
-    (DOWN, [1e4], "target: shape"),
-    (np.eye(3), [1e4, 1e4, 0.0], "target: 0 N/m"),
-    (np.eye(3)[:, :2], [1e4] * 3, "direction: shape"),
-    (None, 1e4, "direction"),
-]
-
-
-@pytest.mark.parametrize(("direction", "target", "message"), BAD)
+@pytest.mark.parametrize(
+    ("direction", "target", "message"),
+    [
+        (DOWN, 0.0, "target: 0 N/m given"),
+        (DOWN, [1e4], "target: shape"),
+        (np.eye(3), [1e4, 1e4, 0.0], "target: 0 N/m"),
+        (np.eye(3)[:, :2], [1e4] * 3, "direction: shape"),
+        (None, 1e4, "direction"),
+    ],
+)
 def test_targets_that_make_no_sense_are_named(direction: Any, target: Any, message: str) -> None:
-    pose = presets.virtual_prototype().at(np.full(10, 0.1))
     with pytest.raises(cdsm.InvalidInput, match=message):
-        cdsm.plan_stiffness(pose, direction, target, 50.0)
+        cdsm.plan_stiffness(hinge().at([0.1]), direction, target, 50.0)

@@ -34,7 +34,7 @@ def planar() -> xr.Dataset:
     return cdsm.sweep(short_arm(spring=1500.0), PLANAR, minimum=[5.0, 40.0, 100.0])
 
 
-def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Dataset) -> None:
+def test_tips_in_a_plane_are_shown_in_mm_and_the_unstable_are_marked(planar: xr.Dataset) -> None:
     figure = plots.plot_map(planar, "softest")
     (colors,) = drawn(figure)
     tips = 1e3 * planar.tip_position.values.reshape(-1, 3)
@@ -43,18 +43,12 @@ def test_tips_in_a_plane_are_shown_in_it_in_mm_with_equal_axes(planar: xr.Datase
     shown = np.asarray(colors.get_array())
     np.testing.assert_allclose(shown, 1e-3 * planar.softest[..., 0].values.ravel(), rtol=1e-12)
     axes: Any = figure.axes[0]
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [mm]", "z [mm]")
-    assert axes.get_aspect() == 1.0
+    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_aspect()) == ("x [mm]", "z [mm]", 1.0)
     assert "[N/mm]" in figure.axes[-1].get_ylabel()
-
-
-def test_unstable_entries_are_marked_and_have_a_margin(planar: xr.Dataset) -> None:
-    tips = 1e3 * planar.tip_position.values.reshape(-1, 3)[:, [0, 2]]
-    marked, colors = drawn(plots.plot_map(planar, "softest"), 2)
-    np.testing.assert_allclose(places(marked), tips)
+    marked, colors = drawn(figure, 2)
+    np.testing.assert_allclose(places(marked), tips[:, [0, 2]])
     assert not len(places(colors))
-    figure = plots.plot_map(planar, "margin")
-    (colors,) = drawn(figure, 2)
+    (colors,) = drawn(plots.plot_map(planar, "margin"), 2)
     shown, margins = np.asarray(colors.get_array()), planar.margin[..., 2].values.ravel()
     assert (shown < 0.0).all()
     np.testing.assert_allclose(shown, margins, rtol=1e-12)

@@ -30,11 +30,9 @@ LOOP = cdsm.load_cycle(POSE, PULL, [[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]])
 def _drawn(figure: Figure) -> Figure:
     """Draw a figure; each panel that is labelled has units on both axes."""
     figure.draw_without_rendering()
-    for axes in figure.axes:
-        for label in (axes.get_xlabel(), axes.get_ylabel()):
-            assert not label or re.search(r"\[.+\]|number|sample|factor|measurement|σ", label), (
-                label
-            )
+    for label in (text() for axes in figure.axes for text in (axes.get_xlabel, axes.get_ylabel)):
+        units = r"\[.+\]|number|sample|factor|measurement|σ"
+        assert not label or re.search(units, label), label
     return figure
 
 
@@ -120,16 +118,14 @@ def test_ranges_are_drawn_and_a_path_is_filmed(tmp_path: Path) -> None:
 
 def test_what_cannot_be_drawn_is_named(tmp_path: Path) -> None:
     other: Any = cdsm.presets.virtual_prototype().at(np.zeros(10))
+    jpg, film = tmp_path / "a.jpg", tmp_path / "a.mp4"
     for call, said in (
         (lambda: plots.plot_arm(3), "pose: 3 given; a Posture is needed"),  # type: ignore[arg-type]
         (lambda: plots.plot_arm(other, PULL), "tension: belongs to another arm"),
         (lambda: plots.plot_arm(other, stiffness=K), "stiffness: belongs to another posture"),
         (lambda: plots.plot_path([POSE, other]), "path: give postures of one arm"),
-        (lambda: plots.plot_path([POSE], animate=tmp_path / "a.mp4"), r"must end in \.gif"),
-        (
-            lambda: plots.save_figure(POSE.plot(), tmp_path / "a.jpg"),
-            r"path: .*\.pdf, \.svg, \.png",
-        ),
+        (lambda: plots.plot_path([POSE], animate=film), r"must end in \.gif"),
+        (lambda: plots.save_figure(POSE.plot(), jpg), r"path: .*\.pdf, \.svg, \.png"),
     ):
         with pytest.raises(cdsm.InvalidInput, match=said):
             call()

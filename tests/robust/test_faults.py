@@ -4,8 +4,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import cdsm
@@ -15,31 +13,22 @@ from tests.support.sweeps import short_arm
 ROOT = Path(__file__).parents[2]
 
 
-@contextmanager
-def running(*arguments: object) -> Iterator[subprocess.Popen[str]]:
-    """Python with these arguments, ended whatever happens."""
-    command = [sys.executable, *map(str, arguments)]
-    with subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
 def test_an_interrupted_command_says_so_in_one_line(tmp_path: Path) -> None:
-    arm, path, out = tmp_path / "arm.toml", tmp_path / "s.zarr", tmp_path / "s.csv"
+    arm, path, out = (tmp_path / name for name in ("arm.toml", "s.zarr", "s.csv"))
     short_arm().geometry.write(arm)
     out.write_text("old", encoding="utf-8")
-    command: list[object] = ["-m", "cdsm", "sweep", arm, "--set", "wire=1x19-1.2mm"]
-    command += ["--minimum", 10, "--random", 140_000, "--out", out, "--store", path]
-    with running(*command) as process:
-        while not list(path.glob("status/c/*")):
-            assert process.poll() is None, process.communicate()
-            time.sleep(0.002)
-        process.send_signal(signal.SIGINT)
-        said, complained = process.communicate(timeout=HANGS)
+    words = f"-m cdsm sweep {arm} --set wire=1x19-1.2mm --minimum 10 --random 140000"
+    command = [sys.executable, *words.split(), "--out", str(out), "--store", str(path)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, cwd=ROOT, text=True, **pipes) as process:  # type: ignore[call-overload]
+        try:
+            while not list(path.glob("status/c/*")):
+                assert process.poll() is None, process.communicate()
+                time.sleep(0.002)
+            process.send_signal(signal.SIGINT)
+            said, complained = process.communicate(timeout=HANGS)
+        finally:
+            process.kill()
     assert process.returncode == 130, complained
     assert said == ""
     told = [line.partition(":")[0] for line in complained.splitlines()]

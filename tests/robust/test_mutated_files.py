@@ -2,10 +2,10 @@
 
 import random
 import re
-from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,18 +18,6 @@ from tests.support.foreign import TREE, crab
 from tests.support.sweeps import short_arm
 
 LAW = cdsm.LinearElasticity(1e4)
-
-
-class Reader(NamedTuple):
-    """How a kind of file is read.
-
-    Attributes:
-        file: Its name in the folder of :func:`whole_files`.
-        read: From its path to whatever it describes.
-    """
-
-    file: str
-    read: Callable[[Path], Any]
 
 
 def _arm(arm: cdsm.Manipulator) -> cdsm.Stiffness:
@@ -54,8 +42,7 @@ def _elasticity(path: Path) -> None:
 
 def _tensile(path: Path) -> None:
     test = cdsm.read_tensile_csv(path)
-    assert np.isfinite(test.displacement).all()
-    assert np.isfinite(test.force).all()
+    assert np.isfinite([test.displacement, test.force]).all()
 
 
 def _path(path: Path) -> None:
@@ -64,27 +51,29 @@ def _path(path: Path) -> None:
         assert array is None or np.isfinite(array).all()
 
 
-READERS: dict[str, Reader] = {
-    "geometry": Reader("full.toml", _geometry),
-    "arm": Reader("arm.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
-    "arm of a urdf": Reader("finger.toml", lambda path: _arm(cdsm.Manipulator.read(path))),
-    "cables": Reader("cables.toml", lambda path: _arm(crab().with_cables(cdsm.read_cables(path)))),
-    "linear wire": Reader("linear.toml", _elasticity),
-    "strand": Reader("strand.toml", _elasticity),
-    "table": Reader("table.toml", _elasticity),
-    "urdf": Reader(
-        "robot.urdf",
-        lambda path: _arm(cdsm.Manipulator.from_urdf(path, crab().cables, tip="tip")),
-    ),
-    "caspr bodies": Reader(
-        "toy_bodies.xml", lambda path: _arm(cdsm.read_caspr(path.parent, elasticity=LAW))
-    ),
-    "caspr cables": Reader(
-        "toy_cables.xml", lambda path: _arm(cdsm.read_caspr(path.parent, elasticity=LAW))
-    ),
-    "tensile test": Reader("tensile.csv", _tensile),
-    "path": Reader("path.csv", _path),
+def _caspr(path: Path) -> cdsm.Stiffness:
+    return _arm(cdsm.read_caspr(path.parent, elasticity=LAW))
+
+
+def _robot(path: Path) -> cdsm.Stiffness:
+    return _arm(cdsm.Manipulator.from_urdf(path, crab().cables, tip="tip"))
+
+
+READERS: dict[str, Callable[[Path], Any]] = {
+    "full.toml": _geometry,
+    "arm.toml": lambda path: _arm(cdsm.Manipulator.read(path)),
+    "finger.toml": lambda path: _arm(cdsm.Manipulator.read(path)),
+    "cables.toml": lambda path: _arm(crab().with_cables(cdsm.read_cables(path))),
+    "linear.toml": _elasticity,
+    "strand.toml": _elasticity,
+    "table.toml": _elasticity,
+    "robot.urdf": _robot,
+    "toy_bodies.xml": _caspr,
+    "toy_cables.xml": _caspr,
+    "tensile.csv": _tensile,
+    "path.csv": _path,
 }
+"""How each of the :func:`whole_files` is read, from its path to whatever it describes."""
 
 
 def whole_files(path: Path) -> Path:
@@ -126,46 +115,41 @@ def _bytes(token: str | bytes) -> bytes:
     return token.encode() if isinstance(token, str) else token
 
 
-def shuffled(whole: bytes, rng: random.Random) -> bytes:
-    """A few cuts, insertions, flipped bits, changed bytes and repeated pieces."""
-    data = bytearray(whole)
-    for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
-        i = rng.randrange(len(data))
-        what = rng.random()
-        if what < 0.25:
-            del data[i : i + rng.randrange(1, 12)]
-        elif what < 0.5:
-            data[i:i] = _bytes(rng.choice(TOKENS))
-        elif what < 0.65:
-            data[i] = rng.randrange(32, 127)
-        elif what < 0.75:
-            data[i] ^= 1 << rng.randrange(8)
-        elif what < 0.8:
-            del data[i:]
-        else:
-            j = rng.randrange(len(data))
-            data[i:i] = data[j : j + rng.randrange(1, 60)]
-        data = data or bytearray(b"x")
-    return bytes(data)
-
-
 def renumbered(whole: bytes, rng: random.Random) -> bytes:
     """One number replaced by one that is none, or too large, or too small."""
     found = rng.choice(list(re.finditer(rb"-?\d+\.?\d*(?:e-?\d+)?", whole)))
     return whole[: found.start()] + _bytes(rng.choice(NUMBERS)) + whole[found.end() :]
 
 
+def shuffled(whole: bytes, rng: random.Random) -> bytes:
+    """A few cuts, insertions, flipped bits, changed bytes and repeated pieces."""
+    data = bytearray(whole)
+    for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
+        i, j = rng.randrange(len(data)), rng.randrange(len(data))
+        match rng.randrange(6):
+            case 0:
+                del data[i : i + rng.randrange(1, 12)]
+            case 1:
+                data[i:i] = _bytes(rng.choice(TOKENS))
+            case 2:
+                data[i] = rng.randrange(32, 127)
+            case 3:
+                data[i] ^= 1 << rng.randrange(8)
+            case 4:
+                data[i:i] = data[j : j + rng.randrange(1, 60)]
+            case _:
+                del data[i + len(data) // 4 :]
+        data = data or bytearray(b"x")
+    return bytes(data)
+
+
 def rearranged(whole: bytes, rng: random.Random) -> bytes:
     """Lines or elements left out, doubled or exchanged."""
     parts = re.split(rb"(?<=[\n>,])", whole)
     i, j = rng.randrange(len(parts)), rng.randrange(len(parts))
-    what = rng.random()
-    if what < 0.3:
-        del parts[i]
-    elif what < 0.6:
-        parts.insert(j, parts[i])
-    else:
-        parts[i], parts[j] = parts[j], parts[i]
+    parts[i], parts[j] = rng.choice(
+        ((b"", parts[j]), (parts[i], parts[i] + parts[j]), (parts[j], parts[i]))
+    )
     return b"".join(parts)
 
 
@@ -174,22 +158,14 @@ FILES = 75
 """Files of each kind."""
 
 
-def outcome(reader: Reader, path: Path) -> str:
-    """``read``, or the error of the library's own that a file is refused with."""
-    try:
-        reader.read(path)
-    except cdsm.CdsmError as error:
-        return type(error).__name__
-    return "read"
-
-
 @pytest.mark.parametrize("name", READERS)
 def test_mutated_files_are_refused_or_read(name: str, tmp_path: Path) -> None:
-    path = whole_files(tmp_path) / READERS[name].file
-    whole, rng = path.read_bytes(), random.Random(f"{name} 1")
-    counts = Counter[str]()
+    path = whole_files(tmp_path) / name
+    whole, rng, read = path.read_bytes(), random.Random(f"{name} 1"), 0
     for i in range(FILES):
         path.write_bytes(MUTATIONS[i % len(MUTATIONS)](whole, rng))
-        counts[outcome(READERS[name], path)] += 1
+        with suppress(cdsm.CdsmError):  # and no other error
+            READERS[name](path)
+            read += 1
     # the changes do spoil something, and not everything
-    assert FILES > counts["read"] > 0
+    assert FILES > read > 0

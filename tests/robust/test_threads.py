@@ -2,12 +2,11 @@
 
 import multiprocessing
 import threading
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import cache
 
 import numpy as np
 
-import cdsm
 from tests.support.arms import mixed_arm, random_arm
 from tests.support.jobs import Work, balanced, batched, one_by_one, rested, solved, stiff
 
@@ -18,30 +17,24 @@ THREADS = 8
 MIXED: tuple[Work, ...] = (stiff,) * 20 + (balanced,) * 8 + (batched,) * 2 + (rested, solved)
 
 
-def assert_same_bits(arms: list[cdsm.Manipulator], jobs: list[tuple[Work, int, int]]) -> None:
+def test_threads_that_do_different_things_with_two_arms_give_the_serial_bits() -> None:
     """Jobs (what, which arm, seed) from many threads, in an order of their own, and serially."""
+    arms = [random_arm(6, 3), random_arm(7, 4, "hinged")]
 
     @cache
-    def serial(work: Work, a: int, seed: int) -> tuple[bytes, ...]:
-        return work(arms[a], seed)
+    def serial(i: int) -> tuple[bytes, ...]:
+        return MIXED[i % len(MIXED)](arms[i % 2], i % 96)
 
-    order = np.random.default_rng(len(jobs)).permutation(len(jobs)).tolist()
     started = threading.Barrier(THREADS)
     with ThreadPoolExecutor(THREADS, initializer=started.wait) as pool:
-        found = [(i, pool.submit(jobs[i][0], arms[jobs[i][1]], jobs[i][2])) for i in order]
+        order = np.random.default_rng(192).permutation(192).tolist()
+        found = [(i, pool.submit(serial.__wrapped__, i)) for i in order]
         for i, job in found:
-            assert job.result() == serial(*jobs[i]), jobs[i]
-
-
-def test_threads_that_do_different_things_with_two_arms_give_the_serial_bits() -> None:
-    arms = [random_arm(6, 3), random_arm(7, 4, "hinged")]
-    jobs = [(MIXED[i % len(MIXED)], i % 2, i % 96) for i in range(192)]
-    assert_same_bits(arms, jobs)
+            assert job.result() == serial(i), i
 
 
 def test_processes_with_a_pickled_arm_give_the_same_bits() -> None:
     arm, seeds = mixed_arm(), range(6)
-    pool: Executor
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         jobs = {w: pool.submit(one_by_one, arm, w, seeds) for w in dict.fromkeys(MIXED)}
         for work, job in jobs.items():

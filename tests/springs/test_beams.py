@@ -3,6 +3,7 @@
 import math
 import warnings
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,32 +75,27 @@ def test_a_cable_between_the_axes_keeps_the_tip_in_its_plane(degrees: float) -> 
 
 
 def test_a_turned_rod_has_a_turned_tip() -> None:
-    tension = CASES[0][0]
-    turned = cdsm.forward_statics(rod(THREE + math.pi / 4.0), tension=tension).pose.tip[:3, 3]
-    x, y, z = cdsm.forward_statics(ROD, tension=tension).pose.tip[:3, 3]
+    turned, (x, y, z) = (
+        cdsm.forward_statics(arm, tension=CASES[0][0]).pose.tip[:3, 3]
+        for arm in (rod(THREE + math.pi / 4.0), ROD)
+    )
     c = math.sqrt(0.5)
     np.testing.assert_allclose(turned, [x, c * (y - z), c * (y + z)], atol=5e-5)
 
 
-def cantilever(pieces: int, **changes: object) -> cdsm.Manipulator:
+def cantilever(pieces: int, **changes: float) -> cdsm.Manipulator:
     section = {"length": 0.4, "disks": 1, "hole_angles": [0.0, 2.0, 4.0], "hole_radius": 0.01}
-    geometry = cdsm.Geometry.backbone(
-        sections=[section],
-        bending_stiffness=EI,
-        pieces=pieces,
-        joint_limit=2.5,
-        **changes,  # type: ignore[arg-type]
-    )
+    sizes: dict[str, Any] = {"bending_stiffness": EI, "pieces": pieces, "joint_limit": 2.5}
+    geometry = cdsm.Geometry.backbone(sections=[section], **sizes, **changes)
     return cdsm.Manipulator(geometry, LAW, gravity=(0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("n", [1, 2, 4, 8])
 def test_cantilevers_bend_as_beams(n: int) -> None:
-    f, none = 1e-6, np.zeros(3)
-    arm = cantilever(n)
+    f, arm = 1e-6, cantilever(n)
 
-    def tip(*wrench: float) -> Array:
-        return cdsm.forward_statics(arm, tension=none, wrench=wrench).pose.tip
+    def tip(*wrench: float, of: cdsm.Manipulator = arm) -> Array:
+        return cdsm.forward_statics(of, tension=np.zeros(3), wrench=wrench).pose.tip
 
     sag = tip(0.0, 0.0, f, 0.0, 0.0, 0.0)[2, 3] / (f * 0.4**3 / (3.0 * EI))
     assert sag - 1.0 == pytest.approx(1.0 / (12.0 * n * n), rel=1e-6)
@@ -109,8 +105,7 @@ def test_cantilevers_bend_as_beams(n: int) -> None:
     turned = tip(0.0, 0.0, 0.0, 0.0, -moment, 0.0)
     assert math.atan2(turned[2, 0], turned[0, 0]) == pytest.approx(math.radians(60.0), rel=1e-9)
     heavy = cantilever(n, mass_per_length=1e-6).with_gravity("z")
-    sag = cdsm.forward_statics(heavy, tension=none).pose.tip[2, 3]
-    sag /= 1e-6 * 9.81 * 0.4**4 / (8.0 * EI)
+    sag = tip(*[0.0] * 6, of=heavy)[2, 3] / (1e-6 * 9.81 * 0.4**4 / (8.0 * EI))
     assert sag - 1.0 == pytest.approx(1.0 / (6.0 * n * n), rel=0.05)
 
 
@@ -143,28 +138,19 @@ def test_tubes_of_the_virtual_prototype_cost_stiffness(
 ) -> None:
     """20 × 1 mm aluminium; the numbers are those of an independent program, in per cent of K."""
     rigid = cdsm.presets.virtual_prototype().geometry
-    tension, along = np.zeros(0), {}
-    for GJ in (None, math.inf, 141.0):
-        geometry = rigid
-        if GJ is not None:
-            links = tuple(
-                cdsm.Link(
-                    length=each.length,
-                    mass=each.mass,
-                    bending_stiffness=189.0,
-                    torsion_stiffness=GJ,
-                )
-                for each in rigid.links
-            )
-            geometry = rigid.replace(links=links)
-        arm = cdsm.Manipulator(geometry, law)
+
+    def along(GJ: float) -> Array:
+        soft = {"bending_stiffness": 189.0, "torsion_stiffness": GJ} if GJ else {}
+        links = tuple(replace(each, **soft) for each in rigid.links)
+        arm = cdsm.Manipulator(rigid.replace(links=links), law)
         ten = [math.radians(10.0) * name.startswith("joint") for name in arm.joint_names]
-        if GJ is None:
-            tension = cdsm.distribute_tension(arm.at(ten), 50.0).values
         K = cdsm.equilibrium(arm.at(ten), tension).stiffness
-        along[GJ] = np.array([K.along(u) for u in "xyz"])
-    np.testing.assert_allclose(100.0 * (along[math.inf] / along[None] - 1.0), bent, atol=0.5)
-    np.testing.assert_allclose(100.0 * (along[141.0] / along[None] - 1.0), twisted, atol=0.5)
+        return np.array([K.along(u) for u in "xyz"])
+
+    pose = cdsm.Manipulator(rigid, law).at(np.full(10, math.radians(10.0)))
+    tension = cdsm.distribute_tension(pose, 50.0).values
+    for GJ, loss in ((math.inf, bent), (141.0, twisted)):
+        np.testing.assert_allclose(100.0 * (along(GJ) / along(0.0) - 1.0), loss, atol=0.5)
 
 
 @pytest.mark.parametrize(("pieces", "off"), [(1, 0.216), (4, -0.017)])
@@ -192,7 +178,7 @@ def test_a_round_rod_beyond_euler_s_load_rests_in_any_direction() -> None:
         assert ("NEUTRAL" in str(rest)) is neutral
 
 
-def test_files_hold_backbones(tmp_path: object) -> None:
+def test_files_hold_backbones() -> None:
     geometry = ROD.geometry
     assert cdsm.Geometry.from_toml(geometry.to_toml()) == geometry
     assert [disk.link for disk in geometry.disks][:3] == ["base_disk", "disk1", "disk2"]
@@ -200,20 +186,23 @@ def test_files_hold_backbones(tmp_path: object) -> None:
     assert "gap3_bend1_y" in ROD.joint_names
 
 
-def test_beams_that_cannot_be_are_named() -> None:
-    section = {"length": 0.2, "disks": 10, "hole_angles": [0.0], "hole_radius": 0.01}
-    for given, said in (
+TUBE = {"outer_diameter": 1e-3, "youngs_modulus": 5e10}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
         ({}, "bending_stiffness: give it"),
         ({"bending_stiffness": 0.0}, "bending_stiffness"),
         ({"bending_stiffness": -1.0}, "bending_stiffness"),
         ({"outer_diameter": 1e-3}, "youngs_modulus: give it"),
-        (
-            {"outer_diameter": 1e-3, "inner_diameter": 2e-3, "youngs_modulus": 5e10},
-            "inner_diameter",
-        ),
-        ({"bending_stiffness": 1.0, "outer_diameter": 1e-3, "youngs_modulus": 5e10}, "not both"),
+        ({**TUBE, "inner_diameter": 2e-3}, "inner_diameter"),
+        ({**TUBE, "bending_stiffness": 1.0}, "not both"),
         ({"bending_stiffness": 1.0, "pieces": 21}, "pieces"),
         ({"bending_stiffness": 1.0, "pieces": 9}, "450 axes .* 400 are taken .* fewer pieces"),
-    ):
-        with pytest.raises(cdsm.GeometryError, match=said):
-            cdsm.Geometry.backbone(sections=[section], **given)  # type: ignore[arg-type]
+    ],
+)
+def test_beams_that_cannot_be_are_named(given: dict[str, float], said: str) -> None:
+    section = {"length": 0.2, "disks": 10, "hole_angles": [0.0], "hole_radius": 0.01}
+    with pytest.raises(cdsm.GeometryError, match=said):
+        cdsm.Geometry.backbone(sections=[section], **given)  # type: ignore[arg-type]

@@ -1,5 +1,6 @@
 """Springs at joints: in the balance, in K_θ, in batches, and in MuJoCo."""
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +16,11 @@ Q = np.array([0.1, -0.2, 0.15, 0.1, -0.1, 0.2])
 
 
 def sprung(**changes: object) -> cdsm.Manipulator:
-    sizes: dict[str, object] = {
-        "joints": 3,
-        "cables_per_joint": 3,
-        "link_length": 0.05,
-        "base_length": 0.02,
-        "disk_offset": 0.01,
-        "hole_radius": 0.02,
-        "link_mass": 0.05,
-        "lead": 0.1,
-        "joint_stiffness": [2.0, 1.0, 0.5],
-        "rest_angle": [0.0, 0.1, 0.0],
-    }
+    sizes: dict[str, Any] = {"joints": 3, "cables_per_joint": 3, "link_length": 0.05}
+    sizes |= {"base_length": 0.02, "disk_offset": 0.01, "hole_radius": 0.02, "link_mass": 0.05}
+    sizes |= {"lead": 0.1, "joint_stiffness": [2.0, 1.0, 0.5], "rest_angle": [0.0, 0.1, 0.0]}
     return cdsm.Manipulator(
-        cdsm.Geometry.universal(**{**sizes, **changes}),  # type: ignore[arg-type]
-        cdsm.LinearElasticity(5e4),
+        cdsm.Geometry.universal(**{**sizes, **changes}), cdsm.LinearElasticity(5e4)
     )
 
 
@@ -47,25 +38,13 @@ def potential(arm: cdsm.Manipulator, K: cdsm.Stiffness, q: Array) -> float:
 
 def test_stiffness_is_the_hessian_of_the_potential() -> None:
     arm = sprung()
-    W = np.append(WRENCH[:3], np.zeros(3))
-    K = cdsm.stiffness(arm.at(Q), np.linspace(5.0, 20.0, 9), W)
+    K = cdsm.stiffness(arm.at(Q), np.linspace(5.0, 20.0, 9), np.append(WRENCH[:3], np.zeros(3)))
     errors = []
     for h in (4e-3, 2e-3):
-        steps = h * np.eye(6)
-        H = np.array(
-            [
-                [
-                    sum(
-                        s * t * potential(arm, K, Q + s * a + t * b)
-                        for s in (1.0, -1.0)
-                        for t in (1.0, -1.0)
-                    )
-                    / (4.0 * h * h)
-                    for b in steps
-                ]
-                for a in steps
-            ]
-        )
+        H = np.zeros((6, 6))
+        for (i, a), (j, b) in product(enumerate(h * np.eye(6)), repeat=2):
+            for s, t in product((1.0, -1.0), repeat=2):
+                H[i, j] += s * t * potential(arm, K, Q + s * a + t * b) / (4.0 * h * h)
         errors.append(abs(H - K.joint).max() / abs(K.joint).max())
     assert errors[1] < 1e-4
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)  # second order
@@ -133,35 +112,33 @@ def test_uncertain_springs_are_springs_of_other_arms(of: str, coupled: bool) -> 
 OVERRIDDEN: tuple[dict[str, Any], ...] = ({"joint1_1": 3.0, "joint2_2": (1.0, 0.2)}, {})
 
 
-def test_springs_are_kept_by_other_cables_and_dimensions() -> None:
-    arm = sprung()
-    again = arm.with_friction(0.1).with_gravity("-y")
-    np.testing.assert_array_equal(again.springs.stiffness, arm.springs.stiffness)
-    assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
-    assert arm.with_springs({}) != arm
-    for each in (arm, *map(arm.with_springs, OVERRIDDEN)):
-        wider = cdsm.ArmParameters(each, ("hole_radius",))(hole_radius=0.021)
-        np.testing.assert_array_equal(wider.springs.stiffness, each.springs.stiffness)
-        np.testing.assert_array_equal(wider.springs.angle, each.springs.angle)
-
-
 @pytest.mark.parametrize("arm", [sprung(), *map(sprung().with_springs, OVERRIDDEN)])
-def test_springs_are_kept_by_files(arm: cdsm.Manipulator, tmp_path: Path) -> None:
+def test_springs_are_kept_by_files_other_cables_and_dimensions(
+    arm: cdsm.Manipulator, tmp_path: Path
+) -> None:
     assert cdsm.Manipulator.read(arm.write(tmp_path / "ARM.toml")) == arm
+    assert cdsm.Geometry.from_toml(arm.geometry.to_toml()) == arm.geometry
+    assert arm.with_springs({"joint1_1": 9.0}) != arm
+    rough = arm.with_friction(0.1).with_gravity("-y")
+    wider = cdsm.ArmParameters(arm, ("hole_radius",))(hole_radius=0.021)
+    for again in (rough, wider):
+        np.testing.assert_array_equal(again.springs.stiffness, arm.springs.stiffness)
+        np.testing.assert_array_equal(again.springs.angle, arm.springs.angle)
 
 
-def test_springs_that_cannot_be_are_named() -> None:
-    arm = sprung()
-    for given, said in (
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
         ({"joint1_1": -1.0}, r"springs\['joint1_1'\]: -1 N m/rad given"),
         ({"joint1_1": (1.0, 2.0, 3.0)}, "stiffness, or"),
         ({"joint1_1": np.nan}, "joint1_1"),
         ([1.0], "dict of joint names"),
-    ):
-        with pytest.raises(cdsm.InvalidInput, match=said):
-            arm.with_springs(given)  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match="joint9_1"):
-        arm.with_springs({"joint9_1": 1.0})
+        ({"joint9_1": 1.0}, "joint9_1"),
+    ],
+)
+def test_springs_that_cannot_be_are_named(given: Any, said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        sprung().with_springs(given)
     with pytest.raises(cdsm.GeometryError, match="joint_stiffness"):
         sprung(joint_stiffness=-1.0)
 

@@ -49,7 +49,6 @@ def test_a_chunked_sweep_is_lazy_and_has_the_same_numbers(whole: xr.Dataset) -> 
     np.testing.assert_array_equal(q.compute(), POSES.angles(short_arm()))
 
 
-# takes seconds: two processes start, seconds each
 def test_a_cluster_of_two_workers_has_the_same_numbers(tmp_path: Path) -> None:
     q, options = POSES.angles(short_arm(), 250), {"minimum": 20.0, "outputs": ("along", "tension")}
     alone = cdsm.sweep(short_arm(), POSES, **options)  # type: ignore[arg-type]
@@ -97,7 +96,6 @@ cdsm.sweep(arm, cdsm.RandomPoses(1000, 1).angles(arm, 20), minimum=20.0, store=s
 """
 
 
-# takes seconds: a process that writes fifty chunks
 def test_a_killed_run_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
     path = tmp_path / "s.zarr"
     with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], cwd=ROOT) as process:
@@ -143,6 +141,11 @@ def test_netcdf_gives_the_same_sweep_back(tmp_path: Path, whole: xr.Dataset) -> 
     xr.testing.assert_identical(cdsm.read_sweep(path), whole)
     path = write_sweep(swept(store=tmp_path / "s.zarr"), path)
     assert same(cdsm.read_sweep(path), whole)
+    with pytest.raises(cdsm.InvalidInput, match=r"ends neither in \.nc \(NetCDF\) nor in \.csv"):
+        write_sweep(whole, tmp_path / "s.txt")
+    xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
+    with pytest.raises(cdsm.FileError, match=r"other\.nc: is not a sweep of cdsm"):
+        cdsm.read_sweep(tmp_path / "other.nc")
 
 
 def test_csv_has_a_row_for_each_entry_and_a_column_for_each_component(
@@ -151,29 +154,20 @@ def test_csv_has_a_row_for_each_entry_and_a_column_for_each_component(
     import pandas
 
     table = pandas.read_csv(write_sweep(whole, tmp_path / "s.csv"))
-    names = whole.status.attrs["flag_meanings"].split()
+    names, joint = whole.status.attrs["flag_meanings"].split(), whole.joint_stiffness
     assert table["status"].tolist() == [names[i] for i in whole.status.values.ravel()]
-    for header, variable in (
-        ("joint1_1 [rad]", whole.joint1_1),
-        ("joint2_1 [rad]", whole.joint2_1),
-        ("minimum [N]", whole.minimum),
-        ("force_z [N]", whole.force.sel(axis="z")),
-        ("tip_position_y [m]", whole.tip_position.sel(axis="y")),
-        ("tension_cable2_3 [N]", whole.tension.sel(cable="cable2_3")),
-        ("along_z [N m-1]", whole.along.sel(direction="z")),
-        ("isotropy", whole.isotropy),
-        (
-            "joint_stiffness_joint1_1_joint2_2 [N m rad-1]",
-            whole.joint_stiffness.sel(joint="joint1_1", joint_column="joint2_2"),
+    for header, variable in {
+        "joint1_1 [rad]": whole.joint1_1,
+        "joint2_1 [rad]": whole.joint2_1,
+        "minimum [N]": whole.minimum,
+        "force_z [N]": whole.force.sel(axis="z"),
+        "tip_position_y [m]": whole.tip_position.sel(axis="y"),
+        "tension_cable2_3 [N]": whole.tension.sel(cable="cable2_3"),
+        "along_z [N m-1]": whole.along.sel(direction="z"),
+        "isotropy": whole.isotropy,
+        "joint_stiffness_joint1_1_joint2_2 [N m rad-1]": joint.sel(
+            joint="joint1_1", joint_column="joint2_2"
         ),
-    ):
+    }.items():
         full = variable.broadcast_like(whole.status).transpose(*whole.status.dims)
         np.testing.assert_allclose(table[header], full.values.ravel(), rtol=1e-15, err_msg=header)
-
-
-def test_what_is_no_sweep_is_named(tmp_path: Path, whole: xr.Dataset) -> None:
-    with pytest.raises(cdsm.InvalidInput, match=r"ends neither in \.nc \(NetCDF\) nor in \.csv"):
-        write_sweep(whole, tmp_path / "s.txt")
-    xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc")
-    with pytest.raises(cdsm.FileError, match=r"other\.nc: is not a sweep of cdsm"):
-        cdsm.read_sweep(tmp_path / "other.nc")

@@ -14,17 +14,16 @@ from cdsm.tolerancing.inputs import inputs_of
 from tests.support import arms
 from tests.support.arms import readme_geometry
 
-LAW = cdsm.LinearElasticity(48e3)
+LAW, STRAND = cdsm.LinearElasticity(48e3), cdsm.presets.STRAND_1X19
 
 
-def readme_arm() -> cdsm.Manipulator:
-    geometry = readme_geometry()
-    return cdsm.Manipulator(geometry, LAW)
+def readme_pose(law: cdsm.Elasticity = LAW) -> cdsm.Posture:
+    arm = cdsm.Manipulator(readme_geometry(), law)
+    return arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
 
 
 def posture() -> tuple[cdsm.Posture, cdsm.Tension]:
-    pose = readme_arm().at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
-    return pose, cdsm.distribute_tension(pose, minimum=50.0)
+    return (pose := readme_pose()), cdsm.distribute_tension(pose, minimum=50.0)
 
 
 WORKSHOP = cdsm.Tolerances(
@@ -41,28 +40,26 @@ WORKSHOP = cdsm.Tolerances(
 
 def test_correlation_decides_between_root_and_sum() -> None:
     pose, tension = posture()
-    whole = cdsm.uncertainty(pose, tension, WORKSHOP, direction=[0, 1, 0])
+
+    def budget(**tolerances: Any) -> Any:
+        return cdsm.uncertainty(pose, tension, cdsm.Tolerances(**tolerances), direction="y")
+
+    whole = cdsm.uncertainty(pose, tension, WORKSHOP, direction="y")
     parts = list(whole.contributions.values())
     assert whole.standard_uncertainty == pytest.approx(math.hypot(*parts), rel=1e-15)
     low, high = whole.interval(0.95)
     assert high - low == pytest.approx(2 * 1.959963984540054 * whole.standard_uncertainty)
-
-    def u(correlation: float) -> float:
-        tolerance = cdsm.Tolerance(0.05, correlation=correlation)
-        budget = cdsm.uncertainty(
-            pose, tension, cdsm.Tolerances(rigidity=tolerance), direction=[0, 1, 0]
-        )
-        return budget.standard_uncertainty
-
-    g = cdsm.uncertainty(
-        pose, tension, cdsm.Tolerances(rigidity=0.05), direction=[0, 1, 0]
-    ).sensitivities["rigidity"]
+    g = budget(rigidity=0.05).sensitivities["rigidity"]
+    none, half, full = (
+        budget(rigidity=cdsm.Tolerance(0.05, correlation=r)).standard_uncertainty
+        for r in (0.0, 0.5, 1.0)
+    )
     # differences with steps of u/10 leave the square of 0.5 % of a common error
-    assert u(0.0) == pytest.approx(0.05 * np.linalg.norm(g), rel=1e-14)
-    assert u(1.0) == pytest.approx(0.05 * abs(g.sum()), rel=1e-5)
-    assert u(0.5) == pytest.approx(math.hypot(u(0.0), u(1.0)) / math.sqrt(2.0), rel=1e-5)
+    assert none == pytest.approx(0.05 * np.linalg.norm(g), rel=1e-14)
+    assert full == pytest.approx(0.05 * abs(g.sum()), rel=1e-5)
+    assert half == pytest.approx(math.hypot(none, full) / math.sqrt(2.0), rel=1e-5)
     # a stiffness without gravity and active part is proportional to EA: 5 % of it, but for them
-    assert u(1.0) / cdsm.stiffness(pose, tension).along([0, 1, 0]) == pytest.approx(0.05, rel=0.02)
+    assert full / cdsm.stiffness(pose, tension).along("y") == pytest.approx(0.05, rel=0.02)
 
 
 def _asked(of: str, seed: int) -> dict[str, Any]:
@@ -100,34 +97,29 @@ def test_first_order_is_monte_carlo_where_it_says_so(of: str, angle: float, leas
     assert sum(held) >= least
 
 
-def _two_least() -> dict[str, Any]:
-    """Two equal smallest eigenvalues: the margin has a kink."""
-    pose = readme_arm().with_gravity((0, 0, 0)).at(np.zeros(8))
-    return {"pose": pose, "tension": np.full(12, 50.0), "of": "margin"}
+def test_first_order_says_where_it_does_not_hold() -> None:
+    """At a kink of the margin, its two smallest eigenvalues equal; and of a cable at its bound.
 
-
-def _at_a_bound() -> dict[str, Any]:
-    """A cable at its bound stays there to first order, but leaves it in some arms."""
+    That cable stays there to first order, but leaves it in some arms.
+    """
+    level = readme_pose().arm.with_gravity((0, 0, 0)).at(np.zeros(8))
     pose, tension = posture()
     assert tension["cable3_1"] == 50.0
-    return {"pose": pose, "tension": tension, "of": "tension", "cable": "cable3_1"}
-
-
-@pytest.mark.parametrize("case", [_two_least, _at_a_bound])
-def test_first_order_says_where_it_does_not_hold(case: Callable[[], dict[str, Any]]) -> None:
-    given = {"tolerances": WORKSHOP} | case()
-    budget = cdsm.uncertainty(**given)
-    assert not budget.is_linear
-    assert "use Monte Carlo" in str(budget)
+    for at, pull, asked in (
+        (level, np.full(12, 50.0), {"of": "margin"}),
+        (pose, tension, {"of": "tension", "cable": "cable3_1"}),
+    ):
+        budget = cdsm.uncertainty(at, pull, WORKSHOP, **asked)  # type: ignore[arg-type]
+        assert not budget.is_linear
+        assert "use Monte Carlo" in str(budget)
 
 
 def test_a_sum_of_four_rectangular_errors_is_that_of_jcgm_101() -> None:
     """JCGM 101, 9.2.3: four of unit variance have u = 2 and a 95 % interval of ± 3.88."""
-    u = 1e-4
+    u, pose = 1e-4, readme_pose().arm.at(np.zeros(8))
     tolerances = cdsm.Tolerances(link_length=cdsm.Tolerance.within(u * math.sqrt(3.0)))
-    question: dict[str, Any] = {"of": "tip", "direction": "x", "tolerances": tolerances}
-    pose = readme_arm().at(np.zeros(8))
-    run = cdsm.monte_carlo(pose, np.full(12, 50.0), **question, draws=200_000, progress=False)
+    asked: Any = {"of": "tip", "direction": "x", "draws": 200_000, "progress": False}
+    run = cdsm.monte_carlo(pose, np.full(12, 50.0), tolerances, **asked)
     assert run.budget.standard_uncertainty == pytest.approx(2.0 * u, rel=1e-9)
     assert run.budget.nonlinearity < 1e-9
     assert run.standard_uncertainty == pytest.approx(2.0 * u, rel=0.005)
@@ -137,8 +129,8 @@ def test_a_sum_of_four_rectangular_errors_is_that_of_jcgm_101() -> None:
 
 def test_draws_without_a_stiffness_are_left_out_and_counted() -> None:
     """The strand begins at 2.2 N: of tensions of 4 ± 1 N, 3.6 % are below it."""
-    arm = cdsm.Manipulator(readme_geometry(), cdsm.presets.STRAND_1X19)
-    pose, own = arm.at(np.full(8, 0.1)), cdsm.Tolerances(tension=cdsm.Tolerance(1.0, correlation=1))
+    pose = readme_pose(STRAND).arm.at(np.full(8, 0.1))
+    own = cdsm.Tolerances(tension=cdsm.Tolerance(1.0, correlation=1))
     asked: dict[str, Any] = {"direction": "z", "draws": 20_000, "progress": False}
     run = cdsm.monte_carlo(pose, np.full(12, 4.0), own, **asked)
     assert run.failed / 20_000 == pytest.approx(0.0359, abs=0.005)
@@ -149,8 +141,7 @@ def test_draws_without_a_stiffness_are_left_out_and_counted() -> None:
 
 def test_the_tensions_of_an_arm_on_paper_follow_its_dimensions() -> None:
     """A strand under other tensions is another spring: EA(F) rises with the least tensions."""
-    arm = cdsm.Manipulator(readme_geometry(), cdsm.presets.STRAND_1X19)
-    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
+    pose = readme_pose(STRAND)
     tension = cdsm.distribute_tension(pose, 50.0)
     heavier = cdsm.Tolerances(link_mass=cdsm.Tolerance(0.03, correlation=1.0), tension=2.0)
     measured, again = (
@@ -172,7 +163,7 @@ def test_distributions_keep_their_standard_uncertainty(
     """Factors of rigidities are lognormal: always positive, of the same mean and deviation."""
     u = 0.4 if source == "rigidity" else 2e-3
     tolerance = cdsm.Tolerance(u, distribution=distribution, correlation=correlation)
-    inputs = inputs_of(readme_arm())
+    inputs = inputs_of(readme_pose().arm)
     groups = inputs.groups(cdsm.Tolerances(**{source: tolerance}))
     drawn = inputs.draw(groups, np.random.default_rng(1), 100_000)[source][:, :2]
     np.testing.assert_allclose(drawn.mean(axis=0), 0.0, atol=0.01 * u)
@@ -206,9 +197,8 @@ def test_two_spools_and_disks_drilled_together() -> None:
 
 def test_friction_does_not_enter_the_frictionless_stiffness() -> None:
     pose, tension = posture()
-    rough = pose.arm.with_friction(0.1).at(pose.q)
-    tolerances = cdsm.Tolerances(friction=0.02, rigidity=0.05)
-    budget = cdsm.uncertainty(rough, tension.values, tolerances, direction="z")
+    rough, both = pose.arm.with_friction(0.1).at(pose.q), {"friction": 0.02, "rigidity": 0.05}
+    budget = cdsm.uncertainty(rough, tension.values, cdsm.Tolerances(**both), direction="z")
     assert budget.contributions["friction"] == 0.0
     assert "without influence on it: friction" in str(budget)
 
@@ -261,21 +251,16 @@ def test_the_budget_of_the_readmes_arm_is_that_of_an_independent_program() -> No
     That program changes EA by 5 % and takes the change of K, which is not quite proportional: 5.1 %
     beside a slope of 4.9 %. All other rows agree to their two digits.
     """
-    geometry = readme_arm().geometry
-    arm = cdsm.Manipulator(geometry, cdsm.presets.STRAND_1X19)
-    pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
+    pose = readme_pose(STRAND)
     F = cdsm.distribute_tension(pose, minimum=50.0).values
-    own = {name: getattr(WORKSHOP, name) for name in ("joint_angle", "tension")}
-    common = {
-        name: cdsm.Tolerance(tolerance.standard, correlation=1.0)
-        for name, (tolerance,) in WORKSHOP.given.items()
-        if name not in own
-    }
-    budgets = [
-        cdsm.uncertainty(pose, F, cdsm.Tolerances(**common, **own), direction=u) for u in "xyz"
-    ]
-    found = {s: [100.0 * b.contributions[s] / b.value for b in budgets] for s in FRICTIONLESS}
+    own = ("joint_angle", "tension")
+    sigma = {name: tolerance.standard for name, (tolerance,) in WORKSHOP.given.items()}
+    tolerances = cdsm.Tolerances(
+        **{name: cdsm.Tolerance(u, correlation=float(name not in own)) for name, u in sigma.items()}
+    )
+    budgets = [cdsm.uncertainty(pose, F, tolerances, direction=u) for u in "xyz"]
     for source, values in FRICTIONLESS.items():
-        np.testing.assert_allclose(found[source], values, rtol=0.1, atol=0.02, err_msg=source)
+        found = [100.0 * b.contributions[source] / b.value for b in budgets]
+        np.testing.assert_allclose(found, values, rtol=0.1, atol=0.02, err_msg=source)
     total = [100.0 * b.relative for b in budgets]
     np.testing.assert_allclose(total, (10.0, 5.5, 5.5), rtol=0.05)

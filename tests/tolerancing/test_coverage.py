@@ -8,14 +8,10 @@ from scipy.stats import binom
 
 import cdsm
 from cdsm.support.progress import track
+from cdsm.support.values import Array
+from tests.support.arms import README_SIZES, readme_geometry
 
-SIZES = {
-    "link_length": 0.06,
-    "disk_offset": 0.012,
-    "hole_radius": 0.025,
-    "link_mass": 0.12,
-    "lead": 0.3,
-}
+ANGLE = math.radians(0.5)
 COMMON = {
     "link_length": 1e-4,
     "disk_offset": 1e-4,
@@ -40,20 +36,16 @@ def covered(count: int, seed: int, axis: str) -> int:
     rng = np.random.default_rng(seed)
     q, F = np.deg2rad([10, 5, 10, 5, -8, 4, -8, 3]), np.linspace(50.0, 90.0, 12)
 
-    def pose(sizes: dict[str, float], rigidity: float, angles: object) -> cdsm.Posture:
-        geometry = cdsm.Geometry.universal(joints=4, cables_per_joint=3, base_length=0.03, **sizes)  # type: ignore[arg-type]
-        return cdsm.Manipulator(geometry, cdsm.LinearElasticity(rigidity)).at(angles)  # type: ignore[arg-type]
+    def pose(sizes: dict[str, float], rigidity: float, angles: Array) -> cdsm.Posture:
+        law = cdsm.LinearElasticity(rigidity)
+        return cdsm.Manipulator(readme_geometry(**sizes), law).at(angles)
 
-    truth = cdsm.stiffness(pose(SIZES, 48e3, q), F).along(axis)
+    truth = cdsm.stiffness(pose({}, 48e3, q), F).along(axis)
     held = 0
     for _ in track(range(count), "arms"):
-        sizes = {name: size + rng.normal(0.0, COMMON[name]) for name, size in SIZES.items()}
-        described = pose(
-            sizes,
-            48e3 * (1.0 + rng.normal(0.0, 0.05)),
-            q + rng.normal(0.0, math.radians(0.5), 8),
-        )
-        tension = F + rng.normal(0.0, 2.0, 12)
+        sizes = {name: README_SIZES[name] + rng.normal(0.0, u) for name, u in COMMON.items()}
+        rigidity, angles = 48e3 * (1.0 + rng.normal(0.0, 0.05)), rng.normal(0.0, ANGLE, 8)
+        described, tension = pose(sizes, rigidity, q + angles), F + rng.normal(0.0, 2.0, 12)
         low, high = cdsm.uncertainty(described, tension, TOLERANCES, direction=axis).interval()
         held += low <= truth <= high
     return held

@@ -53,8 +53,7 @@ def number(of: str, **errors: float) -> float:
 
 def asked(of: str) -> dict[str, Any]:
     """Return the arguments of `uncertainty` for the same measurand."""
-    pose = posture()
-    again = of in ("tension", "distributed")
+    pose, again = posture(), of in ("tension", "distributed")
     return {
         "pose": pose,
         "tension": cdsm.distribute_tension(pose, 20.0, wrench=W) if again else F,
@@ -100,17 +99,11 @@ def test_sensitivities_are_the_limits_of_differences(source: str, of: str) -> No
 
 
 def each_its_own() -> cdsm.Manipulator:
-    plain = arms.random_arm(3, 3)
-    cables = [
-        replace(
-            cable,
-            elasticity=cdsm.presets.STRAND_1X19,
-            series_stiffness=3e5 if c % 3 == 1 else np.inf,
-            control="force" if c % 3 == 2 else "position",
-        )
-        for c, cable in enumerate(plain.cables)
-    ]
-    return plain.with_cables(cables)
+    ways: Any = ({}, {"series_stiffness": 3e5}, {"control": "force"})
+    strand, plain = cdsm.presets.STRAND_1X19, arms.random_arm(3, 3)
+    return plain.with_cables(
+        [replace(each, elasticity=strand, **ways[c % 3]) for c, each in enumerate(plain.cables)]
+    )
 
 
 @pytest.mark.parametrize("make", [arms.mixed_arm, each_its_own])

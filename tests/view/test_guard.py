@@ -127,7 +127,7 @@ def is_refused(view: View, **options: Any) -> bool:
         return bool(error.response.status_code == 403)
 
 
-def test_a_page_of_another_origin_reads_nothing(view: View) -> None:
+def test_no_other_origin_and_no_name_of_another_machine_is_served(view: View) -> None:
     port = port_of(view)
     for origin in (
         "https://evil.example",
@@ -136,19 +136,13 @@ def test_a_page_of_another_origin_reads_nothing(view: View) -> None:
         f"http://localhost:{port}",  # is not 127.0.0.1 to a browser
         f"http://127.0.0.1:{port}.evil.example",
         f"http://127.0.0.1:{port}@evil.example",
-        "null",
-        "",
+        *("null", ""),
     ):
         assert is_refused(view, origin=origin)
-
-
-def test_a_name_that_is_not_this_machine_is_not_served(view: View) -> None:
-    port = port_of(view)
     for host in ("evil.example", "127.0.0.1.evil.example", "evil.localhost", "192.168.0.1"):
         # after DNS rebinding the page is of the same origin as its name for this server
         assert is_refused(view, host=host, origin=f"http://{host}:{port}")
-        assert page_status(view, f"{host}:{port}") == 403
-        assert page_status(view, host) == 403
+        assert page_status(view, f"{host}:{port}") == page_status(view, host) == 403
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "LOCALHOST", "127.0.0.2", "[::1]"])
@@ -163,15 +157,13 @@ def test_this_machine_is_served_under_all_its_names(view: View, host: str) -> No
 def test_a_page_may_connect_to_its_own_server_only(view: View) -> None:
     with urllib.request.urlopen(view.url) as page:
         policy = str(page.headers["Content-Security-Policy"])
-    sources = policy.partition(";")[0].split()[1:]
-    own = ("'self'", "data:", "blob:", f"ws://127.0.0.1:{port_of(view)}")
-    assert {*sources} <= {*own}, policy
+    own = {"'self'", "data:", "blob:", f"ws://127.0.0.1:{port_of(view)}"}
+    assert {*policy.partition(";")[0].split()[1:]} <= own, policy
 
 
 def test_a_client_changes_nothing_of_a_control_but_its_value(view: View) -> None:
     force, switch = view._panel._load[3], view._panel._sag
     before = dict(vars(force._impl))
-    text = view._panel._text._impl.uuid
     updates: dict[str, Any]
     value: Any
     with Client(view) as enemy:
@@ -179,6 +171,7 @@ def test_a_client_changes_nothing_of_a_control_but_its_value(view: View) -> None
             enemy.change(force._impl.uuid, updates)
         for value in (math.nan, math.inf, "7", None, True, [1.0], {}):
             enemy.change(force._impl.uuid, {"value": value})
+        text = view._panel._text._impl.uuid
         for control, value in ((text, 1.0), ("no such", 1.0), (switch._impl.uuid, "true")):
             enemy.change(control, {"value": value})
         settle(view, enemy)
@@ -186,15 +179,11 @@ def test_a_client_changes_nothing_of_a_control_but_its_value(view: View) -> None
         assert switch.value is False
         enemy.change(switch._impl.uuid, {"value": True})  # what everybody may do
         wait_for(lambda: view.shown.setting.sag)
+        for value, kept in ((1e300, 20.0), (-(2**63), -20.0), (3, 3.0)):  # within its range
+            enemy.change(force._impl.uuid, {"value": value})
+            wait_for(lambda kept=kept: view.shown.setting.force[2] == kept)
         enemy.change(enemy.control("all"), {"value": "Reset"})
         wait_for(lambda: not view.shown.setting.sag)
-
-
-@pytest.mark.parametrize(("value", "kept"), [(1e300, 20.0), (-(2**63), -20.0), (3, 3.0)])
-def test_a_slider_stays_within_its_range(view: View, value: float, kept: float) -> None:
-    with Client(view) as sender:
-        sender.change(sender.control("force z [N]"), {"value": value})
-        wait_for(lambda: view.shown.setting.force[2] == kept)
 
 
 def test_a_client_drags_the_tip_and_nothing_else(view: View) -> None:

@@ -92,27 +92,26 @@ def test_a_path_is_played_to_its_end_and_again() -> None:
             np.testing.assert_allclose(view.shown.setting.q, PATH[4], atol=1e-10)
 
 
-def test_a_port_in_use_is_named_and_nothing_is_left_running() -> None:
-    threads = threading.active_count()
-    with socket.create_server(("127.0.0.1", 0)) as other:
-        port = other.getsockname()[1]
-        with pytest.raises(cdsm.InvalidInput, match=f"port: {port} on 127.0.0.1 is not available"):
-            serve(soft_arm(), port=port)
-    assert threading.active_count() == threads
-
-
 @pytest.mark.parametrize(
     ("options", "match"),
     [
         ({"port": 70000}, "port: 70000"),
-        ({"host": "0.0.0.0"}, "use `ssh -L 8080:localhost:8080`"),
+        ({"host": "0.0.0.0", "port": 8080}, "use `ssh -L 8080:localhost:8080`"),
         ({"minimum": -1.0}, "minimum: -1 N given"),
         ({"q": [0.0]}, "q: shape"),
         ({"solver": "no such"}, "no installed solver is called 'no such'"),
         ({"angles": [*PATH[:3], np.full(6, 3.0)]}, "angles: sample 4: "),
         ({"angles": PATH, "tips": np.zeros((2, 3))}, "both of angles= and tips="),
+        ({}, "on 127.0.0.1 is not available"),
     ],
 )
-def test_bad_input_is_named(options: dict[str, Any], match: str) -> None:
-    with pytest.raises(cdsm.CdsmError, match=re.escape(match)):
-        serve(soft_arm(), **options)
+def test_bad_input_is_named_and_nothing_is_left_running(
+    options: dict[str, Any], match: str
+) -> None:
+    threads = threading.active_count()
+    with (
+        socket.create_server(("127.0.0.1", 0)) as other,
+        pytest.raises(cdsm.CdsmError, match=re.escape(match)),
+    ):
+        serve(soft_arm(), **({"port": other.getsockname()[1]} | options))
+    assert threading.active_count() == threads

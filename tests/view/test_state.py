@@ -2,12 +2,12 @@
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import cdsm
-from cdsm.statics import Equilibrium
 from cdsm.support.values import Array
 from cdsm.view.panel import python_text, results_text, tensions_text
 from cdsm.view.scene import Scene
@@ -72,8 +72,8 @@ def test_a_stable_arm_is_shown_with_the_numbers_of_the_api() -> None:
     assert said["stiffness along x, y, z"] == along(K)
     assert said["smallest joint stiffness"] == f"{K.margin:.4g}"
     assert said["tip"] == ", ".join(f"{1000.0 * x:.1f}" for x in pose.tip[:3, 3])
-    tensions = {name: value for name, value in said.items() if "tension" in name}
-    assert [*tensions.values()] == [f"{end:.4g}" for end in (pull.values.min(), pull.values.max())]
+    tensions = [value for name, value in said.items() if "tension" in name]
+    assert tensions == [f"{end:.4g}" for end in (pull.values.min(), pull.values.max())]
     largest = 1e3 * np.linalg.norm(K.compliance[:3, :3], 2)
     assert said["largest compliance"] == f"{largest:.3g}"
     (softest,) = (float(value) for name, value in said.items() if name.startswith("softest"))
@@ -115,53 +115,51 @@ def test_names_and_messages_are_text_and_not_markup() -> None:
     cables = [cdsm.Cable(f"<b>*{c.name}*|", c.sites, law) for c in foreign.cables(law)]
     arm = cdsm.Manipulator.from_urdf(foreign.TREE, cables, tip="tip", gravity=(0.0, 0.0, 0.0))
     shown = show(arm, Setting(q=foreign.POSTURE, minimum=0.0, force=np.zeros(3)))
-    assert shown.tension is not None
     for written in (text(shown), tensions_text(shown)):
         assert "<b>*" not in written
         assert "&#60;b&#62;&#42;" in written
 
 
 def test_what_is_shown_is_the_equilibrium_of_the_arm_tensioned_without_the_force() -> None:
+    """With friction it sags less, and says which holes slide."""
     arm = soft_arm()
-    shown = sagged(arm)
     pose = arm.at(setting(arm).q)
     tension = cdsm.distribute_tension(pose, STABLE, 200.0)
     rest = cdsm.equilibrium(pose, tension, (*FORCE, 0.0, 0.0, 0.0))
     test = cdsm.weight_test(pose, tension, FORCE)
-    assert shown.condition is Condition.STABLE
-    assert shown.rest is not None
+    rough = arm.with_friction(0.1)
+    history = cdsm.load_cycle(rough.at(pose.q), tension.values, [[*FORCE, 0.0, 0.0, 0.0]])
+    shown, stuck = sagged(arm), sagged(rough)
     # both stop where the imbalance is rounding; the softest mode makes 1e-12 m of it at most
-    for by in (rest.displacement, test.displacements[-1]):
-        np.testing.assert_allclose(shown.rest.displacement, by, atol=1e-9)
+    for each, by in (
+        (shown, rest.displacement),
+        (shown, test.displacements[-1]),
+        (stuck, history.displacement[0]),
+    ):
+        assert each.condition is Condition.STABLE
+        assert each.rest is not None
+        np.testing.assert_allclose(each.rest.displacement, by, atol=1e-9)
+    assert 0.0 < history.displacement[0] @ FORCE < rest.displacement @ FORCE
     said = numbers(shown)
     assert said["displacement"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.displacement)
     assert said["stiffness along x, y, z"] == along(rest.stiffness)
     listed = re.findall(r"\| (\S+) \| &nbsp;N", tensions_text(shown))
     assert listed == [f"{F:.4g}" for F in rest.tension]
-    assert float(rest.displacement @ FORCE) > 0.0
+    sticking, sliding = stuck.holes
+    assert 0 < np.count_nonzero(history.sliding[0]) == len(sliding)
+    assert len(sticking) + len(sliding) == len(history.holes)
+    assert f"{len(sticking)} holes stick" in text(stuck)
+    assert numbers(stuck)["stiffness along x, y, z"] == along(history.stiffness(0))
     moved = sagged(arm, UNSTABLE, (0.0, 0.0, 0.0))
     assert moved.condition is Condition.MOVED
     assert "moved to another equilibrium" in text(moved)
 
 
-def test_an_arm_with_friction_sags_less_and_shows_which_holes_slide() -> None:
-    arm = soft_arm().with_friction(0.1)
-    free, shown = sagged(soft_arm()), sagged(arm)
-    pose = arm.at(setting(arm).q)
-    pull = cdsm.distribute_tension(pose, STABLE, 200.0)
-    history = cdsm.load_cycle(pose, pull, [[*FORCE, 0.0, 0.0, 0.0]])
-    assert shown.condition is Condition.STABLE
-    assert shown.rest is not None
-    assert free.rest is not None
-    np.testing.assert_allclose(shown.rest.displacement, history.displacement[0], atol=1e-9)
-    moved = [float(each.displacement @ FORCE) for each in (shown.rest, free.rest)]
-    assert 0.0 < moved[0] < moved[1]
-    sticking, sliding = shown.holes
-    slides = np.flatnonzero(history.sliding[0])
-    assert 0 < slides.size == len(sliding)
-    assert len(sticking) + len(sliding) == len(history.holes)
-    assert f"{len(sticking)} holes stick" in text(shown)
-    assert numbers(shown)["stiffness along x, y, z"] == along(history.stiffness(0))
+def ran(arm: cdsm.Manipulator, at: Setting) -> dict[str, Any]:
+    """What the lines of Python on the page name."""
+    names: dict[str, Any] = {"arm": arm, "cdsm": cdsm}
+    exec(python_text(arm, at).split("```")[1], names)
+    return names
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
@@ -169,14 +167,11 @@ def test_an_arm_with_friction_sags_less_and_shows_which_holes_slide() -> None:
 def test_the_lines_of_python_compute_what_the_page_shows(friction: float, sag: bool) -> None:
     arm = soft_arm().with_friction(friction)
     at = replace(setting(arm, 12.345678, FORCE), sag=sag, solver="clarabel")
-    names: dict[str, object] = {"arm": arm, "cdsm": cdsm}
-    exec(python_text(arm, at).split("```")[1], names)
-    found = names.get("rest", names.get("K"))
-    assert isinstance(found, cdsm.Stiffness | Equilibrium)
-    shown = show(arm, at)
-    assert shown.tensions is not None
+    names = ran(arm, at)
+    tensions = show(arm, at).tensions
+    assert tensions is not None
     # twelve digits are printed
-    np.testing.assert_allclose(found.tension, shown.tensions, rtol=1e-9)
+    np.testing.assert_allclose(names.get("rest", names.get("K")).tension, tensions, rtol=1e-9)
 
 
 # --- motors that pull ---------------------------------------------------------------------------
@@ -205,13 +200,9 @@ def test_what_motors_pull_gives_the_posture_and_its_numbers() -> None:
     assert said["stiffness along x, y, z"] == along(rest.stiffness)
     assert said["tip"] == ", ".join(f"{1e3 * x:z.1f}" for x in rest.pose.tip[:3, 3])
     assert "slack" in tensions_text(shown)
-    names: dict[str, object] = {"arm": rod(), "cdsm": cdsm}
-    exec(python_text(rod(), shown.setting).split("```")[1], names)
+    names = ran(rod(), shown.setting)
     np.testing.assert_allclose(names["rest"].pose.q, rest.pose.q, atol=1e-12)
-
-
-def test_more_wire_than_a_cable_has_cannot_be_taken_in() -> None:
-    shown = pulled(1.0, 0.0, 0.0)
-    assert shown.condition is Condition.INVALID
-    assert (shown.tensions, shown.stiffness) == (None, None)
-    assert "leaves" in shown.problem
+    beyond = pulled(1.0, 0.0, 0.0)  # more wire than a cable has
+    assert beyond.condition is Condition.INVALID
+    assert (beyond.tensions, beyond.stiffness) == (None, None)
+    assert "leaves" in beyond.problem

@@ -28,29 +28,18 @@ def test_elasticity_survives_its_file(law: cdsm.Elasticity, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("text", "faults"),
+    ("text", "said"),
     [
-        ("kind = 'rubber'", ["kind"]),
-        ("kind = 'linear'\nrigidity = -3.0\nstiff = 1", ["rigidity", "stiff"]),
-        ("kind = 'tabulated'\ntensions = [1.0, 'a']", ["tensions"]),
-        (
-            "kind = 'tabulated'\ntensions = [1.0, 0.5]\nstrains = [0.0, 1.0]",
-            ["entry [1] is 0.5 after 1"],
-        ),
+        ("kind = 'rubber'", "kind"),
+        ("kind = 'linear'\nrigidity = -3.0\nstiff = 1", "stiff(?s:.*)rigidity"),
+        ("kind = 'tabulated'\ntensions = [1.0, 'a']", "tensions"),
+        ("kind='tabulated'\ntensions = [1, 0.5]\nstrains = [0, 1.0]", r"entry \[1\] is 0.5 after"),
     ],
 )
-def test_faulty_elasticity_files_name_every_fault(
-    text: str, faults: list[str], tmp_path: Path
-) -> None:
-    path = tmp_path / "wire.toml"
-    path.write_text(text)
-    with pytest.raises(cdsm.FileError, match="not an elasticity") as caught:
-        cdsm.Elasticity.read(path)
-    for fault in faults:
-        assert fault in str(caught.value)
-
-
-def test_measured_points_are_no_law_of_a_wire() -> None:
+def test_faulty_elasticity_files_name_every_fault(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "wire.toml").write_text(text)
+    with pytest.raises(cdsm.FileError, match=f"not an elasticity(?s:.*){said}"):
+        cdsm.Elasticity.read(tmp_path / "wire.toml")
     with pytest.raises(cdsm.FileError, match="Fit it first: `cdsm fit`"):
         cdsm.Elasticity.read(DATA / "instron_strand.csv")
 
@@ -61,29 +50,22 @@ POUND_PER_SQUARE_INCH = 6894.757293168
 """[Pa]"""
 
 
-def strand(diameter: float, stretch_factor: float) -> float:
-    """EA [N] of the stretch in % that makers tabulate, G W/D² in pounds and inches."""
-    modulus = 100.0 / stretch_factor * POUND_PER_SQUARE_INCH
-    return modulus * diameter**2
-
-
 @pytest.mark.parametrize(
     ("name", "rigidity"),
     [
-        ("1x19-1.2mm-datasheet", strand(1.2e-3, 7.79e-6)),
-        ("7x7-1mm", strand(1e-3, 1.2e-5)),
-        ("7x19-1.5mm", strand(1.5e-3, 1.62e-5)),
+        # the stretch in % that makers tabulate, G W/D² in pounds and inches
+        ("1x19-1.2mm-datasheet", 100.0 / 7.79e-6 * POUND_PER_SQUARE_INCH * 1.2e-3**2),
+        ("7x7-1mm", 100.0 / 1.2e-5 * POUND_PER_SQUARE_INCH * 1e-3**2),
+        ("7x19-1.5mm", 100.0 / 1.62e-5 * POUND_PER_SQUARE_INCH * 1.5e-3**2),
         ("nitinol-0.5mm", 83e9 * math.pi / 4.0 * 0.5e-3**2),
         ("uhmwpe-sk75-1760dtex", 124.5 * 176.0),
     ],
 )
 def test_wires_are_as_rigid_as_their_source_says(name: str, rigidity: float) -> None:
     path = EXAMPLES / "wires" / f"{name}.toml"
-    law = cdsm.Elasticity.read(path)
     # the files have five digits
-    assert float(law.rigidity(10.0)) == pytest.approx(rigidity, rel=5e-5)
-    text = path.read_text(encoding="utf-8")
-    assert "Band: rigidity = 0." in text
+    assert float(cdsm.Elasticity.read(path).rigidity(10.0)) == pytest.approx(rigidity, rel=5e-5)
+    assert "Band: rigidity = 0." in path.read_text(encoding="utf-8")
     arm = cdsm.Manipulator.read(EXAMPLES / "arm.toml", wire=path)
     pose = arm.at([0.1] * arm.nv)
     assert cdsm.stiffness(pose, cdsm.distribute_tension(pose, 5.0)).cable_stiffness.min() > 0.0

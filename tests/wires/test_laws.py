@@ -35,6 +35,7 @@ LAWS: dict[str, cdsm.Elasticity] = {
     "function": cdsm.Elasticity.from_rigidity(ramp, 0.0, 1000.0),
     "scaled": STRAND.scaled(1.25),
     "slack": STRAND.slack_below(),
+    "slack table": TABLE.slack_below(),
 }
 METHODS = ("rigidity", "strain", "secant_rigidity", "rigidity_slope", "energy")
 F = np.array([[6.0, 12.0, 28.0, 34.0], [60.0, 150.0, 250.0, 290.0]])
@@ -43,31 +44,27 @@ F = np.array([[6.0, 12.0, 28.0, 34.0], [60.0, 150.0, 250.0, 290.0]])
 @pytest.mark.parametrize("name", LAWS)
 def test_strain_and_energy_are_integrals_of_the_rigidity(name: str) -> None:
     law = LAWS[name]
-    for a, b in ((6.0, 11.0), (33.0, 80.0), (80.0, 290.0)):
-        points = [p for p in POINTS if a < p < b]
+    slack = ((0.0, 1.0), (1.0, 2.2), (0.0, 11.0)) if law.low < 1.0 else ()
+    for a, b in ((6.0, 11.0), (33.0, 80.0), (80.0, 290.0), *slack):
+        points = [p for p in (law.rest, *POINTS) if a < p < b]
         for power, of in enumerate((law.strain, law.energy)):
-            area = quad(
-                lambda f, n=power: f**n / float(law.rigidity(f)),
-                a,
-                b,
-                points=points,
-            )[0]
-            assert float(of(b) - of(a)) == pytest.approx(area, rel=1e-7)
+
+            def slope(f: float, power: int = power) -> float:
+                return f**power / float(law.rigidity(f))
+
+            area = quad(slope, a, b, points=points, limit=200)[0]
+            near = 1e-8 if (a, b) in slack else 1e-7
+            assert float(of(b) - of(a)) == pytest.approx(area, rel=near)
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_slope_is_the_derivative_of_the_rigidity(name: str) -> None:
+def test_slope_and_secant_follow_from_the_rigidity_and_strain(name: str) -> None:
+    """With S = (F − F_0)/ε the tangent is S²/(S − (F − F_0) S')."""
     law, h = LAWS[name], 1e-4
     slope = (law.rigidity(F + h) - law.rigidity(F - h)) / (2.0 * h)
     atol = 1e-6 * float(law.rigidity(F).max())
     np.testing.assert_allclose(law.rigidity_slope(F), slope, rtol=1e-5, atol=atol)
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_tangent_follows_from_the_secant(name: str) -> None:
-    """With S = (F − F_0)/ε the tangent is S²/(S − (F − F_0) S')."""
-    law, h = LAWS[name], 1e-3
-    S = law.secant_rigidity(F)
+    S, h = law.secant_rigidity(F), 1e-3
     np.testing.assert_allclose(S * law.strain(F), F - law.rest, rtol=1e-12)
     slope = (law.secant_rigidity(F + h) - law.secant_rigidity(F - h)) / (2.0 * h)
     np.testing.assert_allclose(S**2 / (S - (F - law.rest) * slope), law.rigidity(F), rtol=1e-4)
@@ -75,18 +72,13 @@ def test_tangent_follows_from_the_secant(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_tension_inverts_strain_both_ends_included(name: str) -> None:
-    law = LAWS[name]
+def test_tension_inverts_strain_and_nothing_beyond_is_reached(name: str) -> None:
+    law, most = LAWS[name], RANGES["tension"].high
     tension = np.array([law.low, *F.ravel(), min(law.high, 1e4)])
     np.testing.assert_allclose(law.tension(law.strain(tension)), tension, rtol=1e-12, atol=1e-12)
     assert float(law.strain(law.rest)) == pytest.approx(0.0, abs=1e-18)
     assert float(law.tension(0.0)) == pytest.approx(law.rest, abs=1e-12)
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_strain_out_of_reach_is_refused_with_the_reach(name: str) -> None:
-    law = LAWS[name]
-    beyond = float(law.strain(min(law.high, RANGES["tension"].high))) * (1.0 + 1e-9)
+    beyond = float(law.strain(min(law.high, most))) * (1.0 + 1e-9)
     for strain in (float(law.strain(law.low)) - 1e-9, beyond):
         with pytest.raises(
             cdsm.ElasticityRangeError, match=r"^no tension .* strain.* reaches"
@@ -127,10 +119,9 @@ def test_rigidity_in_a_wrong_unit_is_doubted_once() -> None:
 
 
 def test_corner_of_eq19_is_bridged_and_nothing_else_changes() -> None:
-    join = 31.0
-    away = np.concatenate([np.linspace(2.2, join - 1.4, 500), np.linspace(join + 1.4, 810.0, 500)])
+    away = np.r_[2.2:29.6:500j, 32.4:810.0:500j]  # type: ignore[misc]
     np.testing.assert_allclose(STRAND.rigidity(away), STRAND.polynomial(away), rtol=1e-8)
-    near = np.linspace(join - 1.4, join + 1.4, 400)
+    near = np.linspace(29.6, 32.4, 400)
     np.testing.assert_allclose(STRAND.rigidity(near), STRAND.polynomial(near), rtol=7e-3)
     slope = STRAND.rigidity_slope(near)
     assert (slope > 0.0).all()
@@ -154,56 +145,56 @@ def test_function_is_sampled_to_eight_digits_and_its_corners_are_told() -> None:
     np.testing.assert_allclose(law.rigidity(tension[:380]), corner(tension[:380]), rtol=1e-2)
 
 
-def own(rigidity: Callable[[Array], Any]) -> cdsm.Elasticity:
-    return cdsm.Elasticity.from_rigidity(rigidity, 0.0, 500.0)
-
-
 def test_scaled_law_is_as_many_times_as_rigid_and_stretches_as_many_times_less() -> None:
     for law in LAWS.values():
         stiffer = law.scaled(1.25)
-        np.testing.assert_allclose(stiffer.rigidity(F), 1.25 * law.rigidity(F), rtol=1e-14)
-        np.testing.assert_allclose(stiffer.strain(F), law.strain(F) / 1.25, rtol=1e-14)
-        np.testing.assert_allclose(stiffer.energy(F), law.energy(F) / 1.25, rtol=1e-14)
+        for ask, factor in (("rigidity", 1.25), ("strain", 0.8), ("energy", 0.8)):
+            expected = factor * getattr(law, ask)(F)
+            np.testing.assert_allclose(getattr(stiffer, ask)(F), expected, rtol=1e-14)
         assert (stiffer.low, stiffer.high, stiffer.rest) == (law.low, law.high, law.rest)
+
+
+def own(rigidity: Callable[[Array], Any]) -> cdsm.Elasticity:
+    return cdsm.Elasticity.from_rigidity(rigidity, 0.0, 500.0)
 
 
 def strand(*coefficients: tuple[float, ...], joins: Any = (), low: float = 0.0) -> object:
     return cdsm.StrandElasticity(coefficients, joins, low, 100.0)
 
 
-BAD: tuple[tuple[Callable[[], object], str], ...] = (
-    *[(lambda EA=EA: cdsm.LinearElasticity(EA), "rigidity") for EA in (0, -1.0, math.nan, "5")],
-    (lambda: cdsm.LinearElasticity.of_wire(200e9, 0.0), "diameter"),
-    (lambda: cdsm.LinearElasticity.of_wire(-1.0, 1e-3), "young_modulus"),
-    (strand, "coefficients"),
-    (lambda: strand(()), "coefficients"),
-    (lambda: strand((math.nan,)), "coefficients"),
-    (lambda: strand((1.0,), joins=(0.5,)), "joins"),
-    (lambda: strand((1.0,), (1.0,), joins=(200.0,)), "rise"),
-    (lambda: strand((10.0,), (20.0,), joins=(5.0,)), "do not meet at 5 N: 10 N below, 20 N ab"),
-    (lambda: strand((-20.0, 1.0), low=2.2), "Narrow the domain"),
-    (lambda: strand((1.0,), low=100.0), "rise"),
-    (lambda: strand((1.0,), low=-1.0), "0 <= low"),
-    (lambda: own(lambda F: F * math.nan), "is nan N at"),
-    (lambda: own(lambda F: 1e3 - 10.0 * F), "Narrow the domain"),
-    (lambda: own(lambda _: np.ones(3)), "fails at .*array"),
-    (lambda: own(lambda _: "stiff"), "fails at"),
-    (lambda: own(lambda F: np.where(F < 50.0, 1e4, 1.1e4)), "jumps"),
-    *[
-        (lambda F=F, e=e: cdsm.TabulatedElasticity(F, e), "tensions|strains")
-        for F, e in (
-            ((1.0,), (0.0,)),
-            ((1.0, 1.0), (0.0, 1.0)),
-            ((1.0, 2.0), (1.0, 0.0)),
-            ((1.0, 2.0), (0.0, 1.0, 2.0)),
-            ((0.0, 5e-324, 100.0), (0.0, 0.002, 0.005)),  # a slope beyond float64
-        )
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        *[(lambda EA=EA: cdsm.LinearElasticity(EA), "rigidity") for EA in (0, -1.0, math.nan, "5")],
+        (lambda: cdsm.LinearElasticity.of_wire(200e9, 0.0), "diameter"),
+        (lambda: cdsm.LinearElasticity.of_wire(-1.0, 1e-3), "young_modulus"),
+        (strand, "coefficients"),
+        (lambda: strand(()), "coefficients"),
+        (lambda: strand((math.nan,)), "coefficients"),
+        (lambda: strand((1.0,), joins=(0.5,)), "joins"),
+        (lambda: strand((1.0,), (1.0,), joins=(200.0,)), "rise"),
+        (lambda: strand((10.0,), (20.0,), joins=(5.0,)), "not meet at 5 N: 10 N below, 20 N ab"),
+        (lambda: strand((-20.0, 1.0), low=2.2), "Narrow the domain"),
+        (lambda: strand((1.0,), low=100.0), "rise"),
+        (lambda: strand((1.0,), low=-1.0), "0 <= low"),
+        (lambda: own(lambda F: F * math.nan), "is nan N at"),
+        (lambda: own(lambda F: 1e3 - 10.0 * F), "Narrow the domain"),
+        (lambda: own(lambda _: np.ones(3)), "fails at .*array"),
+        (lambda: own(lambda _: "stiff"), "fails at"),
+        (lambda: own(lambda F: np.where(F < 50.0, 1e4, 1.1e4)), "jumps"),
+        *[
+            (lambda F=F, e=e: cdsm.TabulatedElasticity(F, e), "tensions|strains")
+            for F, e in (
+                ((1.0,), (0.0,)),
+                ((1.0, 1.0), (0.0, 1.0)),
+                ((1.0, 2.0), (1.0, 0.0)),
+                ((1.0, 2.0), (0.0, 1.0, 2.0)),
+                ((0.0, 5e-324, 100.0), (0.0, 0.002, 0.005)),  # a slope beyond float64
+            )
+        ],
+        (lambda: STRAND.scaled(0.0), "factor"),
     ],
-    (lambda: STRAND.scaled(0.0), "factor"),
 )
-
-
-@pytest.mark.parametrize(("make", "said"), BAD)
 def test_bad_constructor_input_names_the_argument(make: Callable[[], object], said: str) -> None:
     with pytest.raises(cdsm.InvalidInput, match=said):
         make()

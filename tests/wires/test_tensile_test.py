@@ -37,9 +37,8 @@ def test_machine_file_gives_the_law_it_was_made_with(
     assert (test.gauge_length, test.force.size) == (length, points)
     fit = cdsm.fit_tensile_test(test.displacement, test.force, test.gauge_length)
     F = np.linspace(20.0, 585.0, 200)
-    np.testing.assert_allclose(
-        fit.elasticity.rigidity(F), 48e3 * (F + 15.0) / (F + 120.0), rtol=0.01
-    )
+    expected = 48e3 * (F + 15.0) / (F + 120.0)
+    np.testing.assert_allclose(fit.elasticity.rigidity(F), expected, rtol=0.01)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "cp1252", "utf-16"])
