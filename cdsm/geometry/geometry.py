@@ -22,11 +22,17 @@ from cdsm.geometry.beams import Backbone, backbone_fields
 from cdsm.geometry.chain import STEEPEST, Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.geometry.uniform import Hinged, Universal, fields_of, same_angle, spread_out
-from cdsm.geometry.units import WIDEST, doubts_about_angle, doubts_about_units
 from cdsm.support.files import read_text, write_text
 from cdsm.support.format import plural
 from cdsm.support.records import CrossFaults, Length, LengthOrZero, Name, read_toml, record
-from cdsm.support.validation import instance, scalar, sequence_of
+from cdsm.support.validation import (
+    WIDEST,
+    doubts_about_angle,
+    doubts_about_units,
+    instance,
+    scalar,
+    sequence_of,
+)
 from cdsm.support.values import Printed
 
 _Keywords = ParamSpec("_Keywords")

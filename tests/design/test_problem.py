@@ -11,8 +11,8 @@ import pytest
 
 import cdsm
 from cdsm.design.quantities import measure
+from cdsm.design.result import cable_table
 from cdsm.design.search import InfeasibleDesign
-from cdsm.design.workshop import cable_table
 from cdsm.support.values import Array
 
 pytest.importorskip("pymoo")
