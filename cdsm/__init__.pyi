@@ -5,12 +5,13 @@ from cdsm import paper as paper
 from cdsm import plots as plots
 from cdsm import presets as presets
 from cdsm import view as view
-from cdsm.arm_file.cables import read_cables as read_cables
-from cdsm.arm_file.cables import write_cables as write_cables
+from cdsm.arm_file.arm import read_cables as read_cables
+from cdsm.arm_file.arm import write_cables as write_cables
 from cdsm.batch import distribute_tensions as distribute_tensions
 from cdsm.batch import evaluate as evaluate
 from cdsm.cable import Cable as Cable
 from cdsm.cable import Site as Site
+from cdsm.cable import serpentine_cables as serpentine_cables
 from cdsm.control.plants import MuJoCoPlant as MuJoCoPlant
 from cdsm.control.plants import QuasiStaticPlant as QuasiStaticPlant
 from cdsm.control.sensors import Sensors as Sensors
@@ -39,7 +40,6 @@ from cdsm.geometry import CableRoute as CableRoute
 from cdsm.geometry import Geometry as Geometry
 from cdsm.geometry import Joint as Joint
 from cdsm.geometry import Link as Link
-from cdsm.geometry.cables import serpentine_cables as serpentine_cables
 from cdsm.identification import Measurement as Measurement
 from cdsm.identification import TipPosition as TipPosition
 from cdsm.identification import WeightLoop as WeightLoop
@@ -67,7 +67,7 @@ from cdsm.planning.saturation import saturation as saturation
 from cdsm.posture import Posture as Posture
 from cdsm.statics.buckling import critical_load as critical_load
 from cdsm.statics.buckling import critical_tension as critical_tension
-from cdsm.statics.equilibrium import equilibrium as equilibrium
+from cdsm.statics.forward import equilibrium as equilibrium
 from cdsm.statics.forward import forward_statics as forward_statics
 from cdsm.statics.load_cycle import load_cycle as load_cycle
 from cdsm.statics.modes import modes as modes

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cdsm.batch.rows import Arm, Body, Pose
 
 COMPILED = bool(globals().get("COMPILED", True))
-"""Whether numba compiles this module; :mod:`cdsm.batch.choice` also loads it without."""
+"""Whether numba compiles this module; :mod:`cdsm.batch.solution` also loads it without."""
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -485,6 +485,6 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
 
 
 if __name__ == "__main__":
-    from cdsm.batch.choice import compile_ahead  # this module under its own name
+    from cdsm.batch.solution import compile_ahead  # this module under its own name
 
     compile_ahead()

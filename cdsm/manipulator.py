@@ -18,11 +18,10 @@ from typing import TYPE_CHECKING, Any, Self, final, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdsm.cable import Cable, Cables
+from cdsm.cable import Cable, Cables, serpentine_cables
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import InvalidInput, listed, warn
-from cdsm.geometry import LONGEST, Geometry, doubts_about_units
-from cdsm.geometry.cables import serpentine_cables
+from cdsm.geometry import Geometry
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
@@ -32,7 +31,9 @@ from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
 from cdsm.support.status import Status
 from cdsm.support.validation import (
+    LONGEST,
     Direction,
+    doubts_about_units,
     flag,
     gravity_vector,
     instance,
@@ -505,7 +506,7 @@ class Manipulator(Printed):
 def _checked(cables: CablesOrFile) -> Cables:
     """Return cables, given as such or as the path of their file; each needs a name of its own."""
     if isinstance(cables, (str, os.PathLike)):
-        from cdsm.arm_file.cables import read_cables
+        from cdsm.arm_file.arm import read_cables
 
         return Cables(read_cables(cables))
     given = [cables] if isinstance(cables, Cable) else cables

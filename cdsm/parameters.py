@@ -8,10 +8,9 @@ from typing import Any, Final, Literal, NamedTuple, final
 
 import numpy as np
 
-from cdsm.cable import Cable, Site
+from cdsm.cable import Cable, Site, require_own_cables, serpentine_cables
 from cdsm.errors import InvalidInput
 from cdsm.geometry import Geometry, Joint, Link
-from cdsm.geometry.cables import require_own_cables, serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import instance, one_of, scalar, text
 from cdsm.wires.elasticity import Elasticity

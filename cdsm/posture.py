@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import cdsm
 from cdsm.errors import InvalidInput, listed
-from cdsm.geometry.contacts import overlapping
+from cdsm.geometry.parts import overlapping
 from cdsm.routing import Spans, cross
 from cdsm.segments import Segments
 from cdsm.support.format import JointUnits, aligned, coordinates, plain

@@ -13,9 +13,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.cable import serpentine_cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.geometry import Geometry, Link
-from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
 from cdsm.wires.catalogue import SOLID, STRAND
 from cdsm.wires.elasticity import Elasticity

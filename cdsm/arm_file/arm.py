@@ -1,29 +1,122 @@
-"""Read and write ARM.toml: a robot, its cables, their wires, gravity and tolerances in one file."""
+"""Read and write ARM.toml, an arm with all that belongs to it, and files of cables alone."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter
 
-from cdsm.arm_file.cables import routed, settings, wire_tables
-from cdsm.arm_file.model import read_model
-from cdsm.cable import Cable
-from cdsm.errors import FileError, GeometryError
+from cdsm.arm_file.model import SETTINGS, read_model
+from cdsm.cable import Cable, Site, serpentine_cables
+from cdsm.errors import FileError, GeometryError, InvalidInput
 from cdsm.geometry import Geometry
-from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import Manipulator
-from cdsm.support.records import toml_text, verbatim
+from cdsm.support.files import write_text
+from cdsm.support.records import one_line_each, toml_text, verbatim
+from cdsm.support.validation import sequence_of
 from cdsm.tolerances import table_of as tolerance_table
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
-from cdsm.wires.catalogue import Wire
+from cdsm.wires.catalogue import Wire, name_of, table_of
+from cdsm.wires.elasticity import Elasticity
 
-_HEAD = (
+_CABLES_HEAD = """\
+# cdsm cables. Units: m, N, N/m.
+# wire: a name, a constant rigidity EA in N, or the law of a table [wires.NAME].
+# sites: links of the robot with a point in each one's frame, from the actuator's side to the end.
+# lead: straight cable from the actuator to the first site. series_stiffness: of a spring in series;
+# none if left out. control: what the motor holds, "position" or "force". minimum, maximum: tensions
+# that the cable may carry; 0 and none if left out. slack: wire that the motor takes in before the
+# cable pulls; 0 if left out. gain: wire taken in per pull that the motor reports; 1 if left out.
+# friction, wrap (of a site): coefficient, and an angle [rad] that adds to the angle by which the
+# cable turns there; 0 if left out.
+
+"""
+
+_USUAL = {field.name: field.default for field in fields(Cable) + fields(Site)}
+
+
+def read_cables(path: str | os.PathLike[str], wire: Wire | None = None) -> tuple[Cable, ...]:
+    """Read the cables of an arm from a TOML file.
+
+    The file has one table ``[[cables]]`` per cable. Its keys are:
+
+    - ``name``; ``sites``: two or more ``{link = "…", xyz = [x, y, z]}``, [m]. A site may also have
+      ``friction`` and ``wrap`` [rad], as in :class:`~cdsm.Site`.
+    - ``wire``: a name such as ``"1x19-1.2mm"``, a constant rigidity [N], or the NAME of a table
+      ``[wires.NAME]`` in the form of :meth:`Elasticity.read`.
+    - Optional: ``series_stiffness`` [N/m], ``control`` (``"position"`` or ``"force"``),
+      ``minimum`` and ``maximum`` [N], ``slack`` [m] and ``gain``. These keys and ``wire`` may also
+      stand at the top of the file, for all cables without their own.
+    - Optional: ``lead`` [m], the straight cable between the actuator and the first site, and
+      ``friction``, the coefficient in all holes that the cable passes.
+
+    Args:
+        path: The file.
+        wire: Wire of all cables, instead of the wires in the file: a law, a name, EA [N], or a
+            WIRE.toml.
+
+    Raises:
+        FileError: The file cannot be read or does not describe cables. Every fault is listed. The
+            file names no wire for some cables, and ``wire`` is not given.
+    """
+    return tuple(read_model(path, wire, robot=False)[1])
+
+
+def write_cables(cables: Sequence[Cable], path: str | os.PathLike[str]) -> Path:
+    """Write cables to a TOML file. :func:`read_cables` returns equal cables.
+
+    Args:
+        cables: One or more cables.
+        path: The file. An existing file is replaced.
+
+    Raises:
+        InvalidInput: No cables are given, or an elasticity of this kind cannot be written.
+        FileError: The file cannot be written.
+    """
+    cables = sequence_of("cables", cables, Cable)
+    if not cables:
+        raise InvalidInput("cables", "none given; there is nothing to write.")
+    values, tables = _wire_tables(cables)
+    entries = [
+        _routed(each, {"wire": values[each.elasticity], **_settings(each)}) for each in cables
+    ]
+    return write_text(path, _CABLES_HEAD + toml_text({"wires": tables, "cables": entries}))
+
+
+def _wire_tables(cables: Sequence[Cable]) -> tuple[dict[Elasticity, Any], dict[str, Any]]:
+    """Return the value of the key ``wire`` for each law of the cables, and the tables [wires]."""
+    values: dict[Elasticity, Any] = {}
+    tables: dict[str, Any] = {}
+    for law in dict.fromkeys(cable.elasticity for cable in cables):
+        values[law] = name_of(law) or law._constant or f"wire{len(tables) + 1}"
+        if values[law] == f"wire{len(tables) + 1}":
+            tables[values[law]] = table_of(law)
+    return values, tables
+
+
+def _settings(cable: Cable) -> dict[str, Any]:
+    """Return the settings of a cable that are not the default."""
+    return {key: x for key in SETTINGS if (x := getattr(cable, key)) != _USUAL[key]}
+
+
+def _routed(cable: Cable, own: dict[str, Any]) -> dict[str, Any]:
+    """Return the TOML table of a cable with its sites and the settings ``own``."""
+    sites = [
+        {"link": site.link, "xyz": site.position}
+        | {key: x for key in ("friction", "wrap") if (x := getattr(site, key))}
+        for site in cable.sites
+    ]
+    lead = {"lead": cable.lead} if cable.lead else {}
+    return {"name": cable.name, **lead, **own, "sites": one_line_each(sites)}
+
+
+_ARM_HEAD = (
     "# An arm of cdsm. Units: m, rad, kg, N, N/m, m/s2. Base axes: x along the straight arm.\n\n"
 )
 _ESCAPED = re.compile(r"'''|'$|[^\t\n -~\x80-\U0010ffff]")  # what a literal string cannot hold
@@ -50,8 +143,8 @@ def read_arm(
 def arm_text(arm: Manipulator) -> str:
     """Return the text of an ARM.toml; InvalidInput if an elasticity cannot be written."""
     cables, geometry = arm.cables, arm.geometry if arm.is_serpentine else None
-    values, tables = wire_tables(cables)
-    owns = [{"wire": values[each.elasticity]} | settings(each) for each in cables]
+    values, tables = _wire_tables(cables)
+    owns = [{"wire": values[each.elasticity]} | _settings(each) for each in cables]
     shared = {key: x for key, x in owns[0].items() if all(own.get(key) == x for own in owns)}
     owns = [{key: x for key, x in own.items() if key not in shared} for own in owns]
     data: dict[str, Any] = {"gravity": arm.gravity.tolist(), "original_length": arm.original_length}
@@ -67,8 +160,8 @@ def arm_text(arm: Manipulator) -> str:
     if [(c.name, c.sites, c.lead) for c in plain] == [(c.name, c.sites, c.lead) for c in cables]:
         data["cables"] = {cable.name: own for cable, own in each if own}
     else:
-        data["cables"] = [routed(cable, own) for cable, own in each]
-    return _HEAD + toml_text(data)
+        data["cables"] = [_routed(cable, own) for cable, own in each]
+    return _ARM_HEAD + toml_text(data)
 
 
 def _urdf_table(arm: Manipulator) -> dict[str, Any]:

@@ -9,26 +9,60 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any, Final, cast
 
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WrapValidator
 from pydantic import ValidationInfo as Info
 
-from cdsm.arm_file.tables import read_tables
-from cdsm.cable import Cable, Cables, Control, Site
+from cdsm.cable import Cable, Cables, Control, Site, serpentine_cables
 from cdsm.cable_laws import OriginalLength
 from cdsm.errors import LINES, CdsmError, FileError, GeometryError, listed
 from cdsm.geometry import Geometry, toml
-from cdsm.geometry.cables import serpentine_cables
 from cdsm.manipulator import GRAVITY
 from cdsm.support import records
-from cdsm.support.records import EACH, ONE, CrossFaults, record
+from cdsm.support.files import read_text
+from cdsm.support.records import EACH, ONE, CrossFaults, laid_over, read_toml, record
 from cdsm.support.validation import Axis, gravity_vector, one_of
 from cdsm.tolerances import Tolerances
 from cdsm.tolerances import from_table as read_tolerances
-from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table
+from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table, is_file, read_law, table_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity
+
+_FROM: Final = "Write an ARM.toml of it once, `cdsm new ARM.toml --from {path}"
+_OTHERS: Final = {
+    "<mujoco": "is a MuJoCo model (MJCF), no ARM.toml: give the URDF that it was made from.",
+    "<xacro:": "is a xacro file: run xacro on it first, and give what it prints as a URDF.",
+    "<robot": f"is a robot (URDF), no ARM.toml. {_FROM} --cables CABLES.toml --tip LINK`, and give "
+    "that; or, in Python, Manipulator.from_urdf().",
+    "<": "is XML, no ARM.toml. `cdsm new --from` takes a URDF, or the folder of a CASPR model.",
+}
+"""What a file of XML is, by a text in it; the first one counts."""
+
+
+def _read_tables(
+    path: str | os.PathLike[str], changes: Mapping[str, Any] | None, robot: bool
+) -> dict[str, Any]:
+    """Read the tables of a file, ``changes`` laid over them, and the files of wires they name."""
+    if any(Path(path).glob("*_bodies.xml")):
+        said = f"is the folder of a CASPR model. {_FROM} --wire EA`, and give that."
+        raise FileError(path, said.format(path=path))
+    if str(path).endswith((".nc", ".zarr", ".csv")):
+        raise FileError(path, "is a sweep or a table, no arm; give an ARM.toml.")
+    text = read_text(path)
+    if robot and text.lstrip("\ufeff \t\r\n").startswith("<"):
+        said = next(said for sign, said in _OTHERS.items() if sign in text)
+        raise FileError(path, said.format(path=path))
+    tables: dict[str, Any] = laid_over(read_toml(text), changes or {})
+    cables = tables.get("cables")
+    each = [*cables.values()] if isinstance(cables, dict) else cables
+    for table in (tables, *(each if isinstance(each, list) else ())):
+        wire = table.get("wire") if isinstance(table, dict) else None
+        if is_file(wire):
+            table["wire"] = table_of(read_law(Path(path).parent / wire))
+    return tables
+
 
 SETTINGS: Final = "series_stiffness", "control", "minimum", "maximum", "slack", "gain"
 """Keys that are attributes of a :class:`Cable` with the same name."""
@@ -245,7 +279,7 @@ def read_model(
     """
     forced, faults = None if wire is None else as_wire(wire), ""
     try:
-        data = read_tables(path, changes, robot)
+        data = _read_tables(path, changes, robot)
         described, rest = toml.split_geometry(data)
         if robot and ("urdf" not in rest or any(key in described for key in _FORMS)):
             data = {_ROBOT: described, **rest}

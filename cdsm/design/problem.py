@@ -12,10 +12,10 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdsm.cable import require_own_cables
 from cdsm.design.goals import Constraint, Measure, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed
 from cdsm.errors import InvalidInput
-from cdsm.geometry.cables import require_own_cables
 from cdsm.manipulator import Manipulator
 from cdsm.measures.rows import require
 from cdsm.parameters import PARAMETERS, ArmParameters

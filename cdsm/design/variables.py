@@ -8,16 +8,23 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, final
 
-from cdsm.cable import Cable
+from cdsm.cable import Cable, serpentine_cables
 from cdsm.errors import InvalidInput, warn
 from cdsm.geometry import CableRoute, Geometry
-from cdsm.geometry.cables import serpentine_cables
 from cdsm.geometry.uniform import evenly_spaced, hinge_hole_angles
-from cdsm.geometry.units import WIDEST, doubts_about_angle, doubts_about_units
 from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS, ArmParameters, holes_like
 from cdsm.support.format import place
-from cdsm.support.validation import instance, one_of, quantity, scalar, whole_number
+from cdsm.support.validation import (
+    WIDEST,
+    doubts_about_angle,
+    doubts_about_units,
+    instance,
+    one_of,
+    quantity,
+    scalar,
+    whole_number,
+)
 from cdsm.wires.catalogue import as_wire
 
 Value = float | int | str

@@ -9,5 +9,3 @@ from cdsm.geometry.parts import CableRoute as CableRoute
 from cdsm.geometry.parts import Disk as Disk
 from cdsm.geometry.parts import Joint as Joint
 from cdsm.geometry.parts import Link as Link
-from cdsm.geometry.units import LONGEST as LONGEST
-from cdsm.geometry.units import doubts_about_units as doubts_about_units

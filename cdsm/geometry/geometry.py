@@ -22,11 +22,11 @@ from cdsm.geometry.beams import Backbone, backbone_fields
 from cdsm.geometry.chain import STEEPEST, Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
 from cdsm.geometry.uniform import Hinged, Universal, fields_of, same_angle, spread_out
-from cdsm.geometry.units import WIDEST, doubts_about_angle, doubts_about_units
+from cdsm.support import validation
 from cdsm.support.files import read_text, write_text
 from cdsm.support.format import plural
 from cdsm.support.records import CrossFaults, Length, LengthOrZero, Name, read_toml, record
-from cdsm.support.validation import instance, scalar, sequence_of
+from cdsm.support.validation import WIDEST, doubts_about_angle, doubts_about_units, instance
 from cdsm.support.values import Printed
 
 _Keywords = ParamSpec("_Keywords")
@@ -176,7 +176,7 @@ class Geometry(Printed):
             InvalidInput: ``sections`` is not a list or tuple of geometries.
             GeometryError: No section is given, or the arm is invalid, see :class:`Geometry`.
         """
-        parts = sequence_of("sections", sections, Geometry)
+        parts = validation.sequence_of("sections", sections, Geometry)
         if not parts:
             raise GeometryError(["sections: none given; give one or more"])
         first, *_ = parts
@@ -195,7 +195,7 @@ class Geometry(Printed):
                 for joint, R in zip(part.joints, part.hole_radii, strict=True)
             ]
             links += part.links
-        spaced = spread_out(cables, scalar("spread", spread))
+        spaced = spread_out(cables, validation.scalar("spread", spread))
         return replace(first, name=name, joints=tuple(joints), links=tuple(links), cables=spaced)
 
     def replace(self, **changes: Any) -> Geometry:

@@ -22,9 +22,8 @@ import numpy as np
 from lxml import etree
 from numpy.typing import ArrayLike
 
-from cdsm.coupling import Coupling
 from cdsm.errors import InvalidInput, warn
-from cdsm.interchange.mjcf_bodies import Carried, add_bodies, mass_matrix, row
+from cdsm.interchange.mjcf_bodies import Carried, add_bodies, couple, mass_matrix, row
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.report.checks import TOLERANCE, balance_error
@@ -186,7 +185,7 @@ def mujoco_model(
     for joint in joints:
         joint.set("damping", repr(of_joints))
     if coupling:
-        _couple(root, coupling, arm._body.all_joints)
+        couple(root, coupling, arm._body.all_joints)
     controls = _cables(root, arm, K, actuators, of_cables)
     if K is not None:
         frame = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose")
@@ -237,17 +236,6 @@ def _motion(
             damped = f"ratio {beta * ratios.min():.2g} to {beta * ratios.max():.2g} of the modes, "
             damped += f"by the cables: {wires.min():.4g} to {wires.max():.4g} N s/m"
     return step, wires, [f"time step  {1e3 * step:g} ms, {of}", f"damping    {damped}"]
-
-
-def _couple(root: etree._Element, coupling: Coupling, names: Sequence[str]) -> None:
-    """Add an equation for each joint that follows another one, from the initial positions."""
-    equations = etree.SubElement(root, "equality")
-    for i, name in enumerate(names):
-        if i not in coupling.leaders:
-            (j,) = np.flatnonzero(coupling.matrix[i])
-            leader, factor = names[coupling.leaders[j]], float(coupling.matrix[i, j])
-            line = {"joint1": name, "joint2": leader, "polycoef": f"0 {factor!r} 0 0 0"}
-            etree.SubElement(equations, "joint", line)
 
 
 def _missing(K: Stiffness) -> Iterator[str]:

@@ -1,8 +1,8 @@
-"""Write bodies, joints, shapes and sites of an arm for MuJoCo, at the initial joint positions."""
+"""Write bodies, joints, shapes and sites of an arm for MuJoCo, at the initial posture."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from lxml import etree
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from cdsm.coupling import Coupling
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.values import Array
@@ -174,3 +175,14 @@ def _placed(place: Array, turn: Rotation) -> dict[str, str]:
 def row(values: ArrayLike) -> str:
     """Format numbers as the text of an MJCF attribute, exact to the last bit."""
     return " ".join(repr(float(x)) for x in np.ravel(values))
+
+
+def couple(root: etree._Element, coupling: Coupling, names: Sequence[str]) -> None:
+    """Add an equation for each joint that follows another one, from the initial positions."""
+    equations = etree.SubElement(root, "equality")
+    for i, name in enumerate(names):
+        if i not in coupling.leaders:
+            (j,) = np.flatnonzero(coupling.matrix[i])
+            leader, factor = names[coupling.leaders[j]], float(coupling.matrix[i, j])
+            line = {"joint1": name, "joint2": leader, "polycoef": f"0 {factor!r} 0 0 0"}
+            etree.SubElement(equations, "joint", line)

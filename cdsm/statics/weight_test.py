@@ -14,7 +14,7 @@ from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
 from cdsm.statics.at_rest import Equilibrium
-from cdsm.statics.equilibrium import as_equilibrium, equilibrium, followed
+from cdsm.statics.forward import as_equilibrium, equilibrium, followed
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import coordinates, plural, without_rounding

@@ -6,12 +6,12 @@ from types import ModuleType
 
 import pytest
 
-from cdsm.batch import choice, solution
+from cdsm.batch import solution
 
 
 @pytest.fixture(params=["compiled", "numpy"])
 def kernels(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Let all batches of a test use these kernels."""
-    chosen = choice.compiled() if request.param == "compiled" else choice.plain()
+    chosen = solution.compiled() if request.param == "compiled" else solution.plain()
     monkeypatch.setattr(solution, "kernels_for", lambda *_: chosen)
     return chosen

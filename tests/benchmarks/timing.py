@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cdsm.batch.choice import compiled
+from cdsm.batch.solution import compiled
 
 
 def seconds(

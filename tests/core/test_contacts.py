@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from cdsm.geometry.contacts import overlapping
-from cdsm.geometry.parts import Disk
+from cdsm.geometry.parts import Disk, overlapping
 from cdsm.support.values import Array
 
 R, HALF = 0.02, 0.05

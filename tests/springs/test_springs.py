@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import choice, solution
+from cdsm.batch import solution
 from cdsm.support.values import Array
 
 WRENCH = np.array([1.0, 2.0, -1.0, 0.1, 0.05, -0.02])
@@ -151,7 +151,7 @@ def test_a_batch_counts_each_spring_once(outputs: tuple[str, ...]) -> None:
     q, F = np.random.default_rng(0).uniform(-0.1, 0.1, (3, arm.nv)), np.full(15, 60.0)
     u = "z" if "along" in outputs else None
     joint = cdsm.stiffness(arm.at(q[1]), F).joint
-    for compiled in (choice.plain, choice.compiled):
+    for compiled in (solution.plain, solution.compiled):
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(solution, "kernels_for", lambda *_, kernels=compiled: kernels())
             batch = cdsm.evaluate(arm, q, F, outputs=outputs, direction=u)
