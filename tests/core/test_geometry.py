@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 
 import cdsm
 from cdsm import presets
-from tests.support.strategies import geometries
 
 SIZES: dict[str, Any] = {
     "link_length": 0.06,
@@ -197,15 +195,6 @@ def test_sections_are_joined_end_to_end() -> None:
 
 
 # --- TOML -----------------------------------------------------------------------------------
-
-
-@settings(max_examples=60, deadline=None, database=None)
-@given(geometry=geometries(4))
-def test_toml_round_trip_is_exact_and_stable(geometry: cdsm.Geometry) -> None:
-    text = geometry.to_toml()
-    again = cdsm.Geometry.from_toml(text)
-    assert again == geometry
-    assert again.to_toml() == text
 
 
 TWO = """
