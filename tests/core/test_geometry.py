@@ -1,45 +1,42 @@
-"""Geometry: constructors, TOML form, and every fault at once."""
+"""Geometry: constructors, sizes of each joint, holes, sections, and their TOML form."""
 
 import math
-import tomllib
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 
 import cdsm
-from cdsm.support.files import MAXIMUM_BYTES
-from tests.support.arms import mixed_arm
-from tests.support.strategies import geometries
+from cdsm import presets
 
 SIZES: dict[str, Any] = {
-    "link_length": 0.04,
-    "base_length": 0.02,
-    "disk_offset": 0.01,
-    "hole_radius": 0.03,
-    "link_mass": 0.5,
+    "link_length": 0.06,
+    "base_length": 0.03,
+    "disk_offset": 0.008,
+    "hole_radius": 0.02,
+    "link_mass": 0.1,
 }
-UNIVERSAL: dict[str, Any] = {"joints": 5, "cables_per_joint": 3, **SIZES}
-ANGLES: dict[str, Any] = {"cables_per_joint": None}
 HINGED: dict[str, Any] = {"joints": 3, "twist": math.radians(30.0), **SIZES}
+TAPER = (0.02, 0.018, 0.015)
 
 
-def general(**changes: Any) -> cdsm.Geometry:
-    """A valid two-joint geometry from the general constructor, with some fields replaced."""
-    fields: dict[str, Any] = {
-        "name": "two",
-        "base_length": 0.02,
-        "hole_radius": 0.03,
-        "joints": (
-            cdsm.Joint(axes=((0.0, 1.0, 0.0),), disk_offset=0.01),
-            cdsm.Joint(axes=((0.0, 0.0, 1.0),), disk_offset=0.005, limit=0.3),
-        ),
-        "links": (cdsm.Link(length=0.04, mass=0.5), cdsm.Link(length=0.05, mass=0.0)),
-        "cables": (cdsm.CableRoute(joint=2, angle=0.1), cdsm.CableRoute(joint=1, angle=0.2)),
-    }
-    return cdsm.Geometry(**{**fields, **changes})
+def universal(**changes: Any) -> cdsm.Geometry:
+    count = {} if "hole_angles" in changes else {"cables_per_joint": 3}
+    return cdsm.Geometry.universal(**{"joints": 3, **count, **SIZES, **changes})
+
+
+def holes(cable: cdsm.Cable) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Radius and angle of every hole of a cable, actuator side first."""
+    places = [site.position for site in cable.sites]
+    found = [(math.hypot(y, z), math.atan2(z, y) % (2.0 * math.pi)) for _, y, z in places]
+    radii, angles = zip(*found, strict=True)
+    return radii, angles
+
+
+def arm_of(geometry: cdsm.Geometry) -> cdsm.Manipulator:
+    return cdsm.Manipulator(geometry, presets.STRAND_1X19)
 
 
 # --- constructors ---------------------------------------------------------------------------
@@ -47,7 +44,7 @@ def general(**changes: Any) -> cdsm.Geometry:
 
 @pytest.mark.parametrize(("n", "m"), [(1, 1), (5, 3), (4, 4)])
 def test_universal_cable_j_of_joint_k_has_the_hole_angle_of_the_formula(n: int, m: int) -> None:
-    geometry = cdsm.Geometry.universal(**{**UNIVERSAL, "joints": n, "cables_per_joint": m})
+    geometry = universal(joints=n, cables_per_joint=m)
     expected = [
         (k, 2.0 * math.pi * ((k - 1) + n * j) / (n * m)) for k in range(1, n + 1) for j in range(m)
     ]
@@ -55,223 +52,191 @@ def test_universal_cable_j_of_joint_k_has_the_hole_angle_of_the_formula(n: int, 
     assert [cable.angle for cable in geometry.cables] == pytest.approx([a for _, a in expected])
 
 
-def test_hinge_k_is_turned_by_k_minus_1_twists_and_its_pair_sits_beside_it() -> None:
-    twist = math.radians(30.0)
-    geometry = cdsm.Geometry.hinged(**HINGED)
-    assert len(geometry.cables) == 6
+@pytest.mark.parametrize("count", [2, 3])
+def test_hinge_k_is_turned_by_k_minus_1_twists_and_its_cables_with_it(count: int) -> None:
+    """They are evenly spread from 90° beside the axis."""
+    geometry = cdsm.Geometry.hinged(**HINGED, cables_per_joint=count)
     for k, joint in enumerate(geometry.joints):
-        psi = k * twist
+        psi = k * math.radians(30.0)
         np.testing.assert_allclose(joint.axes, [(0.0, math.cos(psi), math.sin(psi))], atol=1e-15)
-        pair = geometry.cables[2 * k : 2 * k + 2]
-        assert [cable.joint for cable in pair] == [k + 1, k + 1]
-        turns = [(cable.angle - psi) % (2.0 * math.pi) for cable in pair]
-        assert turns == pytest.approx([math.pi / 2.0, 3.0 * math.pi / 2.0])
+        own = geometry.cables[count * k : count * (k + 1)]
+        assert {cable.joint for cable in own} == {k + 1}
+        expected = [psi + math.pi / 2.0 + 2.0 * math.pi * j / count for j in range(count)]
+        assert [cable.angle for cable in own] == pytest.approx(expected)
 
 
-def test_hinged_cables_are_evenly_spread_from_90_degrees_beside_the_axis() -> None:
-    geometry = cdsm.Geometry.hinged(**HINGED, cables_per_joint=3)
-    angles = [cable.angle for cable in geometry.cables[3:6]]
-    psi = math.radians(30.0)
-    expected = [psi + math.pi / 2.0 + 2.0 * math.pi * j / 3.0 for j in range(3)]
-    assert angles == pytest.approx(expected)
+def test_a_size_per_joint_is_that_of_its_parts() -> None:
+    geometry = universal(
+        link_length=[0.06, 0.05, 0.04],
+        disk_offset=(0.008, 0.007, 0.006),
+        hole_radius=np.array(TAPER),
+        link_mass=[0.3, 0.2, 0.1],
+        lead=[0.1, 0.2, 0.3],
+        friction=[0.05, 0.1, 0.15],
+        joint_limit=[0.3, 0.4, 0.5],
+        disk_radius=[0.03, 0.025, 0.02],
+        cable_radius=[0.02, 0.018, 0.01],
+    )
+    assert [link.length for link in geometry.links] == [0.06, 0.05, 0.04]
+    assert [link.mass for link in geometry.links] == [0.3, 0.2, 0.1]
+    assert [joint.disk_offset for joint in geometry.joints] == [0.008, 0.007, 0.006]
+    assert geometry.hole_radii == TAPER
+    plain = universal(hole_radius=TAPER)
+    assert [disk.radius for disk in plain.disks] == [1.1 * R for R in TAPER for _ in range(2)]
+    assert geometry.joint_limits == (0.3, 0.4, 0.5)
+    places = [0.03 - 0.008, 0.008, 0.06 - 0.007, 0.007, 0.05 - 0.006, 0.006]
+    links = ["base_disk", "link1", "link1", "link2", "link2", "link3"]
+    for disk, link, x, r in zip(
+        geometry.disks, links, places, np.repeat([0.03, 0.025, 0.02], 2), strict=True
+    ):
+        assert (disk.link, disk.radius) == (link, r)
+        assert disk.x == pytest.approx(x)
+    by_joint = {each.joint: (each.lead, each.friction, each.radius) for each in geometry.cables}
+    assert by_joint == {1: (0.1, 0.05, 0.02), 2: (0.2, 0.1, 0.018), 3: (0.3, 0.15, 0.01)}
 
 
-def test_default_limit_is_never_above_80_degrees() -> None:
-    geometry = cdsm.Geometry.universal(**{**UNIVERSAL, "hole_radius": 0.001})
-    assert geometry.joint_limits == pytest.approx([math.radians(80.0)] * 5)
+def test_limits_are_where_the_disks_touch_and_never_above_80_degrees() -> None:
+    for changes, ratios in (
+        ({"hole_radius": [0.02, 0.018, 0.015], "disk_offset": [0.008, 0.006, 0.004]},
+         (8 / 20, 6 / 18, 4 / 15)),
+        ({"disk_radius": [0.025, 0.03, 0.04]}, (8 / 25, 8 / 30, 8 / 40)),
+        ({"hole_radius": 0.001}, [math.tan(math.radians(40.0))] * 3),
+    ):  # fmt: skip
+        expected = [2.0 * math.atan(ratio) for ratio in ratios]
+        assert universal(**changes).joint_limits == pytest.approx(expected)
 
 
-def test_every_link_has_a_disk_beside_each_of_its_joints() -> None:
-    disks = general().disks
-    assert [(disk.link, disk.joint) for disk in disks] == [
-        *(("base_disk", 1), ("link1", 1)),
-        *(("link1", 2), ("link2", 2)),
-    ]
-    assert [disk.x for disk in disks] == pytest.approx([0.02 - 0.01, 0.01, 0.04 - 0.005, 0.005])
+def test_replace_checks_what_it_changes() -> None:
+    geometry = universal()
+    wider = geometry.replace(hole_radius=0.025)
+    assert wider == universal(hole_radius=0.025)
+    assert universal(hole_radius=[0.03, 0.02, 0.01]).replace(hole_radius=0.025) == wider
+    joints = universal(hole_radius=[0.02, 0.03, 0.02]).joints
+    both = geometry.replace(hole_radius=0.025, joints=joints)
+    assert both.hole_radii == (0.025, 0.03, 0.025)
+    for change, said in (
+        ({"hole_radus": 0.025}, "did you mean hole_radius"),
+        ({"hole_radius": -1.0}, "hole_radius: -1 m"),
+        ({"lead": 0.1}, "lead: is not a key"),
+    ):
+        with pytest.raises(cdsm.GeometryError, match=said):
+            geometry.replace(**change)  # type: ignore[arg-type]
 
 
-# --- TOML -----------------------------------------------------------------------------------
+# --- holes ----------------------------------------------------------------------------------
 
 
-@settings(max_examples=60, deadline=None, database=None)
-@given(geometry=geometries(4))
-def test_toml_round_trip_is_exact_and_stable(geometry: cdsm.Geometry) -> None:
-    text = geometry.to_toml()
-    again = cdsm.Geometry.from_toml(text)
-    assert again == geometry
-    assert again.to_toml() == text
+def test_a_cable_passes_each_disk_at_its_hole_radius_or_at_its_own() -> None:
+    for own in (None, 0.01):
+        for cable in arm_of(universal(hole_radius=TAPER, cable_radius=own)).cables:
+            radii, angles = holes(cable)
+            expected = np.repeat(TAPER if own is None else [own] * 3, 2)[: len(radii)]
+            np.testing.assert_allclose(radii, expected, rtol=1e-14)
+            np.testing.assert_allclose(angles, angles[0], atol=1e-14)
 
 
-def test_to_toml_is_plain_toml_that_states_its_units() -> None:
-    text = general().to_toml()
-    assert tomllib.loads(text)["joints"][1] == {
-        "axes": [[0.0, 0.0, 1.0]],
-        "disk_offset": 0.005,
-        "limit": 0.3,
-    }
-    assert "Units: m, rad, kg" in text.splitlines()[0]
+def test_phase_adds_to_the_angles_of_a_joint_and_all_may_be_given_as_an_array() -> None:
+    for before, after in zip(
+        universal().cables, universal(phase=[0.0, 0.1, -0.2]).cables, strict=True
+    ):
+        added = (0.0, 0.1, -0.2)[before.joint - 1]
+        assert after.angle == pytest.approx(before.angle + added, abs=1e-15)
+    turned = np.add.outer(np.arange(3), [0.0, 2.1, 4.2])
+    assert universal(hole_angles=turned) == universal(hole_angles=turned.tolist())
 
 
-@pytest.mark.parametrize("kind", ["universal", "hinged"])
-def test_short_form_is_the_constructor_of_that_name(kind: str) -> None:
-    keywords = {"universal": UNIVERSAL, "hinged": {**HINGED, "cables_per_joint": 4}}[kind]
-    lines = [f"[{kind}]", *(f"{key} = {value!r}" for key, value in keywords.items())]
-    expected = getattr(cdsm.Geometry, kind)(**keywords)
-    assert cdsm.Geometry.from_toml("\n".join(lines)) == expected
+def test_alternating_hinges_share_holes_loudly_and_spread_sets_them_apart() -> None:
+    alternating: dict[str, Any] = {**HINGED, "joints": 6, "twist": math.pi / 2}
+    with pytest.warns(
+        cdsm.CdsmWarning, match="cable1_1 and cable3_2 and cable5_1.*spread="
+    ) as told:
+        default = cdsm.Geometry.hinged(**alternating)
+    assert [each.filename for each in told] == [__file__]  # the line of the user, not of cdsm
+    angles = [math.degrees(c.angle) for c in default.cables]
+    assert angles == pytest.approx([90 + 90 * k + 180 * j for k in range(6) for j in range(2)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        apart = cdsm.Geometry.hinged(spread=math.radians(12.0), **alternating)
+    turned = np.degrees([c.angle for c in apart.cables]) - angles
+    # hinges 1, 3, 5 share one plane, hinges 2, 4, 6 the other; both cables of a pair turn alike
+    np.testing.assert_allclose(turned.reshape(6, 2), [[d] * 2 for d in (-12, -12, 0, 0, 12, 12)])
 
 
 @pytest.mark.parametrize("lead", [0.0, 0.3])
 def test_friction_is_that_of_every_hole_which_a_cable_passes(lead: float) -> None:
     """The base disk is a hole only if there is a lead before it."""
-    geometry = cdsm.Geometry.universal(**UNIVERSAL, lead=lead, friction=0.1)
-    assert cdsm.Geometry.from_toml(geometry.to_toml()) == geometry
-    assert "friction" not in cdsm.Geometry.universal(**UNIVERSAL, lead=lead).to_toml()
-    assert all(route.friction == 0.1 for route in geometry.cables)
-    arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(5e4))
+    geometry = universal(lead=lead, friction=0.1)
+    assert "friction" not in universal(lead=lead).to_toml()
+    arm = arm_of(geometry)
     assert arm.has_friction
     for cable, route in zip(arm.cables, geometry.cables, strict=True):
         assert cable.friction == (0.1,) * (2 * route.joint - (1 if lead else 2))
-        assert [site.friction for site in cable.sites][-1] == 0.0
-    assert not cdsm.Manipulator(general(), cdsm.LinearElasticity(5e4)).has_friction
+        assert cable.sites[-1].friction == 0.0
+    assert not arm_of(universal()).has_friction
 
 
-# --- faults ---------------------------------------------------------------------------------
-
-
-def raises(said: str, make: Any, *args: Any, **keywords: Any) -> None:
-    with pytest.raises(cdsm.GeometryError) as caught:
-        make(*args, **keywords)
-    assert said in str(caught.value)
-    # a cluster pickles the context too, which pydantic's error cannot be
-    assert isinstance(caught.value.__context__, cdsm.GeometryError | None)
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"hole_radius": 0.0}, "hole_radius: 0 m given; 1e-06 to 10000 m is needed"),
-        ({"friction": 2.5}, "friction: 2.5 given; 0, or 1e-06 to 2 is needed"),
-        ({"link_length": math.nan}, "link_length: input should be a finite number, but is nan"),
-        ({"joints": 101}, "joints: input should be less than or equal to 100, but is 101"),
-        ({"joint_limit": 4.0}, "joint_limit: input should be less than or equal to 3.14"),
-        ({"spread": 15.0}, "spread: 15 rad given; at most one turn; convert degrees to radians"),
-        ({"name": "my arm"}, "name: 'my arm' given; up to 64 of"),
-        ({"hole_radious": 0.03}, "hole_radious: is not a key that is known here; did you mean"),
-        ({"link_length": 0.019}, "disk_offset: too large: link 1 is 0.019 m long, its disks need"),
-        ({"hole_radius": [0.02, 0.01]}, "hole_radius: 2 values given for 5 joints; give one"),
-        ({"link_mass": [0.1, 0.1, -0.1, 0.1, 0.1]}, "link_mass[3]: -0.1 kg given"),
-        ({"phase": [0.1, "b", 0.1, 0.1, 0.1]}, "phase[2]: input should be a valid number"),
-        ({"cables_per_joint": None}, "cables_per_joint: give it, or hole_angles, and not both"),
-        ({**ANGLES, "hole_angles": [[0.1], [0.2]]}, "hole_angles: 2 values given for 5 joints"),
-        ({**ANGLES, "hole_angles": [[0.1], 0.2]}, "hole_angles[2]: input should be"),
-        ({"disk_radius": 0.03}, "disk_radius: too small: at joint 1 it is 0.03 m"),
-        ({"cable_radius": 0.04, "disk_radius": 0.035}, "the farthest hole is at 0.04 m"),
-    ],
-)
-def test_faults_of_uniform_arms_are_named(changes: dict[str, Any], said: str) -> None:
-    raises(said, cdsm.Geometry.universal, **{**UNIVERSAL, **changes})
-
-
-@pytest.mark.parametrize(
-    ("axes", "said"),
-    [
-        (((0.0, 1.0, 0.0), (0.0, 0.0, 0.0)), "axes[2]: has no length; give a direction"),
-        (((0.0, 0.0, 1.0), (0.0, 0.0, -2.0)), "are parallel"),
-        (((0.0, math.nan, 1.0),), "axes[1][2]"),
-    ],
-)
-def test_joint_axes_must_be_one_or_two_independent_directions(axes: Any, said: str) -> None:
-    raises(said, cdsm.Joint, axes=axes, disk_offset=0.01)
-
-
-def test_all_faults_are_listed_at_once() -> None:
-    faulty = {"joints": 101, "link_length": 0, "hole_radius": -1, "link_mass": -1, "lead": math.nan}
-    with pytest.raises(cdsm.GeometryError, match="invalid geometry") as caught:
-        cdsm.Geometry.universal(**{**UNIVERSAL, **faulty})
-    assert [fault.split(":")[0] for fault in caught.value.faults] == list(faulty)
-    with pytest.raises(cdsm.GeometryError) as caught:
-        general(
-            links=(cdsm.Link(length=0.001, mass=0.5), cdsm.Link(length=0.002, mass=0.0)),
-            cables=(cdsm.CableRoute(joint=1, angle=0.0), cdsm.CableRoute(joint=9, angle=0.0)),
+def test_sections_are_joined_end_to_end() -> None:
+    proximal = universal(joints=2, hole_radius=0.025, lead=0.2)
+    for own in (None, 0.012):
+        distal = universal(
+            hole_radius=0.012, base_length=0.01, disk_offset=0.004, phase=0.2, cable_radius=own
         )
-    starts = [fault.split(":")[0] for fault in caught.value.faults]
-    assert starts == ["disk_offset", "cables[2].joint"]
+        geometry = cdsm.Geometry.sections([proximal, distal], name="two")
+        assert geometry.name == "two"
+        assert geometry.hole_radii == (0.025, 0.025, 0.012, 0.012, 0.012)
+        assert [link.length for link in geometry.links] == [0.06, 0.06 + 0.01, 0.06, 0.06, 0.06]
+        assert [joint.disk_offset for joint in geometry.joints] == [0.008] * 2 + [0.004] * 3
+        assert [cable.joint for cable in geometry.cables] == sorted([1, 2, 3, 4, 5] * 3)
+        arm = arm_of(geometry)
+        straight = [0.03 + 0.06 + 0.07 + 0.18, 0.0, 0.0]
+        np.testing.assert_allclose(arm.at(np.zeros(10)).tip[:3, 3], straight)
+        expected = [own or 0.025] * 4 + [0.012] * 6
+        np.testing.assert_allclose(holes(arm.cables[-1])[0], expected, rtol=1e-14)
 
 
-# what is replaced in a TOML text, and what the message must say
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("hole_radius", "zzz", "hole_radius: is missing"),
-        ("angle = 0.1", "angel = 0.1", "cables[1].angel: is not a key"),
-        ("base_length = 0.02", "base_length = 1e999", "base_length: input should be a finite"),
-        ("[[0.0, 0.0, 1.0]]", "[[0.0, 0.0]]", "joints[2].axes[1][3]: is missing"),
-        ("joint = 2", "joint = 7", "cables[1].joint: 7 is past the last joint, 2; give 1 to 2"),
-        ("name =", "b = = 3\nname =", "is not TOML: "),
-    ],
-)
-def test_faults_of_toml_are_named(old: str, new: str, said: str) -> None:
-    text = general().to_toml()
-    assert old in text
-    raises(said, cdsm.Geometry.from_toml, text.replace(old, new, 1))
+# --- TOML -----------------------------------------------------------------------------------
 
 
-NOT_A_GEOMETRY = {
-    "": "holds nothing; give [universal], ",
-    "name = 'a'\nname = 'b'": "is not TOML",
-    "a = " + "[" * 100_000: "is not TOML",
-    "\n".join(f"[{'.'.join(['a'] * n)}]" for n in range(1, 400)): "",
-    'name = "a"\n[universal]\njoints = 3\n': "name: stands outside [universal]",
-    '[[cables]]\nname = "a"\n': "holds cables; give [universal], ",
-}
+TWO = """
+name = "two"
+spread = 0.1
+
+[[sections]]
+[sections.universal]
+joints = 2
+cables_per_joint = 3
+link_length = [0.06, 0.05]
+base_length = 0.03
+disk_offset = 0.008
+hole_radius = [0.025, 0.02]
+disk_radius = 0.03
+link_mass = 0.1
+
+[[sections]]
+[sections.hinged]
+joints = 2
+twist = 1.5707963267948966
+hole_angles = [[0.1, 3.2], [1.6, 4.7]]
+link_length = 0.05
+base_length = 0.0
+disk_offset = 0.006
+hole_radius = 0.012
+link_mass = 0.05
+"""
 
 
-@pytest.mark.parametrize("text", NOT_A_GEOMETRY)
-def test_text_that_is_no_geometry_is_a_geometry_error(text: str) -> None:
-    with pytest.raises(cdsm.GeometryError) as caught:
-        cdsm.Geometry.from_toml(text, source="arm.toml")
-    assert str(caught.value).startswith("arm.toml: ")
-    assert NOT_A_GEOMETRY[text] in str(caught.value)
-    assert len(str(caught.value)) < 2000
-
-
-# --- files ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (None, r"does not exist.*looked in"),
-        (b"name = '\xff'", r"not UTF-8 text \(byte 8\)"),
-        ("name = 'arm'".encode("utf-16"), r"not UTF-8 text \(byte 0\); save it as UTF-8"),
-        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "is a binary file; a text file is needed"),
-        (b" " * (MAXIMUM_BYTES + 1), f"larger than the {MAXIMUM_BYTES} bytes"),
-    ],
-)
-def test_file_that_cannot_be_read_is_a_file_error(
-    content: bytes | None, said: str, tmp_path: Path
-) -> None:
+def test_everything_of_python_is_in_toml(tmp_path: Path) -> None:
+    sizes = {"link_length": [0.06, 0.05], "hole_radius": [0.025, 0.02], "disk_radius": 0.03}
+    distal = cdsm.Geometry.hinged(
+        joints=2, twist=math.pi / 2, hole_angles=[[0.1, 3.2], [1.6, 4.7]], link_length=0.05,
+        base_length=0.0, disk_offset=0.006, hole_radius=0.012, link_mass=0.05,
+    )  # fmt: skip
+    both = [universal(joints=2, **sizes), distal]
+    geometry = cdsm.Geometry.sections(both, spread=0.1, name="two")
+    assert cdsm.Geometry.from_toml(TWO) == geometry
+    assert cdsm.Geometry.from_toml(geometry.to_toml()) == geometry
     path = tmp_path / "arm.toml"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(cdsm.FileError, match=said) as caught:
-        cdsm.Geometry.read(path)
-    assert caught.value.path == str(path)
-
-
-def test_failed_write_leaves_the_earlier_file_and_nothing_beside_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = general().write(tmp_path / "arm.toml")
-    before = path.read_bytes()
-
-    def full(self: Path, data: bytes) -> int:
-        with self.open("wb") as file:
-            file.write(data[:10])
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(cdsm.FileError, match="No space left on device"):
-        mixed_arm().geometry.write(path)
-    assert path.read_bytes() == before
-    assert [entry.name for entry in tmp_path.iterdir()] == ["arm.toml"]
+    path.write_text('wire = "solid-1.2mm"\n' + TWO, encoding="utf-8")
+    arm = cdsm.Manipulator.read(path)
+    assert arm == cdsm.Manipulator(geometry, presets.STEEL_WIRE_200GPA)
+    assert cdsm.Manipulator.read(arm.write(path)) == arm

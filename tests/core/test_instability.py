@@ -7,16 +7,8 @@ import numpy as np
 import pytest
 
 import cdsm
+from tests.support.arms import readme_geometry
 
-SIZES: dict[str, Any] = {
-    "joints": 4,
-    "cables_per_joint": 3,
-    "link_length": 0.03,
-    "base_length": 0.03,
-    "disk_offset": 0.005,
-    "hole_radius": 0.008,
-    "link_mass": 0.02,
-}
 Q = np.deg2rad([12.0, -8.0, 5.0, 15.0, -10.0, 6.0, 9.0, -3.0])
 EA, SPRING, MINIMUM = 300.0, 16e3, 8.0
 
@@ -25,7 +17,9 @@ def stiffness(
     rigidity: float = EA, spring: float = SPRING, minimum: float = MINIMUM
 ) -> cdsm.Stiffness:
     """Build an arm of soft wires and springs from nothing, with what the remedies change."""
-    geometry = cdsm.Geometry.universal(**SIZES)
+    geometry = readme_geometry(
+        link_length=0.03, disk_offset=0.005, hole_radius=0.008, link_mass=0.02, lead=0.0
+    )
     law = cdsm.LinearElasticity(rigidity)
     cables = cdsm.serpentine_cables(geometry, law, series_stiffness=spring)
     pose = cdsm.Manipulator(geometry, cables=cables).at(Q, check_limits=False)
@@ -41,13 +35,10 @@ CHANGED = {
 }
 
 
-def test_the_arm_buckles_and_everything_would_hold_it() -> None:
-    assert not K.is_stable
-    assert list(FOUND) == list(CHANGED)
-
-
 @pytest.mark.parametrize("change", CHANGED)
 def test_a_remedy_ends_where_the_smallest_eigenvalue_is_zero(change: Any) -> None:
+    assert not K.is_stable
+    assert list(FOUND) == list(CHANGED)
     factor = FOUND[change].factor
     assert factor is not None
     edge = CHANGED[change](factor)
@@ -57,12 +48,10 @@ def test_a_remedy_ends_where_the_smallest_eigenvalue_is_zero(change: Any) -> Non
     assert CHANGED[change](factor * (1.0 + up)).is_stable
     assert not CHANGED[change](factor * (1.0 - up)).is_stable
 
-
-@pytest.mark.parametrize("change", CHANGED)
-def test_the_printed_number_is_enough(change: Any) -> None:
+    # the printed number is enough
     words = str(FOUND[change]).split()
     assert CHANGED[change](float(words[words.index("times") - 1])).is_stable
-    assert (words[-1] == "more") == ((FOUND[change].factor or 0.0) > 1.0)
+    assert (words[-1] == "more") == (factor > 1.0)
 
 
 def test_a_stable_arm_needs_nothing() -> None:
@@ -70,7 +59,6 @@ def test_a_stable_arm_needs_nothing() -> None:
     assert held.is_stable
     assert held.remedies == ()
     assert held.warnings == ()
-    assert "UNSTABLE" not in str(held) + repr(held)
 
 
 def test_wires_cannot_help_where_the_motors_hold_forces() -> None:

@@ -17,35 +17,22 @@ K = cdsm.stiffness(POSE, PULL)
 NAMES = [cable.name for cable in POSE.arm.cables]
 
 
-def test_tension_is_indexed_by_cable_and_its_values_are_an_array() -> None:
+def test_tensions_and_cables_are_found_by_name() -> None:
     assert dict(PULL) == dict(zip(NAMES, PULL.values.tolist(), strict=True))
-    assert dict(PULL) == {**PULL}
-    assert list(PULL) == NAMES
-    assert len(PULL) == len(NAMES)
     assert PULL[NAMES[3]] == PULL.values[3]
     assert NAMES[0] in PULL
     assert "cable9_9" not in PULL
     np.testing.assert_array_equal(np.asarray(PULL), PULL.values)
-    copy = np.array(PULL)
-    copy[0] = 0.0  # a copy can be written to, the tension is as it was
-    assert PULL.values[0] > 0.0
-    with pytest.raises(cdsm.InvalidInput, match="did you mean"):
-        _ = PULL["cabel1_1"]
     with pytest.raises(cdsm.InvalidInput, match=r"By index there is the array tension\.values"):
         _ = PULL[0]  # type: ignore[index]
-    np.testing.assert_array_equal(cdsm.stiffness(POSE, np.array(PULL)).joint, K.joint)
-
-
-def test_cables_of_an_arm_are_found_by_number_and_by_name() -> None:
     cables = POSE.arm.cables
     assert cables[NAMES[2]] is cables[2]
     assert cables.names == tuple(NAMES)
-    assert cables == tuple(cables)
     assert cables[:2] == tuple(cables)[:2]
-    assert POSE.arm.with_cables(cables) == POSE.arm
     assert POSE.arm.with_cables(cables[0]).cables == (cables[0],)
-    with pytest.raises(cdsm.InvalidInput, match="no cable is called 'cabel1_1'; did you mean"):
-        _ = cables["cabel1_1"]
+    for of in (PULL, cables, K.shares("z")):
+        with pytest.raises(cdsm.InvalidInput, match="did you mean"):
+            _ = of["cabel1_1"]
 
 
 def test_moment_arms_times_tensions_are_the_torque_that_balances_gravity() -> None:
@@ -58,9 +45,6 @@ def test_moment_arms_times_tensions_are_the_torque_that_balances_gravity() -> No
     np.testing.assert_allclose(arms.values[:, 1], shorter, atol=1e-6)
     joint = POSE.arm.joint_names[1]
     assert arms[NAMES[0], joint] == arms.values[0, 1]
-    lines = str(arms).splitlines()
-    assert lines[0].split() == list(POSE.arm.joint_names)
-    assert lines[1].split()[:3] == [NAMES[0], *(f"{1e3 * x:z.2f}" for x in arms.values[0, :2])]
     for wrong in ((NAMES[0], "joint9"), ("cable9", joint)):
         with pytest.raises(cdsm.InvalidInput):
             _ = arms[wrong]
@@ -72,30 +56,18 @@ def test_moment_arms_times_tensions_are_the_torque_that_balances_gravity() -> No
 def test_shares_are_printed_by_name_and_add_up() -> None:
     shares = K.shares("z")
     assert list(shares) == NAMES
-    assert NAMES[0] in shares
-    assert "cable9_9" not in shares
     assert shares[NAMES[4]] == shares.cables[4]
     rows = {line.split()[0]: line.split() for line in str(shares).splitlines()[1:-1]}
-    assert rows[NAMES[4]][3] == f"{shares.cables[4] / 1e3:z.4g}"
-    assert rows["total"][1:] == [f"{shares.total / 1e3:.4g}", "100.0%"]
     parts = [float(rows[name][4].rstrip("%")) for name in NAMES]
     parts += [float(rows[name][-1].rstrip("%")) for name in ("gravity", "load")]
     assert sum(parts) == pytest.approx(100.0, abs=0.05 * len(parts))
-    with pytest.raises(cdsm.InvalidInput):
-        _ = shares["cable9"]
 
 
 def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
     geometry = cdsm.Geometry.hinged(
-        joints=3,
-        twist=0.0,
-        cables_per_joint=2,
-        link_length=0.05,
-        base_length=0.03,
-        disk_offset=0.01,
-        hole_radius=0.02,
-        link_mass=0.1,
-    )
+        joints=3, twist=0.0, cables_per_joint=2, link_length=0.05, base_length=0.03,
+        disk_offset=0.01, hole_radius=0.02, link_mass=0.1,
+    )  # fmt: skip
     pose = cdsm.Manipulator(geometry, cdsm.LinearElasticity(5e4)).at([0.2, -0.3, 0.25])
     planar = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 30.0))
     with pytest.raises(cdsm.SingularStiffness):
@@ -105,10 +77,6 @@ def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
     np.testing.assert_allclose(matrix @ C, np.eye(2), atol=1e-12)
     # along a line it is what a weight measures
     assert planar.cartesian_in([[1.0, 0.0, 1.0]])[0, 0] == pytest.approx(planar.along([1, 0, 1]))
-    text = str(planar).splitlines()
-    row = next(line.split()[-3:] for line in text if line.startswith("cartesian"))
-    assert row == [f"{matrix[0, 0] / 1e3:.4g}", "-", f"{matrix[1, 1] / 1e3:.4g}"]
-    assert "inf, -: the tip cannot move along (0, 1, 0)" in text[-2]
     with pytest.raises(cdsm.SingularStiffness, match=r"cannot move along \(0, 1, 0\)"):
         planar.cartesian_in(("x", "y"))
     with pytest.raises(cdsm.InvalidInput, match="not orthogonal"):
@@ -145,29 +113,20 @@ RESULTS: dict[str, Callable[[], Any]] = {
 }
 
 
+ROWS = {"Tension": 9, "Shares": 9, "MomentArms": 9, "WeightTest": 2, "PathPlan": 2}
+
+
 @pytest.mark.parametrize("name", RESULTS)
-def test_results_become_strict_json_with_units_in_the_keys(name: str) -> None:
-    found = RESULTS[name]().to_dict()
-    text = json.dumps(found, allow_nan=False)
-    assert json.loads(text) == found
+def test_results_become_strict_json_and_tables_with_units(name: str) -> None:
+    result = RESULTS[name]()
+    found = result.to_dict()
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
     if name != "Report":
         assert any(key.endswith(("_N", "_m", "_N_per_m", "_rad", "_Hz")) for key in found)
-
-
-@pytest.mark.parametrize(
-    ("name", "rows"),
-    [
-        ("Tension", 9),
-        ("Shares", 9),
-        ("MomentArms", 9),
-        ("WeightTest", 2),
-        ("PathPlan", 2),
-    ],
-)
-def test_tables_have_a_row_for_each_and_units_in_the_columns(name: str, rows: int) -> None:
-    table = RESULTS[name]().to_pandas()
-    assert len(table) == rows
-    assert any("[N" in column or "[m" in column for column in table.columns)
+    if name in ROWS:
+        table = result.to_pandas()
+        assert len(table) == ROWS[name]
+        assert any("[N" in column or "[m" in column for column in table.columns)
 
 
 def test_batch_has_one_row_for_each_posture_in_pandas_and_labels_in_xarray() -> None:

@@ -1,37 +1,18 @@
 """Stiffness: singular, unstable, and infinite in some direction."""
 
-import math
-
 import numpy as np
 import pytest
 
 import cdsm
-from tests.support.arms import (
-    STEEL,
-    random_arm,
-    random_posture,
-    random_tension,
-)
-
-ARM = random_arm(1, 3)
-POSE = random_posture(ARM, 1)
-PULL = cdsm.distribute_tension(POSE, minimum=10.0)
-K = cdsm.stiffness(POSE, PULL)
-GEOMETRY = ARM.geometry
-NAN, INF = math.nan, math.inf
-
-
-def soft_posture() -> cdsm.Posture:
-    """Without gravity an arm on soft cables is stable when slack and buckles under tension."""
-    arm = random_arm(3, 3, elasticity=cdsm.LinearElasticity(2000.0))
-    free = cdsm.Manipulator(arm.geometry, cdsm.LinearElasticity(50.0), gravity=(0.0, 0.0, 0.0))
-    return random_posture(free, 1)
+from tests.support.arms import STEEL, random_arm, random_posture, random_tension
 
 
 def brink() -> cdsm.Stiffness:
-    """The stiffness at the very tension at which the arm buckles, by bisection."""
-    pose = soft_posture()
-    unit = random_tension(pose.arm, 1)
+    """At the very tension at which an arm on soft cables without weight buckles, by bisection."""
+    law = cdsm.LinearElasticity(50.0)
+    arm = cdsm.Manipulator(random_arm(3, 3).geometry, law, gravity=(0.0, 0.0, 0.0))
+    pose = random_posture(arm, 1)
+    unit = random_tension(arm, 1)
 
     def at(scale: float) -> cdsm.Stiffness:
         return cdsm.stiffness(pose, scale * unit)
@@ -54,12 +35,11 @@ def test_stiffness_on_the_brink_of_buckling_is_singular_and_still_prints() -> No
         lambda: brittle.along((0.0, 0.0, 1.0)),
         lambda: brittle.shares((0.0, 0.0, 1.0)),
     ):
-        with pytest.raises(cdsm.SingularStiffness, match=r"singular.*buckle.*Change") as caught:
+        with pytest.raises(cdsm.SingularStiffness, match="buckle") as caught:
             call()
         # the same motion, up to its sign
         assert abs(caught.value.direction @ brittle.critical_direction) == pytest.approx(1.0)
         assert np.linalg.norm(caught.value.direction) == pytest.approx(1.0)
-    assert "smallest joint stiffness" in str(brittle)
     assert "nan" not in str(brittle)
     assert np.isfinite(brittle.pseudoinverse()).all()
 
@@ -74,18 +54,14 @@ def test_a_joint_held_by_nothing_has_no_compliance() -> None:
         cables=(cdsm.CableRoute(joint=1, angle=0.0),),
     )
     pose = cdsm.Manipulator(geometry, STEEL).at([0.0, 0.0])
-    F = np.zeros(1)
-    stiff = cdsm.stiffness(pose, F)
-    with pytest.raises(cdsm.SingularStiffness, match="next to nothing holds the arm") as caught:
-        _ = stiff.compliance
+    with pytest.raises(cdsm.SingularStiffness, match="nothing holds") as caught:
+        _ = cdsm.stiffness(pose, [0.0]).compliance
     np.testing.assert_array_equal(caught.value.direction, [1.0, 0.0])
-    batch = cdsm.evaluate(pose.arm, [pose.q], F[None], outputs=("compliance",))
-    assert batch.status[0] == cdsm.Status.SINGULAR
 
 
 def nearly_flat(size: float) -> cdsm.Stiffness:
     """All but straight beyond a bent first joint: the tip moves along the arm ever less."""
-    arm = cdsm.Manipulator(GEOMETRY, cdsm.LinearElasticity(48e3))
+    arm = cdsm.Manipulator(random_arm(1, 3).geometry, cdsm.LinearElasticity(48e3))
     q = size * np.array([0.0, 0.0, 1.0, -0.7, 0.3, 0.5])
     q[:2] = 0.3, 0.25
     return cdsm.stiffness(arm.at(q), np.full(len(arm.cables), 50.0))

@@ -15,7 +15,7 @@ import yourdfpy
 import cdsm
 from cdsm.support.values import Array
 from cdsm.urdf import CROSS_MASS
-from tests.support.arms import mixed_arm, random_arm
+from tests.support.arms import mixed_arm, random_arm, readme_geometry
 from tests.support.patience import HANGS
 
 ROOT = Path(__file__).parents[2]
@@ -25,20 +25,14 @@ PRESETS: dict[str, Callable[[], cdsm.Geometry]] = {
     "experimental_prototype": cdsm.presets.experimental_prototype_geometry,
 }
 
+TAPER = (0.025, 0.022, 0.02)
 ARMS: dict[str, cdsm.Geometry] = {
     "universal": random_arm(1, 3).geometry,
     "long": random_arm(2, 12).geometry,
     "hinged": random_arm(3, 4, "hinged").geometry,
     "mixed": mixed_arm().geometry,
-    "no base": cdsm.Geometry.universal(
-        joints=2,
-        cables_per_joint=3,
-        link_length=0.05,
-        base_length=0.0,
-        disk_offset=0.01,
-        hole_radius=0.03,
-        link_mass=0.0,
-    ),
+    "no base": readme_geometry(joints=2, base_length=0.0, link_mass=0.0),
+    "taper": readme_geometry(joints=3, hole_radius=TAPER),
 }
 
 CHECK_URDF = shutil.which("check_urdf")
@@ -82,14 +76,6 @@ def eq3(geometry: cdsm.Geometry, theta: Array) -> Array:
     return pose
 
 
-def pinocchio_tip(urdf: str, q: Array) -> Array:
-    model = pin.buildModelFromXML(urdf)
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    pose: Array = data.oMf[model.getFrameId("tool0")].homogeneous
-    return pose.copy()
-
-
 def elements(geometry: cdsm.Geometry, tag: str) -> dict[str, ET.Element]:
     """The links or joints of the URDF by name, which must be unique."""
     found = ET.fromstring(cdsm.to_urdf(geometry)).findall(tag)
@@ -115,40 +101,12 @@ def numbers(text: str) -> list[float]:
 @pytest.mark.parametrize("seed", range(3))
 def test_tip_is_eqs_1_to_4_with_table_1(joints: int, seed: int) -> None:
     arm = random_arm(seed, joints)
-    rng = np.random.default_rng([seed, joints, 7])
-    q = rng.uniform(-1.0, 1.0, arm.nv) * arm.upper
-    expected = eq3(arm.geometry, q)
-    np.testing.assert_allclose(pinocchio_tip(arm.urdf, q), expected, rtol=0.0, atol=1e-14)
-    np.testing.assert_allclose(arm.at(q).tip, expected, rtol=0.0, atol=1e-14)
-
-
-def test_hinge_k_turns_about_its_own_twisted_axis() -> None:
-    twist, length, base = 0.7, 0.05, 0.02
-    geometry = cdsm.Geometry.hinged(
-        joints=3,
-        twist=twist,
-        link_length=length,
-        base_length=base,
-        disk_offset=0.01,
-        hole_radius=0.03,
-        link_mass=0.1,
-    )
-    q = np.array([0.3, -0.2, 0.5])
-    expected = np.eye(4)
-    expected[0, 3] = base
-    for k in range(3):
-        axis = np.array([0.0, math.cos(k * twist), math.sin(k * twist)])
-        step = np.eye(4)
-        step[:3, :3] = pin.exp3(q[k] * axis)
-        step[:3, 3] = step[:3, 0] * length
-        expected = expected @ step
-    np.testing.assert_allclose(
-        pinocchio_tip(cdsm.to_urdf(geometry), q), expected, rtol=0.0, atol=1e-14
-    )
+    q = np.random.default_rng([seed, joints, 7]).uniform(-1.0, 1.0, arm.nv) * arm.upper
+    np.testing.assert_allclose(arm.at(q).tip, eq3(arm.geometry, q), rtol=0.0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_yourdfpy_and_pinocchio_agree_on_every_link(name: str, tmp_path: Path) -> None:
+def test_yourdfpy_and_pinocchio_agree_on_every_link_and_limit(name: str, tmp_path: Path) -> None:
     geometry = ARMS[name]
     path = cdsm.write_urdf(geometry, tmp_path / "arm.urdf")
     model = pin.buildModelFromUrdf(path)
@@ -166,60 +124,41 @@ def test_yourdfpy_and_pinocchio_agree_on_every_link(name: str, tmp_path: Path) -
             rtol=0.0,
             atol=1e-13,
         )
+    both = zip(geometry.joints, geometry.joint_limits, strict=True)
+    limits = np.array([limit for joint, limit in both for _ in joint.axes])
+    np.testing.assert_array_equal(model.upperPositionLimit, limits)
+    np.testing.assert_array_equal(model.lowerPositionLimit, -limits)
+    assert (model.upperEffortLimit > 0.0).all()
+    assert (model.upperVelocityLimit > 0.0).all()
 
 
 # --- what is in the file --------------------------------------------------------------------
 
 
 def test_names_of_a_mixed_arm() -> None:
-    links = list(elements(mixed_arm().geometry, "link"))
-    assert links == [
-        "base_link",
-        "base_disk",
-        "cross1",
-        "link1",
-        "link2",
-        "cross3",
-        "link3",
-        "tool0",
-    ]
+    links = "base_link base_disk cross1 link1 link2 cross3 link3 tool0"
+    assert list(elements(mixed_arm().geometry, "link")) == links.split()
     joints = ["joint1_1", "joint1_2", "joint2", "joint3_1", "joint3_2"]
     assert list(elements(mixed_arm().geometry, "joint"))[1:-1] == joints
     assert mixed_arm().joint_names == tuple(joints)
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_limits_are_those_of_the_geometry(name: str) -> None:
+@pytest.mark.parametrize("name", ["mixed", "taper"])
+def test_link_is_a_solid_cylinder_of_the_hole_radius_about_mid_link_or_a_milligram(
+    name: str,
+) -> None:
     geometry = ARMS[name]
-    limits = [
-        limit
-        for joint, limit in zip(geometry.joints, geometry.joint_limits, strict=True)
-        for _ in joint.axes
-    ]
-    moving = [j for j in elements(geometry, "joint").values() if j.attrib["type"] == "revolute"]
-    assert len(moving) == len(limits)
-    for joint, limit in zip(moving, limits, strict=True):
-        written = child(joint, "limit").attrib
-        assert float(written["lower"]) == -limit
-        assert float(written["upper"]) == limit
-        assert float(written["effort"]) > 0.0
-        assert float(written["velocity"]) > 0.0
-
-
-def test_link_is_a_solid_cylinder_of_the_hole_radius_about_mid_link_or_a_milligram() -> None:
-    geometry = mixed_arm().geometry
     links = elements(geometry, "link")
-    R = geometry.hole_radius
-    for k, link in enumerate(geometry.links, start=1):
-        if link.mass == 0.0:
-            mass = child(links[f"link{k}"], "inertial/mass")
-            assert float(mass.attrib["value"]) == CROSS_MASS == 1e-6
-            continue
+    for k, (link, R) in enumerate(zip(geometry.links, geometry.hole_radii, strict=True), start=1):
         inertial = child(links[f"link{k}"], "inertial")
+        mass = float(child(inertial, "mass").attrib["value"])
+        if link.mass == 0.0:
+            assert mass == CROSS_MASS == 1e-6
+            continue
+        assert mass == link.mass
         origin = child(inertial, "origin").attrib
         assert numbers(origin["xyz"]) == [link.length / 2.0, 0.0, 0.0]
         assert not any(numbers(origin["rpy"]))
-        assert float(child(inertial, "mass").attrib["value"]) == link.mass
         inertia = {key: float(v) for key, v in child(inertial, "inertia").attrib.items()}
         across = link.mass * (3.0 * R**2 + link.length**2) / 12.0
         assert inertia["ixx"] == pytest.approx(link.mass * R**2 / 2.0, rel=1e-15)
@@ -227,7 +166,16 @@ def test_link_is_a_solid_cylinder_of_the_hole_radius_about_mid_link_or_a_milligr
         assert inertia["ixy"] == inertia["ixz"] == inertia["iyz"] == 0.0
 
 
-# --- reading back ---------------------------------------------------------------------------
+def test_disks_are_drawn_with_the_radii_of_their_joints() -> None:
+    geometry = readme_geometry(joints=3, hole_radius=TAPER, disk_radius=[0.03, 0.026, 0.021])
+    links = elements(geometry, "link")
+    drawn = [
+        (name, float(child(child(visual, "geometry"), "cylinder").attrib["radius"]))
+        for name in ("base_disk", "link1", "link2", "link3")
+        for visual in links[name].findall("visual")
+        if child(visual, "material").attrib["name"] == "disk"
+    ]
+    assert drawn == [(disk.link, disk.radius) for disk in geometry.disks]
 
 
 def test_disagreement_on_reading_back_is_reported_and_nothing_is_written(
@@ -245,16 +193,12 @@ def test_disagreement_on_reading_back_is_reported_and_nothing_is_written(
     assert path.read_text() == "what was there"
 
 
-# --- shipped files --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", PRESETS)
 def test_shipped_files_are_what_the_generator_writes(name: str, tmp_path: Path) -> None:
     geometry = PRESETS[name]()
-    shipped = ROOT / "urdf"
     toml = geometry.write(tmp_path / f"{name}.toml")
     urdf = cdsm.write_urdf(geometry, tmp_path / f"{name}.urdf")
     if CHECK_URDF:  # Debian: liburdfdom-tools
         subprocess.run([CHECK_URDF, str(urdf)], capture_output=True, timeout=HANGS, check=True)
-    assert (shipped / toml.name).read_bytes() == toml.read_bytes()
-    assert (shipped / urdf.name).read_bytes() == urdf.read_bytes()
+    for path in (toml, urdf):
+        assert (ROOT / "urdf" / path.name).read_bytes() == path.read_bytes()

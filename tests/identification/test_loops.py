@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import cdsm
 from cdsm.identification import WeightLoop, identify
 from cdsm.identification.problem import Problem
-from tests.support.coverage import Experiment
 
 TRUE = {"friction": 0.1, "rigidity": 48e3}
 FREE = {"friction": (0.0, 0.5), "rigidity": (1e4, 2e5)}
@@ -89,9 +89,18 @@ def test_jacobian_is_the_derivative_of_the_residuals() -> None:
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     """Of friction and of rigidity, in 200 experiments of two loops each."""
     planned = [replace(loop, forces=(0.0, 12.0, 24.0, 12.0, 0.0)) for loop in PLANNED]
-    seeds, arm = 200, Experiment(hinge, planned, TRUE, FREE)
-    held = [arm.held(np.random.default_rng([seed, 20])) for seed in range(seeds)]
-    shares = np.mean([list(each.values()) for each in held], axis=0)
+    held = []
+    for seed in range(200):
+        problem = Problem(hinge, None, measured(seed, planned), FREE)
+        truth = problem.point(np.array(list(TRUE.values())))
+        best = problem.search(truth, coarse=True)
+        # an interval holds a value if Δχ² with the parameter fixed there is at most its level²
+        for i in range(truth.size):
+            fixed = best.copy()
+            fixed[i] = truth[i]
+            fixed = problem.search(fixed, np.flatnonzero(np.arange(truth.size) != i), coarse=True)
+            held.append(problem.cost(fixed) - problem.cost(best) <= norm.ppf(0.975) ** 2)
+    shares = np.reshape(held, (-1, 2)).mean(axis=0)
     assert ((shares >= 0.91) & (shares <= 0.98)).all(), shares
 
 
@@ -102,10 +111,7 @@ ONE = replace(PLANNED[0], forces=(0.0, 5.0)).simulated(hinge())
     ("bad", "said"),
     [
         (lambda: replace(PLANNED[0], forces=(5.0, 5.0, 5.0)), "forces.*at least two sizes"),
-        (
-            lambda: replace(PLANNED[0], displacements=(1e-3, 2e-3)),
-            r"displacements.*\(2,\).*\(7,\).*\(7, 3\)",
-        ),
+        (lambda: replace(PLANNED[0], displacements=(1e-3, 2e-3)), r"displacements.*\(7, 3\)"),
         (lambda: replace(PLANNED[0], minimum=None), "tension.*neither"),
         (lambda: identify(hinge, PLANNED, FREE), r"measurements\[0\]: at 0.45 has no readings"),
         (lambda: identify(hinge, [ONE], FREE), "1 independent reading given for 2 .*, friction"),

@@ -1,4 +1,4 @@
-"""Loops of weight tests from CSV files."""
+"""Loops of weight tests and positions of tips from CSV files."""
 
 from pathlib import Path
 
@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm import TipPosition
 from tests.identification.test_loops import hinge
+from tests.identification.test_tip_position import ROD
 
 GOOD = """\
 # any comment
@@ -24,6 +26,12 @@ def read(tmp_path: Path, text: str, **options: object) -> tuple[cdsm.WeightLoop,
     path.write_text(text, encoding="utf-8")
     options = {"displacement_std": 5e-6} | options
     return cdsm.read_loops(path, hinge(), **options)  # type: ignore[arg-type]
+
+
+def tips(tmp_path: Path, text: str) -> tuple[TipPosition, ...]:
+    path = tmp_path / "tips.csv"
+    path.write_text(text, encoding="utf-8")
+    return cdsm.read_tip_positions(path, ROD, std=1e-3)
 
 
 def test_loops_come_out_in_si(tmp_path: Path) -> None:
@@ -59,10 +67,7 @@ def test_three_axes_measured_tensions_and_tests_without_readings(tmp_path: Path)
         ("force [N]", "force [kg]", r"force \[N\]"),
         (",-z,", ",down,", "line 3, column direction.*'down'.*-z"),
         ("up,,,,0,", "up,21,,,0,", "line 5, column joint1.*'21'.*'20'"),
-        (
-            *("side,-10,z,150,0,0,\nside,-10,z,150,5", "s,9,z,9,0,0,\ns,,,,5,0,\nup,,,,5"),
-            "line 8.*up.*goes on",
-        ),
+        ("side,-10,z,150,5", "side,-10,z,150,5,0.1,\nup,,,,5", "line 8.*up.*goes on"),
         ("side,-10,z,150,5", "side,-10,z,150,0", "test side.*two sizes"),
         ("displacement [mm]", "displacement [m]", "test up.*0.249 m, more than the arm is"),
         ("remark", "cable1_1 [N]", "minimum and cable1_1"),
@@ -72,3 +77,32 @@ def test_three_axes_measured_tensions_and_tests_without_readings(tmp_path: Path)
 def test_faults_name_line_and_column(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(cdsm.FileError, match=f"(?s)loops.csv.*{said}"):
         read(tmp_path, GOOD.replace(old, new, 1))
+
+
+HEAD = "label,x [mm],z [mm],cable3_1 [mm],cable3_2 [mm]\n"
+
+
+def test_positions_come_out_in_si(tmp_path: Path) -> None:
+    one, two = tips(tmp_path, f"{HEAD}a,90,5,3,\nb,,6,0,2\n")
+    assert one == TipPosition(x=0.09, z=5e-3, pull={"cable3_1": 3e-3}, std=1e-3, label="a")
+    assert two == TipPosition(z=6e-3, pull={"cable3_1": 0.0, "cable3_2": 2e-3}, std=1e-3, label="b")
+    (pulled,) = tips(tmp_path, "x [m],cable3_3 [N]\n0.09,2\n")
+    assert pulled == TipPosition(x=0.09, tension={"cable3_3": 2.0}, std=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (f"{HEAD}a,90,5,3 mm,\n", "line 2, column cable3_1: '3 mm'"),
+        (f"{HEAD}a,nan,5,3,\n", "line 2, column x: 'nan'"),
+        (f"{HEAD}a,,,3,\n", "line 2: no coordinate was measured"),
+        ("x [mm],cable3_9 [mm]\n90,3\n", "column cable3_9, which is not known"),
+        ("x [mm]\n90\n", "one of a cable, such as cable3_1"),
+        ("x,cable3_1 [mm]\n90,3\n", "column x has no unit"),
+        ("x [mm],cable3_1 [mm],cable3_2 [N]\n90,3,2\n", r"call it cable3_2 \[mm\]"),
+        (HEAD, "holds no positions"),
+    ],
+)
+def test_faults_of_positions_name_line_and_column(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(cdsm.FileError, match=said):
+        tips(tmp_path, text)

@@ -90,12 +90,10 @@ def test_jacobian_is_the_derivative_of_the_residuals_and_gives_the_covariance() 
     scale = np.outer(NOISY.std, NOISY.std)
     np.testing.assert_allclose(NOISY.covariance / scale, np.linalg.inv(J.T @ J) / scale, rtol=1e-6)
     np.testing.assert_allclose(NOISY.correlation, NOISY.covariance / scale, rtol=1e-12)
-    pairs = [each for each in NOISY.warnings if "are correlated at" in each]
-    assert any(each.startswith("hole_radius and drive") for each in pairs)
     for i, j in zip(*np.triu_indices(3, 1), strict=True):
         r = NOISY.correlation[i, j]
         named = f"{NOISY.names[i]} and {NOISY.names[j]} are correlated at {r:+.4f}"
-        assert any(each.startswith(named) for each in pairs) == (abs(r) > 0.95)
+        assert any(each.startswith(named) for each in NOISY.warnings) == (abs(r) > 0.95)
 
 
 def shifted(pose: cdsm.Posture, m: Measurement, factor: float = 1.0, **given: float) -> Array:
@@ -133,10 +131,8 @@ def test_parameters_that_only_act_together_are_named() -> None:
     exact = measured(by_product(area=1e-6, modulus=5e10, hole_radius=0.03))
     found = identify(by_product, exact, free)
     assert found.rank == 2
-    sentence = next(each for each in found.warnings if "not identifiable (rank 2 of 3)" in each)
-    assert "area" in sentence
-    assert "modulus" in sentence
-    assert "hole_radius" not in sentence
+    (sentence,) = (each for each in found.warnings if "not identifiable (rank 2 of 3)" in each)
+    assert [name in sentence for name in free] == [True, True, False]
     i, j, k = (found.names.index(name) for name in free)
     assert np.isinf(found.std[[i, j]]).all()
     assert found.correlation[i, j] == pytest.approx(-1.0)
@@ -166,19 +162,17 @@ def test_a_model_that_ends_before_the_optimum_is_said() -> None:
         model_of, measured(prototype(lead=0.4)), {"lead": (0.05, 1.0)}, start={"lead": 0.1}
     )
     assert 0.29 < found.parameters["lead"] <= 0.3
-    sentence = next(each for each in found.warnings if "no optimum within the bounds" in each)
-    assert "the tube is not that long" in sentence
+    assert any("the tube is not that long" in each for each in found.warnings)
     assert found.confidence()["lead"][1] == math.inf
 
 
 def test_measurements_that_the_model_does_not_explain_are_named() -> None:
     wrong = [*EXACT[:4], replace(EXACT[4], value=2.0 * EXACT[4].value), *EXACT[5:]]
     found = identify(prototype, wrong, FREE)
-    sentence = next(each for each in found.warnings if "does not explain" in each)
-    assert "posture 5" in sentence
+    assert any("does not explain" in each and "posture 5" in each for each in found.warnings)
 
 
-ONE = {"hole_radius": (0.02, 0.05)}
+ONE, SOFT = {"hole_radius": (0.02, 0.05)}, {"drive": (1.0, 50.0)}
 
 
 def searched(free: Any = ONE, model_of: Any = prototype, **changes: Any) -> Identification:
@@ -198,17 +192,11 @@ CASES: dict[str, tuple[Callable[[], object], str]] = {
     "model": (lambda: searched(model_of=lambda hole_radius: 3), "model_of: 3.*a Manipulator"),
     "tensions": (lambda: searched(tension=(5.0,) * 4), r"posture 1.*\(4,\) given, \(6,\)"),
     "domain": (lambda: searched(tension=(900.0,) * 6), "posture 1.*tension 900.*810 N"),
-    "direction": (
-        lambda: searched(direction=(1.0, 0.0, 0.0), angles=(0.0,) * 3),
-        "posture 1: the tip cannot move in its direction",
-    ),
-    "buckling": (
-        lambda: searched({"drive": (1.0, 50.0)}, tension=(700.0,) * 6),
-        "posture 1: the arm buckles",
-    ),
+    "way": (lambda: searched(direction=(1, 0, 0), angles=(0.0,) * 3), "posture 1: .*cannot move"),
+    "buckling": (lambda: searched(SOFT, tension=(700.0,) * 6), "posture 1: the arm buckles"),
     "start": (
         lambda: identify(prototype, EXACT, ONE, start={"hole_radius": 0.1}),
-        r"start\['hole_radius'\]: 0.1 is outside the bounds 0.02 to 0.05",
+        r"start\['hole_radius'\]: 0.1 is outside",
     ),
     "level": (lambda: NOISY.confidence(95.0), "level: 95.*0.95"),
 }

@@ -170,21 +170,19 @@ def test_csv_holds_every_sample_with_its_units_bit_by_bit(tmp_path: Path) -> Non
         rows = list(csv.DictReader(file))
     assert [row["status"] for row in rows] == ["planned", "stiffness", "planned"]
     assert rows[1]["reason"] == plan.infeasible[0].reason
-    names = [cable.name for cable in cables]
-    held = [name for name in names if name != "cable2_1"]
-    columns = {
-        "": (arm.joint_names, "rad", plan.angles),
-        "tensions": (names, "N", plan.tensions),
-        "cable_lengths": (names, "m", plan.cable_lengths),
-        "rest_lengths": (held, "m", plan.rest_lengths),
-        "tips": ("xyz", "m", plan.tips),
-    }
+    held = [name for name in arm.cables.names if name != "cable2_1"]
     for k, row in enumerate((rows[0], rows[2])):
-        for kind, (each, unit, values) in columns.items():
-            told = [float(row[f"{kind} {name} [{unit}]".strip()]) for name in each]
+        for kind, names, unit, values in (
+            ("", arm.joint_names, "rad", plan.angles),
+            ("tensions ", arm.cables.names, "N", plan.tensions),
+            ("cable_lengths ", arm.cables.names, "m", plan.cable_lengths),
+            ("rest_lengths ", held, "m", plan.rest_lengths),
+            ("tips ", "xyz", "m", plan.tips),
+        ):
+            told = [float(row[f"{kind}{name} [{unit}]"]) for name in names]
             np.testing.assert_array_equal(told, values[k])
         assert float(row["achieved [N/m]"]) == plan.achieved[k]
-    assert not any("rest_lengths cable2_1" in column for column in rows[0])
+    assert "rest_lengths cable2_1 [m]" not in rows[0]
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,13 @@ STRAND_ARM = cdsm.presets.virtual_prototype()
 STRAND_POSE = STRAND_ARM.at(np.full(10, 0.1))
 NAN, INF = math.nan, math.inf
 NAMES = ARM.cables.names
+
+
+COUNTS: dict[str, Callable[[Any], object]] = {
+    "steps: .* from 1 to 1000": lambda n: cdsm.weight_test(POSE, PULL, (0.0, 0.0, -1.0), steps=n),
+    f"count: .* from 1 to {2**30}": cdsm.RandomPoses,
+    f"count: .* from 2 to {2**30}": lambda n: cdsm.PathPoses(np.eye(2), n),
+}
 
 
 def except_at(size: int, index: int, value: object, fill: float = 0.0) -> list[Any]:
@@ -62,8 +70,17 @@ def cable(*sites: cdsm.Site, **options: Any) -> Callable[[], object]:
     return lambda: cdsm.Cable(sites=sites or (BASE, END), **given)
 
 
-def distribute(**options: Any) -> Callable[[], object]:
-    return lambda: cdsm.distribute_tension(POSE, **options)
+def distribute(pose: cdsm.Posture = POSE, **options: Any) -> Callable[[], object]:
+    return lambda: cdsm.distribute_tension(pose, **options)
+
+
+def own(**bound: float) -> cdsm.Posture:
+    """Of an arm whose first cable has a bound of its own."""
+    return ARM.with_cables([replace(ARM.cables[0], **bound), *ARM.cables[1:]]).at(POSE.q)  # type: ignore[arg-type]
+
+
+def routed(*sites: cdsm.Site) -> Callable[[], object]:
+    return manipulator(cables=[cdsm.Cable("a", sites, STEEL)])
 
 
 def stiffness(*args: Any, pose: cdsm.Posture = POSE) -> Callable[[], object]:
@@ -83,21 +100,9 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], str]] = {
         ("gravity", manipulator(STEEL, gravity=(0.0, NAN, 0.0)), r"gravity: entry \[1\] is nan"),
         ("no cables", manipulator(cables=()), "cables: none given.*at least one"),
         ("cables a number", lambda: ARM.with_cables(5), "cables: .*list or tuple of Cable"),  # type: ignore[arg-type]
-        (
-            "one name",
-            manipulator(cables=[cdsm.Cable("a", (BASE, END), STEEL)] * 2),
-            "cable 'a'.*used twice",
-        ),
-        (
-            "lost link",
-            manipulator(cables=[cdsm.Cable("a", (BASE, LOST), STEEL)]),
-            "cable 'a'.*'lnk1'.*did you mean 'link1'.*Known: base_link, base_disk",
-        ),
-        (
-            "one place",
-            manipulator(cables=[cdsm.Cable("a", (BASE, BASE, END), STEEL)]),
-            "cable 'a'.*sites 1 and 2 coincide.*leave one out",
-        ),
+        ("one name", manipulator(cables=[ARM.cables[0]] * 2), "cable 'cable1_1'.*used twice"),
+        ("lost link", routed(BASE, LOST), "'lnk1'.*did you mean 'link1'.*Known: base_link"),
+        ("one place", routed(BASE, BASE, END), "cable 'a'.*sites 1 and 2 coincide"),
         ("site", lambda: cdsm.Site("link1", (0.0, NAN, 0.0)), r"position: entry \[1\] is nan"),
         ("site of a number", lambda: cdsm.Site(3, (0.0, 0.0, 0.0)), "link: 3.*a name is needed"),  # type: ignore[arg-type]
         ("site unprintable", lambda: cdsm.Site("a\n", (0.0,) * 3), "character 2 cannot be pri"),
@@ -106,6 +111,10 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], str]] = {
         ("control", cable(control="frce"), "cable 'a'.*'frce'.*did you mean 'force'?"),
         ("spring", cable(series_stiffness=0.0), "cable 'a'.*series_stiffness: 0 N/m.*or inf is"),
         ("lead", cable(lead=-1.0), "cable 'a'.*lead"),
+        ("stiff spring", cable(series_stiffness=1e13), r"series_stiffness.*to 1e\+12 N/m, or inf"),
+        ("own maximum", cable(maximum=1e-10), "maximum.*or inf"),
+        ("own minimum", cable(minimum=-1.0), "minimum.*-1 N given; cables only pull"),
+        ("own minimum nan", cable(minimum=NAN), "minimum.*nan"),
         ("link of a pose", lambda: POSE.link_pose("tol0"), "'tol0'.*did you mean 'tool0'?"),
         ("pose", lambda: cdsm.distribute_tension(3), "pose: 3.*Posture is needed"),  # type: ignore[arg-type]
         ("minimum", distribute(minimum=except_at(C, 3, -1.0)), f"minimum: -1 N.*{NAMES[3]}"),
@@ -116,23 +125,45 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], str]] = {
         (
             "bounds",
             distribute(minimum=5.0, maximum=except_at(C, 2, 3.0, 9.0)),
-            f"maximum: 3 N.*{NAMES[2]}.*below 5 N.*raise the one or lower the other",
+            f"maximum: 3 N.*{NAMES[2]}.*below 5 N",
         ),
+        (
+            "above own",
+            distribute(own(maximum=30.0), minimum=40.0),
+            "30 N .*own maximum.*below 40",
+        ),
+        ("below own", distribute(own(minimum=50.0), maximum=40.0), "40 N .*below 50 N .*own minim"),
+        ("fixed lost", distribute(fixed={"cable1_9": 5.0}), "did you mean"),
+        ("fixed pushes", distribute(fixed={NAMES[1]: -0.5}), "-0.5 N given"),
+        ("fixed list", distribute(fixed=[5.0, 5.0]), "give a dict"),
         ("solver", distribute(solver="dapq"), "solver.*'dapq'.*did you mean 'daqp'?.*Known: "),
         ("tension scalar", stiffness(5.0), rf"tension: shape \(\).*\({C},\) needed.*per cable"),
         ("slack", stiffness(except_at(C, 5, -2.5, 1.0)), f"-2.5 N.*{NAMES[5]}.*only pull"),
         ("another posture", stiffness(PULL, pose=ARM.at(0.5 * POSE.q)), "another posture"),
-        (
-            "another arm",
-            stiffness(PULL, pose=ARM.with_gravity((0.0, 0.0, 1.0)).at(POSE.q)),
-            "tension: was distributed for another arm.*with_gravity",
-        ),
+        ("another arm", stiffness(PULL, pose=ARM.with_gravity("z").at(POSE.q)), "for another arm"),
         ("two wrenches", stiffness(PULL, np.zeros(6)), "wrench.*comes with the Tension"),
         ("no way", lambda: K.along((0.0, 0.0, 0.0)), "direction: .*zero vector"),
         ("way of two", lambda: K.shares((1.0, 0.0)), r"direction: .*shape \(2,\)"),
         ("term", lambda: K.pseudoinverse("activ"), "'activ'.*did you mean 'active'?.*passive"),  # type: ignore[arg-type]
+        # what no machine has is refused with the range
+        ("huge gravity", manipulator(STEEL, gravity=(0.0, 0.0, -9810.0)), "up to 1000 m/s²"),
+        ("huge q", lambda: ARM.at(np.full(6, 1e300), check_limits=False), r"q: .* up to 1e\+15"),
+        ("huge wrench", stiffness(np.ones(C), np.full(6, 1e10)), r"wrench: .* 1e\+09 N"),
+        ("huge minimum", distribute(minimum=1e10), r"minimum: .*newtons from 1e-09 to 1e\+09"),
+        ("huge EA", lambda: cdsm.LinearElasticity(1e13), r"1e\+13 N given; 1e-06 to 1e\+12 N"),
+        ("far site", lambda: cdsm.Site("link1", (0.0, 1e5, 0.0)), "position: .* up to 10000 m"),
     )
 } | {
+    "heavy link": (
+        lambda: cdsm.Link(length=0.1, mass=1e7),
+        cdsm.GeometryError,
+        r"1e\+07 kg given; 0, or",
+    ),
+    "fixed too high": (
+        distribute(maximum=800.0, fixed={NAMES[1]: 4000.0}),
+        cdsm.InfeasibleTension,
+        "joint",
+    ),
     "a path": (lambda: ARM.with_cables(""), cdsm.FileError, "'': is an empty path"),
     "above the law": (
         stiffness(except_at(15, 14, 900.0, 50.0), pose=STRAND_POSE),
@@ -191,20 +222,23 @@ def test_later_changes_to_the_callers_arrays_change_nothing() -> None:
     assert (pull.wrench == own.wrench).all()
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (manipulator(STEEL, gravity=(0.0, 0.0, -9810.0)), r"\[2\] is -9810; .* up to 1000 m/s²"),
-        (lambda: ARM.at(np.full(6, 1e300), check_limits=False), r"q: .* up to 1e\+15"),
-        (stiffness(np.ones(C), np.full(6, 1e10)), r"wrench: .* 1e\+09 N"),
-        (distribute(minimum=1e10), r"minimum: .* is 1e\+10; give newtons from 1e-09 to 1e\+09"),
-        (lambda: cdsm.LinearElasticity(1e13), r"1e\+13 N given; 1e-06 to 1e\+12 N"),
-        (lambda: cdsm.Site("link1", (0.0, 1e5, 0.0)), r"position: .* up to 10000 m"),
-        (lambda: cdsm.Link(length=0.1, mass=1e7), r"1e\+07 kg given; 0, or 1e-09 to 1e\+06 kg"),
-    ],
-)
-def test_what_no_machine_has_is_refused_with_the_range(
-    call: Callable[[], object], message: str
-) -> None:
-    with pytest.raises(cdsm.CdsmError, match=message):
-        call()
+@pytest.mark.parametrize("said", COUNTS)
+def test_a_count_is_bounded_and_a_flag_is_true_or_false(said: str) -> None:
+    given: Any
+    for given in (10**30, 0, 2.0, True):
+        with pytest.raises(cdsm.InvalidInput, match=f"^{said} is needed"):
+            COUNTS[said](given)
+    for given in (np.array([True, False]), 1):
+        with pytest.raises(cdsm.InvalidInput, match=r"^check_limits: .*True or False is needed"):
+            ARM.at(POSE.q, check_limits=given)
+    ARM.at(POSE.q, check_limits=np.True_)  # type: ignore[arg-type]
+
+
+def test_tables_of_pandas_are_the_numbers_they_hold() -> None:
+    pandas: Any = pytest.importorskip("pandas")
+    q, tension = np.tile(POSE.q, (3, 1)), np.tile(PULL.values, (3, 1))
+    angles = pandas.DataFrame(q, columns=ARM.joint_names)
+    found = cdsm.evaluate(ARM, angles, pandas.DataFrame(tension))
+    np.testing.assert_array_equal(found["tip"], cdsm.evaluate(ARM, q, tension)["tip"])
+    with pytest.raises(cdsm.InvalidInput, match="q: holds object entries"):
+        cdsm.evaluate(ARM, angles.astype(object), tension)

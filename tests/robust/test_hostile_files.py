@@ -1,5 +1,7 @@
 """URDFs that could crash Pinocchio or fill the memory, and files that cannot be read."""
 
+import errno
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -7,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import cdsm
+from cdsm.support.files import write_file
 from tests.support.foreign import TREE, crab
 from tests.support.patience import HANGS
 
@@ -27,11 +30,17 @@ def test_entities_are_not_expanded(entities: str, tmp_path: Path) -> None:
         cdsm.Manipulator.from_urdf(path, crab().cables, tip="tip")
 
 
-def test_a_folder_a_missing_file_and_bytes_are_named(tmp_path: Path) -> None:
-    (tmp_path / "binary.toml").write_bytes(b"\x00\x01\x02")
-    for name, said in (("", "regular file"), ("no.toml", "not exist"), ("binary.toml", "binary")):
-        with pytest.raises(cdsm.FileError, match=said):
-            cdsm.Geometry.read(tmp_path / name)
+def test_a_full_disk_leaves_the_file_as_it_was(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text("old", encoding="utf-8")
+
+    def full(aside: Path) -> None:
+        aside.write_text("half", encoding="utf-8")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(cdsm.FileError, match="cannot be written: No space left on device"):
+        write_file(path, full)
+    assert [each.read_text(encoding="utf-8") for each in tmp_path.iterdir()] == ["old"]
 
 
 _CRASH = """
@@ -40,17 +49,13 @@ import cdsm
 warnings.simplefilter("ignore", cdsm.CdsmWarning)
 from tests.support.foreign import joint_element, link_element
 
-def chain(count, kind):
+def tree(count, parent, kind="revolute"):
+    #Links and joints of a tree, whose joint i hangs on the link of this number.
     links = [link_element(f"l{i}") for i in range(count + 1)]
     joints = [
-        joint_element(f"j{i}", kind if i else "revolute", f"l{i}", f"l{i + 1}", *PLACE)
+        joint_element(f"j{i}", kind if i else "revolute", f"l{parent(i)}", f"l{i + 1}", *PLACE)
         for i in range(count)
     ]
-    return "".join([*links, *joints])
-
-def star(count):
-    links = [link_element(f"l{i}") for i in range(count + 1)]
-    joints = [joint_element(f"j{i}", "revolute", "l0", f"l{i + 1}", *PLACE) for i in range(count)]
     return "".join([*links, *joints])
 
 PLACE = ("0.1 0 0", "0 0 0", "0 1 0")
@@ -58,9 +63,9 @@ two = link_element("l0") + link_element("l1")
 hinge = joint_element("j", "revolute", "l0", "l1", *PLACE)
 heavy = link_element("l0") + link_element("l1", 1.0)
 ROBOTS = {
-    "400 universal joints": chain(800, "revolute"),
-    "4500 fixed joints": chain(4500, "fixed"),
-    "3000 branches": star(3000),
+    "400 universal joints": tree(800, lambda i: i),
+    "4500 fixed joints": tree(4500, lambda i: i, "fixed"),
+    "3000 branches": tree(3000, lambda i: 0),
     "a circle": two + hinge + joint_element("k", "revolute", "l1", "l0", *PLACE),
     "a loop": two + hinge + joint_element("k", "revolute", "l1", "l1", *PLACE),
     "two parents": two + hinge + joint_element("k", "revolute", "l0", "l1", *PLACE),

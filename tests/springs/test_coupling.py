@@ -150,13 +150,3 @@ def test_files_hold_followers_and_springs(tmp_path: Path) -> None:
 def test_couplings_that_cannot_be_are_named(follows: dict[str, str], said: str) -> None:
     with pytest.raises(cdsm.GeometryError, match=said):
         robot(follows)
-
-
-def test_followers_are_drawn() -> None:
-    pose = ARM.at([0.1] * ARM.nv)
-    assert pose.joint_positions.shape == (ARM.nv, 3)
-    np.testing.assert_array_equal(pose.bones[-1][1], pose.tip[:3, 3])
-    for leader, joint in zip(ARM.joint_names, pose.joint_positions, strict=True):
-        place = FREE.at(np.asarray(ARM._body.coupling.angles(pose.q)))
-        np.testing.assert_allclose(joint, place.joint_positions[FREE.joint_names.index(leader)])
-    pose.plot()

@@ -8,6 +8,7 @@ import pytest
 
 import cdsm
 from cdsm.support.values import Array
+from tests.support.arms import readme_geometry
 
 LAW = cdsm.LinearElasticity(2e4)
 TENSION = np.array([8.0, 0.0, 3.0])
@@ -16,13 +17,11 @@ WRENCH = np.array([0.3, 0.2, -0.1, 0.01, 0.0, 0.02])
 
 def section() -> cdsm.Manipulator:
     """Eight universal joints with springs, moved by the three cables of the last one."""
-    arm = cdsm.Manipulator(
-        cdsm.Geometry.universal(
-            joints=8, cables_per_joint=3, link_length=0.05, base_length=0.02, disk_offset=0.01,
-            hole_radius=0.01, link_mass=0.01, lead=0.1, joint_stiffness=0.5, joint_limit=1.0,
-        ),
-        LAW,
+    geometry = readme_geometry(
+        joints=8, link_length=0.05, base_length=0.02, disk_offset=0.01, hole_radius=0.01,
+        link_mass=0.01, lead=0.1, joint_stiffness=0.5, joint_limit=1.0,
     )  # fmt: skip
+    arm = cdsm.Manipulator(geometry, LAW)
     return arm.with_cables([each for each in arm.cables if each.name.startswith("cable8")])
 
 

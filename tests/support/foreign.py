@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 import cdsm
-from cdsm.support.values import Array
 
 _INERTIAL = (
     '<inertial><origin xyz="{1} 0.01 -0.02" rpy="0.3 0.2 0.1"/><mass value="{0}"/>'
@@ -85,27 +84,3 @@ def crab(law: cdsm.Elasticity | None = None, **options: Any) -> cdsm.Manipulator
 
 POSTURE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 0.2])
 TENSION = np.array([30.0, 25.0, 40.0, 15.0, 50.0, 22.0, 18.0, 35.0, 28.0])
-
-
-def energy(arm: cdsm.Manipulator, force: Array, reference: cdsm.Posture, F: Array) -> Any:
-    """Total potential of cables (linear laws), weight and tip force, by its parts."""
-    from lxml import etree
-
-    masses = []
-    for link in etree.fromstring(arm.urdf.encode()).findall("link"):
-        inertial = link.find("inertial")
-        if inertial is not None:
-            place = [float(x) for x in inertial.find("origin").get("xyz").split()]
-            masses.append((link.get("name"), float(inertial.find("mass").get("value")), place))
-    k = cdsm.stiffness(reference, F).cable_stiffness
-
-    def total(q: Array) -> Array:
-        pose = arm.at(q, check_limits=False)
-        longer = pose.cable_lengths - reference.cable_lengths
-        value = float(F @ longer + k @ longer**2 / 2.0) - float(force @ pose.tip[:3, 3])
-        for name, mass, place in masses:
-            frame = pose.link_pose(name)
-            value -= mass * float(arm.gravity @ (frame[:3, :3] @ place + frame[:3, 3]))
-        return np.array(value)
-
-    return total

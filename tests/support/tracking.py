@@ -8,6 +8,7 @@ import cdsm
 from cdsm import presets
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support.values import Array
+from tests.support.arms import readme_geometry
 
 WANTED = 4000.0
 """Stiffness along z [N/m] of :func:`circle`."""
@@ -24,16 +25,7 @@ def small_path(
     friction: float = 0.0, lead: float = 0.1, target: float | tuple[float, ...] = 15e3
 ) -> PathPlan:
     """Two universal joints with the strand of Eq. 19; three samples of a bend."""
-    geometry = cdsm.Geometry.universal(
-        joints=2,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=0.02,
-        link_mass=0.05,
-        lead=lead,
-    )
+    geometry = readme_geometry(joints=2, hole_radius=0.02, link_mass=0.05, lead=lead)
     arm = cdsm.Manipulator(geometry, presets.STRAND_1X19).with_friction(friction)
     angles = np.deg2rad([[6.0, -4.0, 5.0, 3.0], [7.0, -3.0, 6.0, 3.0], [8.0, -2.0, 7.0, 3.0]])
     return cdsm.plan_path(arm, "z", target, 10.0, 250.0, angles=angles)
@@ -42,16 +34,7 @@ def small_path(
 @cache
 def circle(friction: float, samples: int = 13) -> PathPlan:
     """Five universal joints, whose tip draws a circle of 15 mm at 4 N/mm along z."""
-    geometry = cdsm.Geometry.universal(
-        joints=5,
-        cables_per_joint=3,
-        link_length=0.06,
-        base_length=0.03,
-        disk_offset=0.012,
-        hole_radius=0.02,
-        link_mass=0.05,
-        lead=0.1,
-    )
+    geometry = readme_geometry(joints=5, hole_radius=0.02, link_mass=0.05, lead=0.1)
     arm = cdsm.Manipulator(geometry, presets.STRAND_1X19).with_friction(friction)
     bent = np.deg2rad(np.tile([6.0, -4.0], 5))
     turn = np.linspace(0.0, 2.0 * np.pi, samples)

@@ -17,6 +17,7 @@ import cdsm
 DATA = Path(__file__).parents[1] / "data"
 INSTRON, ZWICK = DATA / "instron_strand.csv", DATA / "zwick_seil.csv"
 GERMAN = ("Standardweg", "Standardkraft")
+CHOSEN = ("stroke [mm]", "Load")
 HALF: dict[str, Any] = {"gauge_length": 0.5}
 
 
@@ -62,14 +63,8 @@ def test_encodings(encoding: str, tmp_path: Path) -> None:
         ("Tensile strain (Extension) [%],Extension [mm],Load [N]\n0,0,0\n9,1.5,100\n", HALF),
         ("Displacement (Strain 1)\tLoad\n(mm)\t(N)\n0\t0\n1.5\t100\n", HALF),
         ("Extension at Maximum Load [mm];Extension [mm];Load [N]\n9;0;0\n9;1.5;100\n", HALF),
-        (
-            "Extension [in];Extension [mm];Load [N]\n9;0;0\n9;1,5;100\n",
-            {"columns": ("extension [mm]", "Load"), **HALF},
-        ),
-        (
-            "Extension [m];Load [N]\n0;0\n0,0015;1,000e2\nstopped by hand\n",
-            HALF,
-        ),
+        ("Stroke [in];Stroke [mm];Load [N]\n9;0;0\n9;1,5;100\n", {"columns": CHOSEN, **HALF}),
+        ("Extension [m];Load [N]\n0;0\n0,0015;1,000e2\nstopped by hand\n", HALF),
         ("Stroke [µm];Load [N]\n0;0\n1.500,00;100\n", {"decimal": ",", **HALF}),
         ('Stroke [um],Load [N]\n0,0\n"1,500.0",100\nEnd of test,\n', {"decimal": ".", **HALF}),
     ],
