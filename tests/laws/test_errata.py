@@ -86,15 +86,6 @@ def test_eq19_as_printed_is_negative_from_11_newton() -> None:
     assert (eq19_as_printed(np.linspace(11.01, 31.0, 500)) < 0.0).all()
 
 
-@pytest.mark.parametrize(("first", "below"), [(-1e-3, "-787883.6"), (-1e-4, "10869.71")])
-def test_eq19_whose_branches_do_not_meet_is_refused_with_both_values(
-    first: float, below: str
-) -> None:
-    lower, upper = EQ19_PRINTED
-    with pytest.raises(cdsm.InvalidInput, match=f"{below}.* N below, 1135.*TabulatedElasticity"):
-        cdsm.StrandElasticity(((*lower[:-1], first), upper), (31.0,), 2.2, 810.0)
-
-
 def test_eq19_repaired_has_the_printed_digits() -> None:
     """Each coefficient rounds to what is printed; of the first, −1e-4 in place of −1e-3."""
     forms = (("5.2f",) * 5 + (".2e", ".0e"), (".1f", ".2f", ".2f", ".4f", ".2e", ".2e", ".2e"))
