@@ -8,9 +8,9 @@ import pytest
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm import presets
 from cdsm.support.values import Array
 from tests.support import arms
+from tests.support.locked import hinge
 from tests.support.rough import rough
 
 EA = 48e3
@@ -18,19 +18,15 @@ LAW = cdsm.LinearElasticity(EA)
 Posed = tuple[cdsm.Posture, Array]
 
 
-def prototype(friction: float, lead: float = 0.3) -> Posed:
-    arm = presets.virtual_prototype(LAW, lead=lead, friction=friction)
-    pose = arm.at(np.full(10, presets.TEN_DEGREES))
-    return pose, cdsm.distribute_tension(pose, 50.0).values
+def prototype(friction: float) -> Posed:
+    pose, pull = arms.prototype(LAW, lead=0.3, friction=friction)
+    return pose, pull.values
 
 
 def two_hinges(friction: float) -> Posed:
-    geometry = cdsm.Geometry.hinged(
-        joints=2, twist=0.0, cables_per_joint=2, link_length=0.06, base_length=0.02,
-        disk_offset=0.012, hole_radius=0.025, link_mass=0.0, lead=0.3, spread=0.02,
-        friction=friction,
-    )  # fmt: skip
-    pose = cdsm.Manipulator(geometry, LAW, gravity=(0.0, 0.0, 0.0)).at(np.deg2rad([15.0, 15.0]))
+    sizes = {"link_length": 0.06, "disk_offset": 0.012, "hole_radius": 0.025, "lead": 0.3}
+    arm = hinge(joints=2, law=LAW, spread=0.02, friction=friction, **sizes)
+    pose = arm.at(np.deg2rad([15.0, 15.0]))
     return pose, cdsm.distribute_tension(pose, 50.0).values
 
 
@@ -118,12 +114,6 @@ def test_histories_stay_within_the_band() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("friction", [0.05, 0.1])
-def test_a_thousand_histories_stay_within_the_band(friction: float) -> None:
-    assert 0.6 < farthest(prototype(friction), 60.0, range(1000)) < 1.02
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(("friction", "limit", "beyond"), [(0.1, 1.02, 0.0), (0.2, 1.1, 0.01)])
 def test_random_arms_stay_within_the_band(friction: float, limit: float, beyond: float) -> None:
     far = []
@@ -145,21 +135,10 @@ def test_band_near_buckling_warns() -> None:
     pose = arm.at(np.full(arm.nv, 0.1))
     critical = cdsm.critical_tension(pose).minimum
     near = cdsm.rest_band(pose, cdsm.distribute_tension(pose, 0.99 * critical), "z")
-    assert near.warnings
     assert near.warnings[0].startswith("FAR TOO WIDE")
-    assert str(near).startswith("FAR TOO WIDE")
 
 
 def test_without_friction_there_is_one_rest() -> None:
     pose, F = prototype(0.0)
     band = cdsm.rest_band(pose, F, "z")
     assert band.low == band.high == band.breakaway == 0.0
-    assert "±0 mm" in str(band)
-
-
-def test_bad_input_is_named() -> None:
-    pose, F = prototype(0.1)
-    with pytest.raises(cdsm.InvalidInput, match="direction"):
-        cdsm.rest_band(pose, F, (0.0, 0.0, 0.0))
-    with pytest.raises(cdsm.InvalidInput, match="tension: shape"):
-        cdsm.rest_band(pose, F[1:], "z")

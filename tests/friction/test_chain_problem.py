@@ -37,7 +37,7 @@ class Chains(NamedTuple):
         return w.rest_length - natural, (w.spring + natural * w.softness) / stretch
 
 
-def random_chains(seed: int, count: int, most: int = 16) -> Chains:
+def random_chains(seed: int, count: int, most: int) -> Chains:
     """Chains near a state that friction allows: also without friction, slack, springs, forces."""
     rng = np.random.default_rng(seed)
     sizes = rng.integers(1, most + 1, count)
@@ -104,16 +104,13 @@ def check_optimality(chains: Chains) -> tuple[int, int]:
     return slack, int(slides.sum())
 
 
-def test_random_chains_meet_the_optimality_conditions() -> None:
-    slack, sliding = check_optimality(random_chains(0, 800))
-    assert slack > 25
-    assert sliding > 800
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(1, 6))
-def test_twenty_thousand_chains_meet_the_optimality_conditions(seed: int) -> None:
-    check_optimality(random_chains(seed, 4000, most=24))
+@pytest.mark.parametrize(
+    ("count", "most"), [(800, 16), pytest.param(20_000, 24, marks=pytest.mark.long)]
+)
+def test_random_chains_meet_the_optimality_conditions(count: int, most: int) -> None:
+    slack, sliding = check_optimality(random_chains(0, count, most))
+    assert slack > count / 32
+    assert sliding > count
 
 
 # --- one hole in closed form ----------------------------------------------------------------
@@ -126,15 +123,8 @@ def capstan(
     ones, zero = np.ones(2), np.zeros(2)
     length, softness = 0.1 * ones, ones / 1000.0
     natural = length / (1.0 + 50.0 * softness)
-    wire = Wire(
-        np.array([0.1, 0.1 + pulled]),
-        natural,
-        ones,
-        softness,
-        zero,
-        zero,
-        np.exp(mu * angle * ones),
-    )
+    rho = np.exp(mu * angle * ones)
+    wire = Wire(np.array([0.1, 0.1 + pulled]), natural, ones, softness, zero, zero, rho)
     return Chains(np.array([0, 2]), np.array([np.nan]), wire, 50.0 * ones).solve()
 
 

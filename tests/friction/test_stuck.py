@@ -184,19 +184,13 @@ def test_stuck_arms_are_never_softer(seeds: range) -> None:
 
 
 def test_lead_and_motor_control_do_not_count_while_cables_stick() -> None:
-    q = np.full(10, np.deg2rad(10.0))
     F = np.linspace(40.0, 120.0, 15)
-    K = [
-        cdsm.stuck_stiffness(arm.at(q), F).joint
-        for lead in (0.1, 0.3)
-        for arm in [presets.virtual_prototype(LAW, lead=lead, friction=0.1)]
-    ]
-    arm = presets.virtual_prototype(LAW, lead=0.3, friction=0.1)
-    forced = [replace(cable, control="force", series_stiffness=1e3) for cable in arm.cables]
-    K.append(cdsm.stuck_stiffness(arm.with_cables(forced).at(q), F).joint)
-    K.append(cdsm.stuck_stiffness(presets.virtual_prototype(LAW, friction=0.1).at(q), F).joint)
-    for other in K[1:]:
-        np.testing.assert_allclose(other, K[0], rtol=1e-12, atol=1e-12 * abs(K[0]).max())
+    poses = [arms.prototype(LAW, lead=lead, friction=0.1)[0] for lead in (0.0, 0.1, 0.3)]
+    forced = [replace(c, control="force", series_stiffness=1e3) for c in poses[-1].arm.cables]
+    poses += [poses[-1].arm.with_cables(forced).at(poses[-1].q)]
+    K, *others = [cdsm.stuck_stiffness(pose, F).joint for pose in poses]
+    for other in others:
+        np.testing.assert_allclose(other, K, rtol=1e-12, atol=1e-12 * abs(K).max())
 
 
 NUMBERS = {
@@ -216,28 +210,44 @@ def test_numbers_of_the_virtual_prototype(case: tuple[float, float]) -> None:
     """
     lead, bound = case
     for original, off in (("stretched", 0.014), ("unstrained", 0.05)):
-        arm = presets.virtual_prototype(lead=lead, friction=0.1, original_length=original)  # type: ignore[arg-type]
-        pose = arm.at(np.full(10, np.deg2rad(10.0)))
-        pull = cdsm.distribute_tension(pose, minimum=bound)
+        options: Any = {"lead": lead, "friction": 0.1, "original_length": original}
+        pose, pull = arms.prototype(minimum=bound, **options)
         free, stuck = cdsm.stiffness(pose, pull), cdsm.stuck_stiffness(pose, pull)
         for K, expected in zip((free, stuck), NUMBERS[case], strict=True):
             found = [K.along(axis) / 1000.0 for axis in "xyz"]
             np.testing.assert_allclose(found, expected, rtol=off)
 
 
-def test_bad_input_is_named() -> None:
-    pose, F, _ = posed("mixed", 0.1)
-    with pytest.raises(cdsm.InvalidInput, match="pose: 3 given"):
-        cdsm.stuck_stiffness(3, F)  # type: ignore[arg-type]
-    with pytest.raises(cdsm.InvalidInput, match=r"tension: shape \(2,\)"):
-        cdsm.stuck_stiffness(pose, [1.0, 2.0])
-    with pytest.raises(
-        cdsm.InvalidInput, match=r"tension: .* given for cable1_1; cables only pull"
-    ):
-        cdsm.stuck_stiffness(pose, -F)
+STUCK_POSE, STUCK_F, _ = posed("mixed", 0.1)
+STRAND_POSE, _, _ = posed("mixed", 0.1, elasticity=presets.STRAND_1X19)
+ASKED: dict[str, Any] = {
+    "stuck_stiffness": cdsm.stuck_stiffness,
+    "breakaway": lambda pose, F: cdsm.breakaway(pose, F, "z"),
+    "rest_band": lambda pose, F: cdsm.rest_band(pose, F, "z"),
+}
+
+
+@pytest.mark.parametrize("asked", ASKED)
+@pytest.mark.parametrize(
+    ("pose", "tension", "error", "said"),
+    [
+        (3, STUCK_F, cdsm.InvalidInput, "pose: 3 given"),
+        (STUCK_POSE, [1.0, 2.0], cdsm.InvalidInput, r"tension: shape \(2,\)"),
+        (STUCK_POSE, -STUCK_F, cdsm.InvalidInput, "given for cable1_1; cables only pull"),
+        (STRAND_POSE, 0.0 * STUCK_F + 0.5, cdsm.ElasticityRangeError, "cable1_1"),
+    ],
+)
+def test_bad_input_is_named(
+    asked: str, pose: Any, tension: Any, error: type[cdsm.CdsmError], said: str
+) -> None:
+    with pytest.raises(error, match=said):
+        ASKED[asked](pose, tension)
+
+
+def test_what_needs_the_frictionless_stiffness_and_no_direction_are_refused() -> None:
     for use in (cdsm.stiffness_gradient, cdsm.Stiffness.report):
         with pytest.raises(cdsm.InvalidInput, match="cables are stuck; give a frictionless K"):
-            use(cdsm.stuck_stiffness(pose, F))
-    strand = rough(plain_arm("mixed"), 0.1, elasticity=presets.STRAND_1X19)
-    with pytest.raises(cdsm.ElasticityRangeError, match="cable1_1"):
-        cdsm.stuck_stiffness(strand.at(pose.q), np.full(len(F), 0.5))
+            use(cdsm.stuck_stiffness(STUCK_POSE, STUCK_F))
+    for ask in (cdsm.breakaway, cdsm.rest_band):
+        with pytest.raises(cdsm.InvalidInput, match="direction: is the zero vector"):
+            ask(STUCK_POSE, STUCK_F, (0.0, 0.0, 0.0))

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from lxml import etree
@@ -15,9 +16,10 @@ from cdsm.interchange.mjcf import write_mjcf
 from cdsm.interchange.mjcf_bodies import add_bodies, mass_matrix
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture, random_wrench, readme_geometry
-from tests.support.foreign import POSTURE, TENSION, crab
-
-mujoco: Any = pytest.importorskip("mujoco")
+from tests.support.differences import central_difference
+from tests.support.foreign import POSTURE, TENSION, crab, joint_element, link_element
+from tests.support.locked import hinge
+from tests.support.mujoco_arms import mass, tendon_jacobian
 
 DATA = Path(__file__).parents[1] / "data"
 NOTHING = np.zeros(6)
@@ -60,20 +62,15 @@ def two_links(
         f'<inertial><origin xyz="{center} 0 0.01" rpy="0.3 0.2 0.1"/><mass value="{mass}"/>{body}'
         "</inertial>"
     )
-
-    def joint(name: str, parent: str, child: str, x: float, axis: str) -> str:
-        return (
-            f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
-            f'<origin xyz="{x} 0 0"/><axis xyz="{axis}"/>'
-            '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-        )
-
-    urdf = (
-        '<robot name="two"><link name="floor"/><link name="middle"/>'
-        f'<link name="hand">{inertial if body else ""}</link>'
-        f"{joint('a', 'floor', 'middle', 0.1, '0 1 0')}"
-        f"{joint('b', 'middle', 'hand', far, '0 0 1' if far else '0 1 0')}</robot>"
-    )
+    parts = [
+        link_element("floor"),
+        link_element("middle"),
+        f'<link name="hand">{inertial if body else ""}</link>',
+        joint_element("a", "revolute", "floor", "middle", "0.1 0 0", "0 0 0", "0 1 0"),
+        joint_element(
+            "b", "revolute", "middle", "hand", f"{far} 0 0", "0 0 0", "0 0 1" if far else "0 1 0"
+        ),
+    ]
     ways = [(0.02, 0.02), (-0.02, 0.02), (0.02, -0.02)]
     cables = [
         cdsm.Cable(
@@ -84,6 +81,7 @@ def two_links(
         for to in ("middle", "hand")
         for i, (y, z) in enumerate(ways)
     ]
+    urdf = f'<robot name="two">{"".join(parts)}</robot>'
     return cdsm.Manipulator.from_urdf(urdf, cables, tip="hand", check_inertia=False)
 
 
@@ -106,12 +104,6 @@ def soft() -> tuple[cdsm.Posture, Array]:
     changes: list[dict[str, Any]] = [{"control": "force"}, {"series_stiffness": 200.0}, {}]
     cables = [replace(cable, **changes[c % 3]) for c, cable in enumerate(pose.arm.cables)]
     return pose.arm.with_cables(cables).at(pose.q), pull
-
-
-def hinged(joints: int, **changes: Any) -> cdsm.Manipulator:
-    sizes: dict[str, Any] = {"link_length": 0.03, "base_length": 0.02, "disk_offset": 0.005}
-    sizes |= {"joints": joints, "twist": 0.0, "hole_radius": 0.008, "link_mass": 0.02}
-    return cdsm.Manipulator(cdsm.Geometry.hinged(**(sizes | changes)), cdsm.LinearElasticity(2e3))
 
 
 ARMS: dict[str, Any] = {
@@ -137,29 +129,21 @@ def test_balance_and_stiffness_are_those_of_mujoco(name: str, actuators: str) ->
     for c, cable in enumerate(arm.cables):
         length = float(data.tendon(cable.name).length[0]) + cable.lead
         assert length == pytest.approx(pose.cable_lengths[c], abs=1e-14)
-    np.testing.assert_allclose(moment_arms(model, data)[:, place], pose.length_jacobian, atol=1e-14)
+    np.testing.assert_allclose(
+        tendon_jacobian(model, data)[:, place], pose.length_jacobian, atol=1e-14
+    )
     K = cdsm.stiffness(pose, F, wrench=wrench)
 
-    def slope(h: float) -> Array:
-        ends = [[q + e, q - e] for e in h * np.eye(q.size)]
-        of = [[net_torque(model, data, x, arm.tip_link, wrench) for x in pair] for pair in ends]
-        return np.stack([high - low for high, low in of], axis=1) / (2.0 * h)
+    def torque(x: Array) -> Array:
+        return net_torque(model, data, x, arm.tip_link, wrench)
 
-    missing = net_torque(model, data, q, arm.tip_link, wrench)[place] - K.residual
+    missing = torque(q)[place] - K.residual
     scale = float(abs(F @ abs(pose.length_jacobian)).max())
     assert abs(missing).max() < 1e-9 * max(1.0, scale)
-    h = 2.0**-12
-    extrapolated = (4.0 * slope(h / 2.0) - slope(h)) / 3.0
+    coarse, fine = (central_difference(torque, q, h) for h in (2.0**-12, 2.0**-13))
+    extrapolated = (4.0 * fine - coarse) / 3.0
     near = {"rtol": 0.0, "atol": 1e-8 * abs(K.joint).max()}
     np.testing.assert_allclose(extrapolated[np.ix_(place, place)], K.joint, **near)
-
-
-def moment_arms(model: Any, data: Any) -> Array:
-    """J_L (C, nv) of MuJoCo, which stores it sparse."""
-    J = np.zeros((model.ntendon, model.nv))
-    for c, (start, count) in enumerate(zip(model.ten_J_rowadr, model.ten_J_rownnz, strict=True)):
-        J[c, model.ten_J_colind[start : start + count]] = data.ten_J[start : start + count]
-    return J
 
 
 # --- time step ------------------------------------------------------------------------------
@@ -170,23 +154,16 @@ def universal(joints: int, link_mass: float) -> cdsm.Manipulator:
     return cdsm.Manipulator(geometry, cdsm.presets.STRAND_1X19)
 
 
+DOWN = (0.0, 0.0, -9.81)
+FINGER = {"link_length": 0.03, "disk_offset": 0.005, "hole_radius": 0.008, "link_mass": 0.02}
+HEAVY = {"link_length": 0.4, "disk_offset": 0.05, "hole_radius": 0.1, "link_mass": 20.0}
 HELD: dict[str, tuple[cdsm.Manipulator, Array, float]] = {
     "README's arm": (universal(4, 0.12), np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]), 50.0),
-    "finger": (hinged(3), np.deg2rad([20.0, 30.0, 20.0]), 5.0),
-    "heavy and soft": (
-        hinged(2, link_mass=20.0, link_length=0.4, hole_radius=0.1, disk_offset=0.05),
-        np.deg2rad([5.0, 5.0]),
-        10.0,
-    ),
+    "finger": (hinge(joints=3, gravity=DOWN, **FINGER), np.deg2rad([20.0, 30.0, 20.0]), 5.0),
+    "heavy and soft": (hinge(joints=2, gravity=DOWN, **HEAVY), np.deg2rad([5.0, 5.0]), 10.0),
     "massless links": (universal(2, 0.0), np.deg2rad([5.0, -3, 5, -3]), 20.0),
 }
 SECONDS = 0.5
-
-
-def mass(model: Any, data: Any) -> Array:
-    M = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, M)
-    return M
 
 
 @pytest.mark.parametrize("name", HELD)
@@ -303,20 +280,28 @@ def test_modes_decay_as_stated(mode: int, ratio: float | None) -> None:
     assert decay == pytest.approx(wanted, rel=0.05 + omega * model.opt.timestep)
 
 
-def test_bad_input_is_named(tmp_path: Path) -> None:
+FINGER_POSE, FINGER_PULL = finger()
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "said"),
+    [
+        ((FINGER_POSE, FINGER_PULL), {"actuators": "lenght"}, "did you mean 'length'"),
+        ((FINGER_POSE, FINGER_PULL), {"damping_ratio": -0.1}, "damping_ratio: -0.1 given"),
+        ((FINGER_POSE, FINGER_PULL), {"damping": 0.1, "damping_ratio": 0.1}, "not both"),
+        ((), {"actuators": "length"}, "give pose and tension"),
+        ((random_posture(mixed_arm(), 1), FINGER_PULL), {}, "another arm"),
+    ],
+)
+def test_bad_input_is_named(given: Any, options: dict[str, Any], said: str) -> None:
+    with pytest.raises(cdsm.CdsmError, match=said):
+        cdsm.to_mjcf(FINGER_POSE.arm, *given, **options)
+
+
+def test_what_is_written_says_what_it_lacks(tmp_path: Path) -> None:
     pose, pull = finger()
     path = write_mjcf(pose.arm, tmp_path / "arm.xml", pose, pull)
     assert path.read_text(encoding="utf-8") == cdsm.to_mjcf(pose.arm, pose, pull)
-    given: Any
-    for given, options, said in (
-        ((pose.arm, pose, pull), {"actuators": "lenght"}, "did you mean 'length'"),
-        ((pose.arm, pose, pull), {"damping_ratio": -0.1}, "damping_ratio: -0.1 given"),
-        ((pose.arm, pose, pull), {"damping": 0.1, "damping_ratio": 0.1}, "not both"),
-        ((pose.arm,), {"actuators": "length"}, "give pose and tension"),
-        ((mixed_arm(), pose, pull), {}, "another arm"),
-    ):
-        with pytest.raises(cdsm.CdsmError, match=said):
-            cdsm.to_mjcf(*given, **options)
     bare = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(pose.arm))  # its tendons only lie there
     assert not bare.tendon_stiffness.any()
     wrong = cdsm.to_mjcf(pose.arm, pose, pull + 3.0 * np.eye(6)[0])

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from functools import cache
-from itertools import combinations, pairwise
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +12,12 @@ from lxml import etree
 
 import cdsm
 from cdsm.support.values import Array
-from tests.support.differences import assert_second_order
 
 data: Any = pytest.importorskip("example_robot_data", reason="the extra [robots] is not installed")
 pin: Any = pytest.importorskip("pinocchio")
 pytestmark = pytest.mark.filterwarnings("ignore::cdsm.errors.CdsmWarning")
 
 FOLDER = Path(data.robots_loader.getModelPath("ur_description"))
-ROBOTS = {
-    "ur5": ("ur_description/urdf/ur5_robot.urdf", "tool0",
-        ("base_link", "shoulder_link", "upper_arm_link", "forearm_link", "wrist_1_link")),
-    "finger_edu": ("finger_edu_description/robots/finger_edu.urdf", "finger_tip_link",
-        ("finger_base_link", "finger_upper_link", "finger_middle_link", "finger_lower_link")),
-    "double_pendulum": ("double_pendulum_description/urdf/double_pendulum.urdf", "link2",
-        ("base_link", "link1", "link2")),
-}  # fmt: skip
 
 
 def tendon(name: str, links: Sequence[str], points: Iterable[Iterable[float]]) -> cdsm.Cable:
@@ -34,19 +25,7 @@ def tendon(name: str, links: Sequence[str], points: Iterable[Iterable[float]]) -
     return cdsm.Cable(name, tuple(sites), cdsm.LinearElasticity(5e4), lead=0.3)
 
 
-def robot(name: str) -> cdsm.Manipulator:
-    """It, with a cable from each link to the next and one over all of them, on two sides."""
-    file, tip, links = ROBOTS[name]
-    rng = np.random.default_rng(1)
-    cables = [
-        tendon(f"{side}{i}", way, rng.uniform(-0.06, 0.06, (len(way), 3)))
-        for side in ("left", "right")
-        for i, way in enumerate([*pairwise(links), links])
-    ]
-    return cdsm.Manipulator.from_urdf(FOLDER / file, cables, tip=tip)
-
-
-def hand(_: str) -> cdsm.Manipulator:
+def hand() -> cdsm.Manipulator:
     """The Allegro hand: a flexor along the pads and an extensor along the back of three fingers."""
     cables = []
     for finger in range(3):
@@ -59,7 +38,7 @@ def hand(_: str) -> cdsm.Manipulator:
     return cdsm.Manipulator.from_urdf(file, cables, tip="link_3.0_tip", check_inertia=False)
 
 
-def gripper_arm(_: str) -> cdsm.Manipulator:
+def gripper_arm() -> cdsm.Manipulator:
     """The Panda: cables in pairs along its links, and one that closes the coupled fingers."""
     links = [f"panda_link{k}" for k in range(8)]
     cables = [
@@ -80,46 +59,6 @@ def inside(arm: cdsm.Manipulator) -> Array:
     return np.clip(np.linspace(0.4, -0.3, arm.nv), arm.lower, arm.upper)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_lengths_and_stiffness_are_those_of_differences(name: str) -> None:
-    arm = robot(name)
-    pose = arm.at(q := inside(arm))
-    tension = np.linspace(20.0, 60.0, len(arm.cables))
-
-    def lengths(at: Array) -> Array:
-        return arm.at(at, check_limits=False).cable_lengths
-
-    assert_second_order(lengths, pose.length_jacobian, q, step=2.0**-10, tolerance=1e-8)
-    K = cdsm.stiffness(pose, tension)
-
-    def torque(at: Array) -> Array:
-        there = arm.at(at, check_limits=False)
-        F = tension + K.cable_stiffness * (there.cable_lengths - pose.cable_lengths)
-        return F @ there.length_jacobian + there.gravity_torque
-
-    assert_second_order(torque, K.joint, q, step=2.0**-10, size=100.0, tolerance=1e-7)
-
-
-@pytest.mark.parametrize("name", [*ROBOTS, *BY_HAND])
-def test_mujoco_agrees(name: str) -> None:
-    mujoco: Any = pytest.importorskip("mujoco")
-    arm = BY_HAND.get(name, robot)(name)
-    pose = arm.at(inside(arm))
-    tension = np.linspace(20.0, 60.0, len(arm.cables))
-    model = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(arm, pose, tension))
-    state = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, state, 0)
-    mujoco.mj_forward(model, state)
-    theirs = state.qfrc_bias - state.qfrc_passive - state.qfrc_actuator
-    place = [model.joint(joint).dofadr[0] for joint in arm._body.all_joints]
-    theirs, coupling = theirs[place], arm._body.coupling
-    assert model.neq == len(place) - arm.nv
-    if coupling:  # equations of MuJoCo hold the followers
-        assert not state.efc_pos[: state.ne].any()
-        theirs = theirs @ coupling.matrix
-    np.testing.assert_allclose(theirs, cdsm.stiffness(pose, tension).residual, atol=1e-9)
-
-
 # --- robots with cables from anywhere to anywhere -------------------------------------------------
 
 FILES = {str(path.relative_to(FOLDER)): path for path in sorted(FOLDER.rglob("*.urdf"))}
@@ -136,6 +75,7 @@ DIFFERENCES = (
     *("baxter", "bravo7_gripper", "double_pendulum_continuous", "kinova", "panda", "pr2"),
     *("tiago_pro", "talos_left_arm", "talos_reduced", "icub_reduced"),
 )
+MUJOCO = ("ur5_robot", "finger_edu", "double_pendulum")
 COUNT = 5
 
 
@@ -165,11 +105,35 @@ def test_public_robots_are_read_or_refused_by_name() -> None:
     assert sum(coupled) >= 20
 
 
+def posed(name: str) -> cdsm.Manipulator:
+    files = {path.stem: each for each, path in FILES.items()}
+    return BY_HAND[name]() if name in BY_HAND else anyhow(files[name])
+
+
+@pytest.mark.parametrize("name", [*BY_HAND, *MUJOCO])
+def test_mujoco_agrees(name: str) -> None:
+    mujoco: Any = pytest.importorskip("mujoco")
+    arm = posed(name)
+    pose = arm.at(inside(arm))
+    tension = np.linspace(20.0, 60.0, len(arm.cables))
+    model = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(arm, pose, tension))
+    state = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, state, 0)
+    mujoco.mj_forward(model, state)
+    theirs = state.qfrc_bias - state.qfrc_passive - state.qfrc_actuator
+    place = [model.joint(joint).dofadr[0] for joint in arm._body.all_joints]
+    theirs, coupling = theirs[place], arm._body.coupling
+    assert model.neq == len(place) - arm.nv
+    if coupling:  # equations of MuJoCo hold the followers
+        assert not state.efc_pos[: state.ne].any()
+        theirs = theirs @ coupling.matrix
+    np.testing.assert_allclose(theirs, cdsm.stiffness(pose, tension).residual, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", [*BY_HAND, *DIFFERENCES])
 def test_stiffness_is_that_of_pinocchio_s_placements(name: str) -> None:
     """Fourth-order second differences of the potential, over placements of the whole model."""
-    files = {path.stem: each for each, path in FILES.items()}
-    arm = BY_HAND[name](name) if name in BY_HAND else anyhow(files[name])
+    arm = posed(name)
     q, F = inside(arm), np.linspace(20.0, 60.0, len(arm.cables))
     K = cdsm.stiffness(arm.at(q), F)
     model = pin.buildModelFromXML(arm.urdf, mimic=True)  # its own reading of followers

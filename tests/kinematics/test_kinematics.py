@@ -13,6 +13,7 @@ from cdsm.kinematics import KinematicSolution, _residual
 from cdsm.support.values import Array
 from tests.support import foreign
 from tests.support.arms import STEEL, random_arm, readme_geometry
+from tests.support.locked import hinge
 
 KINDS = ("universal", "hinged", "tree")
 TOUCHING = 1e-5  # part of a limit at which disks touch that solutions keep off it
@@ -20,9 +21,7 @@ TOUCHING = 1e-5  # part of a limit at which disks touch that solutions keep off 
 
 def planar_arm(joints: int) -> cdsm.Manipulator:
     """Hinges about y only: the arm moves in the plane of x and z."""
-    disks: dict[str, Any] = {"disk_offset": 0.01, "hole_radius": 0.02, "joint_limit": 0.9}
-    links: dict[str, Any] = {"link_length": 0.1, "base_length": 0.04, "link_mass": 0.1, "lead": 0.3}
-    return cdsm.Manipulator(cdsm.Geometry.hinged(joints=joints, twist=0.0, **disks, **links), STEEL)
+    return hinge(0.9, joints=joints, base_length=0.04, hole_radius=0.02, lead=0.3)
 
 
 def random_tree(seed: int, joints: int) -> cdsm.Manipulator:
@@ -78,24 +77,6 @@ def least_distance(found: KinematicSolution, start: Array) -> float:
 
 def distance(found: KinematicSolution) -> float:
     return float(np.linalg.norm(found.angles - found.guess))
-
-
-# --- cable lengths from joint angles ------------------------------------------------------------
-
-
-def test_eq8_cable_lengths_of_one_hinge_in_closed_form() -> None:
-    arm = planar_arm(1)
-    q, h, R = 0.35, 0.01, 0.02
-    # the chord between two disks; turning about y lifts +z away from what is ahead
-    bend = np.array([1.0, -1.0]) * R * math.sin(q / 2)
-    chord = 2.0 * (h * math.cos(q / 2) + bend)
-    lengths = arm.cable_lengths([q])
-    np.testing.assert_allclose(sorted(lengths), sorted(0.3 + chord), rtol=0.0, atol=1e-16)
-    # the shorter one is on the side that the arm turns to: −z for a positive turn about y
-    bottom = int(np.argmin([path[0, 2] for path in arm.at([q]).cable_paths]))
-    assert lengths[bottom] == lengths.min()
-    np.testing.assert_array_equal(lengths, arm.at([q]).cable_lengths)
-    assert not lengths.flags.writeable
 
 
 # --- solved targets ------------------------------------------------------------------------------
@@ -210,7 +191,6 @@ def test_hinge_stops_at_its_limit_below_target_and_lengths_that_it_cannot_have()
     assert found.angles == -0.9
     assert found.at_limit == ("joint1",)
     assert found.position_error == pytest.approx(0.2 * math.sin((math.pi / 2 - 0.9) / 2))
-    assert "NOT REACHABLE: the tip is 66 mm off its target" in str(found)
     straight = arm.cable_lengths([0.0])
     away = arm.cable_lengths([0.9]) - straight
     found = cdsm.solve_joint_angles(arm, straight + 1.5 * away)
@@ -219,7 +199,6 @@ def test_hinge_stops_at_its_limit_below_target_and_lengths_that_it_cannot_have()
     # both cables longer than straight: by symmetry the straight arm is the nearest
     found = cdsm.solve_joint_angles(arm, straight + 1e-3, guess=[0.1])
     assert found.angles == pytest.approx(0.0, abs=1e-6)
-    assert f"{arm.cables.names[0]} is off most, by -1 mm" in str(found)
 
 
 @pytest.mark.parametrize("kind", KINDS)

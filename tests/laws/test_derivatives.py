@@ -63,6 +63,42 @@ def pose(request: pytest.FixtureRequest) -> cdsm.Posture:
     return POSTURES[request.param]()
 
 
+W, FORCE, MOMENT = arms.random_wrench(3), np.repeat([1.0, 0.0], 3), np.repeat([0.0, 1.0], 3)
+
+
+def _pull(pose: cdsm.Posture) -> Array:
+    return arms.random_tension(pose.arm, 3)
+
+
+def _turning(pose: cdsm.Posture) -> Array:
+    """∂R/∂θ_i of the tip: the cross product of ω_i with each of its axes, (3, 3, nv)."""
+    R = pose.tip[:3, :3]
+    return np.cross(pose.jacobian[3:].T[:, None, :], R.T[None, :, :]).transpose(2, 1, 0)
+
+
+def _load(wrench: Array) -> tuple[Quantity, Quantity]:
+    def term(pose: cdsm.Posture) -> Array:
+        return cdsm.stiffness(pose, _pull(pose), wrench=wrench).load
+
+    return lambda pose: -pose.jacobian.T @ wrench, term
+
+
+DERIVATIVES: dict[str, tuple[Quantity, Quantity]] = {
+    "J_L of the lengths": (lambda p: p.cable_lengths, lambda p: p.length_jacobian),
+    "H_L of J_L": (lambda p: p.length_jacobian, lambda p: p.length_hessian),
+    "J_X of the tip's place": (lambda p: p.tip[:3, 3], lambda p: p.jacobian[:3]),
+    "J_X of the tip's axes": (lambda p: p.tip[:3, :3], _turning),
+    "g of the energy": (lambda p: np.array(gravity_energy(p)), lambda p: p.gravity_torque),
+    "gravity term": (lambda p: p.gravity_torque, lambda p: cdsm.stiffness(p, _pull(p)).gravity),
+    "active term": (
+        lambda p: p.length_jacobian.T @ _pull(p),
+        lambda p: cdsm.stiffness(p, _pull(p)).active,
+    ),
+    "load term of a force": _load(W * FORCE),
+    "load term of a moment": _load(W * MOMENT),
+}
+
+
 def _assert_derivative(pose: cdsm.Posture, quantity: Quantity, analytic: Array) -> None:
     def f(q: Array) -> Array:
         return np.asarray(quantity(pose.arm.at(q, check_limits=False)))
@@ -70,71 +106,21 @@ def _assert_derivative(pose: cdsm.Posture, quantity: Quantity, analytic: Array) 
     assert_second_order(f, analytic, pose.q)
 
 
-def test_length_jacobian_is_derivative_of_lengths(pose: cdsm.Posture) -> None:
-    _assert_derivative(pose, lambda p: p.cable_lengths, pose.length_jacobian)
-
-
-def test_length_hessian_is_derivative_of_length_jacobian(pose: cdsm.Posture) -> None:
-    _assert_derivative(pose, lambda p: p.length_jacobian, pose.length_hessian)
-
-
-def test_length_hessian_is_symmetric(pose: cdsm.Posture) -> None:
-    H = pose.length_hessian
-    np.testing.assert_allclose(H, H.transpose(0, 2, 1), rtol=0.0, atol=1e-15 * abs(H).max())
-
-
-def test_eq16_active_part_contracts_length_hessian_with_tension(pose: cdsm.Posture) -> None:
-    F = arms.random_tension(pose.arm, 3)
-    active = cdsm.stiffness(pose, F).active
-    expected = np.einsum("cij,c->ij", pose.length_hessian, F)
-    # the same products in another order of summation
-    np.testing.assert_allclose(active, expected, rtol=0.0, atol=1e-14 * F.sum())
-    _assert_derivative(pose, lambda p: p.length_jacobian.T @ F, active)
-
-
-def test_jacobian_linear_rows_are_derivative_of_tip_position(pose: cdsm.Posture) -> None:
-    _assert_derivative(pose, lambda p: p.tip[:3, 3], pose.jacobian[:3])
-
-
-def test_jacobian_angular_rows_turn_the_tip(pose: cdsm.Posture) -> None:
-    R = pose.tip[:3, :3]
-    # column i: the cross product of ω_i with each axis of the tip
-    analytic = np.cross(pose.jacobian[3:].T[:, None, :], R.T[None, :, :])  # i, axis, xyz
-    _assert_derivative(pose, lambda p: p.tip[:3, :3], analytic.transpose(2, 1, 0))
-
-
-def test_gravity_torque_is_derivative_of_potential_energy(pose: cdsm.Posture) -> None:
-    _assert_derivative(pose, lambda p: np.array(gravity_energy(p)), pose.gravity_torque)
-
-
-def test_eq16_gravity_part_is_derivative_of_gravity_torque(pose: cdsm.Posture) -> None:
-    _assert_derivative(pose, lambda p: p.gravity_torque, pose.gravity_stiffness)
-    F = arms.random_tension(pose.arm, 3)
-    np.testing.assert_array_equal(cdsm.stiffness(pose, F).gravity, pose.gravity_stiffness)
-
-
-@pytest.mark.parametrize("part", ["force", "moment", "both"])
-def test_eq16_load_part_is_minus_derivative_of_load_torque(pose: cdsm.Posture, part: str) -> None:
-    W = arms.random_wrench(3)
-    W[3:] *= part != "force"
-    W[:3] *= part != "moment"
-    load = cdsm.stiffness(pose, arms.random_tension(pose.arm, 3), wrench=W).load
-    _assert_derivative(pose, lambda p: -p.jacobian.T @ W, load)
-
-
-def test_eq16_load_part_is_symmetric_for_a_force(pose: cdsm.Posture) -> None:
-    F = arms.random_tension(pose.arm, 3)
-    load = cdsm.stiffness(pose, F, wrench=arms.random_wrench(3, moment=False)).load
-    np.testing.assert_array_equal(load, load.T)
+@pytest.mark.parametrize("name", DERIVATIVES)
+def test_differences_converge_to_the_analytic_derivative(pose: cdsm.Posture, name: str) -> None:
+    quantity, derivative = DERIVATIVES[name]
+    _assert_derivative(pose, quantity, derivative(pose))
 
 
 @pytest.mark.parametrize("pose", [name for name in POSTURES if name != "hinged-1"], indirect=True)
-def test_eq16_load_part_is_not_symmetric_with_a_moment(pose: cdsm.Posture) -> None:
-    W = arms.random_wrench(3)
-    load = cdsm.stiffness(pose, arms.random_tension(pose.arm, 3), wrench=W).load
+def test_eq16_load_part_is_symmetric_for_a_force_alone(pose: cdsm.Posture) -> None:
+    quantity, term = _load(W * FORCE)
+    np.testing.assert_array_equal(term(pose), term(pose).T)
+    quantity, term = _load(W)
+    load = term(pose)
     assert abs(load - load.T).max() > 0.01 * abs(load).max()
     with pytest.raises(AssertionError, match=r"neither rounding|fall at the rates"):
-        _assert_derivative(pose, lambda p: -p.jacobian.T @ W, load.T)
+        _assert_derivative(pose, quantity, load.T)
 
 
 @pytest.mark.parametrize("kind", ["universal", "hinged", "mixed"])

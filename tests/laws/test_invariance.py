@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -129,53 +130,37 @@ def test_order_of_cables_does_not_matter(name: str) -> None:
 # Units
 
 
+@pytest.mark.parametrize(("length", "force"), [(2.0, 1.0), (1.0, 10.0), (0.5, 3.0)])
 @pytest.mark.parametrize("name", NAMES)
-def test_an_arm_twice_as_long_is_twice_as_stiff_in_its_joints(name: str) -> None:
-    """Lengths doubled, forces and EA kept: torques double, springs soften to half."""
+def test_joint_stiffness_grows_with_all_lengths_and_with_all_forces(
+    name: str, length: float, force: float
+) -> None:
+    """Torques grow with both; springs, of the same EA, soften as they get longer."""
     arm = _arm(name)
     g = arm.geometry
-    double = cdsm.Manipulator(
-        replace(
-            g,
-            base_length=2.0 * g.base_length,
-            hole_radius=2.0 * g.hole_radius,
-            joints=tuple(replace(j, disk_offset=2.0 * j.disk_offset) for j in g.joints),
-            links=tuple(replace(link, length=2.0 * link.length) for link in g.links),
-            cables=tuple(replace(c, lead=2.0 * c.lead) for c in g.cables),
-        ),
-        [cable.elasticity for cable in arm.cables],
-        gravity=arm.gravity,
+    longer = replace(
+        g,
+        base_length=length * g.base_length,
+        hole_radius=length * g.hole_radius,
+        joints=tuple(replace(j, disk_offset=length * j.disk_offset) for j in g.joints),
+        links=tuple(replace(link, length=length * link.length) for link in g.links),
+        cables=tuple(replace(c, lead=length * c.lead) for c in g.cables),
     )
-    pose = arms.random_posture(arm, 3, reach=0.3)
-    W = arms.random_wrench(3)
-    pull = cdsm.distribute_tension(pose, minimum=25.0, wrench=W)
-    twice = cdsm.distribute_tension(double.at(pose.q), 25.0, wrench=W * ([1.0] * 3 + [2.0] * 3))
-    _close(twice.values, pull.values, 1e-9)
-    K = cdsm.stiffness(pose, pull)
-    L = cdsm.stiffness(twice.posture, pull.values, wrench=twice.wrench)
-    for part in ("active", "passive", "gravity", "load", "joint"):
-        _close(getattr(L, part), 2.0 * getattr(K, part), 1e-13)
-    _close(L.cable_stiffness, K.cable_stiffness / 2.0, 1e-13)
-    _close(L.compliance[:3, :3], 2.0 * K.compliance[:3, :3], 1e-11)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_all_forces_tenfold_make_an_arm_tenfold_as_stiff(name: str) -> None:
-    arm = _arm(name)
-    strong = cdsm.Manipulator(
-        arm.geometry,
-        [cdsm.LinearElasticity(10.0 * float(c.elasticity.rigidity(0.0))) for c in arm.cables],
-        gravity=10.0 * arm.gravity,
-    )
+    laws = [cdsm.LinearElasticity(force * float(c.elasticity.rigidity(0.0))) for c in arm.cables]
+    other = cdsm.Manipulator(longer, laws, gravity=force * arm.gravity)
     pose = arms.random_posture(arm, 4, reach=0.3)
     W = arms.random_wrench(4)
     pull = cdsm.distribute_tension(pose, 20.0, 400.0, wrench=W)
-    tenfold = cdsm.distribute_tension(strong.at(pose.q), 200.0, 4000.0, wrench=10.0 * W)
-    _close(tenfold.values, 10.0 * pull.values, 1e-9)
+    more = force * W * np.repeat([1.0, length], 3)
+    again = cdsm.distribute_tension(other.at(pose.q), force * 20.0, force * 400.0, wrench=more)
+    _close(again.values, force * pull.values, 1e-9)
     K = cdsm.stiffness(pose, pull)
-    L = cdsm.stiffness(tenfold.posture, 10.0 * pull.values, wrench=10.0 * W)
-    _close(L.joint, 10.0 * K.joint, 1e-13)
-    _close(L.compliance, K.compliance / 10.0, 1e-11)
+    L = cdsm.stiffness(again.posture, force * pull.values, wrench=more)
+    for part in ("active", "passive", "gravity", "load", "joint"):
+        _close(getattr(L, part), length * force * getattr(K, part), 1e-13)
+    _close(L.cable_stiffness, force / length * K.cable_stiffness, 1e-13)
+    _close(L.compliance[:3, :3], length / force * K.compliance[:3, :3], 1e-11)
+    _close(L.compliance[3:, 3:], K.compliance[3:, 3:] / (length * force), 1e-11)
 
 
 # Eq. 17
@@ -243,25 +228,6 @@ def test_eq17_tensions_satisfy_the_optimality_conditions(seed: int, name: str) -
     assert excess[at_high].max(initial=-np.inf) < 1e-9 * scale
     assert set(pull.at_minimum) == {pose.arm.cables[c].name for c in np.flatnonzero(at_low)}
     assert set(pull.at_maximum) == {pose.arm.cables[c].name for c in np.flatnonzero(at_high)}
-
-
-@given(
-    name=st.sampled_from(NAMES),
-    seed=SEEDS,
-    low=st.just(0.0) | st.floats(1e-6, 60.0),  # the smallest of floats is refused as a tension
-    more=st.just(0.0) | st.floats(1e-6, 60.0),
-)
-@REPEATABLE
-def test_eq17_raising_the_minimum_never_lowers_the_norm(
-    name: str, seed: int, low: float, more: float
-) -> None:
-    pose = arms.random_posture(_arm(name, seed), seed, reach=0.3)
-    W = arms.random_wrench(seed)
-    loose = np.linalg.norm(cdsm.distribute_tension(pose, low, wrench=W).values)
-    tight = np.linalg.norm(cdsm.distribute_tension(pose, low + more, wrench=W).values)
-    assert tight >= loose * (1.0 - 1e-9)
-    if more > 1.0 and low > 1.0:
-        assert tight > loose
 
 
 # One hinge and its two cables, by hand
@@ -390,7 +356,7 @@ case = pytest.mark.parametrize(("name", "seed"), CASES, ids=[f"{n}-arm{s}" for n
 
 @case
 def test_cartesian_quantities_by_their_definitions(name: str, seed: int) -> None:
-    K = _stiff(name, seed, moment=True)
+    K: Any = _stiff(name, seed, moment=True)
     J = K.posture.jacobian
     C = J @ np.linalg.inv(K.joint) @ J.T
     # inverses lose the digits of their condition numbers, some 1e3 for K_θ, 1e4 for C_vv
@@ -398,15 +364,8 @@ def test_cartesian_quantities_by_their_definitions(name: str, seed: int) -> None
     _close(K.cartesian, np.linalg.inv(C[:3, :3]).astype(np.float64), 1e-9)
     v = J[:3]
     right = v.T @ np.linalg.inv(v @ v.T)
-    terms: dict[str, Callable[[], Array]] = {
-        "active": lambda: K.pseudoinverse("active"),
-        "passive": lambda: K.pseudoinverse("passive"),
-        "gravity": lambda: K.pseudoinverse("gravity"),
-        "load": lambda: K.pseudoinverse("load"),
-        "joint": lambda: K.pseudoinverse(),
-    }
-    for term, found in terms.items():
-        _close(found(), right.T @ getattr(K, term) @ right, 1e-9)
+    for term in ("active", "passive", "gravity", "load", "joint"):
+        _close(K.pseudoinverse(term), right.T @ getattr(K, term) @ right, 1e-9)
     for u in (*np.eye(3), np.array([2.0, -1.0, 0.5])):
         unit = u / np.linalg.norm(u)
         assert K.along(u) == pytest.approx(1.0 / (unit @ C[:3, :3] @ unit), rel=1e-9)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -9,9 +10,7 @@ import pinocchio as pin
 import pytest
 
 import cdsm
-from cdsm.support.values import Array
 from tests.support import arms
-from tests.support.differences import central_difference
 from tests.support.mujoco_arms import in_mujoco, tendon_jacobian
 
 ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
@@ -38,41 +37,22 @@ def pose(request: pytest.FixtureRequest) -> cdsm.Posture:
     return arms.random_posture(_arm(name), seed, reach=0.9)
 
 
-# MuJoCo
-
-
-def test_mujoco_measures_the_same_cable_lengths(pose: cdsm.Posture) -> None:
-    _, data = in_mujoco(pose)
-    lead = np.array([cable.lead for cable in pose.arm.cables])
-    np.testing.assert_allclose(pose.cable_lengths, data.ten_length + lead, rtol=0.0, atol=1e-14)
-
-
-def test_mujoco_measures_the_same_length_jacobian(pose: cdsm.Posture) -> None:
+def test_mujoco_measures_the_same_lengths_tip_and_weight(pose: cdsm.Posture) -> None:
     model, data = in_mujoco(pose)
+    near: Any = {"rtol": 0.0, "atol": 1e-14}
+    lead = np.array([cable.lead for cable in pose.arm.cables])
+    np.testing.assert_allclose(pose.cable_lengths, data.ten_length + lead, **near)
     theirs = tendon_jacobian(model, data)
     assert abs(theirs).max() > 1e-3
-    np.testing.assert_allclose(pose.length_jacobian, theirs, rtol=0.0, atol=1e-14)
-
-
-def test_mujoco_sees_the_same_tip(pose: cdsm.Posture) -> None:
-    model, data = in_mujoco(pose)
+    np.testing.assert_allclose(pose.length_jacobian, theirs, **near)
     site = model.site("tool0").id
     linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jacSite(model, data, linear, angular, site)
-    np.testing.assert_allclose(pose.tip[:3, 3], data.site_xpos[site], rtol=0.0, atol=1e-14)
-    np.testing.assert_allclose(
-        pose.tip[:3, :3], data.site_xmat[site].reshape(3, 3), rtol=0.0, atol=1e-14
-    )
-    np.testing.assert_allclose(pose.jacobian, np.vstack([linear, angular]), rtol=0.0, atol=1e-14)
-
-
-def test_mujoco_feels_the_same_gravity_torque(pose: cdsm.Posture) -> None:
-    _, data = in_mujoco(pose)
+    np.testing.assert_allclose(pose.tip[:3, 3], data.site_xpos[site], **near)
+    np.testing.assert_allclose(pose.tip[:3, :3], data.site_xmat[site].reshape(3, 3), **near)
+    np.testing.assert_allclose(pose.jacobian, np.vstack([linear, angular]), **near)
     # the bias force of an arm at rest is gravity alone; some newtons times some decimetres
     np.testing.assert_allclose(pose.gravity_torque, data.qfrc_bias, rtol=0.0, atol=1e-13)
-
-
-# Pinocchio
 
 
 def _in_pinocchio(arm: cdsm.Manipulator) -> tuple[pin.Model, pin.Data]:
@@ -88,46 +68,6 @@ def test_link_pose_is_pinocchios_frame(pose: cdsm.Posture) -> None:
         if frame.type == pin.FrameType.BODY:
             ours = pose.link_pose(frame.name)
             np.testing.assert_allclose(ours, place.homogeneous, rtol=0.0, atol=1e-14)
-
-
-def _kinematic_hessian(pose: cdsm.Posture) -> Array:
-    """∂J_X/∂q at tool0 as Pinocchio returns it: (6, nv, nv)."""
-    model, data = _in_pinocchio(pose.arm)
-    tip = model.getFrameId("tool0", pin.FrameType.BODY)
-    pin.computeJointKinematicHessians(model, data, pose.q)
-    pin.updateFramePlacements(model, data)
-    hessian = pin.getFrameKinematicHessian(model, data, tip, pin.LOCAL_WORLD_ALIGNED)
-    return np.asarray(hessian)
-
-
-def _repaired(hessian: Array) -> Array:
-    """Pinocchio labels column-major memory as row-major; read it as what it is."""
-    return np.reshape(hessian.ravel("K"), hessian.shape, order="F")
-
-
-@pytest.mark.parametrize("name", ["universal-3", "mixed"])
-def test_pinocchio_still_returns_kinematic_hessians_in_the_wrong_layout(name: str) -> None:
-    arm = _arm(name)
-    pose = arms.random_posture(arm, 0)
-    truth = central_difference(
-        lambda q: arm.at(q, check_limits=False).jacobian, pose.q, step=2.0**-17
-    )
-    returned = _kinematic_hessian(pose)
-    # first differences at 1e-5: 1e-11 of truncation and of rounding
-    assert abs(_repaired(returned) - truth).max() < 1e-9 or abs(returned - truth).max() < 1e-9
-    if abs(returned - truth).max() < 1e-9:
-        pytest.fail(
-            f"Pinocchio {pin.__version__} returns kinematic Hessians in the right layout now: "
-            "take _repaired() out of this file, or it will spoil them."
-        )
-
-
-def test_eq16_load_part_is_pinocchios_kinematic_hessian_times_wrench(pose: cdsm.Posture) -> None:
-    W = arms.random_wrench(8)
-    load = cdsm.stiffness(pose, arms.random_tension(pose.arm, 8), wrench=W).load
-    hessian = _repaired(_kinematic_hessian(pose))
-    expected = -np.einsum("a,aij->ij", W, hessian)  # H[:, i, j] = ∂J[:, i]/∂q_j
-    np.testing.assert_allclose(load, expected, rtol=0.0, atol=1e-13)
 
 
 def test_eq16_gravity_and_load_are_pinocchios_static_torque_derivative(pose: cdsm.Posture) -> None:

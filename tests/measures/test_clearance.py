@@ -10,7 +10,7 @@ import cdsm
 from cdsm.measures.clearance import KINDS
 from cdsm.measures.rows import measured
 from cdsm.support.values import Array
-from tests.support.arms import mixed_arm, random_arm, random_posture
+from tests.support.arms import mixed_arm, random_arm, random_posture, readme_geometry
 
 
 def between(one: Array, other: Array) -> float:
@@ -106,13 +106,8 @@ def test_batch_is_the_single_posture_and_diameters_count() -> None:
 
 def test_a_thick_disk_is_nearer() -> None:
     """In a straight arm a cable ends at a disk 20 mm before the next one, beside its axis."""
-    geometry = cdsm.Geometry.universal(
-        joints=2, cables_per_joint=3, link_length=0.06, base_length=0.03, disk_offset=0.01,
-        hole_radius=0.02, link_mass=0.05,
-    )  # fmt: skip
+    geometry = readme_geometry(joints=2, disk_offset=0.01, hole_radius=0.02)
     pose = cdsm.Manipulator(geometry, cdsm.presets.ELASTIC_STAGE).at(np.zeros(4))
     # the rim is 2 mm from the holes; thick disks come nearer along the axis
     assert cdsm.clearance(pose).disks == pytest.approx(2e-3, abs=1e-9)
     assert cdsm.clearance(pose, 0.0, 0.038).disks == pytest.approx(0.02 - 0.019, abs=1e-8)
-    with pytest.raises(cdsm.InvalidInput, match="thickness"):
-        cdsm.clearance(pose, 0.0, -1e-3)

@@ -5,7 +5,7 @@ import pytest
 
 import cdsm
 from cdsm.measures.indices import has_wrench_closure
-from tests.support.arms import random_arm, random_posture
+from tests.support.arms import prototype, random_arm, random_posture
 
 
 def one_joint(angles: tuple[float, ...]) -> cdsm.Manipulator:
@@ -16,20 +16,16 @@ def one_joint(angles: tuple[float, ...]) -> cdsm.Manipulator:
     return cdsm.Manipulator(geometry, cdsm.presets.ELASTIC_STAGE)
 
 
-def test_three_even_cables_of_a_straight_joint_pull_alike() -> None:
-    even = np.deg2rad([10.0, 130.0, 250.0])
-    assert cdsm.tension_factor(one_joint(tuple(even)).at([0.0, 0.0])) == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_one_more_cable_than_joints_has_one_ratio(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    pose = one_joint(tuple(np.deg2rad([0.0, 120.0, 240.0]) + rng.uniform(-0.5, 0.5, 3))).at(
-        rng.uniform(-0.3, 0.3, 2)
-    )
+    uneven = rng.uniform(-0.5, 0.5, 3) * (seed > 0)  # three even cables pull alike
+    arm = one_joint(tuple(np.deg2rad([10.0, 130.0, 250.0]) + uneven))
+    pose = arm.at(rng.uniform(-0.3, 0.3, 2) * (seed > 0))
     null = np.linalg.svd(pose.length_jacobian.T)[2][-1]
     assert (null > 0.0).all() or (null < 0.0).all()
     # CASPR's TensionFactorMetric, and that of Pham et al., is this ratio
+    assert seed or cdsm.tension_factor(pose) == pytest.approx(1.0)
     assert cdsm.tension_factor(pose) == pytest.approx(abs(null).min() / abs(null).max(), rel=1e-8)
     assert has_wrench_closure(pose)
 
@@ -53,7 +49,6 @@ def test_cables_on_one_side_close_nothing() -> None:
 
 
 def test_isotropy_is_the_ratio_of_extremes() -> None:
-    pose = cdsm.presets.virtual_prototype().at(np.full(10, cdsm.presets.TEN_DEGREES))
-    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 50.0))
+    K = cdsm.stiffness(*prototype())
     values = 1.0 / np.linalg.eigvalsh(K.compliance[:3, :3])
     assert cdsm.isotropy(K) == pytest.approx(values.min() / values.max(), rel=1e-10)

@@ -1,5 +1,6 @@
 """Force polytope and payload against exhaustive searches and another library."""
 
+from collections.abc import Callable
 from itertools import combinations
 
 import numpy as np
@@ -8,9 +9,8 @@ from scipy.spatial import ConvexHull
 
 import cdsm
 from cdsm.support.values import Array
-from tests.support.arms import mixed_arm, random_arm, random_posture
-
-LOW, HIGH = 5.0, 80.0
+from tests.support.arms import mixed_arm, prototype, random_arm, random_posture
+from tests.support.locked import hinge
 
 
 def corners(pose: cdsm.Posture, low: float, high: float) -> Array:
@@ -56,8 +56,7 @@ def test_vertices_are_those_of_an_exhaustive_search(seed: int) -> None:
 @pytest.mark.parametrize("arm", [mixed_arm(), cdsm.presets.virtual_prototype()])
 def test_payload_is_where_tensions_end(arm: cdsm.Manipulator) -> None:
     pose = random_posture(arm, 3, 0.3)
-    maximum = 60.0 if arm.nv < 10 else 800.0
-    minimum = 0.0 if arm.nv < 10 else 15.0
+    minimum, maximum = (0.0, 60.0) if arm.nv < 10 else (15.0, 800.0)
     rng = np.random.default_rng(1)
     for u in rng.normal(size=(3, 3)):
         held = cdsm.payload(pose, u, minimum, maximum)
@@ -85,8 +84,8 @@ def test_no_direction_is_worse_than_the_worst() -> None:
 
 
 def test_deflection_limits_the_payload() -> None:
-    pose = cdsm.presets.virtual_prototype().at(np.full(10, cdsm.presets.TEN_DEGREES))
-    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 50.0, 800.0))
+    pose, pull = prototype()
+    K = cdsm.stiffness(pose, pull)
     C = K.compliance[:3, :3]
     held = cdsm.payload(pose, "z", 50.0, 800.0, deflection=1e-3)
     assert held.limit == "deflection"
@@ -97,8 +96,7 @@ def test_deflection_limits_the_payload() -> None:
 
 
 def test_the_worst_friction_takes_from_both_ends() -> None:
-    arm = cdsm.presets.virtual_prototype(friction=0.1)
-    pose = arm.at(np.full(10, cdsm.presets.TEN_DEGREES))
+    pose, _ = prototype(friction=0.1)
     free = cdsm.payload(pose, "z", 15.0, 200.0)
     rough = cdsm.payload(pose, "z", 15.0, 200.0, worst_friction=True)
     assert 0.0 < rough.force < free.force
@@ -115,8 +113,7 @@ def test_the_worst_friction_takes_from_both_ends() -> None:
 
 def test_pycapacity_finds_the_same_polytope() -> None:
     """pycapacity 2.1.9: human.force_polytope(J_v, J_Lᵀ, 15, 800, 1e-9, −g)."""
-    pose = cdsm.presets.virtual_prototype().at(np.full(10, cdsm.presets.TEN_DEGREES))
-    found = cdsm.force_polytope(pose, 15.0, 800.0)
+    found = cdsm.force_polytope(prototype()[0], 15.0, 800.0)
     assert len(found.vertices) == 48
     assert found.volume == pytest.approx(1062976867.6507927, rel=1e-9)
     assert found.radius == pytest.approx(471.80850355, rel=1e-9)
@@ -133,12 +130,7 @@ def test_where_the_tip_cannot_move_the_links_hold_any_force() -> None:
 
 
 def test_a_pair_holds_a_segment_of_forces() -> None:
-    geometry = cdsm.Geometry.hinged(
-        joints=1, twist=0.0, link_length=0.1, base_length=0.02, disk_offset=0.01,
-        hole_radius=0.02, link_mass=0.0,
-    )  # fmt: skip
-    law = cdsm.presets.ELASTIC_STAGE
-    pose = cdsm.Manipulator(geometry, law, gravity=(0.0, 0.0, 0.0)).at([0.0])
+    pose = hinge(hole_radius=0.02).at([0.0])
     polytope = cdsm.force_polytope(pose, 10.0, 110.0)
     # one cable 110 N, the other 10 N, on 20 mm; the tip is 100 mm away
     assert polytope.radius == pytest.approx(100.0 * 0.02 / 0.1, rel=1e-9)
@@ -146,13 +138,19 @@ def test_a_pair_holds_a_segment_of_forces() -> None:
     assert len(polytope.unbounded) == 2
 
 
-def test_errors_name_what_is_missing() -> None:
-    pose = cdsm.presets.virtual_prototype().at(np.zeros(10))
-    with pytest.raises(cdsm.InvalidInput, match="maximum: cable1_1 has none"):
-        cdsm.force_polytope(pose, 15.0)
-    with pytest.raises(cdsm.InfeasibleTension):
-        cdsm.force_polytope(pose, 15.0, 20.0, (0.0, 0.0, -100.0, 0.0, 0.0, 0.0))
-    with pytest.raises(cdsm.InvalidInput, match="deflection"):
-        cdsm.payload(pose, "z", 15.0, 100.0, deflection=-1.0)
-    with pytest.raises(cdsm.InvalidInput, match="force"):
-        cdsm.force_polytope(pose, 15.0, 800.0).radius_at([1.0, 2.0])
+PUSHED = (0.0, 0.0, -100.0, 0.0, 0.0, 0.0)
+REFUSED: list[tuple[Callable[[cdsm.Posture], object], type[cdsm.CdsmError], str]] = [
+    (lambda p: cdsm.force_polytope(p, 15.0), cdsm.InvalidInput, "maximum: cable1_1 has none"),
+    (lambda p: cdsm.force_polytope(p, 15.0, 20.0, PUSHED), cdsm.InfeasibleTension, "N m"),
+    (lambda p: cdsm.payload(p, "z", 15.0, deflection=-1.0), cdsm.InvalidInput, "deflection"),
+    (lambda p: cdsm.force_polytope(p, 15.0, 800.0).radius_at([1.0]), cdsm.InvalidInput, "force"),
+    (lambda p: cdsm.clearance(p, 0.0, -1e-3), cdsm.InvalidInput, "thickness"),
+]
+
+
+@pytest.mark.parametrize(("ask", "error", "said"), REFUSED)
+def test_bad_input_is_named(
+    ask: Callable[[cdsm.Posture], object], error: type[cdsm.CdsmError], said: str
+) -> None:
+    with pytest.raises(error, match=said):
+        ask(cdsm.presets.virtual_prototype().at(np.zeros(10)))

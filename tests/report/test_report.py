@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,11 +22,6 @@ EVERY = (*TERMS, *TORQUES, "batch")
 
 def having(report: Report, verdict: str) -> set[str]:
     return {each.name for each in report.comparisons if each.verdict == verdict}
-
-
-def virtual(law: cdsm.Elasticity = STRAND) -> cdsm.Posture:
-    arm = cdsm.presets.virtual_prototype(law)
-    return arm.at(np.full(arm.nv, np.deg2rad(10.0)))
 
 
 def with_one(pose: cdsm.Posture, tension: float) -> cdsm.Stiffness:
@@ -58,29 +54,23 @@ def test_right_stiffness_agrees_within_the_error_estimates(seed: int, reach: flo
 
 
 @settings(max_examples=3, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 10_000))
+@given(seed=st.integers(0, 10_000).map(lambda seed: 3 * seed))  # with a moment
 def test_every_wrong_term_is_found_and_named(seed: int) -> None:
     K = hybrid(seed)
+    order = np.roll(np.arange(K.posture.arm.nv), 1)
     for term in TERMS:
         matrix = getattr(K, term)
         one = matrix.copy()
         one[np.unravel_index(abs(matrix).argmax(), matrix.shape)] *= 1.0001
-        for wrong in (1.0001 * matrix, -matrix, 2.0 * matrix, one):
+        wrongs = [1.0001 * matrix, -matrix, 2.0 * matrix, one]
+        wrongs += [matrix[order][:, order]] if order.size > 2 and term != "springs" else []
+        wrongs += [matrix.T.copy()] if term == "load" and order.size > 1 else []
+        for wrong in wrongs:
             report = replace(K, **{term: frozen(wrong)}).report()
             assert having(report, "DIFFERS") == {term, "batch"}
             assert not report.passed
             assert report.faults[0].startswith(f"{term}: off by")
-
-
-def test_swapped_indices_are_found() -> None:
-    K = hybrid(3)  # with a moment: the load term is not symmetric
-    order = np.roll(np.arange(K.posture.arm.nv), 1)
-    for term in TERMS[:4]:
-        wrong = getattr(K, term)[order][:, order]
-        assert term in having(replace(K, **{term: frozen(wrong)}).report(), "DIFFERS")
-    report = replace(K, load=frozen(K.load.T.copy())).report()
-    assert "load" in having(report, "DIFFERS")
-    assert any("not symmetric" in note for note in report.notes)
+    assert order.size == 1 or any("not symmetric" in note for note in K.report().notes)
 
 
 STRETCHED = cdsm.Manipulator(arms.readme_geometry(), STRAND, original_length="stretched")
@@ -128,7 +118,7 @@ def test_equilibrium_is_checked_with_the_free_lengths_of_its_reference() -> None
     ],
 )
 def test_edge_of_a_law_is_not_possible(law: cdsm.Elasticity, tension: float, said: str) -> None:
-    report = with_one(virtual(law), tension).report()
+    report = with_one(arms.prototype(law, 15.0)[0], tension).report()
     assert having(report, "not possible") == {"passive", "joint"}
     assert having(report, "DIFFERS") == set()
     assert report.faults[0].startswith("check not possible for passive and joint: cable1_1")
@@ -177,26 +167,23 @@ class Own(cdsm.Elasticity):
     ],
 )
 def test_law_that_contradicts_itself_is_found(law: Own, wrong: set[str]) -> None:
-    pose = virtual(law)
-    K = cdsm.stiffness(pose, cdsm.distribute_tension(pose, 15.0))
+    K = cdsm.stiffness(*arms.prototype(law, 15.0))
     assert having(K.report(), "DIFFERS") == wrong
 
 
 # --- balance, optimality, stability -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("solver", ["daqp", "osqp", "clarabel"])
-def test_distributed_tensions_are_optimal(solver: str) -> None:
+def test_distributed_tensions_are_optimal() -> None:
     geometry = arms.readme_geometry(cables_per_joint=5)
     pose = arms.random_posture(cdsm.Manipulator(geometry, STRAND), 1, 0.3)
     free = cdsm.distribute_tension(pose, 15.0).values
     most = np.where(free == free.max(), 0.95 * free, np.inf)
-    pull = cdsm.distribute_tension(pose, 15.0, most, solver=solver)
+    pull = cdsm.distribute_tension(pose, 15.0, most)
     assert pull.at_minimum
     assert len(pull.at_maximum) == 1
-    report = cdsm.stiffness(pose, pull).report()
-    assert report.kkt_residual is not None
-    assert report.kkt_residual < 1e-8
+    report: Any = cdsm.stiffness(pose, pull).report()
+    assert 0.0 <= report.kkt_residual < 1e-8
     assert report.passed, report.faults
 
 
@@ -248,11 +235,8 @@ def test_json_and_page_hold_the_report() -> None:
     report = cdsm.stiffness(arm.with_cables(names).at([0.0]), [0.0, 0.0]).report()
     told = report.to_dict()
     assert json.loads(json.dumps(told, allow_nan=False)) == told
-    assert told["passed"] is False
-    assert told["residual_Nm"] == 0.0
+    assert (told["passed"], told["residual_Nm"]) == (False, 0.0)
     page = report.to_html("about <it>")
-    assert page.startswith("<!DOCTYPE html>")
     assert "about &lt;it&gt;" in page
     assert "&lt;b&gt;0" in page
     assert "http" not in page
-    assert str(report).startswith("Stiffness check: ")

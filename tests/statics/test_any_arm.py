@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.support.values import Array
-from tests.support.locked import original_lengths
+from tests.support.locked import potential
 
 STIFFENING = cdsm.Elasticity.from_rigidity(lambda F: 4e3 * (1.0 + F / 50.0), 0.0, 2000.0)
 LAWS = {"linear": cdsm.LinearElasticity(2e4), "user": STIFFENING}
@@ -55,15 +54,10 @@ def lift(law: cdsm.Elasticity, forced: tuple[str, ...] = (), friction: float = 0
     return cdsm.Manipulator.from_urdf(URDF, cables=cables, tip="tool")
 
 
-def potential(pose: cdsm.Posture, tension: Array, force: Array, there: cdsm.Posture) -> float:
-    """Energy of cables, weights and a dead force at a posture; locked at ``pose``."""
-    arm, slide = there.link_pose("arm"), float(there.q[0])
-    total = 9.81 * (0.5 * slide + 0.2 * (arm @ [0.1, 0.0, 0.0, 1.0])[2]) - force @ there.tip[:3, 3]
-    longer = there.cable_lengths - (free := original_lengths(pose, tension))
-    for cable, l_0, more, F in zip(pose.arm.cables, free, longer, tension, strict=True):
-        held = cable.control == "position"
-        total += cable.energy(cable.tension(more, l_0), l_0) if held else F * more
-    return float(total)
+def weight(there: cdsm.Posture) -> float:
+    """Potential energy of the carriage and of the arm."""
+    height = (there.link_pose("arm") @ [0.1, 0.0, 0.0, 1.0])[2]
+    return 9.81 * float(0.5 * there.q[0] + 0.2 * height)
 
 
 FORCED = {"locked": (), "one force": ("over",), "two forces": ("up", "under")}
@@ -80,12 +74,11 @@ def test_rest_is_the_minimum_of_the_potential(law: str, forced: str) -> None:
     assert rest.stable
     assert abs(rest.residual).max() < 1e-10
     assert abs(rest.pose.q - pose.q).max() > 1e-4
-    least, rng = potential(pose, pull.values, force, rest.pose), np.random.default_rng(2)
+    energy, rng = potential(pose, pull.values, force, weight), np.random.default_rng(2)
     for _ in range(10):
         step = 1e-4 * rng.normal(size=2)
-        there = potential(pose, pull.values, force, arm.at(rest.pose.q + step))
-        rise = step @ rest.stiffness.joint @ step / 2.0
-        assert there - least == pytest.approx(rise, rel=0.05)
+        more = energy(arm.at(rest.pose.q + step)) - energy(rest.pose)
+        assert more == pytest.approx(step @ rest.stiffness.joint @ step / 2.0, rel=0.05)
 
 
 def test_stop_of_a_slide_carries_what_the_cables_do_not() -> None:
@@ -95,8 +88,6 @@ def test_stop_of_a_slide_carries_what_the_cables_do_not() -> None:
     assert rest.at_limit == ("slide",)
     assert rest.pose.q[0] == pytest.approx(0.05, abs=1e-15)
     assert rest.stop_torque[0] < 0.0
-    assert "which pushes with" in str(rest)
-    assert "N" in str(rest)
 
 
 @pytest.mark.parametrize(("law", "forced"), CASES)
@@ -107,14 +98,11 @@ def test_friction_loops_close_and_lose_work(law: str, forced: str) -> None:
     path[:, 2] = 8.0 * np.sin(np.linspace(0.0, 4.0 * math.pi, 41)[1:])
     history = cdsm.load_cycle(pose, pull, path)
     assert not history.snaps.any()
-    np.testing.assert_allclose(history.tip[39], history.tip[19], atol=1e-4 * _span(history.tip))
+    span = float(np.ptp(history.tip, axis=0).max())
+    np.testing.assert_allclose(history.tip[39], history.tip[19], atol=1e-4 * span)
     z, f = history.tip[19:, 2], history.wrenches[19:, 2]
     work = float(np.diff(z) @ (f[1:] + f[:-1]) / 2.0)
     assert work == pytest.approx(history.dissipated[20:].sum(), rel=0.05, abs=1e-9)
     for T, cable in zip(history.tensions, pose.arm.cables, strict=True):
         if cable.control == "force":  # its motor holds the tension
             np.testing.assert_allclose(T[:, 0], pull[cable.name], rtol=1e-12)
-
-
-def _span(tip: Array) -> float:
-    return float(np.ptp(tip, axis=0).max())

@@ -1,59 +1,42 @@
 """Buckling against closed forms of one hinge, and against a scan of the margin on any arm."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import cdsm
 from tests.support.arms import mixed_arm, random_posture
+from tests.support.locked import LENGTH, H, hinge
 
-SPRING, RADIUS, OFFSET, LENGTH = 1890.0, 0.02, 0.01, 0.1
+SPRING, RADIUS, OFFSET = 1890.0, 0.02, H
 
 
-def hinge(
-    spring: float = SPRING, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), mass: float = 0.0
-) -> cdsm.Manipulator:
+def pair(angle: float = 0.0, **changes: Any) -> cdsm.Posture:
     """One hinge about y with a pair of cables that are springs of one stiffness [N/m]."""
-    geometry = cdsm.Geometry.hinged(
-        joints=1,
-        twist=0.0,
-        link_length=LENGTH,
-        base_length=0.05,
-        disk_offset=OFFSET,
-        hole_radius=RADIUS,
-        link_mass=mass,
-    )
-    cables = cdsm.serpentine_cables(geometry, cdsm.LinearElasticity(1e12), series_stiffness=spring)
-    return cdsm.Manipulator(geometry, cables=cables, gravity=gravity)
+    arm = hinge(hole_radius=RADIUS, law=cdsm.LinearElasticity(1e12), **changes)
+    springs = [replace(cable, series_stiffness=SPRING) for cable in arm.cables]
+    return arm.with_cables(springs).at([angle])
 
 
 def margin(pose: cdsm.Posture, minimum: float) -> float:
     return cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum)).margin
 
 
-def test_pair_across_a_straight_hinge_buckles_at_its_closed_form() -> None:
-    # K = 2 k R² − F s/4 for either cable of segment s = 2h: DESIGN's active part
-    found = cdsm.critical_tension(hinge().at([0.0]))
-    # the wire of 1e12 N takes 2e-11 of the compliance
-    assert found.minimum == pytest.approx(2.0 * SPRING * RADIUS**2 / OFFSET, rel=1e-9)
-    np.testing.assert_allclose(found.tension, found.minimum, rtol=1e-12)
-    np.testing.assert_allclose(found.mode, [1.0])
-    assert found.stable == ((0.0, found.minimum),)
-
-
 @pytest.mark.parametrize("up", [1.0, -1.0])
 def test_weight_above_the_joint_lowers_it_and_below_raises_it(up: float) -> None:
     # gravity along ∓x: the link stands on its joint, or hangs from it
     mass = 2.0
-    arm = hinge(gravity=(-9.81 * up, 0.0, 0.0), mass=mass)
+    pose = pair(gravity=(-9.81 * up, 0.0, 0.0), link_mass=mass)
     expected = (2.0 * SPRING * RADIUS**2 - up * mass * 9.81 * LENGTH / 2.0) / OFFSET
-    assert cdsm.critical_tension(arm.at([0.0])).minimum == pytest.approx(expected, rel=1e-9)
+    assert cdsm.critical_tension(pose).minimum == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("minimum", [5.0, 60.0])
 def test_tip_force_along_the_link_buckles_it_at_its_closed_form(minimum: float) -> None:
-    pose = hinge().at([0.0])
+    pose = pair()
     found = cdsm.critical_load(pose, [-2.0, 0.0, 0.0, 0.0, 0.0, 0.0], minimum)
     left = 2.0 * SPRING * RADIUS**2 - minimum * OFFSET
     assert found.limit == "buckling"
@@ -67,7 +50,7 @@ def test_tip_force_along_the_link_buckles_it_at_its_closed_form(minimum: float) 
 
 
 def test_side_load_ends_where_the_cable_can_pull_no_more() -> None:
-    pose = hinge().at([0.0])
+    pose = pair()
     found = cdsm.critical_load(pose, [0.0, 0.0, -1.0, 0.0, 0.0, 0.0], 1.0, 51.0)
     # the force −z turns the hinge by the moment P·LENGTH, which one cable more of 50 N holds
     assert found.limit == "infeasible"
@@ -102,11 +85,8 @@ def test_margin_changes_its_sign_there_and_nowhere_below(pose: cdsm.Posture) -> 
     # the eigenvalue is zero to rounding of the largest
     K = cdsm.stiffness(pose, found.tension)
     assert abs(K.margin) < 1e-9 * np.linalg.norm(K.joint, 2)
-    assert (
-        margin(pose, found.minimum * (1.0 - 1e-6))
-        > 0.0
-        > margin(pose, found.minimum * (1.0 + 1e-6))
-    )
+    below, above = (margin(pose, found.minimum * part) for part in (1.0 - 1e-6, 1.0 + 1e-6))
+    assert below > 0.0 > above
     for part in np.linspace(0.01, 0.99, 50):
         assert margin(pose, low + part * (found.minimum - low)) > 0.0
 
@@ -123,9 +103,12 @@ def test_strand_arm_stands_between_two_tensions() -> None:
         assert sign * margin(found.posture, place * (1.0 - 1e-6)) < 0.0
 
 
-@pytest.mark.parametrize("degrees", [-40.0, 7.0, 25.0])
-def test_bent_pair_buckles_at_its_closed_form(degrees: float) -> None:
-    """Across one hinge L± = 2 h cos θ/2 ± 2 R sin θ/2, so all of K is known at any angle."""
+@pytest.mark.parametrize("degrees", [-40.0, 0.0, 7.0, 25.0])
+def test_pair_across_a_hinge_buckles_at_its_closed_form(degrees: float) -> None:
+    """Across one hinge L± = 2 h cos θ/2 ± 2 R sin θ/2, so all of K is known at any angle.
+
+    Straight, K = 2 k R² − F h. The wire of 1e12 N takes 2e-11 of the compliance.
+    """
     angle = math.radians(degrees)
     cosine, sine = math.cos(angle / 2.0), math.sin(angle / 2.0)
     slope = np.array([-OFFSET * sine - RADIUS * cosine, -OFFSET * sine + RADIUS * cosine])
@@ -134,8 +117,10 @@ def test_bent_pair_buckles_at_its_closed_form(degrees: float) -> None:
     ratio = np.array([abs(slope[1]), abs(slope[0])])
     ratio /= ratio.min()
     critical = SPRING * float(slope @ slope) / -float(ratio @ curvature)
-    found = cdsm.critical_tension(hinge().at([angle]))
+    found = cdsm.critical_tension(pair(angle))
     assert found.minimum == pytest.approx(critical, rel=1e-9)
+    assert found.stable == ((0.0, found.minimum),)
+    np.testing.assert_allclose(found.mode, [1.0])
     assert sorted(found.tension) == pytest.approx(sorted(critical * ratio), rel=1e-9)
 
 

@@ -49,23 +49,9 @@ def test_torque_is_the_gradient_of_the_potential_and_stiffness_that_of_the_torqu
         return arm.at(y, check_limits=False)
 
     # steps so small that no tension leaves its law: 30 µm of cable at most
-    step, rounding = 2.0**-10, 100.0
-    assert_second_order(
-        lambda y: np.array(energy(at(y))),
-        here.residual,
-        q,
-        step=step,
-        size=rounding,
-        tolerance=1e-8,
-    )
-    assert_second_order(
-        lambda y: loaded.at(y).residual,
-        here.stiffness,
-        q,
-        step=step,
-        size=rounding,
-        tolerance=1e-8,
-    )
+    small: Any = {"step": 2.0**-10, "size": 100.0, "tolerance": 1e-8}
+    assert_second_order(lambda y: np.array(energy(at(y))), here.residual, q, **small)
+    assert_second_order(lambda y: loaded.at(y).residual, here.stiffness, q, **small)
 
 
 # --- stiffness ------------------------------------------------------------------------------
@@ -261,31 +247,7 @@ def test_answer_below_a_law_names_the_cables_though_iterates_may_pass() -> None:
     assert cdsm.equilibrium(pose, [30.0, 30.0], 1.0 * MOMENT).tension.min() > 2.2
 
 
-# --- failure -------------------------------------------------------------------------------
-
-
-# --- the question ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("tension", "wrench", "said"),
-    [
-        ([20.0], None, "tension"),
-        ([20.0, -1.0], None, "only pull"),
-        ([20.0, 20.0], [1.0, 2.0, 3.0], "wrench"),
-        ([20.0, 20.0], [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0], "wrench"),
-    ],
-)
-def test_bad_input_is_named(tension: Any, wrench: Any, said: str) -> None:
-    with pytest.raises(cdsm.InvalidInput, match=said):
-        cdsm.equilibrium(hinge().at([0.0]), tension, wrench)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_reference_beyond_a_stop_is_refused(side: float) -> None:
-    pose = hinge(limit=0.2).at([side * 0.25], check_limits=False)
-    with pytest.raises(cdsm.InvalidInput, match=f"joint1 = {side * 14.32}°.*11.46°"):
-        cdsm.equilibrium(pose, [20.0, 20.0])
+# --- stops ----------------------------------------------------------------------------------
 
 
 def test_disks_that_touch_are_stops_just_before() -> None:
@@ -311,3 +273,23 @@ def test_compliance_at_a_stop_is_that_of_the_other_joints() -> None:
     np.testing.assert_allclose(rest.compliance, expected, rtol=1e-12, atol=1e-18)
     free = cdsm.equilibrium(arm.at([0.0, 0.0]), np.full(4, 20.0), 0.1 * moment)
     np.testing.assert_array_equal(free.compliance, free.stiffness.compliance)
+
+
+# --- the question ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("angle", "tension", "wrench", "said"),
+    [
+        (0.0, [20.0], None, "tension"),
+        (0.0, [20.0, -1.0], None, "only pull"),
+        (0.0, [20.0, 20.0], [1.0, 2.0, 3.0], "wrench"),
+        (0.0, [20.0, 20.0], [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0], "wrench"),
+        (0.25, [20.0, 20.0], None, "joint1 = 14.32°.*11.46°"),
+        (-0.25, [20.0, 20.0], None, "joint1 = -14.32°.*11.46°"),
+    ],
+)
+def test_bad_input_is_named(angle: float, tension: Any, wrench: Any, said: str) -> None:
+    pose = hinge(limit=0.2).at([angle], check_limits=False)
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        cdsm.equilibrium(pose, tension, wrench)

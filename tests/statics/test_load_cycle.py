@@ -1,4 +1,4 @@
-"""Slow loading of an arm with friction: equilibrium without it, energies, breakaway, numbers."""
+"""Slow loading of an arm with friction: equilibrium without it, energies, tangents, numbers."""
 
 import math
 from dataclasses import replace
@@ -8,36 +8,24 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import presets
 from cdsm.statics.load_cycle import LoadHistory
 from cdsm.support.values import Array
+from tests.support import arms
+from tests.support.locked import hinge
 
 WIRE = cdsm.LinearElasticity(48e3)
 
 
 def planar(mu: float, joints: int = 2, **options: Any) -> tuple[cdsm.Posture, cdsm.Tension]:
     """Hinges about y at 15°: R 25, h 12, links 60 mm, lead 0.3 m, 50 N."""
-    geometry = cdsm.Geometry.hinged(
-        joints=joints,
-        twist=0.0,
-        cables_per_joint=2,
-        link_length=0.06,
-        base_length=0.02,
-        disk_offset=0.012,
-        hole_radius=0.025,
-        link_mass=0.0,
-        lead=0.3,
-        friction=mu,
-    )
-    arm = cdsm.Manipulator(geometry, elasticity=WIRE, gravity=(0.0, 0.0, 0.0), **options)
+    sizes = {"link_length": 0.06, "disk_offset": 0.012, "hole_radius": 0.025, "lead": 0.3}
+    arm = hinge(joints=joints, law=WIRE, friction=mu, **sizes, **options)
     pose = arm.at(np.full(joints, np.deg2rad(15.0)))
     return pose, cdsm.distribute_tension(pose, 50.0)
 
 
 def prototype(mu: float, law: cdsm.Elasticity = WIRE) -> tuple[cdsm.Posture, cdsm.Tension]:
-    arm = presets.virtual_prototype(law, lead=0.3, friction=mu)
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    return pose, cdsm.distribute_tension(pose, 50.0)
+    return arms.prototype(law, lead=0.3, friction=mu)
 
 
 def along_z(*forces: float) -> Array:
@@ -50,16 +38,8 @@ def along_z(*forces: float) -> Array:
 
 
 def slender(law: cdsm.Elasticity = WIRE, **cables: Any) -> cdsm.Posture:
-    geometry = cdsm.Geometry.universal(
-        joints=2,
-        cables_per_joint=3,
-        link_length=0.05,
-        base_length=0.02,
-        disk_offset=0.01,
-        hole_radius=0.03,
-        link_mass=0.2,
-        lead=0.2,
-    )
+    sizes = {"link_length": 0.05, "base_length": 0.02, "disk_offset": 0.01, "hole_radius": 0.03}
+    geometry = arms.readme_geometry(joints=2, link_mass=0.2, lead=0.2, **sizes)
     own, forced = cables.pop("original_length", "unstrained"), cables.pop("forced", ())
     routed = [
         replace(cable, control="force") if c in forced else cable
@@ -159,21 +139,16 @@ def test_locked_motors_keep_their_wire() -> None:
 @pytest.mark.parametrize("control", ["position", "force"])
 def test_tension_falls_from_a_motor_that_pulls(control: cdsm.cable.Control) -> None:
     pose, pull = planar(0.2)
-    cables = [
-        cdsm.Cable(c.name, c.sites, WIRE, lead=c.lead, control=control if i == 0 else "position")
-        for i, c in enumerate(pose.arm.cables)
-    ]
-    arm = cdsm.Manipulator(pose.arm.geometry, cables=cables, gravity=(0.0, 0.0, 0.0))
-    pose = arm.at(pose.q)
+    first, *others = pose.arm.cables
+    pose = pose.arm.with_cables([replace(first, control=control), *others]).at(pose.q)
     F = pull.values
     # pulls, and lets go again
-    first = [2e-4, 0.0] if control == "position" else [1.3 * F[0], F[0]]
-    motors = np.array([[each, 0.0, 0.0, 0.0] for each in first])
+    taken = [2e-4, 0.0] if control == "position" else [1.3 * F[0], F[0]]
+    motors = np.array([[each, 0.0, 0.0, 0.0] for each in taken])
     history = cdsm.load_cycle(pose, F, np.zeros((2, 6)), motors=motors)
     assert history.dissipated.min() > 0.0
     T = history.tensions[0]
-    holes = arm.at(pose.q).segments
-    grip = math.exp(0.2 * holes.wrap[0])
+    grip = math.exp(0.2 * pose.segments.wrap[0])
     if control == "force":
         assert T[0, 0] == pytest.approx(1.3 * F[0], rel=1e-15)
         assert T[1, 0] == pytest.approx(F[0], rel=1e-15)
@@ -183,21 +158,7 @@ def test_tension_falls_from_a_motor_that_pulls(control: cdsm.cable.Control) -> N
     np.testing.assert_array_less(T[1, :-1], T[1, 1:])
 
 
-# --- breakaway, tangents ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("mu", [0.3])
-def test_first_hole_slips_at_the_breakaway_load(mu: float) -> None:
-    pose, pull = prototype(mu)
-    expected = cdsm.breakaway(pose, pull, "z")
-    low, high = 0.9 * expected.load, 1.1 * expected.load
-    for _ in range(24):
-        load = (low + high) / 2.0
-        slips = cdsm.load_cycle(pose, pull, along_z(load)).slip.any()
-        low, high = (low, load) if slips else (load, high)
-    assert high == pytest.approx(expected.load, rel=0.1 * mu)  # it is that of first order
-    slip = cdsm.load_cycle(pose, pull, along_z(high)).slip[0]
-    assert np.flatnonzero(slip).tolist() == [expected.hole_loads.argmin()]
+# --- tangents ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("load", [0.5, 5.2, 15.0])
@@ -254,22 +215,24 @@ def test_numbers_of_an_independent_program_on_the_prototype(mu: float) -> None:
     assert abs(np.count_nonzero(history.sliding[3]) - holes) <= 3
 
 
-# --- results and errors ---------------------------------------------------------------------
+# --- errors ---------------------------------------------------------------------------------
 
 
-def test_bad_arguments_are_named() -> None:
-    pose, pull = planar(0.1)
-    for wrong in (np.zeros(6), np.zeros((2, 3)), np.zeros((0, 6))):
-        with pytest.raises(cdsm.InvalidInput, match=r"wrenches.*\(n, 6\)"):
-            cdsm.load_cycle(pose, pull, wrong)
-    with pytest.raises(cdsm.InvalidInput, match=r"motors.*\(1, 4\) needed"):
-        cdsm.load_cycle(pose, pull, along_z(1.0), motors=np.zeros((2, 4)))
-    with pytest.raises(cdsm.InvalidInput, match=r"motors: 0\.5 m of wire taken in for cable1_1"):
-        cdsm.load_cycle(pose, pull, along_z(1.0), motors=[[0.5, 0.0, 0.0, 0.0]])
-    with pytest.raises(cdsm.InvalidInput, match="substeps"):
-        cdsm.load_cycle(pose, pull, along_z(1.0), substeps=0)
-    with pytest.raises(cdsm.InvalidInput, match="wrenches"):
-        cdsm.load_cycle(pose, pull, along_z(math.nan))
+@pytest.mark.parametrize(
+    ("wrenches", "options", "said"),
+    [
+        (np.zeros(6), {}, r"wrenches.*\(n, 6\)"),
+        (np.zeros((2, 3)), {}, r"wrenches.*\(n, 6\)"),
+        (np.zeros((0, 6)), {}, r"wrenches.*\(n, 6\)"),
+        (along_z(math.nan), {}, "wrenches"),
+        (along_z(1.0), {"motors": np.zeros((2, 4))}, r"motors.*\(1, 4\) needed"),
+        (along_z(1.0), {"motors": [[0.5, 0.0, 0.0, 0.0]]}, r"motors: 0\.5 m of .* cable1_1"),
+        (along_z(1.0), {"substeps": 0}, "substeps"),
+    ],
+)
+def test_bad_input_is_named(wrenches: Array, options: dict[str, Any], said: str) -> None:
+    with pytest.raises(cdsm.InvalidInput, match=said):
+        cdsm.load_cycle(*planar(0.1), wrenches, **options)
 
 
 def test_load_that_no_law_covers_is_named() -> None:
@@ -281,17 +244,10 @@ def test_load_that_no_law_covers_is_named() -> None:
 
 @pytest.mark.long  # a quarter of a minute, on the brink of buckling
 def test_snap_through_is_a_warning() -> None:
-    geometry = cdsm.Geometry.universal(
-        joints=3,
-        cables_per_joint=3,
-        link_length=[0.04, 0.048, 0.078],
-        base_length=0.03,
-        disk_offset=[0.012, 0.0134, 0.0108],
-        hole_radius=[0.023, 0.0217, 0.0127],
-        link_mass=0.05,
-        lead=0.3,
-        friction=0.054,
-    )
+    geometry = arms.readme_geometry(
+        joints=3, link_length=[0.04, 0.048, 0.078], disk_offset=[0.012, 0.0134, 0.0108],
+        hole_radius=[0.023, 0.0217, 0.0127], link_mass=0.05, friction=0.054,
+    )  # fmt: skip
     arm = cdsm.Manipulator(geometry, cdsm.LinearElasticity(88e3))
     pose = arm.at(np.deg2rad([5.0, -5.0, 10.0, 3.0, 8.0, -6.0]))
     load = np.array([40.0, 15.0, 12.0, 0.0, 0.0, 0.0])

@@ -5,13 +5,11 @@ import pytest
 
 import cdsm
 from cdsm import presets
-from tests.support.arms import readme_geometry
+from tests.support import arms
 
 
 def prototype(mu: float) -> tuple[cdsm.Posture, cdsm.Tension]:
-    arm = presets.virtual_prototype(cdsm.LinearElasticity(48e3), lead=0.3, friction=mu)
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    return pose, cdsm.distribute_tension(pose, 50.0)
+    return arms.prototype(cdsm.LinearElasticity(48e3), lead=0.3, friction=mu)
 
 
 def test_small_weights_measure_the_stuck_arm_and_increments_of_large_ones_the_frictionless() -> (
@@ -47,7 +45,7 @@ def test_from_the_sliding_load_on_the_tangent_is_near_the_frictionless_one_of_th
         ratio = test.history.stiffness(k + 1).along("z") / state.along("z")
         assert (ratio <= 1.25) == (test.loads[k] >= test.sliding_load)
     # strands stiffen with the load: the tangent without the weight is no measure of sliding
-    geometry = readme_geometry(lead=0.3, friction=0.05)
+    geometry = arms.readme_geometry(lead=0.3, friction=0.05)
     arm = cdsm.Manipulator(geometry, presets.STRAND_1X19)
     pose = arm.at(np.deg2rad([10, 5, 10, 5, -8, 0, -8, 0]))
     loose = cdsm.distribute_tension(pose, 5.0)
@@ -66,4 +64,3 @@ def test_straight_arm_holds_no_cable() -> None:
     test = cdsm.weight_test(pose, np.full(15, 50.0), [0.0, 0.0, 0.01])
     assert test.breakaway_load == test.sliding_load == 0.0
     assert test.stuck == pytest.approx(test.tangent, rel=1e-9)
-    assert "straight through all holes" in str(test)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm import presets
+from tests.support.arms import prototype
 from tests.support.locked import (
     LENGTH,
     MOMENT,
@@ -19,12 +19,6 @@ from tests.support.locked import (
     restoring,
     soft_hinge,
 )
-
-
-def prototype() -> tuple[cdsm.Posture, cdsm.Tension]:
-    arm = presets.virtual_prototype()
-    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
-    return pose, cdsm.distribute_tension(pose, 50.0)
 
 
 @pytest.mark.parametrize("angle", [0.004, 0.3, -0.2])

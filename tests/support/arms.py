@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 import cdsm
+from cdsm import presets
 from cdsm.support.values import Array
 
 STEEL = cdsm.LinearElasticity.of_wire(200e9, 1.2e-3)
@@ -50,6 +51,15 @@ def readme_geometry(**changes: Any) -> cdsm.Geometry:
     """The geometry of README, with some of its sizes changed."""
     sizes: dict[str, Any] = {"joints": 4, "cables_per_joint": 3, **README_SIZES}
     return cdsm.Geometry.universal(**(sizes | changes))
+
+
+def prototype(
+    elasticity: cdsm.Elasticity = presets.STRAND_1X19, minimum: float = 50.0, **options: Any
+) -> tuple[cdsm.Posture, cdsm.Tension]:
+    """The paper's virtual prototype, 10° at every joint, and its least tensions [N]."""
+    arm = presets.virtual_prototype(elasticity, **options)
+    pose = arm.at(np.full(arm.nv, presets.TEN_DEGREES))
+    return pose, cdsm.distribute_tension(pose, minimum)
 
 
 def mixed_arm() -> cdsm.Manipulator:

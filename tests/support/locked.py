@@ -78,13 +78,18 @@ def original_lengths(pose: cdsm.Posture, tension: Array) -> Array:
     )
 
 
-def potential(pose: cdsm.Posture, tension: Array, force: Array) -> Callable[[cdsm.Posture], float]:
+def potential(
+    pose: cdsm.Posture,
+    tension: Array,
+    force: Array,
+    weight: Callable[[cdsm.Posture], float] = gravity_energy,
+) -> Callable[[cdsm.Posture], float]:
     """Π = Σ E_c(F_c) + Σ F_0 L_c + V − f·x, cable by cable, from what a Cable says alone."""
     cables = pose.arm.cables
     free = original_lengths(pose, tension)
 
     def energy(there: cdsm.Posture) -> float:
-        total = gravity_energy(there) - float(force @ there.tip[:3, 3])
+        total = weight(there) - float(force @ there.tip[:3, 3])
         longer = there.cable_lengths - free
         for c, cable in enumerate(cables):
             if cable.control == "force":
@@ -106,6 +111,17 @@ def balanced(name: str, seed: int = 11, moment: bool = True) -> tuple[cdsm.Postu
     return pose, pull
 
 
+def unbalanced_torque(K: cdsm.Stiffness) -> Callable[[Array], Array]:
+    """What is out of balance at other angles, motors locked, from lengths and weights alone."""
+
+    def torque(q: Array) -> Array:
+        pose = K.posture.arm.at(q, check_limits=False)
+        F = K.tension + K.cable_stiffness * (pose.cable_lengths - K.posture.cable_lengths)
+        return F @ pose.length_jacobian + pose.gravity_torque - K.wrench @ pose.jacobian
+
+    return torque
+
+
 # --- one hinge, closed form -----------------------------------------------------------------
 
 SIZES: dict[str, Any] = {
@@ -125,10 +141,13 @@ def hinge(
     limit: float | None = None,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     law: cdsm.Elasticity | None = None,
+    original_length: cdsm.manipulator.OriginalLength = "unstrained",
     **sizes: Any,
 ) -> cdsm.Manipulator:
+    """Hinges about y, of one joint unless ``sizes`` of the geometry say otherwise."""
     geometry = cdsm.Geometry.hinged(**{**SIZES, "joint_limit": limit, **sizes})
-    return cdsm.Manipulator(geometry, law or cdsm.LinearElasticity(EA), gravity=gravity)
+    law = law or cdsm.LinearElasticity(EA)
+    return cdsm.Manipulator(geometry, law, gravity=gravity, original_length=original_length)
 
 
 def half(side: float, angle: float) -> tuple[float, float]:

@@ -76,3 +76,10 @@ def tendon_jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
         entries = slice(start, start + count)
         dense[t, model.ten_J_colind[entries]] = data.ten_J[entries]
     return dense
+
+
+def mass(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """Joint-space mass matrix (nv, nv) [kg m²]."""
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    return M
