@@ -114,13 +114,8 @@ def test_replace_checks_what_it_changes() -> None:
     joints = universal(hole_radius=[0.02, 0.03, 0.02]).joints
     both = geometry.replace(hole_radius=0.025, joints=joints)
     assert both.hole_radii == (0.025, 0.03, 0.025)
-    for change, said in (
-        ({"hole_radus": 0.025}, "did you mean hole_radius"),
-        ({"hole_radius": -1.0}, "hole_radius: -1 m"),
-        ({"lead": 0.1}, "lead: is not a key"),
-    ):
-        with pytest.raises(cdsm.GeometryError, match=said):
-            geometry.replace(**change)  # type: ignore[arg-type]
+    with pytest.raises(cdsm.GeometryError, match="hole_radius: -1 m"):
+        geometry.replace(hole_radius=-1.0)
 
 
 # --- holes ----------------------------------------------------------------------------------
