@@ -64,6 +64,7 @@ def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
     np.testing.assert_allclose(matrix @ C, np.eye(2), atol=1e-12)
     # along a line it is what a weight measures
     assert planar.cartesian_in([[1.0, 0.0, 1.0]])[0, 0] == pytest.approx(planar.along([1, 0, 1]))
+    assert "the tip cannot move along (0, 1, 0)" in str(planar)
     with pytest.raises(cdsm.SingularStiffness, match=r"cannot move along \(0, 1, 0\)"):
         planar.cartesian_in(("x", "y"))
     with pytest.raises(cdsm.InvalidInput, match="not orthogonal"):
@@ -100,6 +101,7 @@ ROWS = {"Tension": 9, "Shares": 9, "MomentArms": 9, "WeightTest": 2, "PathPlan":
 @pytest.mark.parametrize("name", RESULTS)
 def test_results_become_strict_json_and_tables_with_units(name: str) -> None:
     result = RESULTS[name]()
+    assert "nan" not in str(result)
     found = result.to_dict()
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     if name != "Report":
