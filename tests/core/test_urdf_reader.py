@@ -88,6 +88,8 @@ def test_links_that_move_without_mass_are_noted() -> None:
         read_urdf(cross)
 
 
+LINKS = [LINK.format(f"l{i}") for i in range(402)]
+LONG = [*LINKS, *(HINGE.format(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(401))]
 CIRCLE = HINGE.format("j3", "d", "e"), HINGE.format("j4", "e", "d")
 
 
@@ -110,6 +112,7 @@ CIRCLE = HINGE.format("j3", "d", "e"), HINGE.format("j4", "e", "d")
         (robot(*CHAIN, LINK.format("d")), "roots a, d"),
         (robot(*CHAIN, HINGE.format("j3", "a", "c")), "two parents, by the joints j2 and j3"),
         (robot(*CHAIN, *map(LINK.format, "de"), *CIRCLE), "the links d, e hang on each other"),
+        (robot(*LONG), "401 joints one behind the other"),
         (robot(LINK.format("a")), "has 0 joints that move"),
         ("<robot name='x'><link", "not well-formed"),
         ("<mujoco></mujoco>", "MJCF"),
