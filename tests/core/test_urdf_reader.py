@@ -89,7 +89,9 @@ def test_links_that_move_without_mass_are_noted() -> None:
 
 
 LINKS = [LINK.format(f"l{i}") for i in range(402)]
-LONG = [*LINKS, *(HINGE.format(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(401))]
+FIXED = HINGE.replace("revolute", "fixed")
+LONG = [*LINKS, HINGE.format("j0", "l0", "l1")]
+LONG += [FIXED.format(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(1, 401)]
 CIRCLE = HINGE.format("j3", "d", "e"), HINGE.format("j4", "e", "d")
 
 
