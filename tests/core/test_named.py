@@ -45,22 +45,9 @@ def test_moment_arms_times_tensions_are_the_torque_that_balances_gravity() -> No
     np.testing.assert_allclose(arms.values[:, 1], shorter, atol=1e-6)
     joint = POSE.arm.joint_names[1]
     assert arms[NAMES[0], joint] == arms.values[0, 1]
-    for wrong in ((NAMES[0], "joint9"), ("cable9", joint)):
+    for wrong in ((NAMES[0], "joint9"), ("cable9", joint), "ab", 0):
         with pytest.raises(cdsm.InvalidInput):
-            _ = arms[wrong]
-    for short in ("mid", "ab", 0, (NAMES[0],)):
-        with pytest.raises(cdsm.InvalidInput, match=r"such as moment_arms\[\"cable1_1\", \"joint1"):
-            _ = arms[short]  # type: ignore[index]
-
-
-def test_shares_are_printed_by_name_and_add_up() -> None:
-    shares = K.shares("z")
-    assert list(shares) == NAMES
-    assert shares[NAMES[4]] == shares.cables[4]
-    rows = {line.split()[0]: line.split() for line in str(shares).splitlines()[1:-1]}
-    parts = [float(rows[name][4].rstrip("%")) for name in NAMES]
-    parts += [float(rows[name][-1].rstrip("%")) for name in ("gravity", "load")]
-    assert sum(parts) == pytest.approx(100.0, abs=0.05 * len(parts))
+            _ = arms[wrong]  # type: ignore[index]
 
 
 def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
@@ -77,6 +64,7 @@ def test_planar_arms_have_a_cartesian_stiffness_in_their_plane() -> None:
     np.testing.assert_allclose(matrix @ C, np.eye(2), atol=1e-12)
     # along a line it is what a weight measures
     assert planar.cartesian_in([[1.0, 0.0, 1.0]])[0, 0] == pytest.approx(planar.along([1, 0, 1]))
+    assert "the tip cannot move along (0, 1, 0)" in str(planar)
     with pytest.raises(cdsm.SingularStiffness, match=r"cannot move along \(0, 1, 0\)"):
         planar.cartesian_in(("x", "y"))
     with pytest.raises(cdsm.InvalidInput, match="not orthogonal"):
@@ -91,24 +79,18 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "Tension": lambda: PULL,
     "Stiffness": lambda: K,
     "Shares": lambda: K.shares(U),
-    "KinematicSolution": lambda: cdsm.inverse_kinematics(POSE.arm, POSE.tip),
     "KinematicSolution of lengths": lambda: cdsm.solve_joint_angles(POSE.arm, POSE.cable_lengths),
-    "Modes": lambda: cdsm.modes(POSE, K),
     "Equilibrium": lambda: cdsm.equilibrium(POSE, PULL),
     "WeightTest": lambda: cdsm.weight_test(POSE, PULL, (0.0, 0.0, -1.0), steps=2),
-    "StiffnessRange": lambda: cdsm.stiffness_range(POSE, U, 10.0, 200.0, starts=2),
     "StiffnessPlan": lambda: cdsm.plan_stiffness(POSE, U, K.along(U), 10.0, 200.0),
     "PathPlan": lambda: cdsm.plan_path(
         *(POSE.arm, U, [K.along(U), 1e9], 10.0, 200.0),
         angles=[POSE.q, POSE.q],
         max_change_per_sample=50.0,
     ),
-    "Saturation": lambda: cdsm.saturation(POSE, U, 10.0, 200.0),
-    "CriticalTension": lambda: cdsm.critical_tension(POSE),
     "CriticalLoad": lambda: cdsm.critical_load(POSE, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0), 10.0),
     "Report": lambda: K.report(),
     "ForcePolytope": lambda: cdsm.force_polytope(POSE, 1.0, 200.0),
-    "Payload": lambda: cdsm.payload(POSE, "z", 1.0, 200.0, deflection=1e-3),
     "Clearance": lambda: cdsm.clearance(POSE, 1e-3),
 }
 
@@ -119,6 +101,7 @@ ROWS = {"Tension": 9, "Shares": 9, "MomentArms": 9, "WeightTest": 2, "PathPlan":
 @pytest.mark.parametrize("name", RESULTS)
 def test_results_become_strict_json_and_tables_with_units(name: str) -> None:
     result = RESULTS[name]()
+    assert "nan" not in str(result)
     found = result.to_dict()
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     if name != "Report":

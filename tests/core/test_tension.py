@@ -123,8 +123,7 @@ def test_no_widening_helps_where_the_fixed_tensions_alone_miss_the_balance(
     assert error.missing[2] == pytest.approx(missing, rel=1e-9)
 
 
-@pytest.mark.parametrize("maximum", [INF, 100.0])
-@pytest.mark.parametrize("solver", ["daqp", "osqp"])
+@pytest.mark.parametrize(("maximum", "solver"), [(INF, "daqp"), (100.0, "osqp")])
 def test_torque_the_cables_cannot_exert_at_all_has_no_relaxation(
     maximum: float, solver: str
 ) -> None:

@@ -166,18 +166,6 @@ def test_link_is_a_solid_cylinder_of_the_hole_radius_about_mid_link_or_a_milligr
         assert inertia["ixy"] == inertia["ixz"] == inertia["iyz"] == 0.0
 
 
-def test_disks_are_drawn_with_the_radii_of_their_joints() -> None:
-    geometry = readme_geometry(joints=3, hole_radius=TAPER, disk_radius=[0.03, 0.026, 0.021])
-    links = elements(geometry, "link")
-    drawn = [
-        (name, float(child(child(visual, "geometry"), "cylinder").attrib["radius"]))
-        for name in ("base_disk", "link1", "link2", "link3")
-        for visual in links[name].findall("visual")
-        if child(visual, "material").attrib["name"] == "disk"
-    ]
-    assert drawn == [(disk.link, disk.radius) for disk in geometry.disks]
-
-
 def test_disagreement_on_reading_back_is_reported_and_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -26,30 +26,22 @@ HINGE = (
 )
 
 
-def robot(*parts: str, name: str = "bot") -> str:
-    return f'<robot name="{name}">{"".join(parts)}</robot>'
+def robot(*parts: str) -> str:
+    return f'<robot name="bot">{"".join(parts)}</robot>'
 
 
-def chain() -> list[str]:
-    return [
-        LINK.format("a"),
-        LINK.format("b"),
-        LINK.format("c"),
-        HINGE.format("j1", "a", "b"),
-        HINGE.format("j2", "b", "c"),
-    ]
+CHAIN = [*map(LINK.format, "abc"), HINGE.format("j1", "a", "b"), HINGE.format("j2", "b", "c")]
 
 
 def changed(before: str, after: str) -> str:
-    text = robot(*chain())
+    text = robot(*CHAIN)
     assert before in text
     return text.replace(before, after, 1)
 
 
-def gripper(before: str = "", after: str = "") -> cdsm.Manipulator:
+def gripper(before: str, after: str) -> cdsm.Manipulator:
     assert before in GRIPPER
-    text = GRIPPER.replace(before, after, 1) if before else GRIPPER
-    return cdsm.Manipulator.from_urdf(text, CABLES, tip="fl")
+    return cdsm.Manipulator.from_urdf(GRIPPER.replace(before, after, 1), CABLES, tip="fl")
 
 
 @pytest.mark.parametrize("blank", [" ", "\n", "&#13;", "\u00a0"])
@@ -96,6 +88,10 @@ def test_links_that_move_without_mass_are_noted() -> None:
         read_urdf(cross)
 
 
+LINKS = [LINK.format(f"l{i}") for i in range(402)]
+FIXED = HINGE.replace("revolute", "fixed")
+LONG = [*LINKS, HINGE.format("j0", "l0", "l1")]
+LONG += [FIXED.format(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(1, 401)]
 CIRCLE = HINGE.format("j3", "d", "e"), HINGE.format("j4", "e", "d")
 
 
@@ -115,13 +111,14 @@ CIRCLE = HINGE.format("j3", "d", "e"), HINGE.format("j4", "e", "d")
         (changed('ixx="1e-4"', 'ixx="3e-4"'), "link a: principal moments"),
         (changed('<parent link="b"/>', '<parent link="x"/>'), "no link x"),
         (changed('<link name="c">', '<link name="b">'), "link b: the name is used twice"),
-        (robot(*chain(), LINK.format("d")), "roots a, d"),
-        (robot(*chain(), HINGE.format("j3", "a", "c")), "two parents, by the joints j2 and j3"),
-        (robot(*chain(), *map(LINK.format, "de"), *CIRCLE), "the links d, e hang on each other"),
+        (robot(*CHAIN, LINK.format("d")), "roots a, d"),
+        (robot(*CHAIN, HINGE.format("j3", "a", "c")), "two parents, by the joints j2 and j3"),
+        (robot(*CHAIN, *map(LINK.format, "de"), *CIRCLE), "the links d, e hang on each other"),
+        (robot(*LONG), "401 joints one behind the other"),
         (robot(LINK.format("a")), "has 0 joints that move"),
         ("<robot name='x'><link", "not well-formed"),
         ("<mujoco></mujoco>", "MJCF"),
-        (robot(*chain(), "<x>" * 300 + "</x>" * 300), "depth"),
+        (robot(*CHAIN, "<x>" * 300 + "</x>" * 300), "depth"),
     ],
 )
 def test_faults_are_named(text: str, said: str) -> None:

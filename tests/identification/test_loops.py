@@ -73,18 +73,6 @@ def test_loops_of_a_load_cycle_give_the_arm_that_made_them() -> None:
     assert found.freedom == 2 * 3 * (len(FORCES) - 1) - 2
 
 
-def test_jacobian_is_the_derivative_of_the_residuals() -> None:
-    problem = Problem(hinge, None, measured(1), FREE)
-    true = np.array(list(TRUE.values()))
-    jacobian = problem.jacobian(problem.point(true), central=True) / problem.slope(true)
-    for i, value in enumerate(true):
-        h = np.zeros(2)
-        h[i] = 1e-4 * value
-        up, down = (problem.residuals(problem.point(true + s * h)) for s in (1.0, -1.0))
-        expected = (up - down) / (2.0 * h[i])
-        np.testing.assert_allclose(jacobian[:, i], expected, atol=1e-4 * abs(expected).max())
-
-
 @pytest.mark.long
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     """Of friction and of rigidity, in 200 experiments of two loops each."""

@@ -143,15 +143,6 @@ def test_parameters_that_only_act_together_are_named() -> None:
     assert found.confidence()["area"] == (-math.inf, math.inf)
 
 
-@pytest.mark.parametrize(("limits", "side"), [((0.033, 0.05), "lower"), ((0.02, 0.029), "upper")])
-def test_a_bound_that_excludes_the_optimum_is_named(limits: tuple[float, float], side: str) -> None:
-    exact = measured(prototype(hole_radius=0.031, drive=4e4))
-    found = identify(prototype, exact, {"hole_radius": limits, "drive": FREE["drive"]})
-    assert found.parameters["hole_radius"] == limits[side == "upper"]
-    (said,) = (each for each in found.warnings if "bound" in each)
-    assert said.startswith(f"hole_radius is at its {side} bound")
-
-
 def test_a_model_that_ends_before_the_optimum_is_said() -> None:
     def model_of(lead: float) -> cdsm.Manipulator:
         if lead > 0.3:

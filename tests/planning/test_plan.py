@@ -1,6 +1,5 @@
 """Tensions for a wanted stiffness: hit, measured by a hung weight, least, and start-independent."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -90,29 +89,15 @@ def test_tensions_satisfy_the_conditions_of_first_order(name: str, part: float) 
     assert abs(z[free]).max() < 1e-6 * np.linalg.norm(F)
     assert z[at_low].min(initial=0.0) > -1e-6 * np.linalg.norm(F)
     assert z[at_high].max(initial=0.0) < 1e-6 * np.linalg.norm(F)
-
-
-@pytest.mark.parametrize("part", [0.1, 0.9])
-@pytest.mark.parametrize("name", [name for name in ARMS if name.startswith("hinged")])
-def test_smaller_tensions_all_miss_the_target_on_the_same_side(name: str, part: float) -> None:
-    """They are a convex set, so if along met the target somewhere it would on the way there."""
-    pose, low, high = posture(name)
-    u = np.array([0.2, 0.5, -0.8])
-    found = cdsm.stiffness_range(pose, u, low, high)
-    target = found.low + part * (found.high - found.low)
-    plan = cdsm.plan_stiffness(pose, u, target, low, high)
-    effort = float(np.linalg.norm(plan.tension.values))
+    if not name.startswith("hinged"):
+        return
+    # smaller tensions are a convex set: if along met the target somewhere, it would on the way
     least = cdsm.distribute_tension(pose, low, high).values
-    side = cdsm.stiffness(pose, least).along(u) - target
+    side, tried = along(least) - target, 0
     ends = corners(pose, low, high, np.zeros(6))
-    rng = np.random.default_rng(0)
-    tried = 0
-    for mixture in rng.dirichlet(np.full(len(ends), 0.3), 4000) @ ends:
-        there = mixture
-        if np.linalg.norm(there) > effort:  # back to where the effort is just below
-            way = there - least
-            a, b, c = way @ way, 2.0 * (way @ least), least @ least - effort**2
-            there = least + 0.9999 * (-b + math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a) * way
+    for there in np.random.default_rng(0).dirichlet(np.full(len(ends), 0.3), 2000) @ ends:
+        while np.linalg.norm(there) > 0.9999 * np.linalg.norm(F):
+            there = least + 0.9 * (there - least)
         K = cdsm.stiffness(pose, np.clip(there, low, high))
         if K.margin >= found.floor:
             assert (K.along(u) - target) * side > 0.0

@@ -8,7 +8,7 @@ import pytest
 
 import cdsm
 from cdsm.sweeps.poses import joint_angles
-from tests.support.differences import assert_second_order
+from tests.support.arms import readme_geometry
 
 pytestmark = pytest.mark.filterwarnings("ignore::cdsm.errors.CdsmWarning")
 
@@ -71,18 +71,6 @@ def test_derivatives_are_those_of_all_joints_times_s() -> None:
     np.testing.assert_allclose(K.residual, whole.residual @ S, atol=1e-12)
 
 
-def test_stiffness_is_the_derivative_of_the_torque() -> None:
-    pose = ARM.at(PHI)
-    K = cdsm.stiffness(pose, TENSION, WRENCH)
-
-    def torque(q: np.ndarray) -> np.ndarray:
-        there = ARM.at(q)
-        F = TENSION + K.cable_stiffness * (there.cable_lengths - pose.cable_lengths)
-        return cdsm.stiffness(there, F, WRENCH).residual
-
-    assert_second_order(torque, K.joint, PHI, step=2.0**-9)
-
-
 def test_batches_couple_too() -> None:
     names = ("joint", "springs", "compliance", "margin", "jacobian", "length_jacobian", "tip")
     rows = cdsm.evaluate(ARM, np.tile(PHI, (3, 1)), TENSION, WRENCH, names)
@@ -115,21 +103,16 @@ def test_statics_friction_and_modes_couple() -> None:
 
 
 def test_sections_turn_alike() -> None:
-    sizes: dict[str, Any] = {
-        "joints": 4, "cables_per_joint": 3, "link_length": 0.05, "base_length": 0.02,
-        "disk_offset": 0.01, "hole_radius": 0.015, "link_mass": 0.02, "lead": 0.1,
-    }  # fmt: skip
-    alike = cdsm.Geometry.universal(**sizes, coupled=True)
+    sizes = {"link_length": 0.05, "base_length": 0.02, "disk_offset": 0.01, "hole_radius": 0.015}
+    sizes |= {"link_mass": 0.02, "lead": 0.1}
+    alike = readme_geometry(**sizes, coupled=True)
     arm = cdsm.Manipulator(cdsm.Geometry.sections([alike, alike]), LAW)
     assert arm.joint_names == ("joint1_1", "joint1_2", "joint5_1", "joint5_2")
     own = [each for each in arm.cables if each.name.startswith(("cable4", "cable8"))]
     arm = arm.with_cables(own)  # six cables hold two sections of four joints
     q = np.array([0.05, 0.02, -0.03, 0.04])
     assert abs(cdsm.distribute_tension(arm.at(q), 2.0).residual).max() < 1e-12
-    free = cdsm.Manipulator(
-        cdsm.Geometry.sections([cdsm.Geometry.universal(**sizes)] * 2),
-        LAW,
-    )
+    free = cdsm.Manipulator(cdsm.Geometry.sections([readme_geometry(**sizes)] * 2), LAW)
     every = np.concatenate([np.tile(q[:2], 4), np.tile(q[2:], 4)])
     np.testing.assert_allclose(arm.at(q).tip, free.at(every).tip, atol=1e-14)
 

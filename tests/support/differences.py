@@ -34,15 +34,10 @@ def assert_second_order(
     and h⁴ extrapolated away, have to agree with it to ``tolerance`` of its largest entry. Where the
     differences have no error but rounding (f linear or constant), rounding is all that is allowed.
 
-    Args:
-        f: A function of a vector, of any shape.
-        analytic: Its derivative at x; one axis for x behind those of f, or two for order 2.
-        x: Where.
-        order: 1 for the first derivative, 2 for the Hessian.
-        step: h. Powers of two, because those are halved without rounding.
-        size: Magnitude of the numbers that f is computed from: they set the rounding.
-        tolerance: Relative to the largest entry. The default is what rounding leaves of a moment
-            arm of 1 cm: some 1e-16 m over the smallest step of 1e-3 rad, and ten times that.
+    ``analytic`` has one axis for x behind those of f, or two for ``order`` 2, the Hessian. ``step``
+    is h: powers of two are halved without rounding. ``size`` is the magnitude of the numbers that f
+    is computed from: they set the rounding. The default ``tolerance`` is what rounding leaves of a
+    moment arm of 1 cm: some 1e-16 m over the smallest step of 1e-3 rad, and ten times that.
     """
 
     def estimate(h: float) -> Array:
