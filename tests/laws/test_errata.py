@@ -36,16 +36,6 @@ def test_eq3_row_0_of_table_1_is_eq2_and_is_multiplied_once() -> None:
     np.testing.assert_allclose(eq1(math.radians(-90.0), 0.07, 0.0), eq2(0.07), atol=1e-16)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_eq10_to_12_hold_with_equality(seed: int) -> None:
-    arm = random_arm(seed, 4)
-    pose = random_posture(arm, seed)
-    pull = cdsm.distribute_tension(pose, minimum=10.0, wrench=random_wrench(seed))
-    torque = pull.wrench @ pose.jacobian - pull.values @ pose.length_jacobian - pose.gravity_torque
-    assert abs(torque).max() < 1e-12 * max(1.0, pull.values.max())
-    np.testing.assert_allclose(pull.residual, -torque, rtol=0.0, atol=1e-12)
-
-
 def test_eq10_virtual_work_vanishes_to_second_order_in_the_displacement() -> None:
     arm = random_arm(2, 3)
     pose = random_posture(arm, 2, reach=0.4)
