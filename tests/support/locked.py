@@ -15,8 +15,6 @@ from tests.support import arms
 from tests.support.differences import gravity_energy
 
 STRAND = presets.STRAND_1X19
-# rising all the way to its end, which Eq. 19 does not
-RISING = cdsm.StrandElasticity(((2e3, 60.0), (6768.71, 20.0, 0.01)), (123.0,), 2.2, 810.0)
 # a strand from zero on, EA from 3 kN up; few points, since its third derivative jumps at them
 POINTS = np.array([0.0, 30.0, 250.0, 600.0, 900.0])
 TABLE = cdsm.TabulatedElasticity(
