@@ -310,6 +310,26 @@ def test_singular_stiffness_is_no_error_but_a_status() -> None:
     assert cdsm.evaluate(arm, q, tension, outputs=("joint", "margin")).ok.all()
 
 
+def test_nearly_singular_stiffness_is_decided_as_for_the_single_posture() -> None:
+    """Not singular by its singular values, though the probing torque moves it far."""
+    arm = slack_arm()
+    q = np.array([[0.1, 0.2]])
+    tension = np.array([[0.0, 0.0, 1e-7, 1e-7]])
+    K = cdsm.stiffness(arm.at(q[0]), tension[0])
+    values = np.linalg.svd(K.joint, compute_uv=False)
+    assert 1e-13 < values[-1] / values[0] < 1e-10
+    names = ("along", "compliance", "joint")
+    for u in (DIRECTIONS, DIRECTIONS[0]):
+        batch = cdsm.evaluate(arm, q, tension, outputs=names, direction=u)
+        assert batch.ok.all()
+        np.testing.assert_allclose(batch["compliance"][0], K.compliance, rtol=1e-12)
+        alone = np.reshape([K.along(d) for d in np.atleast_2d(u)], u.shape[:-1])
+        np.testing.assert_allclose(batch["along"][0], alone, rtol=1e-12)
+    immobile = cdsm.evaluate(arm, q, tension, outputs=("pseudoinverse", "compliance"))
+    assert immobile.status[0] == cdsm.Status.IMMOBILE
+    assert only(immobile, 0) == {"compliance"}
+
+
 # --- bad input ------------------------------------------------------------------------------
 
 ARM = random_arm(1, 2)
