@@ -310,6 +310,7 @@ def test_singular_stiffness_is_no_error_but_a_status() -> None:
     assert cdsm.evaluate(arm, q, tension, outputs=("joint", "margin")).ok.all()
 
 
+@pytest.mark.usefixtures("kernels")
 def test_nearly_singular_stiffness_is_decided_as_for_the_single_posture() -> None:
     """Not singular by its singular values, though the probing torque moves it far."""
     arm = slack_arm()
@@ -324,6 +325,7 @@ def test_nearly_singular_stiffness_is_decided_as_for_the_single_posture() -> Non
         assert batch.ok.all()
         np.testing.assert_allclose(batch["compliance"][0], K.compliance, rtol=1e-12)
         alone = np.reshape([K.along(d) for d in np.atleast_2d(u)], u.shape[:-1])
+        assert batch["along"].shape == (1, *alone.shape)
         np.testing.assert_allclose(batch["along"][0], alone, rtol=1e-12)
     immobile = cdsm.evaluate(arm, q, tension, outputs=("pseudoinverse", "compliance"))
     assert immobile.status[0] == cdsm.Status.IMMOBILE
