@@ -102,36 +102,6 @@ def test_bounds_of_all_kinds(name: str) -> None:
     assert_same_as_alone(cdsm.distribute_tensions(arm, q, low[0], high.max(axis=0)))
 
 
-# --- who decides ----------------------------------------------------------------------------
-
-
-def test_rows_that_the_solver_leaves_open_go_to_the_single_posture(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    arm = shallow_arm(3)
-    q, wrench = postures(arm, 60, 0.9), 0.1 * loads(60)
-    expected = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
-    assert 5 < np.count_nonzero(expected.ok) < 55
-
-    def open_(arm: object, J: object, torque: object, low: Array, *_: Any) -> Any:
-        return low, cdsm.Status.SOLVER_FAILED
-
-    monkeypatch.setattr(chunk, "search", open_)
-    found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
-    np.testing.assert_array_equal(found.status, expected.status)
-    scale = np.nanmax(expected.values)
-    np.testing.assert_allclose(found.values, expected.values, rtol=0.0, atol=EXACT * scale)
-
-    def failing(*_: Any) -> None:
-        raise cdsm.CdsmError("solver failed.", "SOLVER_FAILED")
-
-    monkeypatch.setattr(search, "distribute_tension", failing)
-    found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
-    lost = found.status == cdsm.Status.SOLVER_FAILED
-    assert lost[~expected.ok].all()
-    assert np.isnan(found.values[lost]).all()
-
-
 @pytest.mark.usefixtures("kernels")
 @pytest.mark.parametrize(
     ("arm", "reach", "minimum"),
@@ -164,3 +134,30 @@ def test_rounding_on_a_joint_that_no_cable_turns_is_no_missing_torque() -> None:
     batch = cdsm.distribute_tensions(arm, [q], 5.0)
     assert batch.status.tolist() == [cdsm.Status.OK]
     np.testing.assert_allclose(batch.values[0], single.values, rtol=1e-9)
+
+
+def test_rows_that_the_solver_leaves_open_go_to_the_single_posture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    arm = shallow_arm(3)
+    q, wrench = postures(arm, 60, 0.9), 0.1 * loads(60)
+    expected = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
+    assert 5 < np.count_nonzero(expected.ok) < 55
+
+    def open_(arm: object, J: object, torque: object, low: Array, *_: Any) -> Any:
+        return low, cdsm.Status.SOLVER_FAILED
+
+    monkeypatch.setattr(chunk, "search", open_)
+    found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
+    np.testing.assert_array_equal(found.status, expected.status)
+    scale = np.nanmax(expected.values)
+    np.testing.assert_allclose(found.values, expected.values, rtol=0.0, atol=EXACT * scale)
+
+    def failing(*_: Any) -> None:
+        raise cdsm.CdsmError("solver failed.", "SOLVER_FAILED")
+
+    monkeypatch.setattr(search, "distribute_tension", failing)
+    found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
+    lost = found.status == cdsm.Status.SOLVER_FAILED
+    assert lost[~expected.ok].all()
+    assert np.isnan(found.values[lost]).all()

@@ -84,15 +84,6 @@ def test_closed_form_is_the_optimum_of_a_linear_program(
     assert found.low == -found.high
 
 
-@pytest.mark.parametrize(
-    ("friction", "expected"), [(0.1, (0.081, 0.080, 0.082)), (0.2, (0.162, 0.160, 0.165))]
-)
-def test_numbers_of_the_virtual_prototype(friction: float, expected: Array) -> None:
-    """Half-widths [mm] of an independent program."""
-    found = [1e3 * cdsm.rest_band(*prototype(friction), axis).high for axis in "xyz"]
-    np.testing.assert_allclose(found, expected, atol=6e-4)
-
-
 def farthest(posed: Posed, largest: float, seeds: range) -> float:
     """Pull an arm to and fro at random, let go, and return how far of the band the tip rests."""
     pose, F = posed

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -78,15 +77,6 @@ def test_simulated_arms_begin_to_slide_at_the_load(law: cdsm.Elasticity) -> None
             assert cdsm.load_cycle(pose, pull, W[None]).sliding.any() == slides
         tried += 1
     assert tried >= 5
-
-
-@pytest.mark.parametrize(("bound", "expected"), [(15.0, 0.27), (50.0, 0.71), (120.0, 1.61)])
-def test_numbers_of_the_virtual_prototype(bound: float, expected: float) -> None:
-    """First slip in z of an independent program at μ = 0.1, with and without lead: two digits."""
-    for lead in (0.0, 0.3):
-        options: Any = {"lead": lead, "friction": 0.1, "original_length": "stretched"}
-        found = cdsm.breakaway(*arms.prototype(minimum=bound, **options), "z")
-        assert found.load == pytest.approx(expected, abs=0.007)
 
 
 def test_planar_arm_of_two_joints() -> None:

@@ -36,31 +36,17 @@ def _general_arm(seed: int, geometry: cdsm.Geometry) -> cdsm.Manipulator:
     return cdsm.Manipulator(geometry, cables=cables, gravity=(2.0, -5.0, 7.0))
 
 
-def _postures() -> dict[str, Callable[[], cdsm.Posture]]:
-    mixed = arms.mixed_arm().geometry
-    uniform = arms.random_arm(5, 3).geometry
-    serpentine: dict[str, Callable[[], cdsm.Manipulator]] = {
-        f"{kind}-{n}": lambda n=n, kind=kind: arms.random_arm(n, n, kind)  # type: ignore[misc]
-        for kind in ("universal", "hinged")
-        for n in (1, 2, 4, 8)
-    }
-    general: dict[str, Callable[[], cdsm.Manipulator]] = {
-        "mixed": arms.mixed_arm,
-        "general-mixed": lambda: _general_arm(1, mixed),
-        "general-universal": lambda: _general_arm(2, uniform),
-    }
-    return {
-        name: lambda make=make: arms.random_posture(make(), 7)  # type: ignore[misc]
-        for name, make in (serpentine | general).items()
-    }
+ARMS = {
+    **{f"{k}-{n}": arms.random_arm(n, n, k) for k in ("universal", "hinged") for n in (1, 2, 4, 8)},
+    "mixed": arms.mixed_arm(),
+    "general-mixed": _general_arm(1, arms.mixed_arm().geometry),
+    "general-universal": _general_arm(2, arms.random_arm(5, 3).geometry),
+}
 
 
-POSTURES = _postures()
-
-
-@pytest.fixture(scope="module", params=POSTURES)
+@pytest.fixture(params=ARMS)
 def pose(request: pytest.FixtureRequest) -> cdsm.Posture:
-    return POSTURES[request.param]()
+    return arms.random_posture(ARMS[request.param], 7)
 
 
 W, FORCE, MOMENT = arms.random_wrench(3), np.repeat([1.0, 0.0], 3), np.repeat([0.0, 1.0], 3)
@@ -112,7 +98,7 @@ def test_differences_converge_to_the_analytic_derivative(pose: cdsm.Posture, nam
     _assert_derivative(pose, quantity, derivative(pose))
 
 
-@pytest.mark.parametrize("pose", [name for name in POSTURES if name != "hinged-1"], indirect=True)
+@pytest.mark.parametrize("pose", [name for name in ARMS if name != "hinged-1"], indirect=True)
 def test_eq16_load_part_is_symmetric_for_a_force_alone(pose: cdsm.Posture) -> None:
     quantity, term = _load(W * FORCE)
     np.testing.assert_array_equal(term(pose), term(pose).T)

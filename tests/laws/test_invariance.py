@@ -85,19 +85,6 @@ def test_rigid_motion_keeps_joint_stiffness_and_turns_compliance(
     _close(turned.cartesian, both[:3, :3] @ K.cartesian @ both[:3, :3].T, 1e-9)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_rigid_motion_keeps_distributed_tensions(name: str) -> None:
-    arm, angle = _arm(name), 0.7
-    pose = arms.random_posture(arm, 1, reach=0.3)
-    W = arms.random_wrench(1)
-    pull = cdsm.distribute_tension(pose, minimum=30.0, wrench=W)
-    moved = _turned_arm(arm, angle).at(pose.q)
-    turned = np.kron(np.eye(2), _turn(angle)) @ W
-    again = cdsm.distribute_tension(moved, minimum=30.0, wrench=turned)
-    # the solver is asked for 1e-10 of the largest tension
-    _close(again.values, pull.values, 1e-9)
-
-
 # The order of the cables
 
 
@@ -188,20 +175,12 @@ PROBLEMS = [
 ]
 
 
+@pytest.mark.parametrize("solver", ["daqp", "osqp", "clarabel"])
 @pytest.mark.parametrize(("seed", "name"), PROBLEMS)
-@pytest.mark.parametrize("solver", ["osqp", "clarabel"])
-def test_eq17_solvers_agree(seed: int, name: str, solver: str) -> None:
+def test_eq17_tensions_satisfy_the_optimality_conditions(seed: int, name: str, solver: str) -> None:
+    """Which make them the only ones: all solvers agree."""
     pose, low, high, W = _problem(seed, name)
-    ours = cdsm.distribute_tension(pose, low, high, W)
-    theirs = cdsm.distribute_tension(pose, low, high, W, solver=solver)
-    assert (ours.solver, theirs.solver) == ("daqp", solver)
-    np.testing.assert_allclose(theirs.values, ours.values, rtol=0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize(("seed", "name"), PROBLEMS)
-def test_eq17_tensions_satisfy_the_optimality_conditions(seed: int, name: str) -> None:
-    pose, low, high, W = _problem(seed, name)
-    pull = cdsm.distribute_tension(pose, low, high, W)
+    pull = cdsm.distribute_tension(pose, low, high, W, solver=solver)
     F, J = pull.values, pose.length_jacobian
     # Eq. 13, written out
     balance = J.T @ F - (pose.jacobian.T @ W - pose.gravity_torque)
@@ -420,19 +399,6 @@ def test_straight_arm_cannot_move_along_itself(name: str) -> None:
         with pytest.raises(cdsm.SingularStiffness, match="cannot move") as caught:
             cartesian()
         np.testing.assert_allclose(abs(caught.value.direction), (1.0, 0.0, 0.0), atol=1e-15)
-
-
-def test_pendulum_is_held_by_its_load_alone() -> None:
-    """No elasticity, no weight, no tension: K_θ = fℓ of the force f that pulls along the link."""
-    arm = arms.random_arm(1, 1, "hinged")
-    assert arm.geometry is not None
-    free = [replace(cable, control="force") for cable in arm.cables]
-    pose = cdsm.Manipulator(arm.geometry, cables=free, gravity=(0.0, 0.0, 0.0)).at([0.0])
-    K = cdsm.stiffness(pose, np.zeros(len(free)), wrench=(5.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    length = float(np.linalg.norm(pose.jacobian[:3]))
-    np.testing.assert_array_equal(K.passive + K.active, 0.0)
-    assert K.joint[0, 0] == pytest.approx(5.0 * length, rel=1e-15)
-    assert K.along(pose.jacobian[:3, 0]) == pytest.approx(5.0 / length, rel=1e-14)
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-7, 1e9])

@@ -1,7 +1,5 @@
 """Other people's code as the judge: MuJoCo's spatial tendons, Pinocchio's own derivatives."""
 
-from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import mujoco
@@ -13,28 +11,21 @@ import cdsm
 from tests.support import arms
 from tests.support.mujoco_arms import in_mujoco, tendon_jacobian
 
-ARMS: dict[str, Callable[[], cdsm.Manipulator]] = {
+ARMS = {
     **{
-        f"{kind}-{n}": lambda n=n, kind=kind: arms.random_arm(n + 20, n, kind)  # type: ignore[misc]
-        for kind in ("universal", "hinged")
+        f"{k}-{n}": arms.random_arm(n + 20, n, k)
+        for k in ("universal", "hinged")
         for n in (1, 3, 8)
     },
-    "mixed": arms.mixed_arm,
+    "mixed": arms.mixed_arm(),
 }
-
-
-@cache
-def _arm(name: str) -> cdsm.Manipulator:
-    return ARMS[name]()
-
-
 CASES = [(name, seed) for name in ARMS for seed in range(2)]
 
 
 @pytest.fixture(params=CASES, ids=[f"{name}-posture{seed}" for name, seed in CASES])
 def pose(request: pytest.FixtureRequest) -> cdsm.Posture:
     name, seed = request.param
-    return arms.random_posture(_arm(name), seed, reach=0.9)
+    return arms.random_posture(ARMS[name], seed, reach=0.9)
 
 
 def test_mujoco_measures_the_same_lengths_tip_and_weight(pose: cdsm.Posture) -> None:

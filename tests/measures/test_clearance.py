@@ -104,10 +104,15 @@ def test_batch_is_the_single_posture_and_diameters_count() -> None:
         assert thin.disks - one.disks == pytest.approx(0.5e-3)
 
 
-def test_a_thick_disk_is_nearer() -> None:
+def test_a_thick_disk_is_nearer_and_a_cut_one_counts_negative() -> None:
     """In a straight arm a cable ends at a disk 20 mm before the next one, beside its axis."""
     geometry = readme_geometry(joints=2, disk_offset=0.01, hole_radius=0.02)
     pose = cdsm.Manipulator(geometry, cdsm.presets.ELASTIC_STAGE).at(np.zeros(4))
     # the rim is 2 mm from the holes; thick disks come nearer along the axis
     assert cdsm.clearance(pose).disks == pytest.approx(2e-3, abs=1e-9)
     assert cdsm.clearance(pose, 0.0, 0.038).disks == pytest.approx(0.02 - 0.019, abs=1e-8)
+    # a cable that cuts through disks, 1 mm beside their centres
+    ends = [cdsm.Site(link, (0.0, 0.0, 1e-3)) for link in ("base_link", "tool0")]
+    through = cdsm.Cable("through", tuple(ends), cdsm.presets.ELASTIC_STAGE)
+    cut = pose.arm.with_cables([*pose.arm.cables, through]).at(pose.q)
+    assert cdsm.clearance(cut).disks == pytest.approx(1e-3 - 0.022, abs=1e-9)

@@ -42,8 +42,9 @@ def test_no_search_finds_more_even_tensions(seed: int) -> None:
     assert best > 0.7 * factor
 
 
-def test_cables_on_one_side_close_nothing() -> None:
-    pose = one_joint(tuple(np.deg2rad([-40.0, 0.0, 40.0]))).at([0.0, 0.0])
+@pytest.mark.parametrize("degrees", [(-40.0, 0.0, 40.0), (0.0, 180.0)])
+def test_cables_on_one_side_or_in_one_plane_close_nothing(degrees: tuple[float, ...]) -> None:
+    pose = one_joint(tuple(np.deg2rad(degrees))).at([0.0, 0.0])
     assert cdsm.tension_factor(pose) == 0.0
     assert not has_wrench_closure(pose)
 

@@ -51,6 +51,7 @@ def test_vertices_are_those_of_an_exhaustive_search(seed: int) -> None:
     zero = -expected.equations[:, 3].max() if (expected.equations[:, 3] > 0).any() else None
     distance = (-expected.equations[:, 3]).min() if zero is None else zero
     assert found.radius == pytest.approx(distance, rel=1e-6)
+    assert found.radius_at(found.vertices) == pytest.approx(0.0, abs=1e-7 * size)
 
 
 @pytest.mark.parametrize("arm", [mixed_arm(), cdsm.presets.virtual_prototype()])

@@ -105,17 +105,6 @@ def test_closed_loop_loses_its_work_in_the_holes() -> None:
     assert off[1] < 0.3 * off[0]
 
 
-def test_dissipation_converges_with_the_sub_steps() -> None:
-    pose, pull = prototype(0.1)
-    lost = [
-        cdsm.load_cycle(pose, pull, along_z(6.0, -6.0, 6.0), substeps=n).dissipated.sum()
-        for n in (2, 4, 8, 64)
-    ]
-    errors = abs(np.array(lost[:-1]) / lost[-1] - 1.0)
-    assert errors[1] < 0.02
-    assert (np.diff(errors) < 0.0).all()
-
-
 @pytest.mark.parametrize("law", [WIRE, cdsm.StrandElasticity.eq19_repaired()])
 def test_energy_never_comes_from_holes(law: cdsm.Elasticity) -> None:
     pose, pull = prototype(0.15, law)
@@ -158,21 +147,6 @@ def test_tension_falls_from_a_motor_that_pulls(control: cdsm.cable.Control) -> N
     np.testing.assert_array_less(T[1, :-1], T[1, 1:])
 
 
-# --- tangents ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("load", [0.5, 5.2, 15.0])
-def test_tangent_is_the_derivative_of_the_history(load: float) -> None:
-    pose, pull = prototype(0.1)
-    step = 1e-3
-    path = along_z(load - step, load, load + step)
-    history = cdsm.load_cycle(pose, pull, path)
-    if (history.sliding[0] != history.sliding[2]).any():
-        pytest.fail("a hole begins to slide at this load; choose another one")
-    numerical = 2.0 * step / (history.tip[2] - history.tip[0])[2]
-    assert history.stiffness(1).along("z") == pytest.approx(numerical, rel=1e-5)
-
-
 # --- numbers of an independent computation ----------------------------------------------------
 
 PLANAR = {  # μ: secant to −6 N [N/mm], left over at 0 N [mm], loss per cycle of ±6 N [mJ]
@@ -195,24 +169,6 @@ def test_numbers_of_an_independent_program_on_a_planar_arm(mu: float) -> None:
     pose, pull = planar(mu)
     default = cdsm.load_cycle(pose, pull, along_z(-6.0)).displacement[0, 2]
     assert 1000.0 * default == pytest.approx(z[0], rel=2e-3)
-
-
-PROTOTYPE = {  # μ: secants at 0.25, 1, 2, 20 N [N/mm], left over after 20 N [µm], holes that slide
-    0.05: ((257.6, 93.4, 55.9, 39.2), 34.0, 67),
-    0.2: ((257.6, 258.0, 250.0, 44.9), 59.0, 53),
-}
-
-
-@pytest.mark.parametrize("mu", [0.05, 0.2])
-def test_numbers_of_an_independent_program_on_the_prototype(mu: float) -> None:
-    secants, left, holes = PROTOTYPE[mu]
-    pose, pull = prototype(mu)
-    forces = np.array([0.25, 1.0, 2.0, 20.0])
-    history = cdsm.load_cycle(pose, pull, along_z(*forces, 0.0))
-    z = 1000.0 * history.displacement[:, 2]
-    np.testing.assert_allclose(forces / z[:4], secants, rtol=1e-2)
-    assert 1000.0 * z[4] == pytest.approx(left, abs=1.0)
-    assert abs(np.count_nonzero(history.sliding[3]) - holes) <= 3
 
 
 # --- errors ---------------------------------------------------------------------------------

@@ -226,6 +226,8 @@ def test_bytes_that_are_no_message_end_nobodys_view(view: View, tunnel: threadin
         settle(view, enemy)
     with Client(view) as enemy:
         enemy.send(bytes(2**17))  # more than a page ever has to say
+        with pytest.raises(exceptions.ConnectionClosed):
+            enemy.control("no such")
     with Client(view) as friend:
         settle(view, friend, value=1.5)
     assert not tunnel.is_set()
