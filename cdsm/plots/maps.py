@@ -102,7 +102,7 @@ def plot_map(
         CdsmError: xarray is not installed.
     """
     check_sweep(dataset)
-    remedy = "tip_position and the quantity must be among outputs= of the sweep."
+    remedy = "tip_position and the quantity must be among outputs of the sweep."
     for name in ("tip_position", quantity):
         one_of("quantity", name, [str(each) for each in dataset.data_vars], remedy)
     if statistic is not None:

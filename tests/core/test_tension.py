@@ -45,8 +45,8 @@ def test_bounds_too_tight_say_what_is_missing_and_how_far_to_widen(seed: int) ->
     error = refused(pose, low, high, wrench)
     assert 0.0 < error.relaxation < INF
     assert set(error.binding) <= {cable.name for cable in pose.arm.cables}
-    assert "lower minimum=" in str(error)
-    assert "raise maximum=" in str(error)
+    assert "lower minimum" in str(error)
+    assert "raise maximum" in str(error)
 
     advice = re.search(r"Widening every bound by (\S+) N would be enough", str(error))
     assert advice is not None

@@ -137,12 +137,12 @@ CASES: dict[str, tuple[Callable[[], object], type[cdsm.CdsmError], str]] = {
     "above the law": (
         stiffness(except_at(15, 14, 900.0, 50.0), pose=STRAND_POSE),
         cdsm.ElasticityRangeError,
-        rf"900 N.*{STRAND_ARM.cables.names[14]}.*\[2.2 N, 810 N\].*maximum=",
+        rf"900 N.*{STRAND_ARM.cables.names[14]}.*\[2.2 N, 810 N\].*maximum of",
     ),
     "below the law": (
         stiffness(cdsm.distribute_tension(STRAND_POSE), pose=STRAND_POSE),
         cdsm.ElasticityRangeError,
-        r"cable cable.*\[2.2 N, 810 N\].*minimum=",
+        r"cable cable.*\[2.2 N, 810 N\].*minimum of",
     ),
 }
 
