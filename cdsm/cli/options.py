@@ -7,7 +7,7 @@ import math
 import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn
 
 import typer
 
@@ -198,3 +198,50 @@ def numbers(option: str, text: str, counts: Sequence[int] = (), form: str = "N,.
     if counts and len(values) not in counts:
         raise misuse(option, f"{len(values)} given; give {form}.")
     return values
+
+
+class Motion(NamedTuple):
+    """A path of S samples, in SI."""
+
+    angles: Array | None = None  # (S, nv) [rad], [m] where a joint slides; None if tips are given
+    tips: Array | None = None  # (S, 3) [m]; None if angles are given
+    target: Array | None = None  # wanted stiffness (S,) [N/m]; None without such a column
+
+
+def read_path(path: Path, arm: cdsm.Manipulator) -> Motion:
+    """Read --path, a CSV file: a header of names with units, then one line per sample.
+
+    Joints without a column stay at 0. Other columns are ignored, unless their names look like
+    typing errors: then FileError is raised, as for a wrong unit.
+    """
+    import numpy as np
+
+    from cdsm.support.tables import ANGLE, column_in, named_columns, read_table
+
+    def refuse(problem: str) -> NoReturn:
+        raise cdsm.FileError(path, f"{problem}.")
+
+    def column(name: str) -> Array:
+        at, size = column_in(units[name], name, found, refuse)
+        return size * table.column(at, refuse)
+
+    table, length = read_table(path), {"mm": 1e-3, "m": 1.0}
+    if len(table.rows) < 2:
+        refuse("holds no path; a header and one line per sample are needed")
+    pairs = zip(arm.joint_names, arm.slides, strict=True)
+    units = {name: length if slides else ANGLE for name, slides in pairs}
+    units |= dict.fromkeys("xyz", length) | {"target": {"N/mm": 1e3, "N/m": 1.0}}
+    found = named_columns(table, [*units], refuse)
+    has_tips = not found.keys().isdisjoint("xyz")
+    if has_tips != found.keys().isdisjoint(arm.joint_names):
+        first = f"{arm.joint_names[0]} [{'mm' if arm.slides[0] else 'deg'}]"
+        refuse(
+            f"has columns for {'both' if has_tips else 'neither'} of joint angles ({first}, …) and "
+            "tip positions (x [mm], y [mm], z [mm]); give one of them"
+        )
+    target = column("target") if "target" in found else None
+    if has_tips:
+        return Motion(tips=np.transpose([column(name) for name in "xyz"]), target=target)
+    rest = np.zeros(len(table.rows) - 1)
+    joints = [column(name) if name in found else rest for name in arm.joint_names]
+    return Motion(angles=np.transpose(joints), target=target)

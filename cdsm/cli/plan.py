@@ -57,13 +57,12 @@ def plan(
         return answer(
             as_json, numbers | attainable.to_dict() | best.to_dict(), head, attainable, best
         )
-    from cdsm.cli.path_file import read_path
     from cdsm.support.format import plural
 
     if angles:
         raise misuse("--angles", "is of one posture; --path has its own.")
     robot = options.read(arm, changes)
-    file = read_path(path, robot)
+    file = options.read_path(path, robot)
     planned = cdsm.plan_path(
         robot,
         u,

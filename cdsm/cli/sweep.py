@@ -92,9 +92,7 @@ def _postures(
     if grid is not None:
         return _grid(grid, arm)
     if path is not None:
-        from cdsm.cli.path_file import read_path
-
-        file = read_path(path, arm)
+        file = options.read_path(path, arm)
         if file.angles is None or file.target is not None:
             raise cdsm.FileError(path, "has tips or targets; a sweep needs joint angles.")
         return cdsm.PathPoses(file.angles)
