@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -15,9 +14,6 @@ import cdsm
 from cdsm.cli.output import misuse
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from cdsm.statics import Equilibrium
     from cdsm.support.values import Array
 
 
@@ -95,30 +91,6 @@ def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
 def read(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
     """Read an arm, with the changes of --set."""
     return cdsm.Manipulator.read(arm, changes=changes_of(changes))
-
-
-def at_rest(
-    arm: cdsm.Manipulator,
-    tension: str | None,
-    pull: str | None,
-    wrench: ArrayLike,
-    *others: str | float,
-) -> Equilibrium | None:
-    """Return where the arm rests under --tension or --pull; None if neither is given.
-
-    ``others`` are --angles, --minimum and --maximum, which go with neither of them.
-    """
-    if tension is None and pull is None:
-        return None
-    if (tension is not None and pull is not None) or others != ("", 0.0, math.inf):
-        said = "say what the motors do, and the posture follows: give one of them, without "
-        raise misuse("--tension, --pull", f"{said}--angles, --minimum and --maximum.")
-    option, text = ("--tension", tension) if pull is None else ("--pull", pull)
-    form = f"one for each cable: {', '.join(arm.cables.names)}"
-    values = numbers(option, text or "", (len(arm.cables),), form)
-    if pull is None:
-        return cdsm.forward_statics(arm, tension=values, wrench=wrench)
-    return cdsm.forward_statics(arm, pull=[value / 1e3 for value in values], wrench=wrench)
 
 
 def posture(arm: Path, changes: Iterable[str] | None, angles: str) -> cdsm.Posture:
