@@ -74,8 +74,8 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 
 @style.styled
-def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Plot predicted and measured values, and residuals in σ, each with one of the ``labels``."""
+def plot_identification(fit: Identification) -> Figure:
+    """Plot predicted and measured values, and residuals in σ."""
     rows = [fit.measurements[i] for i in fit.measurement_of]
     loops = [(i, one) for i, one in enumerate(fit.measurements) if hasattr(one, "forces")]
     stiff = [k for k, one in enumerate(rows) if hasattr(one, "value")]
@@ -103,11 +103,11 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
     right.axhline(0.0, color="0.2", linewidth=0.8)
     right.set_ylabel("(predicted − measured)/σ")
     if len(rows) <= _MOST_LABELS and any(measurement.label for measurement in fit.measurements):
-        right.set_xticks(place, labels, rotation=90)
+        right.set_xticks(place, fit.reading_names, rotation=90)
     else:
         right.set_xlabel("reading" if loops else "measurement")
         style.whole_numbers(right.xaxis)
-    return style.titled(figure, title)
+    return style.titled(figure, fit._verdict)
 
 
 def _plot_loops(axes: Any, fit: Identification, loops: Sequence[tuple[int, Any]]) -> None:

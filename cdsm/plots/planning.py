@@ -159,13 +159,18 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None =
     if not same or abs(plan.direction - attainable.direction).max() > _SAME:
         raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
     said = f"planned: {N_PER_MM * float(plan.achieved):.4g} N/mm"
-    return _plot_range(attainable, [(F, said, "o")])
+    return plot_stiffness_range(attainable, [(F, said, "o")])
 
 
 @style.styled
-def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
-    """Plot the tension of each cable for the softest and for the stiffest arm."""
-    return _plot_range(attainable)
+def plot_stiffness_range(attainable: StiffnessRange, planned: Sequence[_Case] = ()) -> Figure:
+    """Plot the tension of each cable for the softest and for the stiffest arm, and as planned."""
+    softest = f"softest: {N_PER_MM * attainable.low:.4g} N/mm"
+    stiffest = f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm"
+    ends = (attainable.low_tension, softest, "v"), (attainable.high_tension, stiffest, "^")
+    along = f"stiffness along {style.direction_name(attainable.direction)}"
+    title = f"{attainable.posture.arm.name}: {along}"
+    return _plot_tensions([ends[0], *planned, ends[1]], title)
 
 
 def _by_name(names: Sequence[str], label: str) -> tuple[Figure, Any]:
@@ -177,15 +182,6 @@ def _by_name(names: Sequence[str], label: str) -> tuple[Figure, Any]:
     axes.set_xticks(places, names[::step], rotation=60, ha="right", rotation_mode="anchor")
     axes.set_ylabel(label)
     return figure, axes
-
-
-def _plot_range(attainable: StiffnessRange, between: Sequence[_Case] = ()) -> Figure:
-    softest = f"softest: {N_PER_MM * attainable.low:.4g} N/mm"
-    stiffest = f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm"
-    ends = (attainable.low_tension, softest, "v"), (attainable.high_tension, stiffest, "^")
-    along = f"stiffness along {style.direction_name(attainable.direction)}"
-    shown = [ends[0], *between, ends[1]]
-    return _plot_tensions(shown, f"{attainable.posture.arm.name}: {along}")
 
 
 def _plot_tensions(shown: Sequence[_Case], title: str) -> Figure:
