@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.batch.inputs import checked_threads, given_wrench, postures
 from cdsm.batch.quantities import Codes, OfPostures
 from cdsm.batch.solution import Rows
@@ -18,9 +17,6 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.validation import flag, instance
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @final
@@ -45,13 +41,6 @@ class Tensions(OfPostures):
     minimum: Array
     maximum: Array
     status: Codes
-
-    def plot(self) -> Figure:
-        """Plot the median and the range of the tensions [N] of each cable over all postures.
-
-        Raises InvalidInput if no tensions were found.
-        """
-        return cdsm.plots.plot_tensions(self)
 
     def _quantities(self) -> Iterator[tuple[str, Any, str, tuple[str, ...]]]:
         return self._of({"tension": self.values})

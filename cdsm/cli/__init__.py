@@ -14,13 +14,11 @@ import typer
 
 import cdsm
 from cdsm.cli.arm import export, new, view
-from cdsm.cli.identify import fit, identify
+from cdsm.cli.identify import fit, identify, reproduce
 from cdsm.cli.options import opt
 from cdsm.cli.output import debug_wanted, reported
-from cdsm.cli.plan import design, plan
-from cdsm.cli.reproduce import reproduce
+from cdsm.cli.plan import design, plan, sweep
 from cdsm.cli.stiffness import buckle, stiffness, weigh
-from cdsm.cli.sweep import sweep
 
 app = typer.Typer(
     name="cdsm",

@@ -196,15 +196,13 @@ def view(
     as_json: options.AsJson = False,
 ) -> int:
     """Show an arm in the browser, with sliders, and its stiffness."""
-    from cdsm.cli.path_file import PathFile, read_path
-
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
         robot = options.read(arm, changes)
         start = options.coordinates(angles, robot) if angles else None
         force = options.load_at_tip(robot, load)
         if force[3:].any():
             raise misuse("--load", "has a moment, but the view has forces only: FX,FY,FZ.")
-        motion = PathFile(None, None, None) if path is None else read_path(path, robot)
+        motion = options.Motion() if path is None else options.read_path(path, robot)
         with cdsm.view.serve(
             robot,
             port=port,

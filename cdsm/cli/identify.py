@@ -1,11 +1,12 @@
-"""``cdsm fit`` and ``cdsm identify``: what measurements of a wire or of an arm say."""
+"""``cdsm fit | identify | reproduce``: measurements of a wire, of an arm, and of the paper."""
 
 from __future__ import annotations
 
 import csv
+import json
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -149,3 +150,34 @@ def _usual(name: str, value: float) -> Range:
     if not 0.0 < value < math.inf:
         raise misuse("--free", f"the arm has {name} {value:g}; give bounds, {name}=LOW:HIGH.")
     return value / 2.0, 2.0 * value
+
+
+def reproduce(
+    out: Annotated[Path, opt("Folder; default: reproduction.", "FOLDER")] = Path("reproduction"),
+    kind: Annotated[Literal["pdf", "svg", "png"], opt("Of the figures.", None, "--format")] = "png",
+    as_json: AsJson = False,
+) -> int:
+    """Recompute the figures and numbers of the paper.
+
+    Writes Figs. 3 to 8, 10, 12 and 13, and prints every number of the paper beside ours.
+    reproduction.md also has what was assumed, and what other readings of the paper give.
+    """
+    from cdsm.support.files import make_folder, write_text
+    from cdsm.support.format import aligned
+    from cdsm.support.progress import track
+
+    paper = cdsm.paper
+    make_folder(out)
+    results, written = [], []
+    for compute in track(paper.FIGURES.values(), "recomputing the paper"):
+        result = compute()
+        results.append(result)
+        written.append(cdsm.plots.save_figure(result.plot(), out / f"{result.name}.{kind}"))
+    written.append(write_text(out / "reproduction.md", paper.to_markdown(results)))
+    numbers = paper.to_dict(results)
+    text = json.dumps(numbers, indent=1, allow_nan=False)
+    written.append(write_text(out / "reproduction.json", f"{text}\n"))
+    rows = [(f"{row[0]}: {row[1]}", *row[2:5]) for row in paper.to_rows(results)]
+    table = "\n".join(aligned([("quantity", *paper.HEADER[2:5]), *rows]))
+    said = f"all numbers, and what each is: {out / 'reproduction.md'}"
+    return answer(as_json, numbers, table, f"{said}\nwritten: {', '.join(map(str, written))}")

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn
 
 import typer
 
@@ -15,9 +14,6 @@ import cdsm
 from cdsm.cli.output import misuse
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from cdsm.statics import Equilibrium
     from cdsm.support.values import Array
 
 
@@ -97,30 +93,6 @@ def read(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
     return cdsm.Manipulator.read(arm, changes=changes_of(changes))
 
 
-def at_rest(
-    arm: cdsm.Manipulator,
-    tension: str | None,
-    pull: str | None,
-    wrench: ArrayLike,
-    *others: str | float,
-) -> Equilibrium | None:
-    """Return where the arm rests under --tension or --pull; None if neither is given.
-
-    ``others`` are --angles, --minimum and --maximum, which go with neither of them.
-    """
-    if tension is None and pull is None:
-        return None
-    if (tension is not None and pull is not None) or others != ("", 0.0, math.inf):
-        said = "say what the motors do, and the posture follows: give one of them, without "
-        raise misuse("--tension, --pull", f"{said}--angles, --minimum and --maximum.")
-    option, text = ("--tension", tension) if pull is None else ("--pull", pull)
-    form = f"one for each cable: {', '.join(arm.cables.names)}"
-    values = numbers(option, text or "", (len(arm.cables),), form)
-    if pull is None:
-        return cdsm.forward_statics(arm, tension=values, wrench=wrench)
-    return cdsm.forward_statics(arm, pull=[value / 1e3 for value in values], wrench=wrench)
-
-
 def posture(arm: Path, changes: Iterable[str] | None, angles: str) -> cdsm.Posture:
     """Read an arm and return its posture at --angles."""
     found = read(arm, changes)
@@ -198,3 +170,50 @@ def numbers(option: str, text: str, counts: Sequence[int] = (), form: str = "N,.
     if counts and len(values) not in counts:
         raise misuse(option, f"{len(values)} given; give {form}.")
     return values
+
+
+class Motion(NamedTuple):
+    """A path of S samples, in SI."""
+
+    angles: Array | None = None  # (S, nv) [rad], [m] where a joint slides; None if tips are given
+    tips: Array | None = None  # (S, 3) [m]; None if angles are given
+    target: Array | None = None  # wanted stiffness (S,) [N/m]; None without such a column
+
+
+def read_path(path: Path, arm: cdsm.Manipulator) -> Motion:
+    """Read --path, a CSV file: a header of names with units, then one line per sample.
+
+    Joints without a column stay at 0. Other columns are ignored, unless their names look like
+    typing errors: then FileError is raised, as for a wrong unit.
+    """
+    import numpy as np
+
+    from cdsm.support.tables import ANGLE, column_in, named_columns, read_table
+
+    def refuse(problem: str) -> NoReturn:
+        raise cdsm.FileError(path, f"{problem}.")
+
+    def column(name: str) -> Array:
+        at, size = column_in(units[name], name, found, refuse)
+        return size * table.column(at, refuse)
+
+    table, length = read_table(path), {"mm": 1e-3, "m": 1.0}
+    if len(table.rows) < 2:
+        refuse("holds no path; a header and one line per sample are needed")
+    pairs = zip(arm.joint_names, arm.slides, strict=True)
+    units = {name: length if slides else ANGLE for name, slides in pairs}
+    units |= dict.fromkeys("xyz", length) | {"target": {"N/mm": 1e3, "N/m": 1.0}}
+    found = named_columns(table, [*units], refuse)
+    has_tips = not found.keys().isdisjoint("xyz")
+    if has_tips != found.keys().isdisjoint(arm.joint_names):
+        first = f"{arm.joint_names[0]} [{'mm' if arm.slides[0] else 'deg'}]"
+        refuse(
+            f"has columns for {'both' if has_tips else 'neither'} of joint angles ({first}, …) and "
+            "tip positions (x [mm], y [mm], z [mm]); give one of them"
+        )
+    target = column("target") if "target" in found else None
+    if has_tips:
+        return Motion(tips=np.transpose([column(name) for name in "xyz"]), target=target)
+    rest = np.zeros(len(table.rows) - 1)
+    joints = [column(name) if name in found else rest for name in arm.joint_names]
+    return Motion(angles=np.transpose(joints), target=target)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
@@ -114,17 +113,6 @@ def _show(message: Warning | str, *_: object, **__: object) -> None:
     typer.secho(f"warning: {message}", fg="yellow", err=True)
 
 
-def _with_options(message: str, options: Iterable[str]) -> str:
-    """Call the arguments that a message asks for, such as ``minimum=``, as the ``options`` are."""
-    named = {name: f"--{name.replace('_', '-')}" for name in options}
-
-    def renamed(found: re.Match[str]) -> str:
-        name, value = found.groups(default="")
-        return f"{named[name]}{value and '='}{value}" if name in named else found[0]
-
-    return re.sub(r"\b(\w+)=(?:(\d)|(?![^\s,.;)]))", renamed, message)
-
-
 def reported(function: Callable[..., int]) -> Callable[..., None]:
     """Wrap a command, which returns its exit code: turn errors into a message (JSON with --json).
 
@@ -148,7 +136,7 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
         except (cdsm.CdsmError, OSError) as error:  # OSError: of the terminal or pipe
             if debug_wanted.get():
                 raise
-            kind, message = type(error).__name__, _with_options(str(error), given)
+            kind, message = type(error).__name__, str(error)
             if given["as_json"]:
                 print_json({"error": kind, "message": message, "data": vars(error)})
             else:

@@ -14,6 +14,8 @@ from cdsm.cli.options import file_opt, opt
 from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from cdsm.statics.at_rest import Equilibrium
     from cdsm.statics.buckling import CriticalLoad, CriticalTension
     from cdsm.statics.load_cycle import LoadHistory
@@ -53,42 +55,65 @@ def stiffness(
 
     robot = options.read(arm, changes)
     wrench = options.load_at_tip(robot, load, mass)
-    rest = options.at_rest(robot, tension, pull, wrench, angles, minimum, maximum)
-    if rest is None:
-        pose = robot.at(options.coordinates(angles or "0", robot))
-        least = cdsm.distribute_tension(pose, minimum, maximum, wrench)
-        K, found = cdsm.stiffness(pose, least), list[object]([least])
-    else:
-        pose, K, found = rest.pose, rest.stiffness, [rest]
-    head, numbers = header(pose, [] if rest else [minimum])
-    axes = {axis: options.direction_of(axis) for axis in ("x", "y", "z")}
+    K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull)
+    head, numbers = header(K.posture, [] if rest else [minimum])
+    axes, lines = {axis: options.direction_of(axis) for axis in ("x", "y", "z")}, list[str]()
     if direction is not None:
         axes[direction] = u = options.direction_of(direction)
         numbers |= {"direction": u, "along_direction_N_per_m": K.along(u)}
-    sure, uncertainty = ([], Json()) if rest else _uncertainty(least, axes)
+        lines.append(f"along {direction}: {K.along(u) / 1e3:.4g} N/mm")
+    sure, uncertainty = _uncertainty(K.distribution, axes)
     if check or out is not None:
-        report = rest.report() if rest else K.report()
+        report = (rest or K).report()
         about = f"{arm}\n{head}\ncdsm {cdsm.__version__}"
         write(out, lambda file: write_text(file, report.to_html(about)))
         failed = () if report.passed else ("FAIL: the report says why.",)
         told = numbers | report.to_dict() | uncertainty
         return answer(as_json, told, head, report, *sure, warnings=failed)
-    lines = [] if direction is None else [f"along {direction}: {K.along(u) / 1e3:.4g} N/mm"]
-    stuck, sticking = ([], Json()) if rest else _sticking(least, axes)
-    parts = [head, *found, K, *lines, *stuck, *sure]
+    stuck, sticking = _sticking(K.distribution, axes)
+    parts = [head, rest or K.distribution, K, *lines, *stuck, *sure]
     told = numbers | K.to_dict() | (rest.to_dict() if rest else {}) | sticking | uncertainty
     warnings = K.warnings[:1] + (rest.warnings if rest else ())
     return answer(as_json, told, *parts, warnings=warnings)
 
 
-def _sticking(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tuple[list[str], Json]:
-    """Return the stiffness under small loads, while all cables stick, and where sliding begins.
+def _balanced(
+    arm: cdsm.Manipulator,
+    wrench: ArrayLike,
+    angles: str,
+    minimum: float,
+    maximum: float,
+    tension: str | None,
+    pull: str | None,
+) -> tuple[cdsm.Stiffness, Equilibrium | None]:
+    """Return K at --angles, or K and the equilibrium where --tension or --pull let the arm rest."""
+    if tension is None and pull is None:
+        pose = arm.at(options.coordinates(angles or "0", arm))
+        return cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum, maximum, wrench)), None
+    if None not in (tension, pull) or (angles, minimum, maximum) != ("", 0.0, math.inf):
+        said = "say what the motors do, and the posture follows: give one of them, without "
+        raise misuse("--tension, --pull", f"{said}--angles, --minimum and --maximum.")
+    option, text = ("--tension", tension) if pull is None else ("--pull", pull)
+    form = f"one for each cable: {', '.join(arm.cables.names)}"
+    values = options.numbers(option, text or "", (len(arm.cables),), form)
+    if pull is None:
+        rest = cdsm.forward_statics(arm, tension=values, wrench=wrench)
+    else:
+        rest = cdsm.forward_statics(arm, pull=[value / 1e3 for value in values], wrench=wrench)
+    return rest.stiffness, rest
 
-    The result is a text, in a list, and JSON; both are empty without friction, or if no load in a
-    direction has this limit.
+
+def _sticking(
+    tension: cdsm.Tension | None, axes: dict[str, Sequence[float]]
+) -> tuple[list[str], Json]:
+    """Return the stiffness while all cables stick, and where sliding begins, as text and for JSON.
+
+    Both are empty without distributed tensions, without friction, or if no load has this limit.
     """
     lines, numbers = list[str](), Json()
-    for name, u in axes.items() if tension.posture.arm.has_friction else ():
+    if tension is None or not tension.posture.arm.has_friction:
+        return [], {}
+    for name, u in axes.items():
         with contextlib.suppress(cdsm.CdsmError):
             first = cdsm.breakaway(tension.posture, tension, u)
             if 0.0 < first.load < math.inf:
@@ -101,16 +126,21 @@ def _sticking(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tuple[
     return ["\n".join([head, *lines])], {"sticking": numbers}
 
 
-def _uncertainty(tension: cdsm.Tension, axes: dict[str, Sequence[float]]) -> tuple[list[str], Json]:
+def _uncertainty(
+    tension: cdsm.Tension | None, axes: dict[str, Sequence[float]]
+) -> tuple[list[str], Json]:
     """Return the uncertainty of the stiffness along each axis, as a table and for JSON.
 
-    Without tolerances both are empty. A direction in which the tip cannot move is left out.
+    Both are empty without distributed tensions or tolerances. A direction in which the tip cannot
+    move is left out.
     """
     from cdsm.support.format import aligned
 
-    pose = tension.posture
     found: dict[str, Uncertainty] = {}
-    for name, u in axes.items() if pose.arm.tolerances.given else ():
+    if tension is None or not tension.posture.arm.tolerances.given:
+        return [], {}
+    pose = tension.posture
+    for name, u in axes.items():
         with contextlib.suppress(cdsm.SingularStiffness):
             found[name] = cdsm.uncertainty(pose, tension, pose.arm.tolerances, direction=u)
     if not found:
@@ -163,14 +193,8 @@ def weigh(
         raise misuse("--out", "is the table of --cycles; give both.")
     robot = options.read(arm, changes)
     weight = _weight(robot, load, mass)
-    rest = options.at_rest(robot, tension, pull, [0.0] * 6, angles, minimum, maximum)
-    start: cdsm.Tension | Equilibrium
-    if rest is None:
-        pose = robot.at(options.coordinates(angles or "0", robot))
-        start = cdsm.distribute_tension(pose, minimum, maximum)
-        K = cdsm.stiffness(pose, start)
-    else:
-        pose, start, K = rest.pose, rest, rest.stiffness
+    K, rest = _balanced(robot, [0.0] * 6, angles, minimum, maximum, tension, pull)
+    pose, start = K.posture, rest or K.tension
     head, numbers = header(pose, [] if rest else [minimum], "included")
     result: WeightTest | LoadHistory
     if cycles is not None:
@@ -202,7 +226,7 @@ def _weight(arm: cdsm.Manipulator, load: str | None, mass: float | None) -> Arra
 
 def _cycles(
     pose: cdsm.Posture,
-    start: cdsm.Tension | Equilibrium,
+    start: Array | Equilibrium,
     weight: Array,
     cycles: int,
     steps: int,

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, final
 
 import numpy as np
@@ -15,7 +13,6 @@ from numpy.typing import NDArray
 import cdsm
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
-from cdsm.support.files import as_path
 from cdsm.support.format import aligned, plural
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.values import Array, frozen
@@ -205,25 +202,12 @@ class TrackingRun(Result):
         """Return a table over time, which ``cdsm view`` plays; needs pandas (CdsmError)."""
         return super().to_pandas().rename(columns=lambda name: name.removeprefix("angles "))
 
-    def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
+    def plot(self) -> Figure:
         """Plot tip error, stiffness, tensions and the first-order band over time.
 
-        ``animate`` is the path of a ``.gif`` to write as well; for errors see :meth:`animate`.
+        :func:`cdsm.plots.plot_path` draws the postures of :attr:`states`, and writes a film.
         """
-        if animate is not None:
-            self.animate(animate)
         return cdsm.plots.plot_tracking_run(self)
-
-    def animate(self, path: str | os.PathLike[str]) -> Path:
-        """Write a ``.gif`` in which the true arm follows the path; return its path.
-
-        Raises:
-            InvalidInput: The path does not end in ``.gif``, or no step was completed.
-            FileError: The file cannot be written.
-        """
-        poses = [state.pose for state in self.states]
-        cdsm.plots.plot_path(poses, animate=path, tensions=self.tension)
-        return as_path(path)
 
     def __repr__(self) -> str:
         return f"<TrackingRun of {self.arm.name}, law {self.law}, {self.outcome}>"

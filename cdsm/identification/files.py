@@ -130,10 +130,10 @@ def read_loops(
     for name in ("force", *readings, *tensions, *(each for each in joints if each in header)):
         column_in(units[name], name, header, refuse)
     if tensions and minimum is not None:
-        refuse("has tensions; leave out minimum=")
+        refuse("has tensions; leave out minimum")
     if not tensions and minimum is None:
         said = f"add a column minimum [N] or one for each cable, such as {cables[0]} [N]"
-        refuse(f"has no tensions; {said}, or give minimum=")
+        refuse(f"has no tensions; {said}, or give minimum")
     bound = None if minimum is None else np.asarray(minimum).tolist()
     loops = list[WeightLoop]()
     for label, group in groupby(table.rows[1:], lambda row: cell(row, "test")):

@@ -201,7 +201,7 @@ class Identification(Result):
 
     def plot(self) -> Figure:
         """Plot predicted and measured stiffnesses [N/mm] and loops [mm], and residuals in σ."""
-        return cdsm.plots.plot_identification(self, self.reading_names, self._verdict)
+        return cdsm.plots.plot_identification(self)
 
     def __str__(self) -> str:
         half = float(ndtri(0.975)) * self.std

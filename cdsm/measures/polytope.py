@@ -108,7 +108,7 @@ class ForcePolytope(Result):
         return float(apart.min(initial=math.inf))
 
     def plot(self) -> Figure:
-        """Plot the polytope [N]."""
+        """Plot the polytope [N]; InvalidInput if it has no volume."""
         return cdsm.plots.plot_force_polytope(self)
 
     def __str__(self) -> str:

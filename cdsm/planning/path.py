@@ -168,7 +168,7 @@ def _plan(goal: Goal, before: Array | None, change: Array, steps: int) -> Array:
         "tensions that hit the target exist, but none were found within the largest change: the "
         f"nearest change {goal.space.pose.arm.cables[worst].name} by {moved[worst]:.4g} N in "
         f"{plural(steps, 'sample')}, and {change[worst]:.4g} N are allowed. Raise "
-        "max_change_per_sample=, or change the target more slowly.",
+        "max_change_per_sample, or change the target more slowly.",
     )
 
 

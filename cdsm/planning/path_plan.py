@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, final
 
@@ -112,14 +111,11 @@ class PathPlan(Result):
         """Tip positions (P, 3) [m]."""
         return frozen(np.array([K.posture.tip[:3, 3] for K in self.stiffness]).reshape(-1, 3))
 
-    def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
+    def plot(self) -> Figure:
         """Plot wanted and reached stiffness [N/mm] and the tensions [N] against the samples.
 
-        ``animate`` is a ``.gif`` to write too, in which the arm follows the path. Raises
-        InvalidInput if no sample to animate is planned, FileError if it cannot be written.
+        :func:`cdsm.plots.plot_path` draws the arm on its path, and writes a film.
         """
-        if animate is not None:
-            cdsm.plots.plot_path(self, animate=animate)
         return cdsm.plots.plot_path_plan(self)
 
     def to_dict(self) -> dict[str, object]:

@@ -5,7 +5,8 @@ journal. Show it in a notebook, or write it with :func:`save_figure`. Results ha
 of their own, which calls the functions of this package that are not listed in ``__all__``.
 """
 
-from cdsm.plots.arm import plot_arm
+from cdsm.plots.arm import plot_arm, plot_path
+from cdsm.plots.arm import plot_modes as plot_modes
 from cdsm.plots.loads import plot_critical_load as plot_critical_load
 from cdsm.plots.loads import plot_critical_tension as plot_critical_tension
 from cdsm.plots.loads import plot_load_history as plot_load_history
@@ -21,20 +22,12 @@ from cdsm.plots.measured import plot_monte_carlo as plot_monte_carlo
 from cdsm.plots.measured import plot_tensile_fit as plot_tensile_fit
 from cdsm.plots.measured import plot_uncertainty as plot_uncertainty
 from cdsm.plots.paper import plot_paper as plot_paper
-from cdsm.plots.path import plot_modes as plot_modes
-from cdsm.plots.path import plot_path
 from cdsm.plots.planning import plot_path_plan as plot_path_plan
 from cdsm.plots.planning import plot_saturation as plot_saturation
 from cdsm.plots.planning import plot_shares as plot_shares
 from cdsm.plots.planning import plot_stiffness_plan as plot_stiffness_plan
 from cdsm.plots.planning import plot_stiffness_range as plot_stiffness_range
 from cdsm.plots.planning import plot_stiffness_ranges
-from cdsm.plots.planning import plot_tensions as plot_tensions
 from cdsm.plots.style import save_figure
 
 __all__ = ["plot_arm", "plot_map", "plot_path", "plot_stiffness_ranges", "save_figure"]
-
-
-def __dir__() -> list[str]:
-    """List the public names."""
-    return __all__

@@ -1,23 +1,31 @@
-"""Plot an arm in three dimensions."""
+"""Plot an arm in three dimensions: at a posture, along a path, in its natural modes."""
 
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput
 from cdsm.plots import style
 from cdsm.plots.style import MM
+from cdsm.support.files import as_path, write_file
+from cdsm.support.validation import number_array
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
+    from cdsm.planning.path_plan import PathPlan
     from cdsm.posture import Posture
+    from cdsm.statics.modes import Modes
     from cdsm.stiffness_matrix import Stiffness
     from cdsm.tension import Tension
 
@@ -30,6 +38,10 @@ _FLATTEST = 0.35  # smallest range of an axis, as a fraction of the largest
 _PADS: Final = {"x": -3.0, "y": -6.0, "z": -4.0}  # from the numbers of an axis to its label
 _UNZOOMED = 0.97  # side of the square of 3D axes, over the diagonal of their box at zoom 1
 _ELEVATION, _AZIMUTH = np.deg2rad((24.0, -62.0))  # of the eye
+_GHOSTS = 5  # number of postures that are drawn over each other
+_FRAMES, _RATE = 150, 15  # largest number of frames of an animation, and frames per second
+_SHAPES = 3  # number of modes that are drawn
+_DEFLECTED = 0.25  # largest displacement of the tip in the picture of a mode, over the arm's length
 
 
 class Ellipsoid(NamedTuple):
@@ -56,9 +68,8 @@ def plot_arm(
     Args:
         pose: Posture to draw.
         tension: Tensions that colour the cables, if given.
-        stiffness: If it is given and the arm is stable, an ellipsoid at the tip shows the
-            displacement C_vv f under a force f of 1 N in each direction, at the scale that the
-            legend states. If the arm is unstable, the title says so.
+        stiffness: Of a stable arm, drawn as an ellipsoid at the tip: the displacements C_vv f under
+            forces f of 1 N, at the scale of the legend. Of an unstable one the title says so.
 
     Raises:
         InvalidInput: An argument has the wrong type, or belongs to another arm or posture.
@@ -90,11 +101,70 @@ def plot_arm(
     return finish(figure, title, scale)
 
 
-def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
-    """Compute the ellipsoid of a compliance C_vv (3, 3) [m/N] at the tip (3,) [m] of an arm.
+@style.styled
+def plot_path(
+    path: PathPlan | Sequence[Posture],
+    *,
+    animate: str | os.PathLike[str] | None = None,
+    tensions: ArrayLike | None = None,
+) -> Figure:
+    """Plot some postures of a path over each other, from pale to dark, with the path of the tip.
 
-    It is scaled by a power of ten, so that its longest half axis is 3 to 30 % of the ``length`` of
-    the arm [m]. None if no force moves the tip.
+    Args:
+        path: Postures of one arm, in order; or a plan, of which the feasible samples are drawn.
+        animate: A ``.gif`` to write too: the arm follows the path, with cables coloured by tension.
+        tensions: Tensions (P, C) [N] for the colours at P postures; default: those of a plan.
+
+    Raises:
+        InvalidInput: ``path`` has no postures of one arm, or ``animate`` does not end in ``.gif``.
+        FileError: The animation cannot be written.
+    """
+    poses: Sequence[Any] = path if isinstance(path, Sequence) else [path]
+    for pose in poses:
+        style.expect("path", pose, "Posture" if isinstance(path, Sequence) else "PathPlan")
+    if not isinstance(path, Sequence):
+        poses = [K.posture for K in path.stiffness]
+        tensions = path.tensions if tensions is None else tensions
+    if not poses or any(pose.arm != poses[0].arm for pose in poses):
+        said = "give postures of one arm, or a plan that reaches its target at some samples."
+        raise InvalidInput("path", said)
+    figure, axes = picture()
+    *ghosts, last = (poses[k] for k in _some(len(poses), _GHOSTS))
+    for pose, shade in zip(ghosts, np.linspace(0.8, 0.5, len(ghosts)), strict=True):
+        draw_bones(axes, pose, color=f"{shade:.2f}", linewidth=2.0)
+    draw_arm(axes, last)
+    tips = MM * np.array([pose.tip[:3, 3] for pose in poses])
+    axes.plot(*tips.T, color=style.VERMILLION, label="path of the tip")
+    axes.plot(*tips[-1:].T, "o", color=style.VERMILLION, label="its end")
+    finish(figure, f"{last.arm.name}: the last of {len(poses)} postures, others pale")
+    if animate is not None:
+        values = None if tensions is None else number_array("tensions", tensions)
+        _animate(animate, poses, values, axes)
+    return figure
+
+
+@style.styled
+def plot_modes(modes: Modes) -> Figure:
+    """Plot an arm and its deflections by up to three modes: growing modes, then the lowest."""
+    pose = modes.stiffness.posture
+    figure, axes = picture()
+    draw_bones(axes, pose, color="0.6", linewidth=2.0)
+    names = [f"grows at {rate:.3g}/s" for rate in modes.growth_rates]
+    names += [f"{frequency:.3g} Hz" for frequency in modes.frequencies]
+    shapes = np.hstack([modes.growth_shapes, modes.shapes]).T
+    for shape, name, color in zip(shapes, names, style.COLORS[:_SHAPES], strict=False):
+        moved = np.linalg.norm(pose.jacobian[:3] @ shape) / pose.arm.length
+        step = _DEFLECTED / max(moved, np.linalg.norm(shape)) * shape
+        draw_bones(axes, pose.arm.at(pose.q + step, check_limits=False), color=color)
+        axes.plot([], [], [], color=color, label=name)
+    unstable = "" if modes.is_stable else "UNSTABLE: "
+    return finish(figure, f"{unstable}{pose.arm.name}, enlarged modes")
+
+
+def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
+    """Scale the ellipsoid of C_vv (3, 3) [m/N] at the tip (3,) to 3 to 30 % of ``length`` [m].
+
+    None if no force moves the tip.
     """
     longest = float(np.linalg.norm(compliance, 2))
     if longest == 0.0:
@@ -115,16 +185,18 @@ def color_scale(tensions: Array) -> ScalarMappable:
 
 def draw_arm(axes: Any, pose: Posture, colors: Array | None = None) -> None:
     """Draw an arm on existing 3D axes; ``colors`` (C, 4) are the RGBA colours of its cables."""
-    arm, turn = pose.arm, np.linspace(0.0, 2.0 * np.pi, 49)
-    for disk in arm.geometry.disks if arm.is_serpentine else ():
-        placement = pose.link_pose(disk.link)
-        ring = [0.0 * turn + disk.x, disk.radius * np.cos(turn), disk.radius * np.sin(turn)]
-        edge = placement[:3, 3:] + placement[:3, :3] @ np.array(ring)
-        axes.plot(*(MM * edge), color="0.45", linewidth=0.6)
-    for bracket in () if arm.is_serpentine else pose.brackets:  # from cable sites to their links
-        axes.plot(*(MM * bracket.T), color="0.5", linewidth=0.8)
-    for marker, label, chosen in (("o", "turns", ~arm.slides), ("s", "slides", arm.slides)):
-        if not arm.is_serpentine:
+    arm = pose.arm
+    if arm.is_serpentine:
+        turn = np.linspace(0.0, 2.0 * np.pi, 49)
+        for disk in arm.geometry.disks:
+            placement = pose.link_pose(disk.link)
+            ring = [0.0 * turn + disk.x, disk.radius * np.cos(turn), disk.radius * np.sin(turn)]
+            edge = placement[:3, 3:] + placement[:3, :3] @ np.array(ring)
+            axes.plot(*(MM * edge), color="0.45", linewidth=0.6)
+    else:
+        for bracket in pose.brackets:  # from cable sites to their links
+            axes.plot(*(MM * bracket.T), color="0.5", linewidth=0.8)
+        for marker, label, chosen in (("o", "turns", ~arm.slides), ("s", "slides", arm.slides)):
             look = {"color": "0.1", "mfc": "white", "zorder": 5, "ls": ""}
             named = {"label": label} if arm.slides.any() else {}
             axes.plot(*(MM * pose.joint_positions[chosen].T), marker, **look, **named)
@@ -168,10 +240,7 @@ def frame_arms(axes: Any, label: str = "{} [mm]") -> Array:
 def finish(
     figure: Figure, title: str, colors: ScalarMappable | None = None, label: str = "{} [mm]"
 ) -> Figure:
-    """Complete a 3D picture: scales, labels, title, legend, and a colour bar of tensions.
-
-    The figure becomes as high as the box of the axes looks from the eye, and the box fills it.
-    """
+    """Complete a 3D picture, and make it as high as the box of the axes looks from the eye."""
     axes: Any = figure.axes[0]
     ranges = frame_arms(axes, label)
     side = abs(np.array([math.sin(_AZIMUTH), math.cos(_AZIMUTH), 0.0]))
@@ -187,12 +256,45 @@ def finish(
     axes.set_position((-0.07, (below + 0.14) / total, width / style.ONE_COLUMN, height / total))
     zoom = _UNZOOMED * scale * float(np.linalg.norm(ranges)) / min(height, width)
     axes.set_box_aspect(ranges, zoom=zoom)
-    for artist in (*axes.lines, *axes.collections):
-        artist.set_clip_on(False)  # the box is wider than the square of the axes
-    style.heading(figure, title)
+    _unclip(axes)
+    style.titled(figure, title)
     if labels:
         figure.legend(loc="lower center", ncols=columns, frameon=False)
     if colors is not None:
         bar = figure.add_axes((0.83, 0.2, 0.025, 0.6))
         figure.colorbar(colors, cax=bar, label="cable tension [N]")
     return figure
+
+
+def _some(count: int, most: int) -> list[int]:
+    """Return up to ``most`` of ``count`` indices, evenly spaced, with both ends."""
+    return sorted({round(k) for k in np.linspace(0, count - 1, most).tolist()})
+
+
+def _animate(
+    path: str | os.PathLike[str], poses: Sequence[Posture], tensions: Array | None, like: Any
+) -> None:
+    """Write a GIF of up to 150 postures, coloured by tension, within the limits of ``like``."""
+    if as_path(path).suffix.lower() != ".gif":
+        raise InvalidInput("animate", f"{str(path)!r} given; it must end in .gif.")
+    figure, axes = picture()
+    colors = None if tensions is None else color_scale(tensions)
+    axes.auto_scale_xyz(*np.reshape(like.get_w_lims(), (3, 2)))
+    finish(figure, " ", colors)
+
+    def draw(k: int) -> None:
+        for line in list(axes.lines):
+            line.remove()
+        shades = None if colors is None or tensions is None else colors.to_rgba(tensions[k])
+        draw_arm(axes, poses[k], shades)
+        _unclip(axes)
+        style.titled(figure, f"{poses[0].arm.name}, posture {k} of {len(poses) - 1}")
+
+    film: Any = FuncAnimation(figure, draw, _some(len(poses), _FRAMES), init_func=lambda: None)
+    write_file(path, lambda aside: film.save(aside, PillowWriter(_RATE), dpi=figure.dpi))
+
+
+def _unclip(axes: Any) -> None:
+    """Let lines and surfaces be seen outside the square of 3D axes, which is less than the box."""
+    for artist in (*axes.lines, *axes.collections):
+        artist.set_clip_on(False)

@@ -41,8 +41,9 @@ def plot_weight_test(test: WeightTest) -> Figure:
     right.set(xlabel="load [N]", ylabel="tension at each motor [N]")
     right.set_ylim(bottom=0.0)
     left_it = "; left its reference before the weight" if test.left_reference else ""
-    style.heading(figure, f"{arm.name}: weight of {np.linalg.norm(test.force):.4g} N{left_it}")
-    return figure
+    return style.titled(
+        figure, f"{arm.name}: weight of {np.linalg.norm(test.force):.4g} N{left_it}"
+    )
 
 
 @style.styled
@@ -82,12 +83,7 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
 
 @style.styled
 def plot_load_history(history: LoadHistory) -> Figure:
-    """Plot the force against the displacement of the tip, and the tensions of one cable's segments.
-
-    Both panels begin at the reference posture. Force and displacement are components along the
-    largest force of the history. If no load has a force, the displacement is plotted against the
-    number of the load. The second panel shows the cable whose segments differ most in tension.
-    """
+    """Plot the force along the largest force, and the tensions of the most uneven cable."""
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
     forces = np.vstack([history.reference_wrench, history.wrenches])[:, :3]
     moved = MM * np.vstack([np.zeros(3), history.displacement])
@@ -112,18 +108,12 @@ def plot_load_history(history: LoadHistory) -> Figure:
     right.legend(title=history.reference.arm.cables[cable].name, **style.BESIDE)
     lost = f"{1000.0 * history.dissipated.sum():.4g} mJ lost in all in"
     holes = plural(len(history.holes), "hole")
-    style.heading(figure, f"{history.reference.arm.name}: {lost} {holes}")
-    return figure
+    return style.titled(figure, f"{history.reference.arm.name}: {lost} {holes}")
 
 
 @style.styled
 def plot_tracking_run(run: TrackingRun) -> Figure:
-    """Plot a closed loop over time: tip error, stiffness, displacement of the tip, tensions.
-
-    The third panel shows the displacement of the tip from the frictionless equilibrium, along the
-    first direction of the plan. To first order, friction can hold the tip at rest only within the
-    shaded band.
-    """
+    """Plot a closed loop over time: tip error, stiffness, displacement of the tip, tensions."""
     figure, axes = style.panels(style.TWO_COLUMNS, 6.4, rows=4, sharex=True)
     error, stiffness, band, tension = axes[:, 0]
     t, target, found = run.time, N_PER_MM * run.target, N_PER_MM * run.stiffness
@@ -153,8 +143,7 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
             panel.axvline(at, color="0.3", linewidth=0.8, linestyle=":")
     danger = f"{run.warnings[0].split(':')[0]}. " if run.warnings else ""
     dotted = "; dotted: the load changes" if changes.size else ""
-    style.heading(figure, f"{danger}{run.plan.arm.name}, law {run.law}{dotted}")
-    return figure
+    return style.titled(figure, f"{danger}{run.plan.arm.name}, law {run.law}{dotted}")
 
 
 def _margins(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import itertools
 import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
@@ -19,11 +19,13 @@ from cdsm.errors import InvalidInput
 from cdsm.plots import style
 from cdsm.plots.style import MM, N_PER_MM
 from cdsm.support.tidy import check_sweep, status_names
-from cdsm.support.validation import one_of, scalar, whole_number
+from cdsm.support.validation import one_of, scalar
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
     import xarray
+
+    View = tuple[str, int, NDArray[np.bool_], bool]  # title, normal axis, tips, whether a slice
 
 Statistic = Literal["median", "min", "max"]
 
@@ -31,6 +33,7 @@ _UNITS: Final = {"N m-1": (N_PER_MM, "N/mm"), "N m rad-1": (1.0, "N m/rad"), "1"
 """Factor and label of the colour bar for each unit of a Dataset."""
 
 _MOST_PANELS = 9
+_CELLS = 40  # along the longest side of a map
 _WIDE = 30.0  # the colours are logarithmic if the ratio of largest to smallest value exceeds this
 _ROBUST: Final = (2.0, 98.0)  # percentiles at the ends of the colours, as in xarray
 _FLAT = 1e-9  # tips are in a plane if an extent is below this part of the largest
@@ -42,7 +45,6 @@ _LABELS = 0.75  # space for the labels beside and below a map [inch]
 _BAR, _HEADING = 1.0, 0.6  # width of the colour bar with its label, height of the title [inch]
 _HUGE = 1e300
 _SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
-
 
 _NONE: Final = {"marker": ".", "c": "0.75", "s": 8.0, "label": "no value"}
 _UNSTABLE: Final = {"marker": "x", "c": style.VERMILLION, "s": 14.0, "lw": 0.7, "label": "unstable"}
@@ -56,15 +58,20 @@ class Map(NamedTuple):
     points: Array  # tips (N, 2) [mm]
     values: Array  # the quantity (N,), NaN if missing
     unstable: NDArray[np.bool_]  # (N,)
+    slice: bool  # whether this is one of the slices of a cloud
 
+    def box(self) -> tuple[Array, Array]:
+        """Return the middle and the extent (2,) of the box around the tips [mm]."""
+        every = self.points if len(self.points) else np.zeros((1, 2))
+        extent = np.ptp(every, axis=0)
+        return every.min(axis=0) + extent / 2.0, extent if extent.any() else extent + 1.0
 
-class Slab(NamedTuple):
-    """A slab of the workspace, which a panel shows along its normal."""
-
-    title: str
-    normal: int  # index of the axis normal to the slab
-    middle: float = 0.0  # position on this axis [mm]
-    half: float = np.inf  # half the thickness [mm]
+    def limits(self) -> Array:
+        """Return the ends of both axes of the panel (2, 2) [mm]."""
+        middle, extent = self.box()
+        half = extent / 2.0 + _MARGIN * extent.max()
+        half = np.maximum(half, _THIN * half.max())
+        return np.transpose([middle - half, middle + half])
 
 
 @style.styled
@@ -74,7 +81,6 @@ def plot_map(
     *,
     section: tuple[str, float, float] | None = None,
     statistic: Statistic | None = None,
-    bins: int = 40,
 ) -> Figure:
     """Plot the tips of a sweep in mm, coloured by a quantity, with a panel for each case.
 
@@ -93,42 +99,36 @@ def plot_map(
         section: Axis, position and half thickness [m] of a slab. Only tips inside it are shown.
         statistic: ``"median"``, ``"min"`` or ``"max"`` of the postures in a cell; None: dots where
             the tips are in a plane or a section, else the median.
-        bins: Number of cells along the longest side of a map.
 
     Raises:
         InvalidInput: ``dataset`` is not a sweep or has too many panels or no such quantity,
             ``quantity`` has more than one number per entry, ``section`` is invalid or contains no
-            tip, the statistic is unknown, or ``bins`` is not a whole number from 2 to 500.
+            tip, or the statistic is unknown.
         CdsmError: xarray is not installed.
     """
     check_sweep(dataset)
-    remedy = "tip_position and the quantity must be among outputs= of the sweep."
+    remedy = "tip_position and the quantity must be among outputs of the sweep."
     for name in ("tip_position", quantity):
         one_of("quantity", name, [str(each) for each in dataset.data_vars], remedy)
     if statistic is not None:
         one_of("statistic", statistic, get_args(Statistic))
-    whole_number("bins", bins, 2, 500)
-    tips = MM * dataset["tip_position"].transpose(..., "axis")
-    poses, points = [str(dim) for dim in tips.dims[:-1]], tips.values.reshape(-1, 3)
-    path = "distance" in dataset.coords and poses == ["pose"]  # a joint may have this name
-    slabs = list(_slabs(points[np.isfinite(points).all(axis=1)], section, path))
-    maps = list(_maps(dataset, quantity, poses, points, slabs))
+    maps = list(_maps(dataset, quantity, section))
     every = np.concatenate([each.values for each in maps])
     if not len(every):
         raise InvalidInput(
             "section" if section is not None else "dataset",
             "has no tip to show; widen the section, or sweep over other postures.",
         )
-    if statistic is None and len(slabs) == 3 and not path:
+    if statistic is None and maps[0].slice:
         statistic = "median"
-    limits = [_limits(each.points, bins) for each in maps]
+    limits = [each.limits() for each in maps]
     shapes = [float(np.ptp(x) / np.ptp(y)) for x, y in limits]
     figure, grid, size = _panels(shapes)
     colors, extend = _colors(every)
     for axes in grid.ravel()[len(maps) :]:
         axes.set_axis_off()
     for axes, each, (x, y), shape in zip(grid.ravel(), maps, limits, shapes, strict=False):
-        _draw(axes, each, colors, statistic, bins)
+        _draw(axes, each, colors, statistic)
         axes.set(xlim=x, ylim=y, aspect="equal")
         axes.locator_params("x", nbins=max(2, round(5.0 * min(1.0, shape))))
         axes.set_title(textwrap.fill(each.title, round(_CHARACTERS * (size * shape + 0.5))))
@@ -147,9 +147,8 @@ def plot_map(
     else:
         known = "is finite" if np.isinf(every).any() else "exists"
         title += f": {name} {known} at none of these tips"
-    style.heading(figure, title)
     style.legend_below(figure, grid, 2)
-    return figure
+    return style.titled(figure, title)
 
 
 def _panels(shapes: list[float]) -> tuple[Figure, Any, float]:
@@ -165,42 +164,49 @@ def _panels(shapes: list[float]) -> tuple[Figure, Any, float]:
     return figure, grid, size
 
 
-def _maps(
-    dataset: xarray.Dataset, quantity: str, poses: list[str], points: Array, slabs: list[Slab]
-) -> Iterator[Map]:
-    """Yield the map of each slab, for each combination of the coordinates besides ``poses``."""
+def _maps(dataset: xarray.Dataset, quantity: str, section: Any) -> Iterator[Map]:
+    """Yield a map of each view, for each combination of the coordinates besides those of poses."""
     value, status = dataset[quantity], dataset["status"]
-    dims = [str(dim) for dim in value.dims]
+    tips = MM * dataset["tip_position"].transpose(..., "axis")
+    poses, dims = [str(dim) for dim in tips.dims[:-1]], [str(dim) for dim in value.dims]
     if quantity == "status" or not {*poses} <= {*dims} <= {*status.dims, "direction"}:
         raise InvalidInput(
             "quantity",
             f"{quantity} has the dimensions {', '.join(dims)}; a map shows one number per entry, "
             "such as softest, stiffest, isotropy, margin or along.",
         )
-    cases = {dim: dataset.sizes[dim] for dim in dims if dim not in poses}
-    if (count := math.prod(cases.values())) > _MOST_PANELS:
-        listed = ", ".join(f"{dim} ({size})" for dim, size in cases.items())
+    cases = [dim for dim in dims if dim not in poses]
+    names = list(itertools.product(*([_name(x) for x in dataset[dim]] for dim in cases)))
+    if len(names) > _MOST_PANELS:
+        listed = ", ".join(f"{dim} ({dataset.sizes[dim]})" for dim in cases)
         raise InvalidInput(
             "dataset",
-            f"makes {count} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
-            f"dataset.isel({next(iter(cases))}=[0]).",
+            f"makes {len(names)} panels, of {listed}; choose up to {_MOST_PANELS}, as in "
+            f"dataset.isel({cases[0]}=[0]).",
         )
     # a dimension that the quantity does not have cannot change its status: take index 0
     status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
-    status = status.broadcast_like(value)
-    factor = _UNITS.get(value.units, (1.0, ""))[0]
+    points = tips.values.reshape(-1, 3)
+    known = np.isfinite(points).all(axis=1)
+    points, (x, code) = (
+        points[known],
+        (
+            each.transpose(*cases, *poses).values.reshape(len(names), -1)[:, known]
+            for each in (value, status.broadcast_like(value))
+        ),
+    )
     (buckled,) = (code for code, word in status_names(dataset).items() if word == "unstable")
-    for place in np.ndindex(*cases.values()):
-        at = dict(zip(cases, place, strict=True))
-        x, code = (one.isel(at).transpose(*poses).values.ravel() for one in (value, status))
-        unstable = code == buckled
-        x = factor * (x if quantity == "margin" else np.where(unstable, np.nan, x))
-        names = [_name(dataset[dim][i]) for dim, i in at.items()]
-        for slab in slabs:
-            inside = abs(points[:, slab.normal] - slab.middle) <= slab.half
-            plane = [axis for axis in range(3) if axis != slab.normal]
-            title = ", ".join(filter(None, (*names, slab.title)))
-            yield Map(title, plane, points[inside][:, plane], x[inside], unstable[inside])
+    unstable = code == buckled
+    x = _UNITS.get(value.units, (1.0, ""))[0] * x
+    if quantity != "margin":
+        x = np.where(unstable, np.nan, x)
+    path = "distance" in dataset.coords and poses == ["pose"]  # a joint may have this name
+    views = list(_views(points, section, path))
+    for case, values, buckles in zip(names, x, unstable, strict=True):
+        for view, normal, seen, cut in views:
+            plane = [axis for axis in range(3) if axis != normal]
+            title = ", ".join(filter(None, (*case, view)))
+            yield Map(title, plane, points[seen][:, plane], values[seen], buckles[seen], cut)
 
 
 def _name(coordinate: xarray.DataArray) -> str:
@@ -210,28 +216,28 @@ def _name(coordinate: xarray.DataArray) -> str:
     return f"{coordinate.name} {said}{'' if unit == '1' else f' {unit}'}"
 
 
-def _slabs(points: Array, section: Any, path: bool) -> Iterator[Slab]:
-    """Yield the slab of each panel, for tips (N, 3) [mm]: their plane, or three slices or views."""
+def _views(points: Array, section: Any, path: bool) -> Iterator[View]:
+    """Yield the view of a section or of the plane of all tips, or else three slices or views."""
+
+    def slab(axis: int, middle: float, half: float) -> View:
+        title = f"{'xyz'[axis]} = {round(middle, 1) + 0.0:.3g} ± {half:.2g} mm"
+        inside = abs(points[:, axis] - middle) <= half
+        return title.replace(" ", "\xa0"), axis, inside, section is None  # no line break
+
+    every, extent = np.full(len(points), True), np.ptp([*points, np.zeros(3)], axis=0)
     if section is not None:
         if not isinstance(section, (tuple, list)) or len(section) != 3:
             said = f"{section!r} given; an axis, its place and the half thickness [m] needed."
             raise InvalidInput("section", said)
         axis = "xyz".index(one_of("axis", section[0], tuple("xyz")))
-        yield _slice(axis, *(MM * scalar("section", each) for each in section[1:]))
-        return
-    extent = np.ptp(np.vstack([points, np.zeros(3)]), axis=0)  # the base is at the origin
-    if extent.min() <= _FLAT * extent.max():
-        yield Slab("", int(extent.argmin()))
-        return
-    for axis in (1, 2, 0):
-        x = points[:, axis]
-        seen = Slab(f"seen along {'xyz'[axis]}", axis)
-        yield seen if path else _slice(axis, float(np.median(x)), _SLICE * float(np.ptp(x)))
-
-
-def _slice(axis: int, middle: float, half: float) -> Slab:
-    title = f"{'xyz'[axis]} = {round(middle, 1) + 0.0:.3g} ± {half:.2g} mm"
-    return Slab(title.replace(" ", "\xa0"), axis, middle, half)  # no line break
+        yield slab(axis, *(MM * scalar("section", each) for each in section[1:]))
+    elif extent.min() <= _FLAT * extent.max():  # the base is at the origin
+        yield "", int(extent.argmin()), every, False
+    else:
+        for axis in (1, 2, 0):
+            x = points[:, axis]
+            seen = f"seen along {'xyz'[axis]}", axis, every, False
+            yield seen if path else slab(axis, float(np.median(x)), _SLICE * float(np.ptp(x)))
 
 
 def _colors(values: Array) -> tuple[ScalarMappable, str]:
@@ -249,9 +255,7 @@ def _colors(values: Array) -> tuple[ScalarMappable, str]:
     return ScalarMappable(scale(low, high), colormaps[name]), extend
 
 
-def _draw(
-    axes: Any, shown: Map, colors: ScalarMappable, statistic: Statistic | None, bins: int
-) -> None:
+def _draw(axes: Any, shown: Map, colors: ScalarMappable, statistic: Statistic | None) -> None:
     points, values = shown.points, np.minimum(shown.values, _HUGE)  # inf would not be drawn
     known = ~np.isnan(values)
     look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap}
@@ -263,29 +267,15 @@ def _draw(
     else:
         from scipy.stats import binned_statistic_2d  # here, because it imports slowly
 
-        middle, extent = _box(points)
-        size = (1.0 + _FLAT) * float(extent.max()) / bins
+        middle, extent = shown.box()
+        size = (1.0 + _FLAT) * extent.max() / _CELLS
         count = np.maximum(np.ceil(extent / size), 1.0)
-        first = middle - size * count / 2.0
-        edges = [a + size * np.arange(n + 1.0) for a, n in zip(first, count, strict=True)]
-        cells = binned_statistic_2d(*points[known].T, values[known], statistic, edges)
-        axes.pcolormesh(*edges, np.ma.masked_invalid(cells[0].T), zorder=2, **look)
+        ends = np.transpose([middle - size * count / 2.0, middle + size * count / 2.0])
+        cells, *edges, _ = binned_statistic_2d(
+            *points[known].T, values[known], statistic, count.astype(int), ends
+        )
+        axes.pcolormesh(*edges, np.ma.masked_invalid(cells.T), zorder=2, **look)
     if look["cmap"].name == "PuOr":  # the middle of the scale is white
         axes.set_facecolor("0.88")
     for letter, axis in zip("xy", shown.plane, strict=True):
         getattr(axes, f"set_{letter}label")(f"{'xyz'[axis]} [mm]")
-
-
-def _box(points: Array) -> tuple[Array, Array]:
-    """Return the middle and the extent (2,) of the box around tips (N, 2) [mm]."""
-    every = points if len(points) else np.zeros((1, 2))
-    extent = np.ptp(every, axis=0)
-    return every.min(axis=0) + extent / 2.0, extent if extent.any() else extent + 1.0
-
-
-def _limits(points: Array, bins: int) -> Array:
-    """Return the ends of both axes (2, 2) [mm] of a panel that shows ``points``, or their cells."""
-    middle, extent = _box(points)
-    half = extent / 2.0 + max(_MARGIN, 0.5 / bins) * extent.max()
-    half = np.maximum(half, _THIN * half.max())
-    return np.transpose([middle - half, middle + half])

@@ -36,10 +36,7 @@ _ENDLESS = 1000.0  # tension [N] up to which a law without a highest tension is 
 
 @style.styled
 def plot_tensile_fit(fit: TensileFit) -> Figure:
-    """Plot force against strain, measured and fitted, and the fitted rigidity EA against tension.
-
-    The second panel also shows the stages of the wire and the 95 % band of EA.
-    """
+    """Plot force against strain, measured and fitted, and EA with its band against tension."""
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
     tension, band, length = fit.tension, fit.band, fit.test.gauge_length
     fitted = 100.0 * (fit.start / length + fit.elasticity.strain(tension))
@@ -60,10 +57,7 @@ def plot_tensile_fit(fit: TensileFit) -> Figure:
 
 
 def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: str = "x") -> None:
-    """Shade and name the ``stages`` of a wire: each has a name, a lowest and a highest tension [N].
-
-    ``along`` is the axis of the tension: ``"x"`` or ``"y"``.
-    """
+    """Shade and name the ``stages`` (name, lowest, highest [N]) of a wire on the x- or y-axis."""
     look: dict[str, Any] = {"fontsize": "small", "color": "0.3"}
     whole = stages[-1][2] - stages[0][1]
     for (name, low, high), shade in zip(stages, cycle(("0.93", "0.98", "0.88")), strict=False):
@@ -80,11 +74,8 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 
 @style.styled
-def plot_identification(fit: Identification, labels: Sequence[str], title: str) -> Figure:
-    """Plot predicted and measured values, and residuals divided by σ.
-
-    ``labels`` has a text for each residual; more than 30 residuals are numbered instead.
-    """
+def plot_identification(fit: Identification) -> Figure:
+    """Plot predicted and measured values, and residuals in σ."""
     rows = [fit.measurements[i] for i in fit.measurement_of]
     loops = [(i, one) for i, one in enumerate(fit.measurements) if hasattr(one, "forces")]
     stiff = [k for k, one in enumerate(rows) if hasattr(one, "value")]
@@ -112,19 +103,15 @@ def plot_identification(fit: Identification, labels: Sequence[str], title: str) 
     right.axhline(0.0, color="0.2", linewidth=0.8)
     right.set_ylabel("(predicted − measured)/σ")
     if len(rows) <= _MOST_LABELS and any(measurement.label for measurement in fit.measurements):
-        right.set_xticks(place, labels, rotation=90)
+        right.set_xticks(place, fit.reading_names, rotation=90)
     else:
         right.set_xlabel("reading" if loops else "measurement")
         style.whole_numbers(right.xaxis)
-    style.heading(figure, title)
-    return figure
+    return style.titled(figure, fit._verdict)
 
 
 def _plot_loops(axes: Any, fit: Identification, loops: Sequence[tuple[int, Any]]) -> None:
-    """Plot measured and predicted displacements of loops [mm] against the force [N].
-
-    All are along the force, less the first measured one.
-    """
+    """Plot displacements of loops along the force, less the first measured one."""
     looks = style.line_looks([loop.label or f"[{i}]" for i, loop in loops])
     for look, (i, loop) in zip(looks, loops, strict=True):
         rows = np.flatnonzero(fit.measurement_of == i)
@@ -154,8 +141,7 @@ def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
     right.set(xlabel="candidate", ylabel="tests")
     style.whole_numbers(right.xaxis)
     style.whole_numbers(right.yaxis)
-    style.heading(figure, plural(len(plan.tests), "test"))
-    return figure
+    return style.titled(figure, plural(len(plan.tests), "test"))
 
 
 @style.styled
@@ -172,16 +158,12 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
     axes.margins(x=0.18)
     axes.grid(visible=False, axis="y")
     axes.set(xlabel=f"standard uncertainty [{unit}]")
-    style.heading(figure, f"{budget.name}: {budget.value / size:.4g} {unit}")
-    return figure
+    return style.titled(figure, f"{budget.name}: {budget.value / size:.4g} {unit}")
 
 
 @style.styled
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
-    """Plot a histogram of a Monte Carlo run beside the result of first-order error propagation.
-
-    The latter is drawn as a normal distribution. Dashed lines mark the 95 % intervals of both.
-    """
+    """Plot a histogram of a Monte Carlo run beside the normal distribution of its budget."""
     (unit, size), first = run.budget.measurand.unit, run.budget
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.8)
     values, u = run.values / size, first.standard_uncertainty / size
@@ -204,10 +186,7 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
 
 @style.styled
 def plot_designs(found: DesignSearch) -> Figure:
-    """Plot the objectives of all designs that meet the constraints, and their Pareto front.
-
-    For a single objective, plot its best value against the number of designs.
-    """
+    """Plot the objectives of feasible designs with their front, or the best value of one goal."""
     objectives = found.problem.objectives
     scales = [each.unit[1] for each in objectives]
     names = [textwrap.fill(label, _WIDEST) for label in found._labels]
@@ -235,18 +214,13 @@ def plot_designs(found: DesignSearch) -> Figure:
         ring = {"color": style.VERMILLION, "markerfacecolor": "none", "markersize": 8}
         panel.plot(x[chosen], y[chosen], "o", label="compromise", **ring)
         panel.set(xlabel=names[0], ylabel=names[k])
-    style.heading(figure, f"{len(every)} designs of {found.problem.arm.name}")
     style.legend_below(figure, axes, 3)
-    return figure
+    return style.titled(figure, f"{len(every)} designs of {found.problem.arm.name}")
 
 
 @style.styled
 def plot_force_polytope(polytope: ForcePolytope) -> Figure:
-    """Plot the tip forces [N] that the cables can balance, and the worst direction.
-
-    Raises InvalidInput if ``polytope`` has no surface: the tip cannot move in some direction, or
-    the cables balance forces in one plane only.
-    """
+    """Plot the tip forces that the cables can balance; InvalidInput if they have no volume."""
     if not len(polytope.faces):
         raise InvalidInput(
             "polytope", "has no surface in three dimensions to draw; bend the arm, or add cables."
@@ -265,10 +239,7 @@ def plot_force_polytope(polytope: ForcePolytope) -> Figure:
 
 @style.styled
 def plot_elasticity(law: Elasticity) -> Figure:
-    """Plot tangent and secant rigidity EA [kN] against the tension [N].
-
-    A law without a highest tension is drawn up to 1000 N.
-    """
+    """Plot tangent and secant rigidity EA against the tension, at most up to 1000 N if endless."""
     tension = np.linspace(law.low, law.high if math.isfinite(law.high) else _ENDLESS, 400)
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.3)
     axes.plot(tension, KN * law.rigidity(tension), label="tangent, dF/dε")

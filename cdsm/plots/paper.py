@@ -1,7 +1,8 @@
 """Plot the recomputed figures of the paper: stiffness against Young's modulus, tension and lead.
 
 Columns of panels are the directions x, y and z, or postures. Rows are two definitions of the tip
-stiffness, the "readings": the paper's K_R, and the stiffness that a hung weight measures.
+stiffness, the "readings": the paper's K_R, and the stiffness that a hung weight measures. Both are
+computed from EA/L with the stretched length L, as in the paper, and from EA/l_0.
 """
 
 from __future__ import annotations
@@ -46,16 +47,9 @@ _STAGES: Final = (
 
 @style.styled
 def plot_paper(result: paper.Figure) -> Figure:
-    """Plot one recomputed figure of the paper, with the numbers that the paper prints.
-
-    Figures of stiffness show the paper's K_R, and the stiffness that a hung weight measures. Both
-    are computed from EA/L with the stretched length L, as in the paper, and from EA/l_0 with the
-    original length l_0. The tension on a horizontal axis is the mean of all cables; bars show the
-    range over the cables, as in the paper.
-    """
+    """Plot one recomputed figure of the paper, with the numbers that the paper prints."""
     figure = _DRAWN[result.name](result)
-    style.heading(figure, result.title)
-    return figure
+    return style.titled(figure, result.title)
 
 
 def _multiples(

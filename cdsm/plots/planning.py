@@ -13,11 +13,9 @@ from matplotlib.ticker import MaxNLocator
 from cdsm.errors import InvalidInput
 from cdsm.plots import style
 from cdsm.plots.style import N_PER_MM
-from cdsm.support.format import plural
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
-    from cdsm.batch import Tensions
     from cdsm.planning.path_plan import PathPlan
     from cdsm.planning.plan import StiffnessPlan
     from cdsm.planning.range import StiffnessRange
@@ -77,9 +75,8 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
     axes.set_xticks(np.deg2rad([0.0, 90.0, 180.0, 270.0]), ends)
     axes.set_rlabel_position(60.0)
     axes.yaxis.set_major_locator(MaxNLocator(4))
-    style.heading(figure, "attainable stiffness along u [N/mm]")
     figure.legend(loc="outside lower center")
-    return figure
+    return style.titled(figure, "attainable stiffness along u [N/mm]")
 
 
 @style.styled
@@ -97,8 +94,7 @@ def plot_saturation(found: Saturation) -> Figure:
         label = f"softer above {found.stiffest:.4g} N"
         axes.axvline(found.stiffest, color=style.GREEN, linestyle="-.", label=label)
     axes.legend(loc="lower right")
-    style.heading(figure, found.posture.arm.name)
-    return figure
+    return style.titled(figure, found.posture.arm.name)
 
 
 @style.styled
@@ -148,17 +144,13 @@ def plot_shares(shares: Shares) -> Figure:
     axes.axhline(0.0, color="0.2", linewidth=0.8)
     total = f"{N_PER_MM * shares.total:.4g} N/mm along {style.direction_name(shares.direction)}"
     unstable = "" if shares.stiffness.is_stable else "UNSTABLE: "
-    style.heading(figure, f"{unstable}{arm.name}: contributions to {total}")
     axes.legend()
-    return figure
+    return style.titled(figure, f"{unstable}{arm.name}: contributions to {total}")
 
 
 @style.styled
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
-    """Plot the planned tension of each cable, beside those of the softest and the stiffest arm.
-
-    Raises InvalidInput if ``attainable`` is not of the posture and the direction of the plan.
-    """
+    """Plot the planned tension of each cable, beside those of the softest and the stiffest arm."""
     F, misses = plan.tension, "" if plan.reached else f", missed by {100.0 * plan.misfit:.2g} %"
     if attainable is None:
         return _plot_tensions([(F, f"planned{misses}", "o")], f"{F.posture.arm.name}: plan")
@@ -167,32 +159,18 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None =
     if not same or abs(plan.direction - attainable.direction).max() > _SAME:
         raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
     said = f"planned: {N_PER_MM * float(plan.achieved):.4g} N/mm"
-    return _plot_range(attainable, [(F, said, "o")])
+    return plot_stiffness_range(attainable, [(F, said, "o")])
 
 
 @style.styled
-def plot_stiffness_range(attainable: StiffnessRange) -> Figure:
-    """Plot the tension of each cable for the softest and for the stiffest arm."""
-    return _plot_range(attainable)
-
-
-@style.styled
-def plot_tensions(tensions: Tensions) -> Figure:
-    """Plot the median tension of each cable over many postures, with the least and the largest.
-
-    Raises InvalidInput if all tensions are NaN.
-    """
-    found = tensions.values[tensions.ok]
-    if not len(found):
-        raise InvalidInput("tensions", "have no posture with tensions; see their status.")
-    figure, axes = _by_name(tensions.arm.cables.names, "tension [N]")
-    low, middle, high = np.quantile(found, [0.0, 0.5, 1.0], axis=0)
-    reach = [middle - low, high - middle]
-    axes.errorbar(np.arange(len(middle)), middle, reach, fmt="o", linewidth=0.8)
-    style.from_zero(axes, high)
-    count = f"{len(found)} of {plural(len(tensions), 'posture')}"
-    axes.set_title(f"{tensions.arm.name}: median and range, {count}")
-    return figure
+def plot_stiffness_range(attainable: StiffnessRange, planned: Sequence[_Case] = ()) -> Figure:
+    """Plot the tension of each cable for the softest and for the stiffest arm, and as planned."""
+    softest = f"softest: {N_PER_MM * attainable.low:.4g} N/mm"
+    stiffest = f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm"
+    ends = (attainable.low_tension, softest, "v"), (attainable.high_tension, stiffest, "^")
+    along = f"stiffness along {style.direction_name(attainable.direction)}"
+    title = f"{attainable.posture.arm.name}: {along}"
+    return _plot_tensions([ends[0], *planned, ends[1]], title)
 
 
 def _by_name(names: Sequence[str], label: str) -> tuple[Figure, Any]:
@@ -204,15 +182,6 @@ def _by_name(names: Sequence[str], label: str) -> tuple[Figure, Any]:
     axes.set_xticks(places, names[::step], rotation=60, ha="right", rotation_mode="anchor")
     axes.set_ylabel(label)
     return figure, axes
-
-
-def _plot_range(attainable: StiffnessRange, between: Sequence[_Case] = ()) -> Figure:
-    softest = f"softest: {N_PER_MM * attainable.low:.4g} N/mm"
-    stiffest = f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm"
-    ends = (attainable.low_tension, softest, "v"), (attainable.high_tension, stiffest, "^")
-    along = f"stiffness along {style.direction_name(attainable.direction)}"
-    shown = [ends[0], *between, ends[1]]
-    return _plot_tensions(shown, f"{attainable.posture.arm.name}: {along}")
 
 
 def _plot_tensions(shown: Sequence[_Case], title: str) -> Figure:

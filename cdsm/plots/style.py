@@ -106,9 +106,10 @@ def panels(
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def heading(figure: Figure, text: str) -> None:
-    """Write a title over a figure, with lines no wider than the figure."""
+def titled(figure: Figure, text: str) -> Figure:
+    """Write a title over a figure, with lines no wider than the figure, and return the figure."""
     figure.suptitle(textwrap.fill(text, round(16 * figure.get_figwidth())))
+    return figure
 
 
 def from_zero(axes: Any, *values: Array) -> None:

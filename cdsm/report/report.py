@@ -169,7 +169,7 @@ def _of_limits(K: Stiffness) -> Iterator[str]:
     locked, slack, cables = arm.cables.position_controlled, F == 0.0, arm.cables.names
     near = np.minimum(q - arm.lower, arm.upper - q) < 0.01 * (arm.upper - arm.lower)
     for what, names, chosen in (
-        ("slack, 0 N; they stiffen one direction, raise minimum=", cables, locked & slack),
+        ("slack, 0 N; they stiffen one direction, raise minimum", cables, locked & slack),
         ("force-controlled, no passive stiffness", cables, ~locked),
         ("within 5 % of the low end of their law", cables, locked & ~slack & (low >= 0.95 * F)),
         ("within 5 % of the high end of their law", cables, locked & (high <= 1.05 * F)),

@@ -128,7 +128,8 @@ class LoadHistory(Result):
     def plot(self) -> Figure:
         """Plot force against tip displacement, and the tensions of the segments of one cable.
 
-        The cable is the one whose segments differ most in tension.
+        Force and displacement are components along the largest force. The cable is
+        the one whose segments differ most in tension.
         """
         return cdsm.plots.plot_load_history(self)
 

@@ -159,5 +159,5 @@ def _require_same(path: Path, kept: xarray.Dataset, wanted: xarray.Dataset) -> N
         xarray.testing.assert_identical(*both)
     except AssertionError as difference:
         said = f"{difference}".replace("Left", "Store (L)").replace("right", "wanted sweep (R)")
-        remedy = "Repeat that one, or give another path to store="
+        remedy = "Repeat that one, or give another path to store"
         raise FileError(path, f"contains another sweep. {remedy}.\n{said}") from None

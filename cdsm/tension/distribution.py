@@ -196,7 +196,7 @@ def bounds_at(
     c = int(np.argmax(low - high))
     if low[c] > high[c]:
         said = f"would need {low[c]:.4g} N or more and {high[c]:.4g} N or less at its motor"
-        remedy = f"{said}; raise maximum= or lower minimum=."
+        remedy = f"{said}; raise maximum or lower minimum."
         raise InvalidInput("worst_friction", f"{pose.arm.cables[c].name} {remedy}")
     return low, high
 

@@ -67,7 +67,7 @@ def advice(
     """Say which bounds to widen: of each cable at a bound, the argument, its own, or its law's.
 
     Tensions and bounds are (C,) [N]; ``among`` (C,) are the cables that count, default all. The
-    text is such as "lower minimum=, raise the maximum of cable1_1 itself", or empty.
+    text is such as "lower minimum, raise the maximum of cable1_1 itself", or empty.
     """
     near = OPTIMALITY * max(float(F.max()), 1.0)
     found: dict[str, list[str]] = {}
@@ -78,7 +78,7 @@ def advice(
             (F[c] >= high[c] - near, high[c], "raise", "maximum", law and law.high),
         ):
             if tight and (among is None or among[c]):
-                rule = f"{verb} {side}="
+                rule = f"{verb} {side}"
                 if value == getattr(cable, side):
                     rule = f"{verb} the {side} of % itself"
                 elif value == end:

@@ -25,33 +25,25 @@ from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 from cdsm.errors import CdsmError, InvalidInput
+from cdsm.view.scene import HANDLE
 
-HANDLE: Final = "/target"
-"""Name of the scene node that clients may drag."""
-
+_HOST = "127.0.0.1"
 _FARTHEST = 1e6  # largest coordinate [m] to which it may be dragged
 _LONGEST = 2**16  # size of a message in bytes; those of the page have a few hundred
 _STARTING: Final = threading.Lock()
 
 
-def guarded_server(host: object, port: int, label: str) -> viser.ViserServer:
+def guarded_server(port: int, label: str) -> viser.ViserServer:
     """Start a viser server that refuses what our page does not send.
 
     viser has no option for this, so while it starts, the function that it calls to start a
-    websocket server is replaced. Raises InvalidInput if the address is not of this machine or not
-    available (viser would take another port), CdsmError if viser does not call that function.
+    websocket server is replaced. Raises InvalidInput if the port is not available (viser would take
+    another one), CdsmError if viser does not call that function.
     """
-    if not isinstance(host, str) or not _is_loopback(host):
-        raise InvalidInput(
-            "host",
-            f"{host!r} given; the view is for this machine alone: give 127.0.0.1, ::1 or "
-            f"localhost. From another machine use `ssh -L {port}:localhost:{port}`.",
-        )
     try:
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        socket.create_server((host, port), family=family).close()
+        socket.create_server((_HOST, port)).close()
     except OSError as error:
-        said = f"{port} on {host} is not available ({error.strerror}); give another port, or 0."
+        said = f"{port} is not available ({error.strerror}); give another port, or 0."
         raise InvalidInput("port", said) from None
     original, called = websocket_server.serve, threading.Event()
 
@@ -64,7 +56,7 @@ def guarded_server(host: object, port: int, label: str) -> viser.ViserServer:
     with _STARTING:
         websocket_server.serve = serve  # type: ignore[assignment,misc]
         try:
-            server = viser.ViserServer(host, port, label, verbose=False)
+            server = viser.ViserServer(_HOST, port, label, verbose=False)
         finally:
             websocket_server.serve = original  # type: ignore[misc]
     if not called.is_set():

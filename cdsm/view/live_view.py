@@ -1,23 +1,30 @@
-"""Run a live view: compute results when a control changes, and draw them."""
+"""Serve a live view: one page for any number of browsers of this machine.
+
+A change of a control computes the results anew, and draws them.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import threading
 from collections.abc import Callable
 from concurrent import futures
 from typing import TYPE_CHECKING, Self, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from cdsm.errors import CdsmError, InvalidInput, need
 from cdsm.kinematics import inverse_kinematics
 from cdsm.manipulator import Manipulator
+from cdsm.planning.path import checked_path
 from cdsm.plots.style import MM
+from cdsm.support.validation import instance, quantity, vector, whole_number
 from cdsm.support.values import Array
-from cdsm.view.guard import HANDLE
 from cdsm.view.panel import Panel
-from cdsm.view.scene import Scene
+from cdsm.view.scene import HANDLE, Scene
 from cdsm.view.state import Condition, Setting, Shown, show
 
 if TYPE_CHECKING:
@@ -25,33 +32,103 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
+_PANEL = 390  # width of the panel in pixels, so that its longest row fits on one line
 _SIZE = 0.2  # size of the handle at the tip, over the arm's length
 _FASTEST, _SPEED = 30.0, 10.0  # largest speed of a path, and its first speed [samples/s]
+
+
+def serve(
+    arm: Manipulator,
+    *,
+    port: int = 8080,
+    q: ArrayLike | None = None,
+    minimum: float = 0.0,
+    maximum: float = math.inf,
+    force: ArrayLike = (0.0, 0.0, 0.0),
+    angles: ArrayLike | None = None,
+    tips: ArrayLike | None = None,
+) -> View:
+    """Serve a live view of an arm: sliders, a 3D picture, and the stiffness.
+
+    The view runs in background threads until it is closed. All browsers share one set of sliders.
+    Only this machine can connect, and no web page of another site. To see the view from another
+    machine, forward the port: ``ssh -L 8080:localhost:8080 THIS_MACHINE``.
+
+    An arm with springs and fewer cables than joints has sliders of how much wire each motor takes
+    in, from straight cables, and :func:`~cdsm.forward_statics` gives its posture; with ``q`` or a
+    path it has those of the joints.
+
+    Args:
+        arm: The arm; it is not changed.
+        port: Port to listen at; 0 for any free port.
+        q: Joint angles at the start (nv,) [rad]; by default zero, or the nearest joint limit.
+        minimum: Lower bound of all tensions at the start [N].
+        maximum: Upper bound of all tensions [N].
+        force: Force at the tip at the start, in base axes (3,) [N].
+        angles: A path to play, as joint angles (S, nv) [rad]; the arm starts at the first.
+        tips: A path to play, as tip positions (S, 3) [m]; give only one kind of path.
+
+    Returns:
+        The running view. ``url`` is the address of its page, ``shown`` its present results;
+        ``wait()`` waits for Ctrl-C, ``close()`` or the end of a ``with`` block ends it.
+
+    Raises:
+        CdsmError: viser is not installed (extra ``[view]``). The installed viser starts its server
+            so that other sites cannot be refused.
+        InvalidInput: A value has the wrong type or shape, an angle is beyond its limit, or the
+            port is not available.
+    """
+    need("view", "viser")
+    from cdsm.view.guard import guarded_server
+
+    straight = np.clip(np.zeros(instance("arm", arm, Manipulator).nv), arm.lower, arm.upper)
+    free = q is None and angles is None and tips is None
+    pulled = free and arm.has_springs and len(arm.cables) < arm.nv
+    path = None if angles is None and tips is None else checked_path(arm, angles, tips)
+    route = path if path is None or tips is not None else _tips(arm, path)
+    start = Setting(
+        q=arm._angles(straight if q is None else q, check_limits=True),
+        minimum=quantity("minimum", minimum, "tension", zero=True),
+        maximum=quantity("maximum", maximum, "tension", infinite=True),
+        force=vector("force", force, 3, "force at the tip [N], base axes"),
+        pull=np.zeros(len(arm.cables)) if pulled else None,
+    )
+    with contextlib.redirect_stdout(None):  # viser prints addresses
+        server = guarded_server(whole_number("port", port, 0, 65535), arm.name)
+    try:
+        # viser's share button opens a tunnel to a public server; the guard refuses it
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(_PANEL)
+        view = View(arm, start, server)
+        if path is not None and route is not None:
+            view.add_path(path, route)
+    except BaseException:
+        server.stop()
+        raise
+    return view
 
 
 @final
 class View:
     """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``."""
 
-    def __init__(
-        self, arm: Manipulator, start: Setting, server: viser.ViserServer, pull: float, push: float
-    ) -> None:
+    def __init__(self, arm: Manipulator, start: Setting, server: viser.ViserServer) -> None:
         self.arm, self._server = arm, server
         self._closed, self._lock = threading.Event(), threading.Lock()
         self._thread = futures.ThreadPoolExecutor(1, "cdsm view")
         self._last: futures.Future[None] | None = None
         self._player: Player | None = None
-        self._scene = Scene(server, arm, push)
+        self._panel = Panel(server.gui, arm, start, self._request)
+        self._scene = Scene(server, arm, self._panel.largest_force)
         self._handle = TipHandle(server.scene, arm, self._request)
-        self._panel = Panel(server.gui, arm, start, pull, push, self._request)
         self._refresh()
         self._scene.begin(server.initial_camera, self._shown, np.empty((0, 3)))
 
     @property
     def url(self) -> str:
         """Address of the page."""
-        host = self._server.get_host()
-        return f"http://{f'[{host}]' if ':' in host else host}:{self._server.get_port()}"
+        return f"http://{self._server.get_host()}:{self._server.get_port()}"
 
     @property
     def shown(self) -> Shown:
@@ -196,3 +273,14 @@ class TipHandle:
         if shown.reference is not None and not self._dragged:
             self._node.position = shown.reference.tip[:3, 3]
         return self._remark if np.array_equal(shown.setting.q, self._q) else ""
+
+
+def _tips(arm: Manipulator, path: Array) -> Array:
+    """Return the tip positions (S, 3) [m] at joint angles (S, nv); name a sample that has none."""
+    tips = []
+    for i, q in enumerate(path):
+        try:
+            tips.append(arm.at(q).tip[:3, 3])
+        except CdsmError as error:
+            raise InvalidInput("angles", f"sample {i + 1}: {error}") from None
+    return np.array(tips)

@@ -16,7 +16,6 @@ from cdsm.plots.style import MM, N_PER_MM
 from cdsm.stiffness_matrix.prints import model_of
 from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.values import Array
-from cdsm.tension import DEFAULT_SOLVER
 from cdsm.view.scene import ELLIPSOID, FORCE, SLIDES, STICKS, Scene
 from cdsm.view.state import Color, Condition, Setting, Shown
 from cdsm.wires.catalogue import wires_text
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     import viser
 
 _STEPS = 500  # least number of steps of a slider, which is a few hundred pixels long
+_TENSION, _FORCE = 200.0, 20.0  # ends of sliders [N], unless the start is beyond
 _PULLED = 0.1  # most wire that a motor takes in or pays out, over the arm's length
 _LENGTHS = 10.0  # largest coordinate of a prismatic joint on its slider, over the arm's length
 _ROUND = 1e-9  # largest difference of an end of a slider from a round number, over a step
@@ -48,8 +48,8 @@ _BOX: Final = '<div style="height:{};overflow-y:auto;font-size:0.8em">\n\n{}\n\n
 class Panel:
     """Panel of the page: controls that set the arm, and text about the arm.
 
-    The slider of the least tension ends at ``pull`` [N], those of the force at ± ``push`` [N].
-    ``changed`` is called, in any thread, when a control has changed.
+    The sliders of the force end at ± ``largest_force`` [N]. ``changed`` is called, in any thread,
+    when a control has changed.
     """
 
     def __init__(
@@ -57,8 +57,6 @@ class Panel:
         gui: viser.GuiApi,
         arm: Manipulator,
         start: Setting,
-        pull: float,
-        push: float,
         changed: Callable[[], None],
     ) -> None:
         self._gui, self._arm, self._start, self._changed = gui, arm, start, changed
@@ -66,8 +64,10 @@ class Panel:
         basis = f"wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
         gui.add_markdown(escaped(f"{arm}; {basis}; {friction or 'frictionless'}"), order=-2.0)
         self._text = gui.add_markdown("", order=-1.0)  # above the path, which has 0
+        most, push = max(_TENSION, start.minimum), max(_FORCE, float(abs(start.force).max()))
+        self.largest_force = push
         with gui.add_folder("Load"):
-            self._load = [self.add_slider("least tension [N]", 0.0, pull, start.minimum)]
+            self._load = [self.add_slider("least tension [N]", 0.0, most, start.minimum)]
             for axis, value in zip("xyz", start.force.tolist(), strict=True):
                 self._load.append(self.add_slider(f"force {axis} [N]", -push, push, value))
             self._sag = self._add_switch("motors locked", start.sag, _SAG)
@@ -216,7 +216,6 @@ def python_text(arm: Manipulator, setting: Setting) -> str:
     given = [f"{setting.minimum:.12g}"]
     given += [f"{setting.maximum:.12g}"] if math.isfinite(setting.maximum) else []
     given += [f"wrench={wrench}"] if setting.force.any() and not setting.sag else []
-    given += [f"solver={setting.solver!r}"] if setting.solver != DEFAULT_SOLVER else []
     last = "K = cdsm.stiffness(pose, tension)"
     if setting.sag and arm.has_friction:
         last = f"K = cdsm.load_cycle(pose, tension, [{wrench}]).stiffness(-1)"

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
+HANDLE: Final = "/target"
+"""Name of the scene node that users may drag."""
+
 ELLIPSOID: Final[Color] = (200, 85, 61)
 FORCE: Final[Color] = (59, 111, 182)
 STICKS: Final[Color] = (40, 40, 45)

@@ -21,7 +21,7 @@ from cdsm.statics.at_rest import Equilibrium
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array, frozen
-from cdsm.tension import DEFAULT_SOLVER, Tension, distribute_tension
+from cdsm.tension import Tension, distribute_tension
 
 Color = tuple[int, int, int]
 
@@ -67,7 +67,6 @@ class Setting:
     maximum: float = math.inf  # upper bound of all tensions [N]
     force: Array  # at the tip, in base axes (3,) [N]
     sag: bool = False  # whether the force moves the arm, tensioned without it, motors locked
-    solver: str = DEFAULT_SOLVER
     pull: Array | None = None  # wire that the motors take in (C,) [m]: the posture follows from it
 
 
@@ -151,8 +150,8 @@ def show(arm: Manipulator, setting: Setting) -> Shown:
             condition = Condition.NEUTRAL if rest.neutral or not rest.stable else condition
             said = "\n".join([*rest.warnings, *rest.pose.remarks])
             return Shown(**found, condition=condition, problem=said)
-        bounds, wrench = (setting.minimum, setting.maximum), force * (not setting.sag)
-        tension = distribute_tension(pose, *bounds, wrench, setting.solver)
+        wrench = force * (not setting.sag)
+        tension = distribute_tension(pose, setting.minimum, setting.maximum, wrench)
         found["tension"] = tension
         if not setting.sag:
             found["stiffness"] = K = stiffness(pose, tension)

@@ -112,20 +112,20 @@ def read_tensile_csv(
         refuse(
             f"has no header that names {' and '.join(columns or ('displacement', 'force'))} in "
             f"its first {_HEADERS} lines; there are {', '.join(names) or 'no names'}. Choose two "
-            "by columns=."
+            "by columns."
         )
     at, chosen = -at, []
     for kind, places, given in zip(_UNITS, fit, units or (None, None), strict=True):
         if len(places) > 1:
             several = " and ".join(names[k] for k in places)
-            refuse(f"{several} may both be the {kind}; choose by columns=.")
+            refuse(f"{several} may both be the {kind}; choose by columns.")
         known, place = _UNITS[kind], places[0]
         written = [_name_and_unit(names[place])[1], *below[place : place + 1]]
         unit = next((each for each in (*written, given) if each in known), None)
         if unit is None or given not in (None, unit):
             refuse(
                 f"has the {kind} {names[place]!r} in {' '.join(written).strip() or 'no unit'}, and "
-                f"units= says {given or 'nothing'}; give one of {', '.join(known)}."
+                f"units says {given or 'nothing'}; give one of {', '.join(known)}."
             )
         chosen.append((place, unit, known[unit]))
     (x, x_unit, to_m), (y, _, to_N) = chosen
@@ -147,7 +147,7 @@ def read_tensile_csv(
     source = f"{names[x]!r} and {names[y]!r} of line {table.rows[at][0]}"
     if gauge_length is None:
         if x_unit not in _STRAINS:
-            refuse("has no gauge length; give gauge_length=, or a line # gauge_length = 500 mm.")
+            refuse("has no gauge length; give gauge_length, or a line # gauge_length = 500 mm.")
         gauge_length = 1.0
         source += "; no gauge length: displacements are those of 1 m of wire"
     to_m *= gauge_length if x_unit in _STRAINS else 1.0

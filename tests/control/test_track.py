@@ -8,7 +8,7 @@ import pytest
 
 import cdsm
 from cdsm import control, presets
-from cdsm.cli.path_file import read_path
+from cdsm.cli.options import read_path
 from cdsm.planning.path_plan import PathPlan
 from tests.support.arms import readme_geometry
 from tests.support.tracking import circle, small_path

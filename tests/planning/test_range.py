@@ -163,7 +163,7 @@ def test_stiffness_that_tension_raises_without_end_asks_for_a_maximum() -> None:
         ({"minimum": 80.0, "maximum": 70.0}, cdsm.InvalidInput, "maximum: 70 N"),
         ({"wrench": (0.0, 0.0, 1e5, 0.0, 0.0, 0.0)}, cdsm.InfeasibleTension, "balances the arm"),
         ({"minimum": 50.0, "maximum": 50.1}, cdsm.InfeasibleTension, "balances the arm"),
-        ({"minimum": 1000.0, "maximum": 2e3}, cdsm.ElasticityRangeError, "lower minimum="),
+        ({"minimum": 1000.0, "maximum": 2e3}, cdsm.ElasticityRangeError, "lower minimum"),
         ({"pose": hinge().at([0.0]), "direction": "x"}, cdsm.SingularStiffness, "cannot move alo"),
     ],
 )

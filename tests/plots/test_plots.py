@@ -91,7 +91,6 @@ PICTURES: tuple[Callable[[], Any], ...] = (
     lambda: LOOP,
     lambda: cdsm.critical_tension(POSE),
     lambda: cdsm.critical_load(POSE, np.eye(6)[0], 10.0),
-    lambda: cdsm.distribute_tensions(POSE.arm, [POSE.q, 0.5 * POSE.q], 10.0),
     lambda: cdsm.presets.STRAND_1X19,
     lambda: cdsm.force_polytope(POSE, 10.0, 200.0),
     lambda: cdsm.fit_tensile_test(np.linspace(0.0, 5e-3, 50), np.linspace(0.0, 480.0, 50), 0.5),
@@ -111,7 +110,7 @@ def test_every_picture_is_drawn_with_units(result: Callable[[], Any]) -> None:
 
 def test_ranges_are_drawn_and_a_path_is_filmed(tmp_path: Path) -> None:
     _drawn(plots.plot_stiffness_ranges({"up to 200 N": [REACH]}))
-    path().plot(animate=tmp_path / "arm.gif")
+    plots.plot_path(path(), animate=tmp_path / "arm.gif")
     with Image.open(tmp_path / "arm.gif") as film:
         assert film.n_frames == 3  # type: ignore[attr-defined]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from cdsm.cli.path_file import read_path
+from cdsm.cli.options import read_path
 from tests.interchange.test_caspr import cable, folder, link
 from tests.support.arms import mixed_arm
 from tests.support.foreign import TREE, crab
