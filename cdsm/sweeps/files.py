@@ -19,8 +19,8 @@ from cdsm.support.files import as_path, require_folder
 from cdsm.support.progress import progress_bar
 from cdsm.support.status import Status
 from cdsm.support.tidy import check_sweep, tidy, write_labelled
-from cdsm.sweeps.cases import Cases
-from cdsm.sweeps.quantities import QUANTITIES
+from cdsm.sweeps.cases import QUANTITIES
+from cdsm.sweeps.dataset import Labelled
 
 if TYPE_CHECKING:
     import xarray
@@ -94,7 +94,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
 
 
 def stored(
-    path: Path, cases: Cases, q: xarray.DataArray, by_dask: bool, progress: bool
+    path: Path, cases: Labelled, q: xarray.DataArray, by_dask: bool, progress: bool
 ) -> xarray.Dataset:
     """Compute what a store lacks, chunk by chunk; return the sweep that it then has.
 

@@ -25,10 +25,10 @@ from cdsm.support.validation import (
     text,
     unit_directions,
 )
-from cdsm.sweeps.cases import Cases
+from cdsm.sweeps.cases import DEFAULT, QUANTITIES, require
+from cdsm.sweeps.dataset import Labelled
 from cdsm.sweeps.files import stored
 from cdsm.sweeps.poses import PoseSet, angles_of, distinct
-from cdsm.sweeps.quantities import DEFAULT, QUANTITIES
 from cdsm.tension import checked_bounds
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def sweep(
             or by name, make the dimension ``wrench``.
         direction: Direction of ``along``: an axis such as ``"z"``, or (3,), any length. Several,
             axes, (D, 3) or by name, make the dimension ``direction``.
-        outputs: Names of quantities: keys of :data:`~cdsm.sweeps.quantities.QUANTITIES`.
+        outputs: Names of quantities: keys of :data:`~cdsm.sweeps.cases.QUANTITIES`.
         worst_friction: As for :func:`~cdsm.distribute_tension`: all segments of the cables stay
             within the bounds, whatever loads came before. Then the bounds at the motors are
             narrower.
@@ -104,7 +104,7 @@ def sweep(
     ways, directions = _named(direction)
     W = given_wrench(wrenches, len(wrenches))
     u = unit_directions("direction", directions)
-    cases = Cases(
+    cases = Labelled(
         arm=arm,
         outputs=tuple(one_of("output", name, QUANTITIES) for name in names),
         wrench=np.atleast_2d(W),
@@ -119,6 +119,7 @@ def sweep(
             "direction": None if u.ndim == 1 else ways or range(len(u)),
         },
     )
+    require(cases.outputs, arm, cases.maximum, worst_friction, diameter)
     given = getattr(q, "chunks", None) is not None
     shown = flag("progress", progress)
     if store is None:
