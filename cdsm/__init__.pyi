@@ -14,7 +14,7 @@ from cdsm.cable import Site as Site
 from cdsm.cable import serpentine_cables as serpentine_cables
 from cdsm.control.plants import MuJoCoPlant as MuJoCoPlant
 from cdsm.control.plants import QuasiStaticPlant as QuasiStaticPlant
-from cdsm.control.sensors import Sensors as Sensors
+from cdsm.control.sensing import Sensors as Sensors
 from cdsm.control.track import track as track
 from cdsm.design.evaluation import evaluate_designs as evaluate_designs
 from cdsm.design.goals import Constraint as Constraint

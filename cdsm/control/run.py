@@ -6,16 +6,15 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
+from cdsm.errors import listed
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
-from cdsm.support.files import as_path
 from cdsm.support.format import aligned, plural
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.values import Array, frozen
@@ -34,7 +33,6 @@ _ENDS: Final = {
     "elasticity_range": "OUTSIDE THE LAW",
 }
 _ROUNDING = 1e-9  # distance beyond a band [m] that counts as rounding
-_LISTED = 3  # largest number of motors whose names are printed
 
 
 @final
@@ -155,11 +153,6 @@ class TrackingRun(Result):
         known = np.isfinite(self.band)
         return frozen(abs(self.displacement[known]) <= self.band[known] + _ROUNDING)
 
-    @property
-    def end(self) -> float:
-        """Time of the last completed step [s]; 0 if no step was completed."""
-        return float(self.time.max(initial=0.0))
-
     @quantity("1")
     def steps_needed(self) -> int:
         """Steps between two samples with which the outer loop can follow the plan's tensions."""
@@ -167,17 +160,12 @@ class TrackingRun(Result):
         return max(math.ceil(float(changes.max(initial=0.0)) - _ROUNDING), 1)
 
     @property
-    def saturated_motors(self) -> tuple[str, ...]:
-        """Names of the cables whose command was changed at some step because of a tension bound."""
-        names = self.arm.cables.names
-        return tuple(names[c] for c in np.flatnonzero(self.saturated.any(axis=0)))
-
-    @property
     def warnings(self) -> tuple[str, ...]:
         """Faults of the run, worst first; empty if there are none."""
         said = []
         if self.outcome != "completed":
-            said.append(f"{_ENDS[self.outcome]} at {self.end:.4g} s: {self.reason}")
+            end = self.time.max(initial=0.0)
+            said.append(f"{_ENDS[self.outcome]} at {end:.4g} s: {self.reason}")
         if unstable := np.flatnonzero(~(self.margin > 0.0)).tolist():
             said.append(f"UNSTABLE {self._at(unstable)}: without friction the arm would buckle")
         if failed := sorted(self.replan_failed):
@@ -208,30 +196,21 @@ class TrackingRun(Result):
     def plot(self, animate: str | os.PathLike[str] | None = None) -> Figure:
         """Plot tip error, stiffness, tensions and the first-order band over time.
 
-        ``animate`` is the path of a ``.gif`` to write as well; for errors see :meth:`animate`.
+        ``animate`` is a ``.gif`` to write too, in which the true arm follows the path. Raises
+        InvalidInput if no step was completed, FileError if it cannot be written.
         """
         if animate is not None:
-            self.animate(animate)
+            poses = [state.pose for state in self.states]
+            cdsm.plots.plot_path(poses, animate=animate, tensions=self.tension)
         return cdsm.plots.plot_tracking_run(self)
-
-    def animate(self, path: str | os.PathLike[str]) -> Path:
-        """Write a ``.gif`` in which the true arm follows the path; return its path.
-
-        Raises:
-            InvalidInput: The path does not end in ``.gif``, or no step was completed.
-            FileError: The file cannot be written.
-        """
-        poses = [state.pose for state in self.states]
-        cdsm.plots.plot_path(poses, animate=path, tensions=self.tension)
-        return as_path(path)
 
     def __repr__(self) -> str:
         return f"<TrackingRun of {self.arm.name}, law {self.law}, {self.outcome}>"
 
     def __str__(self) -> str:
         tip, off = 1e3 * self.tip_error, 100.0 * abs(self.stiffness_error)
-        known, motors = off[np.isfinite(off)], self.saturated_motors
-        clamped = ", ".join(motors) if len(motors) <= _LISTED else str(len(motors))
+        known, clamped = off[np.isfinite(off)], np.flatnonzero(self.saturated.any(axis=0))
+        motors = listed([self.arm.cables.names[c] for c in clamped]) if clamped.size else "none"
         low, high = self.tension.min(initial=math.inf), self.tension.max(initial=0.0)
         least = f"{np.nanmin(self.margin, initial=math.inf):.4g} {self.arm.stiffness_unit()}"
         inside, bands = self.inside, plural(self.inside.size, "step")
@@ -240,7 +219,7 @@ class TrackingRun(Result):
             ("frictionless stiffness error, mean and largest", f"{_both(known)} %"),
             ("true tensions at the motors", f"{low:.4g} to {high:.4g} N"),
             ("smallest joint stiffness", least),
-            ("motors clamped at a tension bound", clamped or "none"),
+            ("motors clamped at a tension bound", motors),
             ("rigidity of the wires, as estimated", f"{100.0 * self.rigidity[-1:].sum():.4g} %"),
             (
                 "inside the first-order band",
