@@ -154,5 +154,3 @@ def test_errors_name_what_is_missing() -> None:
         cdsm.force_polytope(pose, 15.0, 20.0, (0.0, 0.0, -100.0, 0.0, 0.0, 0.0))
     with pytest.raises(cdsm.InvalidInput, match="deflection"):
         cdsm.payload(pose, "z", 15.0, 100.0, deflection=-1.0)
-    with pytest.raises(cdsm.InvalidInput, match="force"):
-        cdsm.force_polytope(pose, 15.0, 800.0).radius_at([1.0, 2.0])
