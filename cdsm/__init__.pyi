@@ -20,7 +20,7 @@ from cdsm.design.evaluation import evaluate_designs as evaluate_designs
 from cdsm.design.goals import Constraint as Constraint
 from cdsm.design.goals import Objective as Objective
 from cdsm.design.problem import DesignProblem as DesignProblem
-from cdsm.design.refine import refine_design as refine_design
+from cdsm.design.search import refine_design as refine_design
 from cdsm.design.search import search_designs as search_designs
 from cdsm.design.variables import Variable as Variable
 from cdsm.errors import CdsmError as CdsmError
@@ -75,10 +75,10 @@ from cdsm.statics.weight_test import weight_test as weight_test
 from cdsm.stiffness_matrix import Stiffness as Stiffness
 from cdsm.stiffness_matrix import stiffness as stiffness
 from cdsm.support.status import Status as Status
-from cdsm.sweeps.files import read_sweep as read_sweep
 from cdsm.sweeps.poses import GridPoses as GridPoses
 from cdsm.sweeps.poses import PathPoses as PathPoses
 from cdsm.sweeps.poses import RandomPoses as RandomPoses
+from cdsm.sweeps.sweep import read_sweep as read_sweep
 from cdsm.sweeps.sweep import sweep as sweep
 from cdsm.tension import Tension as Tension
 from cdsm.tension import distribute_tension as distribute_tension

@@ -117,7 +117,7 @@ def design(
     """
     from cdsm.batch.inputs import checked_threads
     from cdsm.design.problem_file import read_problem
-    from cdsm.design.refine import require_smooth
+    from cdsm.design.search import require_smooth
     from cdsm.support.files import make_folder, write_text
     from cdsm.support.validation import whole_number
 

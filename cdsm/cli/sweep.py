@@ -49,7 +49,7 @@ def sweep(
         raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
     from cdsm.support.tidy import status_names
     from cdsm.sweeps.cases import DEFAULT
-    from cdsm.sweeps.files import write_sweep
+    from cdsm.sweeps.sweep import write_sweep
 
     robot = options.read(arm, changes)
     low = options.numbers("--minimum", minimum)
