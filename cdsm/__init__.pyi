@@ -59,11 +59,11 @@ from cdsm.measures.indices import tension_factor as tension_factor
 from cdsm.measures.payload import payload as payload
 from cdsm.measures.polytope import force_polytope as force_polytope
 from cdsm.parameters import ArmParameters as ArmParameters
-from cdsm.planning.gradient import stiffness_gradient as stiffness_gradient
 from cdsm.planning.path import plan_path as plan_path
 from cdsm.planning.plan import plan_stiffness as plan_stiffness
 from cdsm.planning.range import stiffness_range as stiffness_range
-from cdsm.planning.saturation import saturation as saturation
+from cdsm.planning.sensitivity import saturation as saturation
+from cdsm.planning.sensitivity import stiffness_gradient as stiffness_gradient
 from cdsm.posture import Posture as Posture
 from cdsm.statics.buckling import critical_load as critical_load
 from cdsm.statics.buckling import critical_tension as critical_tension
