@@ -126,8 +126,8 @@ def sweep(
     if out is None and figure is None and store is None:
         raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
     from cdsm.support.tidy import status_names
-    from cdsm.sweeps.files import write_sweep
-    from cdsm.sweeps.quantities import DEFAULT
+    from cdsm.sweeps.cases import DEFAULT
+    from cdsm.sweeps.sweep import write_sweep
 
     robot = options.read(arm, changes)
     low = options.numbers("--minimum", minimum)
@@ -223,7 +223,7 @@ def design(
     """
     from cdsm.batch.inputs import checked_threads
     from cdsm.design.problem_file import read_problem
-    from cdsm.design.refine import require_smooth
+    from cdsm.design.search import require_smooth
     from cdsm.support.files import make_folder, write_text
     from cdsm.support.validation import whole_number
 

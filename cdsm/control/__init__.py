@@ -13,10 +13,9 @@ from cdsm.control.laws import (
     mixed,
     tension_control,
 )
-from cdsm.control.observer import with_rigidity
 from cdsm.control.plants import Plant as Plant
 from cdsm.control.run import TrackingRun
-from cdsm.control.sensors import Measurement
+from cdsm.control.sensing import Measurement, with_rigidity
 
 __all__ = [
     "Command",

@@ -1,4 +1,6 @@
-"""Motor laws: pure functions from references and measurements to a command within the bounds.
+"""Motor laws, and the outer loop that plans tensions again for the wanted stiffness.
+
+A law is a pure function from references and measurements to a command within the bounds.
 
 The motor of a position-controlled cable keeps the length of wire that it has paid out, l_0,
 constant; a law computes the next l_0. Every law ends in :func:`limited`, which predicts the
@@ -18,8 +20,12 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.control.sensors import Measurement
-from cdsm.errors import InvalidInput
+from cdsm.control.sensing import Estimate, Measurement, with_rigidity
+from cdsm.errors import CdsmError, InvalidInput, UnreachableStiffness
+from cdsm.manipulator import Manipulator
+from cdsm.planning.path_plan import PathPlan
+from cdsm.planning.plan import plan_stiffness
+from cdsm.posture import Posture
 from cdsm.support.validation import vector
 from cdsm.support.values import Array
 
@@ -27,6 +33,8 @@ PROPORTIONAL, INTEGRAL = 0.2, 0.3
 """Gains of the tension control [-]: fractions of the tension error that one step corrects."""
 
 _ROUNDING = 1e-9  # distance of a tension beyond its bound [N] that counts as rounding
+_SOFTER = 5e-3  # change of the estimated softness 1/s from which the arm is built again with it
+_WITHIN = 1e-6  # how far inside the range of the stiffness a target is moved [-]
 
 
 class Reference(NamedTuple):
@@ -183,3 +191,74 @@ def _clamped(given: ControlInput, paid_out: Array, predicted: Array) -> Command:
     k = given.reference.stiffness
     beyond = np.divide(predicted - tension, k, out=np.zeros_like(k), where=k > 0.0)
     return Command(np.asarray(paid_out + beyond), tension, np.asarray(tension != predicted))
+
+
+def reference_at(arm: Manipulator, q: Array, tension: Array) -> Reference:
+    """Return the reference at angles q (nv,) and tensions F (C,) [N], without friction."""
+    laws, lengths = arm._laws, arm.cable_lengths(q)
+    wire, k = laws.original_lengths(lengths, tension), laws.stiffness(lengths, tension)
+    return Reference(q, tension, wire, k)
+
+
+class StiffnessLoop:
+    """Planner of the least tensions that give the target stiffness at the posture to come.
+
+    ``low`` and ``high`` (C,) [N] bound the tensions at the motors. In each step the tensions move
+    towards those planned; none changes by more than ``change`` (C,) [N]. ``failed`` has the reason
+    for each step at which nothing could be planned, so that the previous tensions were kept.
+    """
+
+    def __init__(self, plan: PathPlan, low: Array, high: Array, change: Array) -> None:
+        self._plan, self._low, self._high, self._change = plan, low, high, change
+        self._arm, self._softness = plan.arm, 1.0
+        self._mean = plan.tensions[0]  # mean tensions along each cable, as planned last
+        self._steps, self.failed = 0, dict[int, str]()
+
+    def next(
+        self, wanted: Reference, target: Array, estimate: Estimate, before: Reference
+    ) -> tuple[Reference, Reference, dict[str, bool]]:
+        """Plan the tensions of the next step, for the stiffness ``target`` (D,) [N/m].
+
+        The posture to come is that of ``wanted``, moved by the estimated distance of the arm from
+        the reference ``before``. Return the reference, the one before with the wire as calibrated
+        now, and the values of ``target_unreachable`` and ``change_limited``.
+        """
+        ratio, last, unreachable, limited = estimate.ratio, self._mean, False, False
+        try:
+            self._calibrate(estimate.softness)
+            moved = wanted.angles + (estimate.pose.q - before.angles)
+            pose = self._arm.at(np.clip(moved, self._arm.lower, self._arm.upper))
+            wrench = np.append(estimate.force, np.zeros(3))
+            F, reached = self._least(pose, target, self._low * ratio, self._high * ratio, wrench)
+            part = 1.0 / max(float((abs(F - last) / self._change).max()), 1.0)
+            self._mean = last + part * (F - last)
+            unreachable, limited = not reached, part < 1.0
+        except CdsmError as error:
+            self.failed[self._steps] = str(error)
+        self._steps += 1
+        motor = np.clip(self._mean / ratio, self._low, self._high)
+        now = reference_at(self._arm, wanted.angles, self._mean)._replace(tension=motor)
+        then = reference_at(self._arm, before.angles, last)._replace(tension=before.tension)
+        return now, then, {"target_unreachable": unreachable, "change_limited": limited}
+
+    def _least(
+        self, pose: Posture, target: Array, low: Array, high: Array, wrench: Array
+    ) -> tuple[Array, bool]:
+        """Return the least tensions (C,) [N] nearest to the target, and whether they reach it."""
+        direction = self._plan.direction
+        wanted = target if direction.ndim > 1 else target[0]
+        try:
+            plan = plan_stiffness(pose, direction, wanted, low, high, wrench)
+        except UnreachableStiffness as error:
+            nearest = np.clip(error.target, error.low * (1 + _WITHIN), error.high * (1 - _WITHIN))
+            return plan_stiffness(pose, direction, nearest, low, high, wrench).tension.values, False
+        return plan.tension.values, plan.reached
+
+    def _calibrate(self, softness: float) -> None:
+        """Divide the rigidity of the wires by the estimated ``softness`` 1/s, if that changed."""
+        if softness <= 0.0:  # far from the posture of the plan, measurements fit no wire
+            said = f"estimated as {1.0 / softness:.3g} times that of the wires' laws."
+            raise InvalidInput("rigidity", said)
+        if abs(softness - self._softness) > _SOFTER:
+            self._softness = softness
+            self._arm = with_rigidity(self._plan.arm, 1.0 / softness)

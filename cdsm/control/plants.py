@@ -15,7 +15,7 @@ import numpy as np
 
 import cdsm
 from cdsm.control.laws import Command
-from cdsm.control.sensors import Measurement
+from cdsm.control.sensing import Measurement
 from cdsm.errors import ElasticityRangeError, InvalidInput, need, solver_failed
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture

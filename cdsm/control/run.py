@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
+from cdsm.errors import listed
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support.format import aligned, plural
@@ -31,7 +32,6 @@ _ENDS: Final = {
     "elasticity_range": "OUTSIDE THE LAW",
 }
 _ROUNDING = 1e-9  # distance beyond a band [m] that counts as rounding
-_LISTED = 3  # largest number of motors whose names are printed
 
 
 @final
@@ -152,11 +152,6 @@ class TrackingRun(Result):
         known = np.isfinite(self.band)
         return frozen(abs(self.displacement[known]) <= self.band[known] + _ROUNDING)
 
-    @property
-    def end(self) -> float:
-        """Time of the last completed step [s]; 0 if no step was completed."""
-        return float(self.time.max(initial=0.0))
-
     @quantity("1")
     def steps_needed(self) -> int:
         """Steps between two samples with which the outer loop can follow the plan's tensions."""
@@ -164,17 +159,12 @@ class TrackingRun(Result):
         return max(math.ceil(float(changes.max(initial=0.0)) - _ROUNDING), 1)
 
     @property
-    def saturated_motors(self) -> tuple[str, ...]:
-        """Names of the cables whose command was changed at some step because of a tension bound."""
-        names = self.arm.cables.names
-        return tuple(names[c] for c in np.flatnonzero(self.saturated.any(axis=0)))
-
-    @property
     def warnings(self) -> tuple[str, ...]:
         """Faults of the run, worst first; empty if there are none."""
         said = []
         if self.outcome != "completed":
-            said.append(f"{_ENDS[self.outcome]} at {self.end:.4g} s: {self.reason}")
+            end = self.time.max(initial=0.0)
+            said.append(f"{_ENDS[self.outcome]} at {end:.4g} s: {self.reason}")
         if unstable := np.flatnonzero(~(self.margin > 0.0)).tolist():
             said.append(f"UNSTABLE {self._at(unstable)}: without friction the arm would buckle")
         if failed := sorted(self.replan_failed):
@@ -214,8 +204,8 @@ class TrackingRun(Result):
 
     def __str__(self) -> str:
         tip, off = 1e3 * self.tip_error, 100.0 * abs(self.stiffness_error)
-        known, motors = off[np.isfinite(off)], self.saturated_motors
-        clamped = ", ".join(motors) if len(motors) <= _LISTED else str(len(motors))
+        known, clamped = off[np.isfinite(off)], np.flatnonzero(self.saturated.any(axis=0))
+        motors = listed([self.arm.cables.names[c] for c in clamped]) if clamped.size else "none"
         low, high = self.tension.min(initial=math.inf), self.tension.max(initial=0.0)
         least = f"{np.nanmin(self.margin, initial=math.inf):.4g} {self.arm.stiffness_unit()}"
         inside, bands = self.inside, plural(self.inside.size, "step")
@@ -224,7 +214,7 @@ class TrackingRun(Result):
             ("frictionless stiffness error, mean and largest", f"{_both(known)} %"),
             ("true tensions at the motors", f"{low:.4g} to {high:.4g} N"),
             ("smallest joint stiffness", least),
-            ("motors clamped at a tension bound", clamped or "none"),
+            ("motors clamped at a tension bound", motors),
             ("rigidity of the wires, as estimated", f"{100.0 * self.rigidity[-1:].sum():.4g} %"),
             (
                 "inside the first-order band",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import fields
 from typing import Any, Final, NamedTuple
@@ -12,8 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr
 
-from cdsm.control.laws import LAWS, ControlInput, Law, Reference, checked_command
-from cdsm.control.observer import Observer
+from cdsm.control.laws import (
+    LAWS,
+    ControlInput,
+    Law,
+    Reference,
+    StiffnessLoop,
+    checked_command,
+    reference_at,
+)
 from cdsm.control.plants import (
     Plant,
     PlantState,
@@ -22,22 +28,21 @@ from cdsm.control.plants import (
     require_unstrained,
 )
 from cdsm.control.run import Outcome, TrackingRun
-from cdsm.control.sensors import Sensors
-from cdsm.control.stiffness_loop import StiffnessLoop, reference_at
+from cdsm.control.sensing import Observer, Sensors
 from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, listed
 from cdsm.friction.band import half_width
 from cdsm.manipulator import Manipulator
+from cdsm.planning.path import checked_change
 from cdsm.planning.path_plan import PathPlan
 from cdsm.posture import Posture
 from cdsm.support import progress
-from cdsm.support.validation import bound, instance, one_of, quantity, whole_number
+from cdsm.support.validation import instance, one_of, quantity, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
 
 _MOST_STEPS: Final = 1000  # largest number of steps of control between two samples
 
 _DIVERGED: Final = 0.1  # tip error over the length of the arm of a loop that is unstable
-_PLANNED: Final = {"target_unreachable": False, "change_limited": False}
 _OUTCOMES: Final[dict[type | None, Outcome]] = {
     EquilibriumError: "no_equilibrium",
     ElasticityRangeError: "elasticity_range",
@@ -114,24 +119,12 @@ def track(
             "plant", f"its arm and that of the plan differ in joints or cables: {other}."
         )
     count = whole_number("steps", steps, 1, _MOST_STEPS)
-    change = bound("max_change_per_step", max_change_per_step, len(arm.cables))
-    if not (change > 0.0).all():
-        raise InvalidInput("max_change_per_step", f"{change.min():g} N given; it must be positive.")
+    change = checked_change("max_change_per_step", arm, max_change_per_step)
     outer = StiffnessLoop(plan, low, high, change) if name == "stiffness" else None
     hung = quantity("payload", payload, "mass", zero=True) * arm.gravity
     schedule = _schedule(plan, count, hung)
     rows: list[dict[str, Any]] = []
-    outcome: Outcome = "completed"
-    reason = ""
-    try:
-        for row in _follow(plan, command_of, plant, sensors, schedule, outer, (low, high)):
-            rows.append(row)
-            off = float(np.linalg.norm(row["tips"] - row["reference_tips"]))
-            if off > _DIVERGED * arm.length:
-                outcome, reason = "diverged", f"the tip is {1e3 * off:.3g} mm off its path"
-                break
-    except _PlantError as error:
-        outcome, reason = _OUTCOMES.get(type(error.__cause__), "diverged"), str(error)
+    outcome, reason = _follow(plan, command_of, plant, sensors, schedule, outer, (low, high), rows)
     return TrackingRun(
         plan=plan,
         law=name,
@@ -155,10 +148,11 @@ def _follow(
     schedule: list[_Wanted],
     outer: StiffnessLoop | None,
     bounds: tuple[Array, Array],
-) -> Iterator[dict[str, Any]]:
-    """Control step by step; yield the values of each field of TrackingRun at each step.
+    rows: list[dict[str, Any]],
+) -> tuple[Outcome, str]:
+    """Control step by step; return how it ends, and why.
 
-    Raises _PlantError if the plant cannot follow a command.
+    The values of each field of TrackingRun at each step are added to ``rows``.
     """
     last, load = schedule[0].reference, plan.stiffness[0].wrench
     state = plant.initial(last.angles, last.tension, load)
@@ -166,12 +160,13 @@ def _follow(
     measured = sensors.measure(true_values, random)
     observer = Observer(plan.arm, sensors)
     estimate = observer.initial(last.angles, measured)
-    paid_out, error, directions = measured.paid_out, 0.0 * last.tension, plan.direction
+    paid_out, error = measured.paid_out, 0.0 * last.tension
     forced = _tension_controlled(plan.stiffness[0].posture)
     for wanted in progress.track(schedule, "following the path"):
         measured = sensors.measure(true_values, random)
         estimate = observer.update(estimate, measured)
-        reference, before, flags = wanted.reference, last, _PLANNED
+        reference, before = wanted.reference, last
+        flags = {"target_unreachable": False, "change_limited": False}
         if outer is not None:
             reference, before, flags = outer.next(reference, wanted.target, estimate, last)
         given = ControlInput(reference, before, measured, error, paid_out, *bounds, forced)
@@ -179,32 +174,35 @@ def _follow(
         try:
             state = plant.step_to(state, command, wanted.wrench)
         except CdsmError as fault:
-            raise _PlantError(str(fault)) from fault
+            return _OUTCOMES.get(type(fault), "diverged"), str(fault)
         true_values.append(state.true_values)
         last, paid_out, error = reference, command.paid_out, given.error
-        yield {
-            "reference_tips": wanted.tip,
-            "target": wanted.target,
-            "wrench": wanted.wrench,
-            "states": state,
-            "angles": state.pose.q,
-            "tips": state.pose.tip[:3, 3],
-            "tension": state.true_values.tension,
-            "estimated_angles": estimate.pose.q,
-            "estimated_force": estimate.force,
-            "rigidity": 1.0 / estimate.softness,
-            "reference_tension": reference.tension,
-            "measured_tension": measured.tension,
-            "commanded_tension": command.tension,
-            "paid_out": command.paid_out,
-            "saturated": command.saturated,
-            **flags,
-            **_assessed(state, wanted.wrench, directions.reshape(-1, 3)),
-        }
-
-
-class _PlantError(Exception):
-    """The plant cannot follow a command."""
+        tip = state.pose.tip[:3, 3]
+        rows.append(
+            {
+                "reference_tips": wanted.tip,
+                "target": wanted.target,
+                "wrench": wanted.wrench,
+                "states": state,
+                "angles": state.pose.q,
+                "tips": tip,
+                "tension": state.true_values.tension,
+                "estimated_angles": estimate.pose.q,
+                "estimated_force": estimate.force,
+                "rigidity": 1.0 / estimate.softness,
+                "reference_tension": reference.tension,
+                "measured_tension": measured.tension,
+                "commanded_tension": command.tension,
+                "paid_out": command.paid_out,
+                "saturated": command.saturated,
+                **flags,
+                **_assessed(state, wanted.wrench, plan.direction.reshape(-1, 3)),
+            }
+        )
+        off = float(np.linalg.norm(tip - wanted.tip))
+        if off > _DIVERGED * plan.arm.length:
+            return "diverged", f"the tip is {1e3 * off:.3g} mm off its path"
+    return "completed", ""
 
 
 class _Wanted(NamedTuple):

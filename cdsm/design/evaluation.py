@@ -1,4 +1,4 @@
-"""Evaluate many designs, in this process or in several."""
+"""Evaluate many designs, in one process or in several, and explain why none is feasible."""
 
 from __future__ import annotations
 
@@ -8,19 +8,23 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
-from typing import Any, final
+from typing import Any, NoReturn, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.design.goals import KINDS
 from cdsm.design.problem import MISSED, DesignProblem
-from cdsm.design.quantities import Found, measure
-from cdsm.errors import unknown
+from cdsm.design.quantities import Found, measure, quiet_arm
+from cdsm.errors import CdsmError, unknown
+from cdsm.manipulator import UNCHECKED
+from cdsm.stiffness_matrix import stiffness
+from cdsm.support.format import plural
 from cdsm.support.progress import progress_bar
 from cdsm.support.tables import csv_text
 from cdsm.support.validation import instance, number_array, whole_number
 from cdsm.support.values import Array, Named, ReadOnlyState, frozen
+from cdsm.tension import distribute_tension
 
 
 @final
@@ -177,3 +181,66 @@ def workers(
         # a forked process would inherit threads of BLAS
         with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
             yield lambda rows: counted(pool.map(compute, rows, chunksize=4))
+
+
+class InfeasibleDesign(CdsmError):
+    """No design that a search tried meets all constraints of its problem.
+
+    ``design`` has the smallest sum of violations, one number for each variable (none if no arm was
+    valid); ``constraints`` names what it violates, ``held``: it is not balanced, or unstable.
+    """
+
+    def __init__(self, message: str, constraints: Sequence[str], design: Sequence[float]) -> None:
+        super().__init__(message)
+        self.constraints, self.design = tuple(constraints), tuple(design)
+
+
+def explain(designs: Designs) -> NoReturn:
+    """Raise InfeasibleDesign: what the design of the smallest sum of violations misses."""
+    problem, count = designs.problem, plural(len(designs), "design")
+    missed = np.nan_to_num(designs.violations, posinf=1e9)
+    arms = np.array([not fault for fault in designs.faults])
+    if not arms.any():
+        raise InfeasibleDesign(f"none of {count} is an arm: {designs.faults[0]}", (), ())
+    best = int(np.where(arms, missed.sum(axis=1), np.inf).argmin())
+    row, said = designs.designs[best], dict[str, str]()
+    if missed[best, 0] > 0.0:
+        share, why = f"{100.0 * missed[best, 0]:.3g} %", _first_reason(problem, row)
+        said["held"] = f"{share} of its postures and loads are not held: {why}"
+    for each, miss in zip(problem.constraints, missed[best, 1:].tolist(), strict=True):
+        if miss > 0.0:
+            value = float(designs[each.key][best])
+            now = "does not exist" if np.isnan(value) else each.shown(value)
+            far = f", {100.0 * miss:.3g} % off" if miss < 1e9 else ""
+            words = problem.with_margin(each, each.words)
+            said[each.key] = f"{words} {now}, {each.asked} is asked{far}"
+    for objective in problem.objectives:
+        value = float(designs[objective.key][best])
+        if not np.isfinite(value):
+            said.setdefault(objective.key, f"{objective.words} is {objective.shown(value)}")
+    values = zip(problem.variables, problem.values(row), strict=True)
+    chosen = ", ".join(f"{each.of} {each.shown(value)}" for each, value in values)
+    raise InfeasibleDesign(
+        f"none of {count} meets all constraints. The nearest one ({chosen}) misses: "
+        f"{'; '.join(said.values()).rstrip('.')}. Loosen what it misses, widen a variable, or "
+        "search longer.",
+        tuple(said),
+        tuple(row.tolist()),
+    )
+
+
+def _first_reason(problem: DesignProblem, row: Array) -> str:
+    """Return which posture a design does not hold first, and why."""
+    bounds, worst, number = (problem.minimum_of(row), problem.maximum), problem.worst_friction, 0
+    try:
+        arm = quiet_arm(problem, row)
+        for number, q in enumerate(problem.postures_of(arm)):
+            pose = arm.at(q)
+            for load in problem.loads:
+                pull = distribute_tension(pose, *bounds, load, worst_friction=worst)
+                margin = stiffness(pose, pull).margin
+                if margin <= 0.0:
+                    return f"posture {number}: UNSTABLE, least eigenvalue of K {margin:.3g} N m/rad"
+    except CdsmError as error:
+        return f"posture {number}: {str(error).replace(UNCHECKED, '')}"
+    return "its tensions are at the edge"

@@ -17,11 +17,11 @@ from cdsm.design.goals import Constraint, Measure, Objective
 from cdsm.design.variables import WHOLE, Value, Variable, changed
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.measures.rows import require
 from cdsm.parameters import PARAMETERS, ArmParameters
 from cdsm.support.format import plural
 from cdsm.support.validation import NO_WRENCH, instance, number_array, scalar, sequence_of
 from cdsm.support.values import Array, Given, ReadOnlyState, frozen
+from cdsm.sweeps.cases import require
 from cdsm.sweeps.poses import PoseSet, joint_angles
 from cdsm.tension import checked_bounds
 from cdsm.tolerances import Tolerances
@@ -101,8 +101,7 @@ class DesignProblem(ReadOnlyState):
         joint_angles(self.arm, postures)  # raises for a wrong shape
         checked_bounds(self.arm, self.minimum, self.maximum)
         asked = {measure.of for measure in (*objectives, *constraints)}
-        friction, diameter = self.worst_friction, self.diameter
-        require(asked, self.arm, self.maximum, worst_friction=friction, diameter=diameter)
+        require(asked, self.arm, self.maximum, self.worst_friction, self.diameter)
         if "deflection" in asked and not loads[:, :3].any(axis=1).all():
             raise InvalidInput("loads", "deflection needs a force in every load.")
         if self.tolerances is not None:

@@ -5,24 +5,22 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from functools import cached_property
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.batch import Batch, evaluate
 from cdsm.design.goals import KINDS, Measure
 from cdsm.design.problem import SURE, DesignProblem
 from cdsm.errors import CdsmError, CdsmWarning, GeometryError
 from cdsm.manipulator import Manipulator
-from cdsm.measures.clearance import KINDS as CLEARANCES
-from cdsm.measures.indices import principal_stiffness
-from cdsm.measures.rows import force_radii, friction_losses, measured, narrowed_bounds, payloads
+from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array
-from cdsm.tension import distribute_tension
+from cdsm.sweeps.cases import QUANTITIES, Cases
+from cdsm.tension import bounds_at, distribute_tension, grip
 from cdsm.tolerancing.budget import propagate
 from cdsm.tolerancing.measurand import Measurand, MeasurandName
 
@@ -31,7 +29,13 @@ _MEASURANDS: Final[dict[str, MeasurandName]] = {
     "margin": "margin",
     "motor_force": "tension",
 }
-_OUTPUTS = ("tip", "tension", "margin", "compliance", "cable_lengths")
+_SWEPT: Final = {
+    "stiffness": "translational_compliance",
+    "motor_force": "tension",
+    "wire_length": "cable_lengths",
+    "workspace": "tip_position",
+}
+"""Quantities of a sweep from which those of a design are computed, where names are different."""
 
 
 class Found(NamedTuple):
@@ -75,77 +79,69 @@ def quiet_arm(problem: DesignProblem, design: Array) -> Manipulator:
 
 
 class _Arm:
-    """An arm with all pairs of posture and load: ``held`` says which are balanced and stable."""
+    """An arm at all pairs of posture and load; it is held at those where it is stable."""
 
     def __init__(self, problem: DesignProblem, arm: Manipulator, minimum: float) -> None:
-        self.problem, self.arm = problem, arm
-        self.postures = problem.postures_of(arm)
-        count = len(problem.loads)
-        self.q = np.repeat(self.postures, count, axis=0)
-        self.loads = np.tile(problem.loads, (len(self.postures), 1))
-        self.loss = np.ones((len(self.q), len(arm.cables)))
-        if problem.worst_friction:
-            self.loss = np.repeat(friction_losses(arm, self.postures), count, axis=0)
-        self.low, self.high, exist = narrowed_bounds(arm, minimum, problem.maximum, self.loss)
-        self.found, stable = self._evaluated(self.loads)
-        self.held = exist & stable
+        self.problem, self.arm, self.postures = problem, arm, problem.postures_of(arm)
+        payloads = [each.direction for each in problem.measures if each.of == "payload"]
+        self.ways = [*dict.fromkeys(payloads)]
+        names = {_SWEPT.get(each.of, each.of) for each in problem.measures} & {*QUANTITIES}
+        self.cases = Cases(
+            arm=arm,
+            outputs=tuple(sorted({*names, "margin"})),
+            wrench=problem.loads,
+            minimum=np.array([minimum]),
+            maximum=problem.maximum,
+            direction=np.array(self.ways).reshape(-1, 3),
+            worst_friction=problem.worst_friction,
+            diameter=problem.diameter,
+        )
+        self.rows = self.cases.rows(self.postures)
+        self.held = _held(self.rows)
         self.margins: dict[tuple[str, int], Array] = {}
 
-    def _evaluated(self, loads: Array) -> tuple[Batch, NDArray[np.bool_]]:
-        """Evaluate all postures under ``loads`` (R, 6); also return which are stable (R,)."""
-        bounds: Any = {"minimum": self.low, "maximum": self.high}
-        found = evaluate(self.arm, self.q, None, loads, _OUTPUTS, threads=1, **bounds)
-        known = np.isin(found.status, (Status.OK, Status.IMMOBILE))
-        return found, known & (found["margin"] > 0.0)
+    def _pair(self, case: int) -> tuple[Posture, Array]:
+        """Return the posture and the load of one of the held pairs."""
+        posture, load = divmod(int(np.flatnonzero(self.held)[case]), len(self.problem.loads))
+        return self.arm.at(self.postures[posture]), self.problem.loads[load]
 
-    @cached_property
-    def of_pose(self) -> dict[str, Array]:
-        """Quantities of the postures alone that are held under a load, those of the problem."""
-        wanted = {each.of for each in self.problem.measures} & {*CLEARANCES, "tension_factor"}
-        inside = self.held.reshape(len(self.postures), -1).any(axis=1)
-        return measured(self.arm, self.postures[inside], sorted(wanted), self.problem.diameter)
-
-    def cases(self, each: Measure) -> Array:
+    def cases_of(self, each: Measure) -> Array:
         """Return a quantity in SI (n, k) for each held posture and load; k = 1.
 
         For ``motor_force``, k counts the cables. What depends on neither is one case.
         """
         held, geometry = self.held, self.arm.geometry
-        C = self.found["compliance"][held][:, :3, :3]
-        bounds = self.q[held], self.loads[held], self.low[held], self.high[held]
-        u = np.array(each.direction)
-        match each.of:
-            case "mass":
-                found = np.array([sum(link.mass for link in geometry.links)])
-            case "length":
-                found = np.array([geometry.length])
-            case "wire_length":
-                found = self.found["cable_lengths"][held].max(axis=0).sum(keepdims=True)
-            case "stiffness":
-                with np.errstate(divide="ignore"):
-                    found = 1.0 / np.maximum(np.einsum("i,nij,j->n", u, C, u), 0.0)
-            case "deflection":
-                bare, stable = self._evaluated(np.zeros_like(self.loads))
-                C, forces = bare["compliance"][:, :3, :3], self.loads[:, :3, None]
-                moved = np.linalg.norm((C @ forces)[..., 0], axis=1)
-                found = np.where(stable, moved, math.inf)[held]
-            case "margin":
-                found = self.found["margin"][held]
-            case "softest":
-                found = principal_stiffness(C)["softest"]
-            case "payload":
-                found = payloads(self.arm, *bounds, u[None])[:, 0]
-            case "force_radius":
-                found = force_radii(self.arm, *bounds)
-            case "motor_force":
-                return np.asarray(self.found["tension"][held] * self.loss[held])
-            case _:
-                found = self.of_pose[each.of]
+        inside = held.reshape(len(self.postures), -1).any(axis=1)
+        swept = _SWEPT.get(each.of, each.of)
+        if each.of == "mass":
+            return np.array([[sum(link.mass for link in geometry.links)]])
+        if each.of == "length":
+            return np.array([[geometry.length]])
+        if each.of == "deflection":
+            outputs = "translational_compliance", "margin"
+            bare = replace(self.cases, outputs=outputs, wrench=np.zeros((1, 6)))
+            rows = bare.rows(self.postures)  # the motors are locked before the load acts
+            moved = np.linalg.norm(rows[outputs[0]] @ self.problem.loads[:, :3].T, axis=1)
+            moved[~_held(rows)] = math.inf
+            return np.asarray(moved.reshape(-1, 1)[held])
+        found = self.rows[swept][inside if QUANTITIES[swept].needs == "posture" else held]
+        if each.of == "wire_length":
+            return np.array([[found.max(axis=0).sum()]])
+        if each.of == "motor_force":
+            if not self.problem.worst_friction:
+                return found
+            return found * np.exp([grip(self._pair(n)[0]) for n in range(len(found))])
+        if each.of == "payload":
+            found = found[:, self.ways.index(each.direction)]
+        elif each.of == "stiffness":
+            with np.errstate(divide="ignore"):
+                u = np.array(each.direction)
+                found = 1.0 / np.maximum(np.einsum("i,nij,j->n", u, found, u), 0.0)
         return found[:, None]
 
     def sure(self, each: Measure) -> Array:
-        """Return :meth:`cases` with the margin for tolerances of each, if the quantity has one."""
-        found = self.cases(each)
+        """Return :meth:`cases_of` with the margin of each case, if the quantity has one."""
+        found = self.cases_of(each)
         if self.problem.has_margin(each):
             found = found + [self._margin(each, case) for case in range(len(found))]
         return found
@@ -155,10 +151,11 @@ class _Arm:
         if each.of == "held":
             return float(self.held.mean())
         if each.of == "workspace":
-            return _volume(self.found["tip"][self.held][:, :3, 3])
+            inside = self.held.reshape(len(self.postures), -1).any(axis=1)
+            return _volume(self.rows["tip_position"][inside])
         if not self.held.any() and each.of not in ("mass", "length"):
             return math.nan
-        found = self.cases(each)
+        found = self.cases_of(each)
         worst = found.argmax() if KINDS[each.of].best == "least" else found.argmin()
         case, cable = divmod(int(worst), found.shape[1])
         extra = self._margin(each, case)[cable] if self.problem.has_margin(each) else 0.0
@@ -171,17 +168,26 @@ class _Arm:
         yet: its tensions are the least ones of its dimensions, within bounds that do not change.
         """
         if (each.key, case) not in self.margins:
-            n, of = int(np.flatnonzero(self.held)[case]), _MEASURANDS[each.of]
-            pose = self.arm.at(self.q[n])
-            pull = distribute_tension(pose, self.low[n], self.high[n], self.loads[n])
+            (pose, load), of = self._pair(case), _MEASURANDS[each.of]
+            given, rough = (
+                (float(self.cases.minimum[0]), self.cases.maximum),
+                self.cases.worst_friction,
+            )
+            pull = distribute_tension(pose, *bounds_at(pose, *given, rough), load)
             u = None if each.direction is None else np.array(each.direction)
-            tolerances, loss = self.problem.tolerances, self.loss[n] if of == "tension" else 1.0
+            tolerances = self.problem.tolerances
             assert tolerances is not None
             measurand = Measurand(of, stiffness(pose, pull), u, redistribute=True)
             variances, *_ = propagate(measurand, measurand.inputs.groups(tolerances), {})
             found = np.sqrt(sum(variances.values(), 0.0 * measurand.value()))
+            loss = np.exp(grip(pose)) if rough and of == "tension" else 1.0
             self.margins[each.key, case] = SURE[each.of] * self.problem.coverage * loss * found
         return self.margins[each.key, case]
+
+
+def _held(rows: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """Return in which cases the arm is balanced and stable."""
+    return np.isin(rows["status"], (Status.OK, Status.IMMOBILE))
 
 
 def _volume(tips: Array) -> float:

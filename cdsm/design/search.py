@@ -1,42 +1,35 @@
-"""Search of a design problem by NSGA-II (Deb et al., IEEE T-EC 6, 2002), as pymoo implements it."""
+"""Search for the best designs, and refine one.
+
+A search is NSGA-II (Deb et al., IEEE T-EC 6, 2002) of pymoo, a refinement SLSQP (Kraft, 1988) of
+scipy on the quantities at each posture and load.
+"""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
+from collections.abc import Callable
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from cdsm.design.evaluation import Designs, gathered, workers
+from cdsm.design.evaluation import Designs, explain, gathered, workers
+from cdsm.design.goals import KINDS
 from cdsm.design.problem import DesignProblem
-from cdsm.design.quantities import Found, quiet_arm
+from cdsm.design.quantities import Found, measure_cases
 from cdsm.design.result import DesignSearch
 from cdsm.design.variables import WHOLE
-from cdsm.errors import CdsmError, need
-from cdsm.manipulator import UNCHECKED
-from cdsm.stiffness_matrix import stiffness
-from cdsm.support.format import plural
+from cdsm.errors import InvalidInput, need
 from cdsm.support.validation import instance, whole_number
 from cdsm.support.values import Array, frozen
-from cdsm.tension import distribute_tension
 
+SMOOTH: Final = ("stiffness", "margin", "deflection", "motor_force", "mass", "length")
+"""Quantities that are smooth functions of the design at one posture and load."""
 
-class InfeasibleDesign(CdsmError):
-    """No design that a search tried meets all constraints of its problem.
-
-    ``design`` has the smallest sum of violations, one number for each variable (none if no arm was
-    valid); ``constraints`` names what it violates, ``held``: it is not balanced, or unstable.
-    """
-
-    def __init__(self, message: str, constraints: Sequence[str], design: Sequence[float]) -> None:
-        super().__init__(message)
-        self.constraints, self.design = tuple(constraints), tuple(design)
-
-
-_FAR = 1e3
-"""Number that stands for a violation or an objective that does not exist."""
+_FAR = 1e3  # stands for a violation or an objective that does not exist
+_SAFE = 1e-7  # relative distance from each limit, so that rounding violates none
+_NOT_HELD = -10.0  # condition of a design that does not hold all postures
+_DIGITS = 12  # of scaled variables: next to the end of a range is at it, such as no lead
 
 
 def search_designs(
@@ -87,7 +80,7 @@ def search_designs(
             return gathered(problem, designs, evaluated)
 
         _minimize(problem, evaluate, steps, size, seed)
-    return best_of(gathered(problem, np.array(rows), found), seed)
+    return _best_of(gathered(problem, np.array(rows), found), seed)
 
 
 def _minimize(
@@ -142,17 +135,108 @@ def _minimize(
     minimize(task, algorithm, ("n_gen", generations), seed=seed, copy_algorithm=False)
 
 
-def best_of(evaluated: Designs, seed: int) -> DesignSearch:
+def refine_design(
+    problem: DesignProblem, start: ArrayLike | None = None, *, iterations: int = 100
+) -> DesignSearch:
+    """Improve a design of continuous variables by SLSQP.
+
+    The objective is the worst value over postures and loads, which has kinks. So SLSQP solves a
+    smooth problem: it minimises t, where t is at least the objective (negated if it is maximised)
+    at every posture and load, and each constraint is met at all of them. Derivatives are central
+    differences. The least tensions have kinks where a cable reaches a bound, and wrap angles where
+    a cable goes straight through a hole; the mean of both sides is used there. A step to a design
+    that does not hold all postures is shortened. With ``tolerances``, each posture and load has its
+    own margin, coverage · u. The result is the best of all designs evaluated, near a minimum that
+    is near the start; see :func:`search_designs` for the whole range.
+
+    Args:
+        problem: The problem. Its variables are continuous. It has one objective, with the default
+            ``goal``. All its quantities are among ``stiffness``, ``margin``, ``deflection``,
+            ``motor_force``, ``mass`` and ``length``.
+        start: Design (n,) [m, rad, N] to begin with; None: the given arm.
+        iterations: Maximum number of iterations.
+
+    Raises:
+        InvalidInput: The problem is not of this kind, or ``start`` is missing, outside the ranges,
+            or does not hold all postures.
+        InfeasibleDesign: No design met all constraints; see :func:`search_designs`.
+    """
+    from scipy.optimize import minimize
+
+    instance("problem", problem, DesignProblem)
+    whole_number("iterations", iterations, 1)
+    require_smooth(problem)
+    begin = problem.start if start is None else np.asarray(start, dtype=np.float64)
+    if begin is None:
+        raise InvalidInput("start", "is needed: the given arm is outside the ranges.")
+    problem.values(begin)
+    low, high = problem.bounds.T
+    objective, limits = problem.objectives[0], problem.constraints
+    visited: list[tuple[Array, Found]] = []
+    known: dict[bytes, list[Array] | None] = {}
+
+    def cases(y: Array) -> list[Array] | None:
+        y = y.round(_DIGITS)
+        if y.tobytes() not in known:
+            design = np.clip(low + (high - low) * y, low, high)
+            found, each = measure_cases(problem, design, (objective, *limits))
+            visited.append((design, found))
+            exist = each is not None and all(np.isfinite(x).all() for x in each)
+            known[y.tobytes()] = each if exist else None
+        return known[y.tobytes()]
+
+    y = (begin - low) / (high - low)  # each variable from 0 to 1
+    first = cases(y)
+    if first is None:
+        raise InvalidInput("start", "does not hold all postures; give another one.")
+    scale = objective.sign * (float(abs(first[0]).max()) or 1.0)
+
+    def conditions(z: Array) -> Array:
+        found = cases(z[:-1])
+        if found is None:  # the line search then takes a smaller step
+            return np.full(sum(each.size for each in first), _NOT_HELD)
+        parts = [z[-1] - found[0] / scale]
+        for limit, each in zip(limits, found[1:], strict=True):
+            parts.append(limit.distance(each) - _SAFE)
+        return np.concatenate([part.ravel() for part in parts])
+
+    minimize(
+        lambda z: z[-1],
+        np.append(y, (first[0] / scale).max()),
+        bounds=[*[(0.0, 1.0)] * y.size, (None, None)],
+        constraints={"type": "ineq", "fun": conditions},
+        method="SLSQP",
+        jac="3-point",
+        options={"maxiter": iterations, "ftol": 1e-9},
+    )
+    designs, quantities = zip(*visited, strict=True)
+    return _best_of(gathered(problem, np.array(designs), quantities), 0)
+
+
+def require_smooth(problem: DesignProblem) -> None:
+    """Raise InvalidInput if :func:`refine_design` cannot treat a problem."""
+    goals = problem.objectives
+    wrong = [f"{each.of} is not continuous" for each in problem.variables if not each.is_continuous]
+    wrong += ["it has several objectives"] * (len(goals) > 1)
+    wrong += [f"{x.of} at its {x.goal} is not smooth" for x in goals if x.goal != KINDS[x.of].best]
+    asked = dict.fromkeys(each.of for each in (*goals, *problem.constraints))
+    wrong += [f"{name} is not smooth" for name in asked if name not in SMOOTH]
+    if wrong:
+        said = f"cannot be refined: {', '.join(wrong)}. Use search_designs (without --refine)."
+        raise InvalidInput("problem", said)
+
+
+def _best_of(evaluated: Designs, seed: int) -> DesignSearch:
     """Return the result of a search; raise InfeasibleDesign if no evaluated design is feasible."""
-    front = pareto(evaluated)
+    front = _pareto(evaluated)
     if not len(front):
-        _explain(evaluated)
+        explain(evaluated)
     return DesignSearch(
         problem=evaluated.problem, seed=seed, evaluated=evaluated, front=frozen(front)
     )
 
 
-def pareto(designs: Designs) -> NDArray[np.intp]:
+def _pareto(designs: Designs) -> NDArray[np.intp]:
     """Return the indices (m,) of the feasible designs that no other feasible design dominates.
 
     They are sorted by the first objective, the best first. Of designs with equal objectives, only
@@ -164,54 +248,3 @@ def pareto(designs: Designs) -> NDArray[np.intp]:
     distinct = goals[usable[first]]
     no_worse = (distinct[:, None] <= distinct).all(axis=2)  # each is no worse than itself
     return np.asarray(usable[first][no_worse.sum(axis=0) == 1])
-
-
-def _explain(designs: Designs) -> NoReturn:
-    """Raise InfeasibleDesign: what the design of the smallest sum of violations misses."""
-    problem, count = designs.problem, plural(len(designs), "design")
-    missed = np.nan_to_num(designs.violations, posinf=1e9)
-    arms = np.array([not fault for fault in designs.faults])
-    if not arms.any():
-        raise InfeasibleDesign(f"none of {count} is an arm: {designs.faults[0]}", (), ())
-    best = int(np.where(arms, missed.sum(axis=1), np.inf).argmin())
-    row, said = designs.designs[best], dict[str, str]()
-    if missed[best, 0] > 0.0:
-        share, why = f"{100.0 * missed[best, 0]:.3g} %", _first_reason(problem, row)
-        said["held"] = f"{share} of its postures and loads are not held: {why}"
-    for each, miss in zip(problem.constraints, missed[best, 1:].tolist(), strict=True):
-        if miss > 0.0:
-            value = float(designs[each.key][best])
-            now = "does not exist" if np.isnan(value) else each.shown(value)
-            far = f", {100.0 * miss:.3g} % off" if miss < 1e9 else ""
-            words = problem.with_margin(each, each.words)
-            said[each.key] = f"{words} {now}, {each.asked} is asked{far}"
-    for objective in problem.objectives:
-        value = float(designs[objective.key][best])
-        if not np.isfinite(value):
-            said.setdefault(objective.key, f"{objective.words} is {objective.shown(value)}")
-    values = zip(problem.variables, problem.values(row), strict=True)
-    chosen = ", ".join(f"{each.of} {each.shown(value)}" for each, value in values)
-    raise InfeasibleDesign(
-        f"none of {count} meets all constraints. The nearest one ({chosen}) misses: "
-        f"{'; '.join(said.values()).rstrip('.')}. Loosen what it misses, widen a variable, or "
-        "search longer.",
-        tuple(said),
-        tuple(row.tolist()),
-    )
-
-
-def _first_reason(problem: DesignProblem, row: Array) -> str:
-    """Return which posture a design does not hold first, and why."""
-    bounds, worst, number = (problem.minimum_of(row), problem.maximum), problem.worst_friction, 0
-    try:
-        arm = quiet_arm(problem, row)
-        for number, q in enumerate(problem.postures_of(arm)):
-            pose = arm.at(q)
-            for load in problem.loads:
-                pull = distribute_tension(pose, *bounds, load, worst_friction=worst)
-                margin = stiffness(pose, pull).margin
-                if margin <= 0.0:
-                    return f"posture {number}: UNSTABLE, least eigenvalue of K {margin:.3g} N m/rad"
-    except CdsmError as error:
-        return f"posture {number}: {str(error).replace(UNCHECKED, '')}"
-    return "its tensions are at the edge"

@@ -17,10 +17,10 @@ _CLOSED = 1e-9  # smaller ratios are rounding of the linear program
 def tension_factor(pose: Posture) -> float:
     """Compute the tension factor [-]: the largest min(F)/max(F) of F ≥ 0 with J_Lᵀ F = 0.
 
-    It is 1 if equal tensions cause no joint torque, and 0 without wrench closure
-    (:func:`has_wrench_closure`). Pham, Yeo, Yang and Chen, Robotics and Autonomous Systems 57
-    (2009), use the ratio of one solution, so their factor may be smaller. Raises CdsmError if the
-    linear program fails.
+    It is 1 if equal tensions cause no joint torque. Above 0 the arm has wrench closure: unlimited
+    tensions can balance every joint torque (Gouttefarde and Gosselin, IEEE T-RO 22, 2006). Pham,
+    Yeo, Yang and Chen, Robotics and Autonomous Systems 57 (2009), use the ratio of one solution, so
+    their factor may be smaller. Raises CdsmError if the linear program fails.
     """
     J = instance("pose", pose, Posture).length_jacobian
     count, nv = J.shape
@@ -38,16 +38,6 @@ def tension_factor(pose: Posture) -> float:
         raise solver_failed("highs", f"finds no tension factor: {found.message}")
     ratio = float(found.x[-1])
     return ratio if ratio > _CLOSED else 0.0
-
-
-def has_wrench_closure(pose: Posture) -> bool:
-    """Return whether unlimited tensions F ≥ 0 can balance every joint torque.
-
-    They can if J_Lᵀ has full rank and some F > 0 has J_Lᵀ F = 0 (Gouttefarde and Gosselin, IEEE
-    T-RO 22, 2006). For limited tensions, see :func:`force_polytope`. Raises CdsmError if the
-    linear program fails.
-    """
-    return tension_factor(pose) > 0.0
 
 
 def isotropy(stiffness: Stiffness) -> float:

@@ -20,7 +20,7 @@ from cdsm.errors import CdsmError, InvalidInput, solver_failed
 from cdsm.posture import Posture
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import NO_WRENCH, instance, number_array, wrench_vector
+from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
 from cdsm.support.values import Array, frozen
 from cdsm.tension import bounds_at, distribute_tension, solvers
 
@@ -73,7 +73,7 @@ class ForcePolytope(Result):
 
         The arm balances every force up to ``radius``, in all directions.
         """
-        return self.radius_at(np.zeros(3))
+        return float(self.offsets.min(initial=math.inf))
 
     @quantity("1", "axis")
     def worst_direction(self) -> Array:
@@ -88,24 +88,6 @@ class ForcePolytope(Result):
             return math.inf
         corners = self.vertices[self.faces] - self.vertices.mean(axis=0)
         return float(abs(np.linalg.det(corners)).sum()) / 6.0
-
-    def radius_at(self, force: ArrayLike) -> float:
-        """Compute the distance of a force f from the nearest facet [N]: min_i (b_i − n_i·f).
-
-        n_i and b_i are the rows of ``normals`` and ``offsets``. Every force up to this one may be
-        added to f. The distance is negative if the arm cannot balance f.
-
-        Args:
-            force: f (3,) [N], or several (n, 3): then the smallest of their distances.
-
-        Raises:
-            InvalidInput: ``force`` is not (3,) or (n, 3) numbers.
-        """
-        loads = number_array("force", force, "force")
-        if loads.ndim not in (1, 2) or loads.shape[-1] != 3 or not loads.size:
-            raise InvalidInput("force", f"shape {loads.shape} given, (3,) or (n, 3) needed [N].")
-        apart = self.offsets - np.atleast_2d(loads) @ self.normals.T
-        return float(apart.min(initial=math.inf))
 
     def plot(self) -> Figure:
         """Plot the polytope [N]; InvalidInput if it has no volume."""

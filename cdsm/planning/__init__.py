@@ -5,9 +5,9 @@ stiffness that the tensions can reach, and saturation: the tension above which m
 stiffens the arm.
 """
 
-from cdsm.planning.gradient import StiffnessGradient as StiffnessGradient
 from cdsm.planning.path_plan import InfeasibleSample as InfeasibleSample
 from cdsm.planning.path_plan import PathPlan as PathPlan
 from cdsm.planning.plan import StiffnessPlan as StiffnessPlan
 from cdsm.planning.range import StiffnessRange as StiffnessRange
-from cdsm.planning.saturation import Saturation as Saturation
+from cdsm.planning.sensitivity import Saturation as Saturation
+from cdsm.planning.sensitivity import StiffnessGradient as StiffnessGradient

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, Final, NamedTuple
@@ -20,8 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize
 
-from cdsm.errors import ElasticityRangeError, InfeasibleTension, SingularStiffness
-from cdsm.planning.gradient import form_by_tension
+from cdsm.errors import ElasticityRangeError, InfeasibleTension, InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.stiffness_matrix.instability import verdict
@@ -221,9 +221,8 @@ class TensionSpace:
         axes = np.eye(self.least.values.size)
         others = np.random.default_rng(0).normal(size=(random, len(axes)))
         ways = (*axes, *-axes, *others)
-        found = np.array(
-            [F for F in map(self.corner, ways) if F is not None] or [self.least.values]
-        )
+        known = [F for F in map(self.corner, ways) if F is not None]
+        found = np.array(known or [self.least.values])
         _, different = np.unique(np.round(found / self.unit, _DIGITS), axis=0, return_index=True)
         return found[np.sort(different)]
 
@@ -251,6 +250,18 @@ def affine(of: Function, factor: float, constant: float = 0.0) -> Function:
     return value
 
 
+def form_by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> Array:
+    """Compute leftᵀ (∂K_θ/∂F_c) right (C, a, b) for ``left`` (nv, a) and ``right`` (nv, b).
+
+    ``slope`` (C,) [1/m] are the derivatives of the cable stiffnesses with respect to the tensions.
+    """
+    H, J = pose.length_hessian, pose.length_jacobian
+    pairs = (left[:, None, :, None] * right[:, None]).reshape(H[0].size, -1)
+    active = (H.reshape(len(H), -1) @ pairs).reshape(-1, left.shape[1], right.shape[1])
+    passive = slope[:, None, None] * (J @ left)[:, :, None] * (J @ right)[:, None]
+    return np.asarray(active + passive)
+
+
 def unstable(K: Stiffness, tried: str, bounds: Bounds | None = None) -> SingularStiffness:
     """Return the error that none of the tensions ``tried`` make the arm stable; K is the best."""
     arm = K.posture.arm
@@ -276,17 +287,14 @@ def _least_tensions(
     outside = (low > F) | (high < F)
     if not outside.any():
         return least, (low, high)
-    if (low <= high).all():
-        try:
-            inside = distribute_tension(pose, low, high, wrench)
-            return replace(inside, minimum=least.minimum, maximum=least.maximum), (low, high)
-        except InfeasibleTension:
-            pass
+    with suppress(InfeasibleTension, InvalidInput):  # InvalidInput: a domain is beyond its bounds
+        inside = distribute_tension(pose, low, high, wrench)
+        return replace(inside, minimum=least.minimum, maximum=least.maximum), (low, high)
     wider = advice(pose.arm, F, least.minimum, least.maximum, outside)
     places = np.flatnonzero(outside).tolist()
-    said = f"outside the domain {cables[places[0]].elasticity._span} of the elasticity, and no "
-    said += (
+    said = (
+        f"outside the domain {cables[places[0]].elasticity._span} of the elasticity, and no "
         "tensions within it and the bounds balance the arm. Take another elasticity, change the "
+        f"posture or the load{wider and f', {wider}'}."
     )
-    said += f"posture or the load{wider and f', {wider}'}."
     raise ElasticityRangeError(said, F[outside].tolist(), places, [cables[c].name for c in places])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cdsm.planning.path_plan import PathPlan
     from cdsm.planning.plan import StiffnessPlan
     from cdsm.planning.range import StiffnessRange
-    from cdsm.planning.saturation import Saturation
+    from cdsm.planning.sensitivity import Saturation
     from cdsm.stiffness_matrix import Shares
     from cdsm.tension import Tension
 

@@ -1,14 +1,14 @@
-"""What a sweep computes at each posture, and its Dataset.
+"""Compute the quantities of many postures, each in several cases: for sweeps and for designs.
 
 A case is a combination of a wrench and a lower bound of the tensions (a minimum).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Final, final
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,18 +16,81 @@ from numpy.typing import NDArray
 from cdsm.batch.evaluation import OUTPUTS, evaluate
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
-from cdsm.measures import rows as measures
-from cdsm.measures.indices import principal_stiffness
-from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.format import JointUnits
-from cdsm.support.progress import progress_bar
+from cdsm.measures.clearance import KINDS, distances
+from cdsm.measures.indices import principal_stiffness, tension_factor
+from cdsm.measures.payload import largest_force
+from cdsm.measures.polytope import balanced, polytope_of
+from cdsm.posture import Posture
 from cdsm.support.status import Status
-from cdsm.support.validation import XYZ
+from cdsm.support.validation import flag, quantity
 from cdsm.support.values import Array
-from cdsm.sweeps.quantities import CASES, QUANTITIES
+from cdsm.tension import checked_bounds, grip
 
-if TYPE_CHECKING:
-    import xarray
+Needs = Literal["posture", "tension", "stiffness", "stable arm"]
+
+
+class Quantity(NamedTuple):
+    """Description of an output of a sweep, which is a variable of the Dataset."""
+
+    needs: Needs  # what must exist for the quantity to exist
+    long_name: str  # in words
+    units: str  # SI, in the notation of UDUNITS
+    dims: tuple[str, ...]  # its own dimensions, after those of poses and cases
+
+
+CASES: Final = ("wrench", "minimum")
+"""Dimensions of the cases; each exists only if several values of the argument are given."""
+
+_JOINTS = ("joint", "joint_column")
+_AXES = ("axis", "axis_column")
+_K = "N m rad-1"
+
+_TABLE: dict[Needs, dict[str, tuple[str, ...]]] = {  # words, unit and dimensions
+    "posture": {
+        "tip_position": ("position of the tip in base axes", "m", "axis"),
+        "cable_lengths": ("cable lengths L, lead included (Eq. 8)", "m", "cable"),
+        "gravity_torque": ("gravity torque g = dV/dq", "N m", "joint"),
+        "gravity_stiffness": ("gravity part of K, dg/dq", _K, *_JOINTS),
+        "tension_factor": ("largest min F / max F with J_L^T F = 0; 0: no wrench closure", "1"),
+        "cable_clearance": ("least distance of two cables", "m"),
+        "link_clearance": ("least distance of a cable from a backbone", "m"),
+        "disk_clearance": ("least distance of a cable from a disk, or its hole's edge", "m"),
+    },
+    "tension": {
+        "tension": ("least cable tensions F in balance (Eq. 17)", "N", "cable"),
+        "payload": ("largest force in a direction within the tension limits", "N", "direction"),
+        "force_radius": ("largest force in any direction within the tension limits", "N"),
+    },
+    "stiffness": {
+        "cable_stiffness": ("cable stiffness, diagonal of K_L", "N m-1", "cable"),
+        "active_stiffness": ("active part of K, H_L F (Eq. 16)", _K, *_JOINTS),
+        "passive_stiffness": ("passive part of K, J_L^T K_L J_L (Eq. 16)", _K, *_JOINTS),
+        "load_stiffness": ("load part of K (Eq. 16)", _K, *_JOINTS),
+        "joint_stiffness": ("joint stiffness K (Eq. 16)", _K, *_JOINTS),
+        "margin": ("stability margin, smallest eigenvalue of the symmetric part of K", _K),
+        "translational_compliance": ("compliance C_vv, motion per force", "m N-1", *_AXES),
+        "along": ("stiffness in a direction, 1/(u^T C_vv u) (Eq. 20)", "N m-1", "direction"),
+        "cartesian": ("Cartesian stiffness, inverse of C_vv", "N m-1", *_AXES),
+        "pseudoinverse": ("the paper's Cartesian stiffness, J+^T K J+", "N m-1", *_AXES),
+    },
+    "stable arm": {
+        "softest": ("stiffness in the softest direction", "N m-1"),
+        "stiffest": ("stiffness in the stiffest direction", "N m-1"),
+        "isotropy": ("softest over stiffest", "1"),
+        "softest_direction": ("softest direction, unit length", "1", "axis"),
+        "stiffest_direction": ("stiffest direction, unit length", "1", "axis"),
+    },
+}
+
+QUANTITIES: Final[dict[str, Quantity]] = {
+    name: Quantity(needs, words, units, tuple(dims))
+    for needs, table in _TABLE.items()
+    for name, (words, units, *dims) in table.items()
+}
+"""All quantities that a sweep computes, by name."""
+
+DEFAULT: Final = ("tip_position", "along", "margin", "softest", "stiffest", "isotropy")
+"""Default outputs, which the maps need."""
 
 _BATCH_NAMES: Final = {
     "tip_position": "tip",
@@ -39,13 +102,13 @@ _BATCH_NAMES: Final = {
 _BLOCKS: Final[dict[str, Any]] = {"tip": np.s_[:, :3, 3], "compliance": np.s_[:, :3, :3]}
 """Parts of matrices of a batch."""
 
-_FAST, _SLOW = 2**15, 2**8  # rows that are computed together, also with measures of milliseconds
+_SLOW: Final = frozenset(("tension_factor", *KINDS, "payload", "force_radius"))
+"""Measures that take some milliseconds a posture."""
 
 
-@final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Cases:
-    """What a sweep computes at each posture; InvalidInput if an argument is missing or wrong."""
+    """What is computed at each posture, and in which cases."""
 
     arm: Manipulator
     outputs: tuple[str, ...]  # names from QUANTITIES
@@ -55,11 +118,6 @@ class Cases:
     direction: Array  # unit directions (D, 3)
     worst_friction: bool  # whether all segments of the cables stay within the bounds
     diameter: float  # of the cables [m]
-    names: Mapping[str, Sequence[object] | None]  # of wrenches, minima, directions; None: only one
-
-    def __post_init__(self) -> None:
-        known = {"worst_friction": self.worst_friction, "diameter": self.diameter}
-        measures.require(self.outputs, self.arm, self.maximum, **known)  # type: ignore[arg-type]
 
     @property
     def count(self) -> int:
@@ -67,80 +125,34 @@ class Cases:
         return len(self.wrench) * len(self.minimum)
 
     @property
-    def together(self) -> int:
-        """Return the number of postures that are computed together, in about a second at most."""
-        slow = not measures.SLOW.isdisjoint(self.outputs)
-        return max(1, (_SLOW if slow else _FAST) // self.count)
-
-    def dataset(self, q: xarray.DataArray, progress: bool = False) -> xarray.Dataset:
-        """Compute the cases at joint angles q (…, joint) [rad], by all threads and with a bar.
-
-        If q is chunked, the Dataset is lazy; a chunk is then computed by one thread.
-        """
-        import xarray
-
-        names = (*self.outputs, "status")
-        dims = [_dims(name) for name in names]
-        by_joint = q.coords.keys() >= {*self.arm.joint_names}  # a coordinate for each, as of a grid
-        coordinates = self._coordinates() if by_joint else {**self._coordinates("joint"), "q": q}
-        taken = {*names, *coordinates, *CASES}
-        for name in map(str, q.coords.keys() - {"joint"}):
-            if name in taken or "/" in name or not name.isprintable():
-                problem = "is another variable of the Dataset, or no name that files accept"
-                remedy = "Rename it in the URDF, or sweep over a path or random postures"
-                raise InvalidInput("angles", f"joint {name!r} of the grid {problem}. {remedy}.")
-        variables = xarray.apply_ufunc(
-            self._compute,
-            q,
-            kwargs={"threads": None, "progress": progress} if q.chunks is None else {},
-            input_core_dims=[["joint"]],
-            output_core_dims=dims,
-            dask="parallelized",
-            output_dtypes=[np.int8 if name == "status" else np.float64 for name in names],
-            dask_gufunc_kwargs={"output_sizes": {d: self._sizes[d] for each in dims for d in each}},
-        )
-        found = xarray.Dataset(dict(zip(names, variables, strict=True)), attrs=self._about())
-        found.attrs["poses"] = q.attrs.get("poses", "as given")
-        for name in names:
-            found[name].attrs = self._attributes(name)
-        one = {dim: 0 for dim, several in self.names.items() if several is None}
-        return found.assign_coords(coordinates).isel(one, missing_dims="ignore")
+    def slow(self) -> bool:
+        """Whether a posture takes milliseconds."""
+        return not _SLOW.isdisjoint(self.outputs)
 
     @property
-    def _sizes(self) -> dict[str, int]:
+    def sizes(self) -> dict[str, int]:
+        """Return the size of each dimension of an output or of the cases."""
         nv, own = self.arm.nv, {"axis": 3, "axis_column": 3, "cable": len(self.arm.cables)}
         own |= {"wrench": len(self.wrench), "minimum": len(self.minimum)}
         return own | {"direction": len(self.direction), "joint": nv, "joint_column": nv}
 
-    def _compute(
-        self, q: Array, threads: int | None = 1, progress: bool = False
-    ) -> tuple[NDArray[Any], ...]:
-        """Compute all outputs, then ``status``, at joint angles q (…, nv) [rad]."""
-        flat, found = q.reshape(-1, self.arm.nv), []
-        with progress_bar("sweep", len(flat), wanted=progress) as advance:
-            for part in (flat[i : i + self.together] for i in range(0, len(flat), self.together)):
-                found.append(self._rows(part, threads))
-                advance(len(part))
-        names = (*self.outputs, "status")
-        sizes = [[self._sizes[dim] for dim in _dims(name)] for name in names]
-        rows = [np.concatenate([each[name] for each in found]) for name in names]
-        shapes = [(*q.shape[:-1], *own) for own in sizes]
-        return tuple(row.reshape(shape) for row, shape in zip(rows, shapes, strict=True))
+    def rows(self, q: Array, threads: int | None = 1) -> dict[str, NDArray[Any]]:
+        """Compute outputs and ``status`` at q (P, nv); a row is a posture, wrench and minimum.
 
-    def _rows(self, q: Array, threads: int | None) -> dict[str, NDArray[Any]]:
-        """Compute outputs and ``status`` at q (P, nv); a row is a posture, wrench and minimum."""
-        arm, names, cases = self.arm, self.outputs, self.count
+        Quantities of the posture alone have a row for each posture. NaN stands for what does not
+        exist.
+        """
+        arm, cases = self.arm, self.count
         wrench = np.tile(np.repeat(self.wrench, len(self.minimum), axis=0), (len(q), 1))
-        at = np.repeat(q, cases, axis=0)
         low, high, bounded = self._bounds(q)
-        kinds = {QUANTITIES[name].needs for name in names}
-        asked = {_BATCH_NAMES.get(name, name) for name in names}
+        kinds = {QUANTITIES[name].needs for name in self.outputs}
+        asked = {_BATCH_NAMES.get(name, name) for name in self.outputs}
         asked |= {"tension"} if kinds - {"posture"} else set()
         asked |= {"margin"} if kinds & {"stiffness", "stable arm"} else set()
         asked |= {"compliance"} if "stable arm" in kinds else set()
         found = evaluate(
             arm,
-            at,
+            np.repeat(q, cases, axis=0),
             wrench=wrench,
             outputs=[name for name in OUTPUTS if name in asked],
             direction=self.direction if "along" in asked else None,
@@ -152,101 +164,88 @@ class Cases:
         exist = ~np.isin(status, (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES))
         status[exist & ~bounded] = Status.INFEASIBLE
         rows: dict[str, NDArray[Any]] = {"status": status}
+        for name in self.outputs:
+            needs, _, _, dims = QUANTITIES[name]
+            of_batch = _BATCH_NAMES.get(name, name)
+            count = len(q) if needs == "posture" else len(status)
+            rows[name] = np.full((count, *(self.sizes[dim] for dim in dims)), np.nan)
+            if of_batch in found:
+                values = found[of_batch][_BLOCKS.get(of_batch, ())]
+                if needs == "posture":
+                    rows[name][:] = values[::cases]
+                else:
+                    rows[name][bounded] = values[bounded]
 
-        def spread(values: Mapping[str, Array], place: NDArray[np.bool_]) -> None:
-            for name in values.keys() & {*names}:
-                rows[name] = np.full((len(place), *values[name].shape[1:]), np.nan)
+        def put(values: Mapping[str, Any], place: Any) -> None:
+            for name in values.keys() & rows.keys():
                 rows[name][place] = values[name]
 
-        for name in names:
-            if (of_batch := _BATCH_NAMES.get(name, name)) in found:
-                part: Any = _BLOCKS.get(of_batch, ())
-                values: Array = found[of_batch][part]
-                if QUANTITIES[name].needs == "posture":
-                    rows[name] = values[::cases]
-                else:
-                    spread({name: values[bounded]}, bounded)
-        posed, wanted = exist[::cases], [name for name in names if name in measures.MEASURED]
-        spread(measures.measured(arm, q[posed], wanted, self.diameter), posed)
         held = exist & ~np.isin(status, (Status.INFEASIBLE, Status.SOLVER_FAILED))
-        bounds = arm, at[held], wrench[held], low[held], high[held]
-        if "payload" in names:
-            spread({"payload": measures.payloads(*bounds, self.direction)}, held)
-        if "force_radius" in names:
-            spread({"force_radius": measures.force_radii(*bounds)}, held)
+        for i in np.flatnonzero(exist[::cases]).tolist() if self.slow else ():
+            pose = arm.at(q[i])
+            put(self._measures(pose), i)
+            for row in range(i * cases, (i + 1) * cases):
+                if held[row]:
+                    put(self._forces(pose, wrench[row], low[row], high[row]), row)
         if "margin" in found:
             known = np.isin(status, (Status.OK, Status.IMMOBILE))
             if "stable arm" in kinds:
                 stable = known & (found["margin"] > 0.0)
-                spread(principal_stiffness(found["compliance"][stable, :3, :3]), stable)
+                put(principal_stiffness(found["compliance"][stable, :3, :3]), stable)
             status[known & (found["margin"] <= 0.0)] = Status.UNSTABLE
         return rows
 
-    def _bounds(self, q: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return bounds (R, C) [N] of the tensions at the motors, and whether they exist (R,)."""
-        loss = np.ones((len(q), len(self.arm.cables)))
-        if self.worst_friction:
-            exist = evaluate(self.arm, q, outputs=[], threads=1).ok
-            loss[exist] = measures.friction_losses(self.arm, q[exist])
-        loss = np.repeat(loss, self.count, axis=0)
-        low = np.resize(self.minimum, len(loss))
-        return measures.narrowed_bounds(self.arm, low, self.maximum, loss)
-
-    def _coordinates(self, *dims: str) -> dict[str, Any]:
-        """Return the coordinates of arguments and of named dimensions, also of ``dims``."""
-        own = {"axis", *CASES, *dims, *(dim for name in self.outputs for dim in _dims(name))}
-        force, moment = np.split(self.wrench, 2, axis=1)
-        found: dict[str, Any] = {}
-        for name, along, values, long_name, units in (
-            ("force", ("wrench", "axis"), force, "force on the tip, base axes", "N"),
-            ("moment", ("wrench", "axis"), moment, "moment on the tip, base axes", "N m"),
-            ("minimum", ("minimum",), self.minimum, "lower bound of all tensions", "N"),
-            ("maximum", (), self.maximum, "upper bound of all tensions", "N"),
-            ("diameter", (), self.diameter, "diameter of the cables", "m"),
-            ("direction_vector", ("direction", "axis"), self.direction, "unit vector", "1"),
-        ):
-            if own.issuperset(along):
-                found[name] = (along, values, {"long_name": long_name, "units": units})
-        joints = dict.fromkeys(("joint", "joint_column"), self.arm.joint_names)
-        axes = dict.fromkeys(("axis", "axis_column"), XYZ)
-        labels = {**axes, **joints, "cable": self.arm.cables.names, **self.names}
-        for dim, names in labels.items():
-            if dim in own - found.keys() and names is not None:
-                words = isinstance(names[0], str)
-                told = {"long_name": f"{'name' if words else 'number'} of the {dim}"}
-                told |= {} if words else {"units": "1"}
-                found[dim] = (dim, np.array(names, dtype=object if words else np.int64), told)
+    def _measures(self, pose: Posture) -> dict[str, float]:
+        kinds = [name for name in self.outputs if name in KINDS]
+        near = distances(pose, self.diameter, kinds=kinds) if kinds else {}
+        found = {kind: each.distance for kind, each in near.items()}
+        if "tension_factor" in self.outputs:
+            found["tension_factor"] = tension_factor(pose)
         return found
 
-    def _attributes(self, name: str) -> dict[str, Any]:
-        """Return the attributes of an output or of ``status``."""
-        if name == "status":
-            words = "what became of the entry; NaN stands only where it says so"
-            flags = {"flag_meanings": " ".join(kind.name.lower() for kind in Status)}
-            return {"long_name": words, "units": "1", **flags, "flag_values": [*map(int, Status)]}
-        units, of_slides = QUANTITIES[name].units, {"N m": "N", "N m rad-1": "N m-1"}
-        if units in of_slides:
-            units = JointUnits(self.arm.slides).joined(units, of_slides[units])
-        return {"long_name": QUANTITIES[name].long_name, "units": units}
+    def _forces(self, pose: Posture, wrench: Array, low: Array, high: Array) -> dict[str, Any]:
+        """Compute the largest forces [N] that tensions within the bounds balance; 0 if none."""
+        found: dict[str, Any] = {}
+        if "payload" in self.outputs:
+            ways = (balanced(pose, u[:, None], wrench, low, high) for u in self.direction)
+            found["payload"] = [largest_force(each) for each in ways]
+        if "force_radius" in self.outputs:
+            polytope = polytope_of(pose, wrench, low, high)
+            found["force_radius"] = polytope.radius if polytope else 0.0
+        return found
 
-    def _about(self) -> dict[str, str]:
-        """Return the attributes of the Dataset, which tell the arm by the text of its ARM.toml."""
-        from cdsm.arm_file.arm import arm_text  # pydantic: slow to import
+    def _bounds(self, q: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return bounds (R, C) [N] of the tensions at the motors, and whether they exist (R,).
 
-        try:
-            arm = arm_text(self.arm)
-        except InvalidInput:  # laws made from functions cannot be written
-            arm = f"{self.arm.__getstate__() | {'cables': [*self.arm.cables]}}"
-        about = {"Conventions": "CF-1.11", "title": f"stiffness sweep of {self.arm.name}"}
-        about |= {"source": f"cdsm {version('cdsm-stiffness')}", "arm": arm}
-        about["model"] = frictionless_model(self.arm)
+        With the worst friction they are narrower, so that each segment stays within the given ones;
+        where none are left, the given bounds are returned.
+        """
+        pairs = [checked_bounds(self.arm, each, self.maximum) for each in self.minimum.tolist()]
+        low, high = (
+            np.tile(each, (len(q) * len(self.wrench), 1)) for each in zip(*pairs, strict=True)
+        )
+        exist = np.ones(len(low), dtype=np.bool_)
         if self.worst_friction:
-            about["worst_friction"] = "all segments stay within the bounds, whatever came before"
-        return about
+            loss = np.ones((len(q), low.shape[1]))
+            for i in np.flatnonzero(evaluate(self.arm, q, outputs=[], threads=1).ok):
+                loss[i] = np.exp(grip(self.arm.at(q[i])))
+            loss = np.repeat(loss, self.count, axis=0)
+            exist = np.asarray((low * loss <= high / loss).all(axis=1))
+            loss[~exist] = 1.0
+            low, high = low * loss, high / loss
+        return low, high, exist
 
 
-def _dims(name: str) -> list[str]:
-    """Return the dimensions of an output or of ``status`` behind those of the postures."""
-    quantity = QUANTITIES.get(name)
-    cases = () if quantity and quantity.needs == "posture" else CASES
-    return [*cases, *(quantity.dims if quantity else ())]
+def require(
+    names: Collection[str], arm: Manipulator, maximum: float, worst_friction: bool, diameter: float
+) -> None:
+    """Raise InvalidInput if an argument of a sweep of ``names`` is missing or invalid."""
+    if flag("worst_friction", worst_friction) and not arm.has_friction:
+        raise InvalidInput(
+            "worst_friction",
+            f"{arm.name} has no friction in its holes; leave it out, or give them a coefficient: "
+            "friction = in ARM.toml, --set friction=0.1, Manipulator.with_friction.",
+        )
+    quantity("diameter", diameter, "diameter", zero=True)
+    if "force_radius" in names and math.isinf(checked_bounds(arm, 0.0, maximum)[1].max()):
+        raise InvalidInput("maximum", "force_radius needs a finite one [N].")

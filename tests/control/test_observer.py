@@ -6,8 +6,8 @@ import pytest
 import cdsm
 from cdsm.control import with_rigidity
 from cdsm.control.laws import Command
-from cdsm.control.observer import Estimate, Observer
 from cdsm.control.plants import QuasiStaticState
+from cdsm.control.sensing import Estimate, Observer
 from tests.support.tracking import paid_out, small_path
 
 Pairs = list[tuple[QuasiStaticState, Estimate]]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.design.evaluation import InfeasibleDesign
 from cdsm.design.result import cable_table
-from cdsm.design.search import InfeasibleDesign
 from cdsm.support.values import Array
 from tests.support.arms import readme_geometry
 

@@ -8,7 +8,6 @@ from scipy.optimize import minimize
 
 import cdsm
 from cdsm.measures.clearance import KINDS
-from cdsm.measures.rows import measured
 from cdsm.support.values import Array
 from tests.support.arms import mixed_arm, random_arm, random_posture, readme_geometry
 
@@ -95,10 +94,10 @@ def test_clearances_equal_a_direct_computation(arm: cdsm.Manipulator, reach: flo
 def test_batch_is_the_single_posture_and_diameters_count() -> None:
     arm = mixed_arm()
     q = np.random.default_rng(0).uniform(-0.3, 0.3, (5, arm.nv))
-    rows = measured(arm, q, KINDS, 1e-3)
+    rows = cdsm.sweep(arm, q, outputs=KINDS, diameter=1e-3)
     for n in range(len(q)):
         one, thin = cdsm.clearance(arm.at(q[n]), 1e-3), cdsm.clearance(arm.at(q[n]))
-        assert (one.cables, one.links, one.disks) == tuple(each[n] for each in rows.values())
+        assert (one.cables, one.links, one.disks) == tuple(rows[kind][n] for kind in KINDS)
         assert thin.cables - one.cables == pytest.approx(1e-3)
         assert thin.links - one.links == pytest.approx(0.5e-3)
         assert thin.disks - one.disks == pytest.approx(0.5e-3)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 import cdsm
-from cdsm.sweeps.quantities import QUANTITIES
+from cdsm.sweeps.cases import QUANTITIES
 from tests.support.arms import readme_geometry
 
 EVERYTHING = tuple(name for name in QUANTITIES if name != "force_radius")

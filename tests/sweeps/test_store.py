@@ -15,7 +15,7 @@ from distributed import Client, LocalCluster
 
 import cdsm
 from cdsm.batch import Batch
-from cdsm.sweeps.files import write_sweep
+from cdsm.sweeps.sweep import write_sweep
 from tests.support.patience import HANGS
 from tests.support.sweeps import CASES, EVERYTHING, GRID, short_arm
 

@@ -11,7 +11,7 @@ import cdsm
 from cdsm.measures.payload import largest_force
 from cdsm.measures.polytope import balanced
 from cdsm.support.values import Array
-from cdsm.sweeps.quantities import QUANTITIES
+from cdsm.sweeps.cases import QUANTITIES
 from cdsm.tension import checked_bounds
 from tests.support.sweeps import CASES, EVERYTHING, GRID, WRENCHES, short_arm
 

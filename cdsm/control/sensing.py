@@ -1,4 +1,4 @@
-"""Estimate joint angles from wire and tension at the motors, with stretch and friction.
+"""Sensors at the motors, and the state of the arm that a controller estimates from them.
 
 A cable with the paid-out wire l_0 and the tension F at its motor has the length
 
@@ -9,33 +9,93 @@ k_series of the series spring, and the tension F_0 at which this spring has no e
 rigidity factor s is the actual rigidity of all wires divided by the rigidity of their laws. There
 are more cables than joints, so the cable lengths give the angles and s: the rigidity is calibrated
 while the arm moves. All steps together give s (recursive least squares); the last step gives the
-angles.
-
-ρ_j is the tension of segment j divided by the tension at the motor; friction makes it differ from
-1. The estimate contains the rest length of each segment. At each step wire slides through the holes
-according to the friction law.
+angles. Friction makes ρ_j differ from 1: at each step wire slides through the holes.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, final
 
 import numpy as np
 
-from cdsm.control.sensors import Measurement, Sensors
+from cdsm.errors import InvalidInput
 from cdsm.friction.capstan import ChainProblem
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.support.validation import quantity, scalar, whole_number
 from cdsm.support.values import Array
 from cdsm.tension import grip
 
+_LARGEST_NOISE: Final = 4.0  # standard deviations at which noise is cut off
 _UNSURE: Final = 0.3  # standard deviation of 1/s before the first measurement
 _FINEST: Final = 1e-9  # smallest assumed error of a length [m], also with exact sensors
 _LEAST_SPREAD: Final = 1e-3  # smallest assumed error of a tension [N], also with exact load cells
 _STEPS, _CONVERGED = 8, 1e-8  # most Gauss–Newton steps, and the step [rad] that ends them
+
+
+class Measurement(NamedTuple):
+    """Values at the motors at one step, as measured or true.
+
+    Attributes:
+        paid_out: l_0 paid out by each motor (C,) [m], from its encoder.
+        tension: F at each motor (C,) [N].
+    """
+
+    paid_out: Array
+    tension: Array
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """Sensors of all motors: an encoder for the wire and a load cell for the tension.
+
+    Encoders count from where the cable is just taut (zero strain) at a known posture, so they
+    measure the rest length l_0 that is paid out.
+
+    Attributes:
+        encoder: Length [m] of one count of an encoder; 0: exact.
+        tension_noise: Standard deviation [N] of the Gaussian noise of a load cell, which is cut off
+            at ± four standard deviations.
+        tension_bias: Constant error of all load cells [N].
+        delay: Number of control steps by which all measurements are late.
+        seed: Seed of the noise: the same seed gives the same noise in each run.
+
+    Raises:
+        InvalidInput: A value is negative or not a number, or delay or seed are not whole numbers.
+    """
+
+    encoder: float = 1e-5
+    tension_noise: float = 0.0
+    tension_bias: float = 0.0
+    delay: int = 0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not scalar("encoder", self.encoder) >= 0.0:
+            raise InvalidInput("encoder", f"{self.encoder:g} m given; 0 or more is needed.")
+        quantity("tension_noise", self.tension_noise, "force", zero=True)
+        scalar("tension_bias", self.tension_bias)
+        whole_number("delay", self.delay, 0)
+        whole_number("seed", self.seed, 0)
+
+    def measure(
+        self, true_values: Sequence[Measurement], random: np.random.Generator
+    ) -> Measurement:
+        """Measure the newest of the ``true_values``, or an earlier one if there is a delay.
+
+        The noise is drawn from ``random``; each call draws the same number of random numbers.
+        """
+        now = true_values[max(len(true_values) - 1 - int(self.delay), 0)]
+        counted = now.paid_out
+        if self.encoder:
+            counted = self.encoder * np.round(counted / self.encoder)
+        draws = np.clip(random.standard_normal(counted.size), -_LARGEST_NOISE, _LARGEST_NOISE)
+        return Measurement(counted, now.tension + self.tension_bias + self.tension_noise * draws)
 
 
 class Estimate(NamedTuple):
