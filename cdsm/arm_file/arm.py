@@ -9,12 +9,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
-
 from cdsm.arm_file.model import SETTINGS, read_model
 from cdsm.cable import Cable, Site, serpentine_cables
 from cdsm.errors import FileError, GeometryError, InvalidInput
-from cdsm.geometry import Geometry
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import write_text
 from cdsm.support.records import one_line_each, toml_text, verbatim
@@ -154,7 +151,7 @@ def arm_text(arm: Manipulator) -> str:
     if geometry is None:
         data["urdf"] = _urdf_table(arm)
     else:
-        data["geometry"] = TypeAdapter(Geometry).dump_python(geometry, exclude_defaults=True)
+        data["geometry"] = geometry._table
         plain = serpentine_cables(geometry, cables[0].elasticity)
     each = zip(cables, owns, strict=True)
     if [(c.name, c.sites, c.lead) for c in plain] == [(c.name, c.sites, c.lead) for c in cables]:

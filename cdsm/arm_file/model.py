@@ -101,7 +101,7 @@ def _described(tables: dict[str, Any]) -> Geometry:
     if not tables:
         raise CrossFaults([_NO_ROBOT])
     try:
-        return toml.build(Geometry, tables)
+        return toml.build(tables)
     except GeometryError as error:
         keys = "|".join(ArmFile.__dataclass_fields__)
         known = re.compile(rf"((^|\.)({keys}): is not a key that is known here).*")

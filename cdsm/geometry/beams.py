@@ -8,7 +8,6 @@ from typing import Annotated, Any, Self, cast
 
 from pydantic import Field, PlainValidator, model_validator
 
-from cdsm.errors import GeometryError
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Limit, Link, Pieces
 from cdsm.support import records
 
@@ -81,21 +80,12 @@ class Section:
     disk_radius: records.Length | None = None
 
 
-def _sections(given: object) -> tuple[Section, ...]:
-    """Return sections that may be given as tables; CrossFaults lists every fault."""
-    if not isinstance(given, (list, tuple)) or not given:
-        raise ValueError("give one or more")
-    sections, faults = list[Section](), list[str]()
-    for i, each in enumerate(given, start=1):
-        try:
-            sections.append(each if isinstance(each, Section) else Section(**each))
-        except GeometryError as error:
-            faults += [f"[{i}].{fault}" for fault in error.faults]
-        except TypeError:
-            faults.append(f"[{i}]: {each!r:.60} given; a table is needed")
-    if faults:
-        raise records.CrossFaults(faults)
-    return tuple(sections)
+def _section(given: object) -> Section:
+    if isinstance(given, dict):
+        return Section(**given)
+    if not isinstance(given, Section):
+        raise ValueError(f"{given!r:.60} given; a table is needed")
+    return given
 
 
 @records.record
@@ -121,7 +111,10 @@ class Backbone(Beam):
         name: Name of the robot.
     """
 
-    sections: Annotated[Sequence[Section | dict[str, Any]], PlainValidator(_sections)]
+    sections: Annotated[
+        Sequence[Annotated[Section | dict[str, Any], PlainValidator(_section)]],
+        Field(min_length=1),
+    ]
     mass_per_length: records.Mass = 0.0
     joint_limit: Limit | None = None
     name: records.Name = "arm"
@@ -138,7 +131,7 @@ class Backbone(Beam):
 
 def backbone_fields(of: Backbone) -> dict[str, Any]:
     """Return the fields of the :class:`~cdsm.Geometry` of a backbone by name."""
-    sections = cast("tuple[Section, ...]", of.sections)  # see _sections
+    sections = cast("Sequence[Section]", of.sections)  # see _section
     common = sections[0].hole_radius
     joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
     for section in sections:

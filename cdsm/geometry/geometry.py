@@ -14,10 +14,9 @@ from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, ParamSpec, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, model_validator
 
 from cdsm.errors import GeometryError, listed, warn
-from cdsm.geometry import toml
 from cdsm.geometry.beams import Backbone, backbone_fields
 from cdsm.geometry.chain import STEEPEST, Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
@@ -25,7 +24,15 @@ from cdsm.geometry.uniform import Hinged, Universal, fields_of, same_angle, spre
 from cdsm.support import validation
 from cdsm.support.files import read_text, write_text
 from cdsm.support.format import plural
-from cdsm.support.records import CrossFaults, Length, LengthOrZero, Name, read_toml, record
+from cdsm.support.records import (
+    CrossFaults,
+    Length,
+    LengthOrZero,
+    Name,
+    read_toml,
+    record,
+    toml_text,
+)
 from cdsm.support.validation import WIDEST, doubts_about_angle, doubts_about_units, instance
 from cdsm.support.values import Printed
 
@@ -261,12 +268,19 @@ class Geometry(Printed):
 
     def to_toml(self) -> str:
         """Return the TOML text from which :meth:`read` builds an equal geometry."""
-        lines = [
-            "# cdsm geometry. Units: m, rad, kg.",
-            "# axes: in the axes of the link before; angle: of the hole about x, from y towards z;",
-            "# joint (of a cable): the joint it drives, from 1; it ends on the disk after it.",
-        ]
-        return "\n".join([*lines, *toml.lines_of(self)]) + "\n"
+        head = """\
+# cdsm geometry. Units: m, rad, kg.
+# axes: in the axes of the link before; angle: of the hole about x, from y towards z;
+# joint (of a cable): the joint it drives, from 1; it ends on the disk after it.
+"""
+        first = {name: getattr(self, name) for name in ("name", "base_length", "hole_radius")}
+        return head + toml_text(first | self._table)
+
+    @property
+    def _table(self) -> dict[str, Any]:
+        """All values that are not the usual ones, as parsed TOML."""
+        table: dict[str, Any] = TypeAdapter(Geometry).dump_python(self, exclude_defaults=True)
+        return table
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the text of :meth:`to_toml` to a file; return its path. FileError on failure."""
@@ -275,11 +289,13 @@ class Geometry(Printed):
     @classmethod
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
         """Build a geometry from TOML text as :meth:`read` does; errors begin with ``source``."""
+        from cdsm.geometry import toml
+
         try:
             data, rest = toml.split_geometry(read_toml(instance("text", text, str)))
             if "urdf" in rest and not data:
                 raise GeometryError(["urdf: a robot has no geometry; use Manipulator.read"])
-            return toml.build(cls, data)
+            return toml.build(data)
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 

@@ -7,7 +7,6 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import fields
 from functools import wraps
 from typing import (
     Annotated,
@@ -157,12 +156,6 @@ def parse(kind: type[_Record], data: object) -> _Record:
     # only from JSON does pydantic's strict mode accept a table as a record and an array as a tuple;
     # JSON has no dates, so they become strings, which only names accept
     return _reporting(TypeAdapter(kind).validate_json, kind)(json.dumps(data, default=str))
-
-
-def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
-    """Return a TOML line for each field of a record, or each of ``keys``, that is not None."""
-    names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
-    return toml_text({name: getattr(record, name) for name in names}).splitlines()
 
 
 def did_you_mean(key: str, known: Iterable[str], least: float = 0.6) -> str:
