@@ -22,11 +22,11 @@ from cdsm.cable import Cable, Cables, serpentine_cables
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import InvalidInput, listed, warn
 from cdsm.geometry import Geometry
+from cdsm.joints import Spring, Springs, springs_of
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
-from cdsm.springs import Spring, Springs, springs_of
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
 from cdsm.support.status import Status

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
-from cdsm.coupling import Coupling
 from cdsm.errors import InvalidInput
+from cdsm.joints import Coupling
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
 

@@ -10,7 +10,7 @@ from lxml import etree
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from cdsm.coupling import Coupling
+from cdsm.joints import Coupling
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.support.values import Array
