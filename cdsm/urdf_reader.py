@@ -20,10 +20,9 @@ from lxml.builder import E
 from cdsm.errors import LINES, GeometryError, InvalidInput, listed, warn
 from cdsm.geometry import MAXIMUM_JOINTS
 from cdsm.rigid_body import RigidBody, accepts
-from cdsm.support.files import read_text
+from cdsm.support.files import XmlFault, numbers, parse_xml, read_text
 from cdsm.support.validation import RANGES, flag
 from cdsm.support.values import Array
-from cdsm.support.xml import XmlFault, numbers, parse_xml
 
 _INSTEAD = {
     "floating": "fix the base to the world; a floating base has no stiffness",
