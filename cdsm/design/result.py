@@ -20,8 +20,8 @@ from cdsm.interchange.mjcf import write_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import make_folder, write_text
 from cdsm.support.format import aligned, plain, plural
+from cdsm.support.result import data_frame
 from cdsm.support.tables import csv_text
-from cdsm.support.tidy import data_frame
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.urdf import write_urdf

@@ -17,8 +17,8 @@ import numpy as np
 from cdsm.errors import CdsmError, FileError, need
 from cdsm.support.files import as_path, require_folder
 from cdsm.support.progress import progress_bar
-from cdsm.support.status import Status
-from cdsm.support.tidy import check_sweep, tidy, write_labelled
+from cdsm.support.result import write_labelled
+from cdsm.support.status import Status, check_sweep, tidy
 from cdsm.sweeps.cases import Cases
 from cdsm.sweeps.quantities import QUANTITIES
 
