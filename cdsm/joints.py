@@ -124,6 +124,12 @@ class Springs:
         return frozen(self._coupling.square(K) if self._coupling else K)
 
     @property
+    def given(self) -> dict[str, tuple[float, float]]:
+        """Stiffness and angle of each spring by the name of its joint."""
+        rows = zip(self.joints, self.stiffness.tolist(), self.angle.tolist(), strict=True)
+        return {name: (k, angle) for name, k, angle in rows if k or angle}
+
+    @property
     def sprung(self) -> list[int]:
         """Indices of the joints that have a spring."""
         return np.flatnonzero(self.stiffness).tolist()
