@@ -272,15 +272,6 @@ def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]
     return tuple(wanted)
 
 
-def accepts(urdf: str) -> bool:
-    """Return whether Pinocchio reads a URDF."""
-    try:
-        pin.buildModelFromXML(urdf)
-    except ValueError:
-        return False
-    return True
-
-
 def rotation_vector(rotation: Array) -> tuple[Array, Array]:
     """Compute the rotation vector φ (3,) [rad] of a rotation (3, 3), and its derivative (3, 3).
 

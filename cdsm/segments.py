@@ -18,7 +18,6 @@ import numpy as np
 
 from cdsm.cable import Cable
 from cdsm.routing import Indices, Routing, Spans, cross, dot
-from cdsm.support.format import plural
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 STRAIGHT = 1e-9
@@ -50,11 +49,6 @@ class Chains:
     site: Indices
     friction: Array
     wrap: Array
-
-    def __repr__(self) -> str:
-        counts = (len(self.segments), "segment"), (len(self.start) - 1, "cable")
-        segments, cables = (plural(*each) for each in counts)
-        return f"<{segments} of {cables}, {plural(self.hole.size, 'hole')}>"
 
     @classmethod
     def of(cls, cables: Sequence[Cable]) -> Self:
@@ -149,9 +143,6 @@ class Segments(ReadOnlyState):
             _sites=frozen(sites),
             _spans=spans,
         )
-
-    def __repr__(self) -> str:
-        return repr(self.chains)
 
     @property
     def grip(self) -> Array:
