@@ -365,15 +365,15 @@ class Manipulator(Printed):
     @property
     def joint_units(self) -> tuple[str, ...]:
         """Unit of each joint's coordinate (nv,): rad, or m for a prismatic joint."""
-        return JointUnits(self.slides).coordinates
+        return tuple("m" if slides else "rad" for slides in self.slides)
 
     def torque_unit(self, joint: int | None = None) -> str:
         """Return the unit of torque of a joint or, if None, of all: "N m", "N" or "N m or N"."""
-        return JointUnits(self.slides).torque(joint)
+        return JointUnits(self.slides).joined("N m", "N", joint)
 
     def stiffness_unit(self) -> str:
         """Return the unit of eigenvalues of K_θ: "N m/rad", "N/m" or "N m/rad or N/m"."""
-        return JointUnits(self.slides).stiffness()
+        return JointUnits(self.slides).joined("N m/rad", "N/m")
 
     def __repr__(self) -> str:
         return f"<Manipulator {self}>"

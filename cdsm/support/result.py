@@ -155,12 +155,9 @@ class Result(ReadOnlyState):
         """Return the units that depend on the joints of the arm."""
         if not self._arm:
             return {}
-        units = JointUnits(self._arm.slides)
-        return {
-            "joint": units.joined("rad", "m"),
-            "torque": units.torque(),
-            "joint stiffness": units.stiffness(),
-        }
+        joined = JointUnits(self._arm.slides).joined
+        torque, stiffness = joined("N m", "N"), joined("N m/rad", "N/m")
+        return {"joint": joined("rad", "m"), "torque": torque, "joint stiffness": stiffness}
 
     def _labels(self) -> dict[str, Sequence[object]]:
         """Return the names along each dimension that has names."""
