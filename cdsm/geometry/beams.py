@@ -128,30 +128,29 @@ class Backbone(Beam):
             raise records.CrossFaults(faults)
         return self
 
-
-def backbone_fields(of: Backbone) -> dict[str, Any]:
-    """Return the fields of the :class:`~cdsm.Geometry` of a backbone by name."""
-    sections = cast("Sequence[Section]", of.sections)  # see _section
-    common = sections[0].hole_radius
-    joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
-    for section in sections:
-        gap = section.length / section.disks
-        own = None if section.hole_radius == common else section.hole_radius
-        for _ in range(section.disks):
-            if links:  # from the middle of the gap before to the middle of this one
-                links[-1] = Link(length=links[-1].length + gap / 2.0, mass=links[-1].mass)
-            joints += [
-                Joint(
-                    disk_offset=gap / 2.0,
-                    limit=of.joint_limit,
-                    hole_radius=own,
-                    disk_radius=section.disk_radius,
-                    mass=of.mass_per_length * gap,
-                    **of.stiffness(),
-                )
-            ]
-            links += [Link(length=gap / 2.0, mass=section.disk_mass)]
-        kept: dict[str, Any] = {"joint": len(joints), "friction": section.friction}
-        cables += [CableRoute(angle=x, lead=section.lead, **kept) for x in section.hole_angles]
-    whole = {"name": of.name, "base_length": joints[0].disk_offset, "hole_radius": common}
-    return whole | {"joints": joints, "links": links, "cables": cables}
+    def parts(self) -> dict[str, Any]:
+        """Return the fields of the :class:`~cdsm.Geometry` by name."""
+        sections = cast("Sequence[Section]", self.sections)  # see _section
+        common = sections[0].hole_radius
+        joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
+        for section in sections:
+            gap = section.length / section.disks
+            own = None if section.hole_radius == common else section.hole_radius
+            for _ in range(section.disks):
+                if links:  # from the middle of the gap before to the middle of this one
+                    links[-1] = Link(length=links[-1].length + gap / 2.0, mass=links[-1].mass)
+                joints += [
+                    Joint(
+                        disk_offset=gap / 2.0,
+                        limit=self.joint_limit,
+                        hole_radius=own,
+                        disk_radius=section.disk_radius,
+                        mass=self.mass_per_length * gap,
+                        **self.stiffness(),
+                    )
+                ]
+                links += [Link(length=gap / 2.0, mass=section.disk_mass)]
+            kept: dict[str, Any] = {"joint": len(joints), "friction": section.friction}
+            cables += [CableRoute(angle=x, lead=section.lead, **kept) for x in section.hole_angles]
+        whole = {"name": self.name, "base_length": joints[0].disk_offset, "hole_radius": common}
+        return whole | {"joints": joints, "links": links, "cables": cables}
