@@ -269,7 +269,7 @@ class Manipulator(Printed):
         """
         q = self._angles(q, check_limits)
         routing = self._routing
-        state = self._body.state(q, routing.used)
+        state = self._body.state(q)
         site = routing.sites(state.placement)
         spans = routing.spans(state.twist, site)
         self._require_apart(spans.length, q)
@@ -283,6 +283,7 @@ class Manipulator(Printed):
             gravity_torque=frozen(state.gravity_torque),
             gravity_stiffness=frozen(state.gravity_stiffness),
             _twist=frozen(state.twist),
+            _placements=frozen(state.placement),
             _sites=frozen(site),
             _spans=spans,
         )
@@ -293,7 +294,7 @@ class Manipulator(Printed):
         Arguments and errors are those of :meth:`at`.
         """
         q, routing = self._angles(q, check_limits), self._routing
-        site = routing.sites(self._body.joint_placements(q, routing.used))
+        site = routing.sites(self._body.placements(q))
         length = np.linalg.norm(site[:, routing.second] - site[:, routing.first], axis=0)
         self._require_apart(length, q)
         return frozen(routing.lengths(length))

@@ -8,7 +8,7 @@ scratch data of its own. Callers must pass checked arrays; they receive copies.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import deepcopy
 from typing import NamedTuple
 
@@ -36,7 +36,7 @@ class State(NamedTuple):
     gravity_torque: Array  # g = ∂V/∂q (nv,)
     gravity_stiffness: Array  # ∂g/∂q (nv, nv)
     twist: Array  # (v, z) (6, n): a point x that joint j moves has ∂x/∂θ_j = v_j + z_j × x
-    placement: Array  # poses (n, 4, 4) of the bodies that were asked for
+    placement: Array  # poses (n+1, 4, 4) of the base and of the joints' frames
 
 
 class TreeArrays(NamedTuple):
@@ -103,12 +103,11 @@ class RigidBody:
         slides = np.asarray(~self._twists[1:, 3:].any(axis=1))
         self.slides = frozen(slides[list(self.coupling.leaders)] if self.coupling else slides)
 
-    def state(self, q: Array, rows: Sequence[int] = ()) -> State:
-        """Compute everything at joint angles q (nv,), with the poses of the bodies in ``rows``."""
+    def state(self, q: Array) -> State:
+        """Compute everything at joint angles q (nv,)."""
         model, data = self._model, self._data()
         slope = pin.computeGeneralizedGravityDerivatives(model, data, self._angles(q))
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
-        placement = np.array([data.oMi[row].homogeneous for row in rows]).reshape(-1, 4, 4)
         # for a model with one joint, Pinocchio returns vectors
         n = len(self.all_joints)
         J, twist = jacobian.reshape(6, n).copy(), data.J.reshape(6, n).copy()
@@ -117,7 +116,7 @@ class RigidBody:
             S = self.coupling.matrix
             J, torque, slope = J @ S, torque @ S, self.coupling.square(slope)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
-        return State(tip, J, torque, slope, twist, placement)
+        return State(tip, J, torque, slope, twist, _poses(data.oMi))
 
     def tip(self, q: Array) -> tuple[Array, Array]:
         """Compute only the pose (4, 4) of the tip and J_X (6, nv) of :meth:`state`."""
@@ -128,11 +127,11 @@ class RigidBody:
         J = jacobian.reshape(6, -1)
         return pose, J @ self.coupling.matrix if self.coupling else J
 
-    def joint_placements(self, q: Array, rows: Sequence[int]) -> Array:
-        """Compute the poses (n, 4, 4) of the joints' frames in ``rows``; row 0 is the base."""
+    def placements(self, q: Array) -> Array:
+        """Compute only the poses (n+1, 4, 4) of :meth:`state`."""
         data = self._data()
         pin.forwardKinematics(self._model, data, self._angles(q))
-        return np.array([data.oMi[row].homogeneous for row in rows]).reshape(-1, 4, 4)
+        return _poses(data.oMi)
 
     def link_placements(self, q: Array) -> dict[str, Array]:
         """Compute the poses (4, 4) of the frames of all links in base axes, by name."""
@@ -240,6 +239,10 @@ class RigidBody:
         if not hasattr(self._scratch, "data"):
             self._scratch.data = self._model.createData()
         return self._scratch.data
+
+
+def _poses(placements: Iterable[pin.SE3]) -> Array:
+    return np.array([each.homogeneous for each in placements])
 
 
 def _bounded(robot: etree._Element) -> str:

@@ -127,18 +127,8 @@ class Routing:
         )
 
     def sites(self, placement: Array) -> Array:
-        """Compute all sites (3, P) [m] from the poses (n, 4, 4) of the bodies in :attr:`used`."""
-        sites = np.einsum("pxy,py->xp", placement[self._where, :3], self._homogeneous)
-        return np.asarray(sites)
-
-    @cached_property
-    def used(self) -> tuple[int, ...]:
-        """Rows of the joints whose bodies have sites."""
-        return tuple(np.unique(self.row).tolist())
-
-    @cached_property
-    def _where(self) -> Indices:
-        return np.searchsorted(self.used, self.row)
+        """Compute all sites (3, P) [m] from the poses (n+1, 4, 4) of the joints' frames."""
+        return np.asarray(np.einsum("pxy,py->xp", placement[self.row, :3], self._homogeneous))
 
     @cached_property
     def _homogeneous(self) -> Array:
