@@ -288,17 +288,6 @@ class Manipulator(Printed):
             _spans=spans,
         )
 
-    def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
-        """Compute only L(q) (C,) [m], lead included (Eq. 8); equal to ``at(q).cable_lengths``.
-
-        Arguments and errors are those of :meth:`at`.
-        """
-        q, routing = self._angles(q, check_limits), self._routing
-        site = routing.sites(self._body.placements(q))
-        length = np.linalg.norm(site[:, routing.second] - site[:, routing.first], axis=0)
-        self._require_apart(length, q)
-        return frozen(routing.lengths(length))
-
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
         """Check joint angles (nv,) [rad] and return them read-only."""
         q = vector("q", q, self.nv, self._meaning_of_q)
@@ -482,17 +471,7 @@ class Manipulator(Printed):
     @cached_property
     def _chains(self) -> Chains:
         """All cables of the arm, divided at their holes into segments."""
-        return Chains.of(self.cables)
-
-    @cached_property
-    def _chain_routing(self) -> Routing:
-        """Routing of the segments of :attr:`_chains`, each as a cable of its own."""
-        return Routing.of(self._body, self._chains.segments, every=True)
-
-    @cached_property
-    def _segment_laws(self) -> CableLaws:
-        """Elasticities of the segments of :attr:`_chains`."""
-        return CableLaws(self._chains.segments, self.original_length)
+        return Chains.of(self.cables, self._body, self.original_length)
 
 
 def _checked(cables: CablesOrFile) -> Cables:

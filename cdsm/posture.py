@@ -175,8 +175,7 @@ class Posture(ReadOnlyState):
     @cached_property
     def segments(self) -> Segments:
         """Lengths of cable segments between holes, and wrap angles; computed on first use."""
-        chains, routing = self.arm._chains, self.arm._chain_routing
-        return Segments.at(chains, routing, self._twist, routing.sites(self._placements))
+        return Segments.at(self.arm._chains, self._twist, self._placements)
 
     def _equals(self, other: Posture) -> bool:
         return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))

@@ -8,7 +8,7 @@ scratch data of its own. Callers must pass checked arrays; they receive copies.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from typing import NamedTuple
 
@@ -116,7 +116,8 @@ class RigidBody:
             S = self.coupling.matrix
             J, torque, slope = J @ S, torque @ S, self.coupling.square(slope)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
-        return State(tip, J, torque, slope, twist, _poses(data.oMi))
+        placement = np.array([each.homogeneous for each in data.oMi])
+        return State(tip, J, torque, slope, twist, placement)
 
     def tip(self, q: Array) -> tuple[Array, Array]:
         """Compute only the pose (4, 4) of the tip and J_X (6, nv) of :meth:`state`."""
@@ -126,12 +127,6 @@ class RigidBody:
         pose: Array = pin.updateFramePlacement(model, data, self._tip).homogeneous
         J = jacobian.reshape(6, -1)
         return pose, J @ self.coupling.matrix if self.coupling else J
-
-    def placements(self, q: Array) -> Array:
-        """Compute only the poses (n+1, 4, 4) of :meth:`state`."""
-        data = self._data()
-        pin.forwardKinematics(self._model, data, self._angles(q))
-        return _poses(data.oMi)
 
     def link_placements(self, q: Array) -> dict[str, Array]:
         """Compute the poses (4, 4) of the frames of all links in base axes, by name."""
@@ -239,10 +234,6 @@ class RigidBody:
         if not hasattr(self._scratch, "data"):
             self._scratch.data = self._model.createData()
         return self._scratch.data
-
-
-def _poses(placements: Iterable[pin.SE3]) -> Array:
-    return np.array([each.homogeneous for each in placements])
 
 
 def _bounded(robot: etree._Element) -> str:
