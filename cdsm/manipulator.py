@@ -22,11 +22,11 @@ from cdsm.cable import Cable, Cables, serpentine_cables
 from cdsm.cable_laws import CableLaws, OriginalLength
 from cdsm.errors import InvalidInput, listed, warn
 from cdsm.geometry import Geometry
+from cdsm.joints import Spring, Springs, springs_of
 from cdsm.posture import Posture
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import SHORTEST_SEGMENT, Routing
 from cdsm.segments import Chains
-from cdsm.springs import Spring, Springs, springs_of
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, beyond, plural
 from cdsm.support.status import Status
@@ -115,8 +115,7 @@ class Manipulator(Printed):
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
             not three numbers. Two cables have the same name, or a cable is on an unknown link.
             ``original_length`` is unknown.
-        FileError: The file of the cables cannot be read. The file of the cables names no wire for
-            some of them.
+        FileError: The file of the cables cannot be read.
     """
 
     name: str
@@ -136,6 +135,7 @@ class Manipulator(Printed):
     _body: RigidBody
     _routing: Routing
     _laws: CableLaws
+    _own_springs: dict[str, tuple[float, float]] | None
     _doubts: tuple[str, ...]
 
     def __init__(
@@ -194,12 +194,10 @@ class Manipulator(Printed):
             springs: As for :meth:`with_springs`; a URDF has no element for them.
 
         Raises:
-            FileError: The file of the URDF or of the cables cannot be read. The file of the cables
-                names no wire for some of them.
+            FileError: The file of the URDF or of the cables cannot be read.
             GeometryError: The URDF is not a supported robot; lists every fault.
-            InvalidInput: No link is called ``tip``, or ``original_length`` is unknown. ``urdf`` is
-                neither a path nor a text, or ``joint_names`` does not name each moving joint once.
-                Two cables have the same name, or a cable is on an unknown link.
+            InvalidInput: As for :class:`Manipulator`. No link is called ``tip``, or ``joint_names``
+                does not name each moving joint once.
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
         more: Any = {"joint_names": joint_names, "springs": springs}
@@ -271,7 +269,7 @@ class Manipulator(Printed):
         """
         q = self._angles(q, check_limits)
         routing = self._routing
-        state = self._body.state(q, routing.used)
+        state = self._body.state(q)
         site = routing.sites(state.placement)
         spans = routing.spans(state.twist, site)
         self._require_apart(spans.length, q)
@@ -285,20 +283,10 @@ class Manipulator(Printed):
             gravity_torque=frozen(state.gravity_torque),
             gravity_stiffness=frozen(state.gravity_stiffness),
             _twist=frozen(state.twist),
+            _placements=frozen(state.placement),
             _sites=frozen(site),
             _spans=spans,
         )
-
-    def cable_lengths(self, q: ArrayLike, *, check_limits: bool = True) -> Array:
-        """Compute only L(q) (C,) [m], lead included (Eq. 8); equal to ``at(q).cable_lengths``.
-
-        Arguments and errors are those of :meth:`at`.
-        """
-        q, routing = self._angles(q, check_limits), self._routing
-        site = routing.sites(self._body.joint_placements(q, routing.used))
-        length = np.linalg.norm(site[:, routing.second] - site[:, routing.first], axis=0)
-        self._require_apart(length, q)
-        return frozen(routing.lengths(length))
 
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
         """Check joint angles (nv,) [rad] and return them read-only."""
@@ -367,15 +355,15 @@ class Manipulator(Printed):
     @property
     def joint_units(self) -> tuple[str, ...]:
         """Unit of each joint's coordinate (nv,): rad, or m for a prismatic joint."""
-        return JointUnits(self.slides).coordinates
+        return tuple("m" if slides else "rad" for slides in self.slides)
 
     def torque_unit(self, joint: int | None = None) -> str:
         """Return the unit of torque of a joint or, if None, of all: "N m", "N" or "N m or N"."""
-        return JointUnits(self.slides).torque(joint)
+        return JointUnits(self.slides).joined("N m", "N", joint)
 
     def stiffness_unit(self) -> str:
         """Return the unit of eigenvalues of K_θ: "N m/rad", "N/m" or "N m/rad or N/m"."""
-        return JointUnits(self.slides).stiffness()
+        return JointUnits(self.slides).joined("N m/rad", "N/m")
 
     def __repr__(self) -> str:
         return f"<Manipulator {self}>"
@@ -402,21 +390,24 @@ class Manipulator(Printed):
         """Check what defines an arm, and set all attributes; ``urdf`` has been checked before.
 
         Without ``springs``, they are those of the geometry.
-        ``like`` is an arm of the same robot, whose doubts the user has seen.
+        ``like`` is an arm whose doubts the user has seen.
         """
         one_of("original_length", original_length, get_args(OriginalLength))
         gravity = gravity_vector("gravity", gravity)
         if joint_names is not None:
             joint_names = sequence_of("joint_names", joint_names, str)
         cables = _checked(cables)
-        same = like is not None and np.array_equal(gravity, like.gravity)
+        same = like is not None and urdf is like.urdf and np.array_equal(gravity, like.gravity)
         body = like._body if like and same else RigidBody(urdf, tip_link, gravity, joint_names)
-        self.__dict__.update(urdf=urdf, cables=cables, tip_link=tip_link, gravity=gravity)
-        self.__dict__.update(original_length=original_length, tolerances=tolerances)
+        usual = geometry.springs if geometry else {}
+        own = springs_of(usual if springs is None else springs, body.all_joints, body.coupling)
+        # those that change the springs of the geometry, if any do
+        changed = None if own.given == usual else dict.fromkeys(usual, (0.0, 0.0)) | own.given
         self.__dict__.update({name: getattr(body, name) for name in _OF_BODY})
-        given = geometry.springs if geometry and springs is None else springs or {}
-        self.__dict__.update(springs=springs_of(given, body.all_joints, body.coupling))
-        self.__dict__.update(_geometry=geometry, _body=body, _routing=Routing.of(body, cables))
+        self.__dict__.update(urdf=urdf, cables=cables, tip_link=tip_link, gravity=gravity)
+        self.__dict__.update(original_length=original_length, tolerances=tolerances, springs=own)
+        self.__dict__.update(_geometry=geometry, _body=body, _own_springs=changed)
+        self.__dict__.update(_routing=Routing.of(body, cables))
         self.__dict__.update(_laws=CableLaws(cables, original_length), _doubts=_doubts(self))
         for doubt in self._doubts:
             if like is None or doubt not in like._doubts:
@@ -427,10 +418,8 @@ class Manipulator(Printed):
         """Return what defines the arm: two arms are equal if these values are equal."""
         names = ("urdf", "cables", "tip_link", "original_length", "joint_names", "tolerances")
         state = {name: getattr(self, name) for name in names}
-        own = self.springs
-        rows = zip(own.joints, own.stiffness.tolist(), own.angle.tolist(), strict=True)
-        state["springs"] = {name: (k, angle) for name, k, angle in rows if k or angle}
-        return state | {"geometry": self._geometry, "gravity": tuple(self.gravity.tolist())}
+        state |= {"geometry": self._geometry, "springs": self._own_springs}
+        return state | {"gravity": tuple(self.gravity.tolist())}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._define(**state)
@@ -442,22 +431,14 @@ class Manipulator(Printed):
         return hash(self.urdf)
 
     def _replace(self, **changes: Any) -> Manipulator:
-        """Return the same robot with other cables, gravity or tolerances."""
+        """Return an arm of which some of the values in :meth:`__getstate__` are others."""
         state = {**self.__getstate__(), **changes}
         return Manipulator.__new__(Manipulator)._define(**state, like=self)
 
-    @property
-    def _own_springs(self) -> dict[str, tuple[float, float]] | None:
-        """Springs that :meth:`with_springs` gave; None if they are those of the geometry."""
-        usual = self._geometry.springs if self._geometry else {}
-        given: dict[str, tuple[float, float]] = self.__getstate__()["springs"]
-        return None if given == usual else dict.fromkeys(usual, (0.0, 0.0)) | given
-
     def _with_geometry(self, geometry: Geometry, cables: Sequence[Cable]) -> Manipulator:
         """Return the arm of another geometry with these cables, otherwise like this one."""
-        state = {**self.__getstate__(), "geometry": geometry, "cables": cables}
-        state |= {"urdf": to_urdf(geometry), "joint_names": None, "springs": self._own_springs}
-        return Manipulator.__new__(Manipulator)._define(**state)
+        urdf = to_urdf(geometry)
+        return self._replace(geometry=geometry, cables=cables, urdf=urdf, joint_names=None)
 
     def with_cables(self, cables: CablesOrFile) -> Manipulator:
         """Return an arm with the same robot and other cables, given as for :class:`Manipulator`."""
@@ -490,17 +471,7 @@ class Manipulator(Printed):
     @cached_property
     def _chains(self) -> Chains:
         """All cables of the arm, divided at their holes into segments."""
-        return Chains.of(self.cables)
-
-    @cached_property
-    def _chain_routing(self) -> Routing:
-        """Routing of the segments of :attr:`_chains`, each as a cable of its own."""
-        return Routing.of(self._body, self._chains.segments, every=True)
-
-    @cached_property
-    def _segment_laws(self) -> CableLaws:
-        """Elasticities of the segments of :attr:`_chains`."""
-        return CableLaws(self._chains.segments, self.original_length)
+        return Chains.of(self.cables, self._body, self.original_length)
 
 
 def _checked(cables: CablesOrFile) -> Cables:

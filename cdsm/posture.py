@@ -56,6 +56,7 @@ class Posture(ReadOnlyState):
     gravity_torque: Array
     gravity_stiffness: Array
     _twist: Array
+    _placements: Array
     _sites: Array
     _spans: Spans
 
@@ -111,12 +112,6 @@ class Posture(ReadOnlyState):
         """Sites of each cable in base axes, one array (sites, 3) per cable [m]."""
         ends = np.cumsum([len(cable.sites) for cable in self.arm.cables])
         return tuple(frozen(path.copy()) for path in np.split(self._sites.T, ends[:-1]))
-
-    @cached_property
-    def _placements(self) -> Array:
-        """Poses (n+1, 4, 4) of the base and of all joints' frames."""
-        body = self.arm._body
-        return frozen(body.joint_placements(self.q, range(len(body.all_joints) + 1)))
 
     @property
     def joint_positions(self) -> Array:
@@ -180,10 +175,7 @@ class Posture(ReadOnlyState):
     @cached_property
     def segments(self) -> Segments:
         """Lengths of cable segments between holes, and wrap angles; computed on first use."""
-        arm = self.arm
-        routing = arm._chain_routing
-        sites = routing.sites(arm._body.joint_placements(self.q, routing.used))
-        return Segments.at(arm._chains, routing, self._twist, sites)
+        return Segments.at(self.arm._chains, self._twist, self._placements)
 
     def _equals(self, other: Posture) -> bool:
         return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))

@@ -17,8 +17,8 @@ import pinocchio as pin
 from lxml import etree
 from numpy.typing import NDArray
 
-from cdsm.coupling import coupling_of, limits_of, mimics_of
 from cdsm.errors import GeometryError, InvalidInput, listed
+from cdsm.joints import coupling_of, limits_of, mimics_of
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, frozen
 
@@ -36,11 +36,11 @@ class State(NamedTuple):
     gravity_torque: Array  # g = ∂V/∂q (nv,)
     gravity_stiffness: Array  # ∂g/∂q (nv, nv)
     twist: Array  # (v, z) (6, n): a point x that joint j moves has ∂x/∂θ_j = v_j + z_j × x
-    placement: Array  # poses (n, 4, 4) of the bodies that were asked for
+    placement: Array  # poses (n+1, 4, 4) of the base and of the joints' frames
 
 
 class TreeArrays(NamedTuple):
-    """The kinematic tree as plain arrays. Row 0 is the base, row i joint i of all_joints."""
+    """The kinematic tree as plain arrays: row 0 is the base, row i Pinocchio's joint i."""
 
     parent: NDArray[np.intp]  # row of the joint before, (nv+1,)
     order: NDArray[np.intp]  # rows, sorted so that each joint comes after its parent (nv,)
@@ -77,23 +77,15 @@ class RigidBody:
         except ValueError as error:
             raise GeometryError(f"Pinocchio does not accept the URDF: {error}") from None
         model.gravity.linear = np.array(gravity)
-        names = tuple(model.names)[1:]
-        mimics = mimics_of(robot)
+        names, mimics = tuple(model.names)[1:], mimics_of(robot)
         free = tuple(name for name in names if name not in mimics)
         self.joint_names = free if joint_names is None else _reordered(free, joint_names)
         self.all_joints = names
-        if joint_names is not None:
-            self.all_joints = (*self.joint_names, *(name for name in names if name in mimics))
-        self.coupling = coupling_of(mimics, self.all_joints)
-        # index in Pinocchio's order of each of our coordinates, and the inverse permutation
-        self._theirs = frozen(np.array([names.index(name) for name in self.all_joints]))
-        self._ours = frozen(np.argsort(self._theirs))
-        self._sorted = self.all_joints == names
-        self._rows = (0, *(1 + self._theirs).tolist())  # Pinocchio's index of each row
+        self.coupling = coupling_of(mimics, names, self.joint_names)
         self.nv = len(self.joint_names)
         self.name: str = model.name
-        self.lower: Array = frozen(_unlimited(model.lowerPositionLimit)[self._theirs])
-        self.upper: Array = frozen(_unlimited(model.upperPositionLimit)[self._theirs])
+        self.lower: Array = frozen(_unlimited(model.lowerPositionLimit))
+        self.upper: Array = frozen(_unlimited(model.upperPositionLimit))
         if self.coupling:
             self.lower, self.upper = limits_of(self.coupling, self.lower, self.upper)
         self._frames = {
@@ -104,67 +96,53 @@ class RigidBody:
         self.link_names = tuple(self._frames)
         self._tip = self._frame(tip)
         self._scratch = threading.local()
-        self.parent: list[int] = [self._row(model.parents[i]) for i in self._rows]
-        self.tip_joints = frozen(
-            np.array(self.joints_to(self._row(model.frames[self._tip].parentJoint)), np.intp) - 1
-        )
+        self.parent: list[int] = list(model.parents)
+        to_tip = self.joints_to(model.frames[self._tip].parentJoint)
+        self.tip_joints = frozen(np.array(to_tip, np.intp) - 1)
         self._twists = frozen(self._local_twists())
         slides = np.asarray(~self._twists[1:, 3:].any(axis=1))
         self.slides = frozen(slides[list(self.coupling.leaders)] if self.coupling else slides)
 
-    def state(self, q: Array, rows: Sequence[int] = ()) -> State:
-        """Compute everything at joint angles q (nv,), with the poses of the bodies in ``rows``."""
+    def state(self, q: Array) -> State:
+        """Compute everything at joint angles q (nv,)."""
         model, data = self._model, self._data()
-        slope = pin.computeGeneralizedGravityDerivatives(model, data, self._permuted(q))
+        slope = pin.computeGeneralizedGravityDerivatives(model, data, self._angles(q))
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
-        poses, ids = data.oMi, self._rows
-        placement = np.array([poses[ids[row]].homogeneous for row in rows]).reshape(-1, 4, 4)
         # for a model with one joint, Pinocchio returns vectors
         n = len(self.all_joints)
-        J, twist = jacobian.reshape(6, n), data.J.reshape(6, n)
-        torque, slope = data.g, slope.reshape(n, n)
-        if self._sorted:
-            J, twist, torque, slope = J.copy(), twist.copy(), torque.copy(), slope.copy()
-        else:
-            order = self._theirs
-            J, twist, torque = J[:, order], twist[:, order], torque[order]
-            slope = slope[order[:, None], order]
+        J, twist = jacobian.reshape(6, n).copy(), data.J.reshape(6, n).copy()
+        torque, slope = data.g.copy(), slope.reshape(n, n).copy()
         if self.coupling:
             S = self.coupling.matrix
             J, torque, slope = J @ S, torque @ S, self.coupling.square(slope)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
+        placement = np.array([each.homogeneous for each in data.oMi])
         return State(tip, J, torque, slope, twist, placement)
 
     def tip(self, q: Array) -> tuple[Array, Array]:
         """Compute only the pose (4, 4) of the tip and J_X (6, nv) of :meth:`state`."""
         model, data = self._model, self._data()
-        pin.computeJointJacobians(model, data, self._permuted(q))
+        pin.computeJointJacobians(model, data, self._angles(q))
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         pose: Array = pin.updateFramePlacement(model, data, self._tip).homogeneous
-        J = jacobian.reshape(6, -1).take(self._theirs, axis=1)
+        J = jacobian.reshape(6, -1)
         return pose, J @ self.coupling.matrix if self.coupling else J
-
-    def joint_placements(self, q: Array, rows: Sequence[int]) -> Array:
-        """Compute the poses (n, 4, 4) of the joints' frames in ``rows``; row 0 is the base."""
-        data = self._data()
-        pin.forwardKinematics(self._model, data, self._permuted(q))
-        return np.array([data.oMi[self._rows[row]].homogeneous for row in rows]).reshape(-1, 4, 4)
 
     def link_placements(self, q: Array) -> dict[str, Array]:
         """Compute the poses (4, 4) of the frames of all links in base axes, by name."""
         data = self._data()
-        pin.framesForwardKinematics(self._model, data, self._permuted(q))
+        pin.framesForwardKinematics(self._model, data, self._angles(q))
         return {name: data.oMf[index].homogeneous for name, index in self._frames.items()}
 
     def potential_energy(self, q: Array) -> float:
         """Compute the gravitational energy V of all links [J] at joint angles (nv,) [rad]."""
-        return float(pin.computePotentialEnergy(self._model, self._data(), self._permuted(q)))
+        return float(pin.computePotentialEnergy(self._model, self._data(), self._angles(q)))
 
     def mass_matrix(self, q: Array) -> Array:
         """Compute the joint-space mass matrix M (nv, nv) [kg m²] at joint angles (nv,) [rad]."""
-        M = np.array(pin.crba(self._model, self._data(), self._permuted(q)))
-        ours: Array = M.reshape(2 * (len(self.all_joints),))[np.ix_(self._theirs, self._theirs)]
-        return self.coupling.square(ours) if self.coupling else ours
+        M: Array = np.array(pin.crba(self._model, self._data(), self._angles(q)))
+        M = M.reshape(2 * (len(self.all_joints),))
+        return self.coupling.square(M) if self.coupling else M
 
     def locate(self, link: str) -> tuple[int, Array, Array]:
         """Return the row of the joint that carries a link, and the link's frame in the joint's.
@@ -174,7 +152,7 @@ class RigidBody:
         """
         frame = self._model.frames[self._frame(link)]
         place = frame.placement
-        return self._row(frame.parentJoint), place.rotation.copy(), place.translation.copy()
+        return int(frame.parentJoint), place.rotation.copy(), place.translation.copy()
 
     def joints_to(self, row: int) -> list[int]:
         """Return the rows of the joints from the base to the joint in ``row``, included."""
@@ -188,24 +166,23 @@ class RigidBody:
     def length(self) -> float:
         """Length of the path from the base through the joints to the tip at q = 0 [m]."""
         model = self._model
-        steps = [model.jointPlacements[self._rows[1 + joint]] for joint in self.tip_joints]
+        steps = [model.jointPlacements[1 + joint] for joint in self.tip_joints.tolist()]
         steps.append(model.frames[self._tip].placement)
         return float(sum(np.linalg.norm(step.translation) for step in steps))
 
     def arrays(self) -> TreeArrays:
         """Return the kinematic tree as plain arrays."""
         model, tip = self._model, self._model.frames[self._tip]
-        places = [model.jointPlacements[i] for i in self._rows]
-        inertias = [model.inertias[i] for i in self._rows]
+        places, inertias = list(model.jointPlacements), list(model.inertias)
         return TreeArrays(
             parent=np.array(self.parent, dtype=np.intp),
-            order=1 + self._ours,
+            order=np.arange(1, 1 + len(self.all_joints)),
             rotation=np.array([place.rotation for place in places]),
             translation=np.array([place.translation for place in places]),
             twist=self._twists,
             mass=np.array([inertia.mass for inertia in inertias]),
             centre=np.array([inertia.lever for inertia in inertias]),
-            tip=self._row(tip.parentJoint),
+            tip=int(tip.parentJoint),
             tip_rotation=tip.placement.rotation.copy(),
             tip_point=tip.placement.translation.copy(),
         )
@@ -232,25 +209,21 @@ class RigidBody:
                 f"the shapes of the URDF cannot be drawn: {str(error).strip().rstrip('.')}. Meshes "
                 "of a package:// are looked for in the folders of ROS_PACKAGE_PATH."
             ) from None
-        rows = frozenset(self._row(shape.parentJoint) for shape in shapes.geometryObjects)
-        return Shapes(lambda q: drawn.display(self._permuted(q)), rows)
+        rows = frozenset(int(shape.parentJoint) for shape in shapes.geometryObjects)
+        return Shapes(lambda q: drawn.display(self._angles(q)), rows)
 
     def _local_twists(self) -> Array:
         """Compute the unit twist of each joint in its own frame (nv+1, 6), linear part first."""
         model, data = self._model, self._data()
         pin.computeJointJacobians(model, data, pin.neutral(model))
-        of = [pin.getJointJacobian(model, data, i, pin.LOCAL) for i in self._rows[1:]]
-        columns = zip(of, self._theirs, strict=True)
-        return np.vstack([np.zeros(6), *(J.reshape(6, -1)[:, i] for J, i in columns)])
+        columns = [
+            pin.getJointJacobian(model, data, 1 + j, pin.LOCAL).reshape(6, -1)[:, j]
+            for j in range(len(self.all_joints))
+        ]
+        return np.vstack([np.zeros(6), *columns])
 
-    def _permuted(self, q: Array) -> Array:
-        if self.coupling:
-            q = self.coupling.angles(q)
-        return q if self._sorted else q[self._ours]
-
-    def _row(self, joint: int) -> int:
-        """Convert Pinocchio's index of a joint to our row; the base is 0."""
-        return 1 + int(self._ours[joint - 1]) if joint else 0
+    def _angles(self, q: Array) -> Array:
+        return self.coupling.angles(q) if self.coupling else q
 
     def _frame(self, link: str) -> int:
         # Pinocchio fails if it searches a name that is not UTF-8
@@ -291,15 +264,6 @@ def _reordered(names: tuple[str, ...], wanted: Sequence[str]) -> tuple[str, ...]
     if faults := faults + [f"has too many of {name!r}" for name in more]:
         raise InvalidInput("joint_names", f"{listed(faults)}; name each joint that moves once.")
     return tuple(wanted)
-
-
-def accepts(urdf: str) -> bool:
-    """Return whether Pinocchio reads a URDF."""
-    try:
-        pin.buildModelFromXML(urdf)
-    except ValueError:
-        return False
-    return True
 
 
 def rotation_vector(rotation: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ b (sign +1). Seen from the body of a, all of them move b:
     d_i = ±(v_i + z_i × b),   ∂ℓ/∂θ_i = u·d_i,
     ∂²ℓ/∂θ_i∂θ_j = ((d_i − (u·d_i) u)/ℓ ± u × z_i)·d_j   with i before j on the way from a to b.
 
-Arrays have the components first, (3, …); a last axis of postures is allowed everywhere.
+Arrays have the components first, (3, …).
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
-from cdsm.coupling import Coupling
 from cdsm.errors import InvalidInput
+from cdsm.joints import Coupling
 from cdsm.rigid_body import RigidBody
 from cdsm.support.values import Array, frozen
 
@@ -127,18 +127,8 @@ class Routing:
         )
 
     def sites(self, placement: Array) -> Array:
-        """Compute all sites (3, P) [m] from the poses (n, 4, 4) of the bodies in :attr:`used`."""
-        sites = np.einsum("pxy,py->xp", placement[self._where, :3], self._homogeneous)
-        return np.asarray(sites)
-
-    @cached_property
-    def used(self) -> tuple[int, ...]:
-        """Rows of the joints whose bodies have sites."""
-        return tuple(np.unique(self.row).tolist())
-
-    @cached_property
-    def _where(self) -> Indices:
-        return np.searchsorted(self.used, self.row)
+        """Compute all sites (3, P) [m] from the poses (n+1, 4, 4) of the joints' frames."""
+        return np.asarray(np.einsum("pxy,py->xp", placement[self.row, :3], self._homogeneous))
 
     @cached_property
     def _homogeneous(self) -> Array:
@@ -150,22 +140,20 @@ class Routing:
         w = b - site[:, self.first]
         length = np.sqrt(dot(w, w))
         u = w / np.maximum(length, _TINY)  # the caller refuses coincident sites
-        sign = self.sign.reshape(self.sign.shape + (1,) * (site.ndim - 2))
-        along = twist[:, self.path] * sign
+        along = twist[:, self.path] * self.sign
         d = along[:3] + cross(along[3:], b[:, :, None])
         return Spans(length, u, along[3:], d, dot(u[:, :, None], d))
 
     def lengths(self, length: Array) -> Array:
         """Compute the lengths L (C,) [m] of all cables from those of the segments (S,)."""
-        total = _sum(self.cable, length, len(self.fixed))
-        return total + self.fixed.reshape(self.fixed.shape + (1,) * (total.ndim - 1))
+        return _sum(self.cable, length, len(self.fixed)) + self.fixed
 
     def jacobian(self, spans: Spans) -> Array:
         """Compute J_L = ∂L/∂θ (C, nv)."""
         real, to = self._rates
         C = len(self.fixed)
         J = _sum(to, spans.rate[real], C * self.nv)
-        return self.reduced(J.reshape(C, self.nv, *J.shape[1:]))
+        return self.reduced(J.reshape(C, self.nv))
 
     def reduced(self, J: Array) -> Array:
         """Return derivatives (n, …) by the independent joints, from those by all of them."""
@@ -173,26 +161,21 @@ class Routing:
 
     def hessian(self, spans: Spans, weight: Array) -> Array:
         """Compute Σ weight_s ∂²ℓ_s/∂θ² (nv, nv): H_L·F if the weights (S,) are tensions."""
-        _, source, target = self._pairs
-        pairs = self._products(spans, weight)
-        H = _sum(target, pairs[source], self.nv**2)
-        H = H.reshape(self.nv, self.nv, *H.shape[1:])
-        return self.coupling.square(H) if self.coupling else H
+        return np.asarray(self.hessians(spans, weight, np.zeros_like(self.cable), 1)[0])
 
     def hessians(self, spans: Spans, weight: Array, group: Indices, count: int) -> Array:
         """Compute the same sums for each of ``count`` groups of segments (count, nv, nv)."""
         segment, source, target = self._pairs
         pairs = self._products(spans, weight)[source]
         H = _sum(group[segment] * self.nv**2 + target, pairs, count * self.nv**2)
-        H = H.reshape(count, self.nv, self.nv, *H.shape[1:])
+        H = H.reshape(count, self.nv, self.nv)
         return self.coupling.square(H) if self.coupling else H
 
     def _products(self, spans: Spans, weight: Array) -> Array:
         length, u, axis, d, rate = spans
         f = weight[:, None]
         c = (f / length[:, None]) * (d - rate * u[:, :, None]) + f * cross(u[:, :, None], axis)
-        pairs = dot(c[:, :, :, None], d[:, :, None])
-        return np.asarray(pairs.reshape(-1, *pairs.shape[3:]))
+        return dot(c[:, :, :, None], d[:, :, None]).ravel()
 
     @cached_property
     def _rates(self) -> tuple[NDArray[np.bool_], Indices]:
@@ -234,9 +217,5 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def _sum(index: Indices, values: Array, count: int) -> Array:
-    """Sum values (n, …) by their index (n,) into (count, …)."""
-    if values.ndim == 1:
-        return np.asarray(np.bincount(index, values, count), dtype=np.float64)
-    total = np.zeros((count, *values.shape[1:]))
-    np.add.at(total, index, values)
-    return total
+    """Sum values (n,) by their index (n,) into (count,)."""
+    return np.asarray(np.bincount(index, values, count), dtype=np.float64)

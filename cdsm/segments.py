@@ -17,8 +17,9 @@ from typing import Self, final
 import numpy as np
 
 from cdsm.cable import Cable
+from cdsm.cable_laws import CableLaws, OriginalLength
+from cdsm.rigid_body import RigidBody
 from cdsm.routing import Indices, Routing, Spans, cross, dot
-from cdsm.support.format import plural
 from cdsm.support.values import Array, ReadOnlyState, frozen
 
 STRAIGHT = 1e-9
@@ -41,6 +42,8 @@ class Chains:
         site: Index of each hole among the sites of its cable (P,).
         friction: μ of each hole (P,) [-].
         wrap: :attr:`Site.wrap` of each hole (P,) [rad].
+        routing: Routing of the segments, each as a cable of its own.
+        laws: Their elasticities.
     """
 
     segments: tuple[Cable, ...]
@@ -50,14 +53,11 @@ class Chains:
     site: Indices
     friction: Array
     wrap: Array
-
-    def __repr__(self) -> str:
-        counts = (len(self.segments), "segment"), (len(self.start) - 1, "cable")
-        segments, cables = (plural(*each) for each in counts)
-        return f"<{segments} of {cables}, {plural(self.hole.size, 'hole')}>"
+    routing: Routing
+    laws: CableLaws
 
     @classmethod
-    def of(cls, cables: Sequence[Cable]) -> Self:
+    def of(cls, cables: Sequence[Cable], body: RigidBody, original_length: OriginalLength) -> Self:
         """Divide cables at their holes into segments."""
         segments: list[Cable] = []
         start, holes = [0], []
@@ -85,6 +85,8 @@ class Chains:
             site=frozen(places.astype(np.intp)),
             friction=frozen(friction.copy()),
             wrap=frozen(wrap.copy()),
+            routing=Routing.of(body, segments, every=True),
+            laws=CableLaws(tuple(segments), original_length),
         )
 
 
@@ -107,13 +109,11 @@ class Segments(ReadOnlyState):
     length_jacobian: Array
     wrap: Array
     wrap_jacobian: Array
-    _routing: Routing
-    _sites: Array
     _spans: Spans
 
     @classmethod
-    def at(cls, chains: Chains, routing: Routing, twist: Array, sites: Array) -> Self:
-        """Compute the segments at a posture.
+    def at(cls, chains: Chains, twist: Array, placement: Array) -> Self:
+        """Compute the segments from the world twists and the poses of the joints' frames.
 
         With the directions u and v before and behind a hole, φ = atan2(|u × v|, u·v) and
 
@@ -124,7 +124,8 @@ class Segments(ReadOnlyState):
         the cable goes straight through, φ has a kink; there the gradient is 0, the mean of both
         sides.
         """
-        spans = routing.spans(twist, sites)
+        routing = chains.routing
+        spans = routing.spans(twist, routing.sites(placement))
         hole, nv = chains.hole, routing.nv
         u, v = spans.direction[:, hole], spans.direction[:, hole + 1]
         normal = cross(u, v)
@@ -145,13 +146,8 @@ class Segments(ReadOnlyState):
             length_jacobian=frozen(routing.jacobian(spans)),
             wrap=frozen(np.arctan2(sine, dot(u, v)) + chains.wrap),
             wrap_jacobian=frozen(routing.reduced(gradient)),
-            _routing=routing,
-            _sites=frozen(sites),
             _spans=spans,
         )
-
-    def __repr__(self) -> str:
-        return repr(self.chains)
 
     @property
     def grip(self) -> Array:
@@ -178,8 +174,8 @@ class Segments(ReadOnlyState):
         It is the cable's part of the active term of K_θ. ``tension`` is T (S,) [N].
         """
         cable = self.chains.cable
-        return frozen(self._routing.hessians(self._spans, tension, cable, int(cable[-1]) + 1))
+        return frozen(self.chains.routing.hessians(self._spans, tension, cable, int(cable[-1]) + 1))
 
     def active(self, tension: Array) -> Array:
         """Compute the active term Σ T_j ∂²l_j/∂θ² (nv, nv) [N m/rad] of all segments."""
-        return frozen(self._routing.hessian(self._spans, tension))
+        return frozen(self.chains.routing.hessian(self._spans, tension))

@@ -11,19 +11,16 @@ import math
 import os
 from collections import Counter, defaultdict
 from collections.abc import Iterator
-from copy import deepcopy
 
 import numpy as np
 from lxml import etree
-from lxml.builder import E
 
 from cdsm.errors import LINES, GeometryError, InvalidInput, listed, warn
 from cdsm.geometry import MAXIMUM_JOINTS
-from cdsm.rigid_body import RigidBody, accepts
-from cdsm.support.files import read_text
+from cdsm.rigid_body import RigidBody
+from cdsm.support.files import XmlFault, numbers, parse_xml, read_text
 from cdsm.support.validation import RANGES, flag
 from cdsm.support.values import Array
-from cdsm.support.xml import XmlFault, numbers, parse_xml
 
 _INSTEAD = {
     "floating": "fix the base to the world; a floating base has no stiffness",
@@ -201,10 +198,6 @@ def _reading_faults(robot: etree._Element) -> Iterator[str]:
     try:
         arm = RigidBody(etree.tostring(robot, encoding="unicode"), root, np.zeros(3))
     except GeometryError as error:
-        for joint in joints:
-            alone = E.robot(*(E.link(name=end) for end in _ends(joint)), deepcopy(joint), name="r")
-            if not accepts(etree.tostring(alone, encoding="unicode")):
-                yield f"joint {joint.get('name')}: {error}"
         yield str(error)
         return
     turning = [joint for joint in joints if joint.get("type") != "fixed"]

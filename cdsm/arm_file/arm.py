@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from importlib.resources import files
 from pathlib import Path
+from string import Template
 from typing import Any
-
-from pydantic import TypeAdapter
 
 from cdsm.arm_file.model import SETTINGS, read_model
 from cdsm.cable import Cable, Site, serpentine_cables
 from cdsm.errors import FileError, GeometryError, InvalidInput
-from cdsm.geometry import Geometry
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import write_text
 from cdsm.support.records import one_line_each, toml_text, verbatim
@@ -22,7 +23,7 @@ from cdsm.support.validation import sequence_of
 from cdsm.tolerances import table_of as tolerance_table
 from cdsm.urdf import TIP, to_urdf
 from cdsm.urdf_reader import read_urdf
-from cdsm.wires.catalogue import Wire, name_of, table_of
+from cdsm.wires.catalogue import WIRES, Wire, name_of, table_of
 from cdsm.wires.elasticity import Elasticity
 
 _CABLES_HEAD = """\
@@ -154,7 +155,7 @@ def arm_text(arm: Manipulator) -> str:
     if geometry is None:
         data["urdf"] = _urdf_table(arm)
     else:
-        data["geometry"] = TypeAdapter(Geometry).dump_python(geometry, exclude_defaults=True)
+        data["geometry"] = geometry._table
         plain = serpentine_cables(geometry, cables[0].elasticity)
     each = zip(cables, owns, strict=True)
     if [(c.name, c.sites, c.lead) for c in plain] == [(c.name, c.sites, c.lead) for c in cables]:
@@ -173,3 +174,33 @@ def _urdf_table(arm: Manipulator) -> dict[str, Any]:
     except GeometryError:  # the arm was built without this check
         table["check_inertia"] = False
     return table
+
+
+def template(
+    name: str,
+    wire: str | float,
+    minimum: float,
+    sections: Sequence[tuple[str, Mapping[str, float]]],
+) -> str:
+    """Return the text of an ARM.toml called ``name``: ``template.toml`` beside this file, filled.
+
+    ``minimum`` is the lower bound of all tensions [N]. Each of ``sections``, base to tip, is a
+    constructor of :class:`Geometry` by name and its keywords; lines of the file with other keywords
+    are left out.
+    """
+    text = files("cdsm.arm_file").joinpath("template.toml").read_text("utf-8")
+    section = next(each for each in text.split("\n\n") if each.startswith("[[sections]]"))
+    header, *lines = section.split("\n")
+    robot = []
+    for i, (kind, sizes) in enumerate(sections):
+        values: dict[str, object] = dict(sizes)
+        values |= {f"{key}_degrees": f"{math.degrees(x):.4g}" for key, x in sizes.items()}
+        values["kind"] = kind if len(sections) == 1 else f"sections.{kind}"
+        values["start"] = "end of the section before" if i else "base frame"
+        values["disk_radius"] = f"{1.2 * sizes['hole_radius']:.4g}"
+        values["cable_radius"] = f"{sizes['hole_radius'] / 2.0:.4g}"
+        own = [line for line in lines if line[0] in "#[" or line.split(" = ")[0] in sizes]
+        robot.append(Template("\n".join([header][: len(sections) - 1] + own)).substitute(values))
+    return Template(text.replace(section, "\n\n".join(robot))).substitute(
+        name=name, wire=json.dumps(wire), wires=", ".join(WIRES), minimum=minimum
+    )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
@@ -17,7 +17,7 @@ from pydantic import ValidationInfo as Info
 
 from cdsm.cable import Cable, Cables, Control, Site, serpentine_cables
 from cdsm.cable_laws import OriginalLength
-from cdsm.errors import LINES, CdsmError, FileError, GeometryError, listed
+from cdsm.errors import LINES, FileError, GeometryError, listed
 from cdsm.geometry import Geometry, toml
 from cdsm.manipulator import GRAVITY
 from cdsm.support import records
@@ -101,7 +101,7 @@ def _described(tables: dict[str, Any]) -> Geometry:
     if not tables:
         raise CrossFaults([_NO_ROBOT])
     try:
-        return toml.build(Geometry, tables)
+        return toml.build(tables)
     except GeometryError as error:
         keys = "|".join(ArmFile.__dataclass_fields__)
         known = re.compile(rf"((^|\.)({keys}): is not a key that is known here).*")
@@ -110,16 +110,9 @@ def _described(tables: dict[str, Any]) -> Geometry:
         ) from None
 
 
-def _one_of(kind: str, name: str, known: Iterable[str], remedy: str = "") -> str:
-    try:
-        return one_of(kind, name, known, remedy)
-    except CdsmError as error:  # it is no ValueError, as pydantic needs it
-        raise ValueError(str(error)) from None
-
-
 def _name_of_one(cable: str, info: Info) -> str:
     geometry = info.data.get("geometry")
-    return _one_of("cable", cable, geometry.cable_names) if geometry else cable
+    return one_of("cable", cable, geometry.cable_names) if geometry else cable
 
 
 def _new_names(wires: dict[str, Elasticity]) -> dict[str, Elasticity]:
@@ -137,7 +130,7 @@ def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
     # with faulty tables of wires, any name is right
     laws: dict[str, Elasticity] = WIRES | known.get("wires", {wire: _NO_WIRE})
     remedy = "Or give EA in N, a file WIRE.toml, or a table [wires.NAME]."
-    return laws[_one_of("wire", wire, laws, remedy)]
+    return laws[one_of("wire", wire, laws, remedy)]
 
 
 _Gravity = Annotated[

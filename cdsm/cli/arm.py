@@ -44,7 +44,7 @@ def new(
 
     Every command reads it; sizes, wire and all else are edited in it. --from makes one of a robot.
     """
-    from cdsm.arm_file.template import template
+    from cdsm.arm_file.arm import template
     from cdsm.support.files import write_text
     from cdsm.wires.catalogue import is_file
 

@@ -125,7 +125,7 @@ def sweep(
     """
     if out is None and figure is None and store is None:
         raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
-    from cdsm.support.tidy import status_names
+    from cdsm.support.status import status_names
     from cdsm.sweeps.cases import DEFAULT
     from cdsm.sweeps.sweep import write_sweep
 

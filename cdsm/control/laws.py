@@ -195,7 +195,7 @@ def _clamped(given: ControlInput, paid_out: Array, predicted: Array) -> Command:
 
 def reference_at(arm: Manipulator, q: Array, tension: Array) -> Reference:
     """Return the reference at angles q (nv,) and tensions F (C,) [N], without friction."""
-    laws, lengths = arm._laws, arm.cable_lengths(q)
+    laws, lengths = arm._laws, arm.at(q).cable_lengths
     wire, k = laws.original_lengths(lengths, tension), laws.stiffness(lengths, tension)
     return Reference(q, tension, wire, k)
 

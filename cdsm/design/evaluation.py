@@ -168,7 +168,7 @@ def workers(
     """
     whole_number("jobs", jobs, 1)
     compute = partial(measure, problem)
-    with progress_bar("designs", total, wanted=progress, rate=True) as advance:
+    with progress_bar("designs", total, wanted=progress) as advance:
 
         def counted(found: Iterable[Found]) -> Iterator[Found]:
             for each in found:

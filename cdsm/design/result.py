@@ -20,8 +20,8 @@ from cdsm.interchange.mjcf import write_mjcf
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import make_folder, write_text
 from cdsm.support.format import aligned, plain, plural
+from cdsm.support.result import data_frame
 from cdsm.support.tables import csv_text
-from cdsm.support.tidy import data_frame
 from cdsm.support.validation import whole_number
 from cdsm.support.values import Array, ReadOnlyState
 from cdsm.urdf import write_urdf
@@ -233,7 +233,7 @@ def cable_table(arm: Manipulator) -> str:
     motor winds, is their difference. The lengths are without stretch, and without the wire needed
     to fix both ends.
     """
-    straight = arm.cable_lengths(np.clip(0.0, arm.lower, arm.upper))
+    straight = arm.at(np.clip(0.0, arm.lower, arm.upper)).cable_lengths
     shortest, longest = _extremes(arm)
     leads = [cable.lead for cable in arm.cables]
     lengths = np.column_stack([leads, straight, shortest, longest, longest - shortest])
@@ -254,7 +254,7 @@ def _extremes(arm: Manipulator) -> tuple[Array, Array]:
     inset = _INSIDE * (arm.upper - arm.lower)
     low, high = arm.lower + inset, arm.upper - inset
     straight = np.clip(0.0, low, high)
-    shortest = longest = at_rest = arm.cable_lengths(straight)
+    shortest = longest = at_rest = arm.at(straight).cable_lengths
     first = 0
     for joint in arm.geometry.joints:
         own = slice(first, first + len(joint.axes))

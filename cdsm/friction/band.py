@@ -115,7 +115,7 @@ def half_width(K: Stiffness, u: Array) -> float:
     segments = K.posture.segments
     chains, F = segments.chains, K.tension[segments.chains.cable]
     with np.errstate(divide="ignore"):
-        soft = 1.0 / K.posture.arm._segment_laws.stiffness(segments.lengths, F)
+        soft = 1.0 / segments.chains.laws.stiffness(segments.lengths, F)
     forced = np.isinf(soft)  # the first segment of a force-controlled cable
     soft[forced] = 0.0
     own = chains.cable[:, None] == chains.cable[chains.hole]  # segments of the hole's cable (S, P)

@@ -189,7 +189,7 @@ def assemble_segments(
     ``sliding`` (P,) marks the holes in which cables slide. Raises ElasticityRangeError if a tension
     is outside the domain of its law.
     """
-    segments, laws = pose.segments, pose.arm._segment_laws
+    segments, laws = pose.segments, pose.segments.chains.laws
     chains, length = segments.chains, segments.lengths
     k = laws.stiffness(length, tension)
     # (1 + ε) of the wire: the spring in series is part of the length

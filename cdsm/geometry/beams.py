@@ -8,7 +8,6 @@ from typing import Annotated, Any, Self, cast
 
 from pydantic import Field, PlainValidator, model_validator
 
-from cdsm.errors import GeometryError
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Joint, Limit, Link, Pieces
 from cdsm.support import records
 
@@ -81,21 +80,12 @@ class Section:
     disk_radius: records.Length | None = None
 
 
-def _sections(given: object) -> tuple[Section, ...]:
-    """Return sections that may be given as tables; CrossFaults lists every fault."""
-    if not isinstance(given, (list, tuple)) or not given:
-        raise ValueError("give one or more")
-    sections, faults = list[Section](), list[str]()
-    for i, each in enumerate(given, start=1):
-        try:
-            sections.append(each if isinstance(each, Section) else Section(**each))
-        except GeometryError as error:
-            faults += [f"[{i}].{fault}" for fault in error.faults]
-        except TypeError:
-            faults.append(f"[{i}]: {each!r:.60} given; a table is needed")
-    if faults:
-        raise records.CrossFaults(faults)
-    return tuple(sections)
+def _section(given: object) -> Section:
+    if isinstance(given, dict):
+        return Section(**given)
+    if not isinstance(given, Section):
+        raise ValueError(f"{given!r:.60} given; a table is needed")
+    return given
 
 
 @records.record
@@ -121,7 +111,10 @@ class Backbone(Beam):
         name: Name of the robot.
     """
 
-    sections: Annotated[Sequence[Section | dict[str, Any]], PlainValidator(_sections)]
+    sections: Annotated[
+        Sequence[Annotated[Section | dict[str, Any], PlainValidator(_section)]],
+        Field(min_length=1),
+    ]
     mass_per_length: records.Mass = 0.0
     joint_limit: Limit | None = None
     name: records.Name = "arm"
@@ -135,30 +128,29 @@ class Backbone(Beam):
             raise records.CrossFaults(faults)
         return self
 
-
-def backbone_fields(of: Backbone) -> dict[str, Any]:
-    """Return the fields of the :class:`~cdsm.Geometry` of a backbone by name."""
-    sections = cast("tuple[Section, ...]", of.sections)  # see _sections
-    common = sections[0].hole_radius
-    joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
-    for section in sections:
-        gap = section.length / section.disks
-        own = None if section.hole_radius == common else section.hole_radius
-        for _ in range(section.disks):
-            if links:  # from the middle of the gap before to the middle of this one
-                links[-1] = Link(length=links[-1].length + gap / 2.0, mass=links[-1].mass)
-            joints += [
-                Joint(
-                    disk_offset=gap / 2.0,
-                    limit=of.joint_limit,
-                    hole_radius=own,
-                    disk_radius=section.disk_radius,
-                    mass=of.mass_per_length * gap,
-                    **of.stiffness(),
-                )
-            ]
-            links += [Link(length=gap / 2.0, mass=section.disk_mass)]
-        kept: dict[str, Any] = {"joint": len(joints), "friction": section.friction}
-        cables += [CableRoute(angle=x, lead=section.lead, **kept) for x in section.hole_angles]
-    whole = {"name": of.name, "base_length": joints[0].disk_offset, "hole_radius": common}
-    return whole | {"joints": joints, "links": links, "cables": cables}
+    def parts(self) -> dict[str, Any]:
+        """Return the fields of the :class:`~cdsm.Geometry` by name."""
+        sections = cast("Sequence[Section]", self.sections)  # see _section
+        common = sections[0].hole_radius
+        joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
+        for section in sections:
+            gap = section.length / section.disks
+            own = None if section.hole_radius == common else section.hole_radius
+            for _ in range(section.disks):
+                if links:  # from the middle of the gap before to the middle of this one
+                    links[-1] = Link(length=links[-1].length + gap / 2.0, mass=links[-1].mass)
+                joints += [
+                    Joint(
+                        disk_offset=gap / 2.0,
+                        limit=self.joint_limit,
+                        hole_radius=own,
+                        disk_radius=section.disk_radius,
+                        mass=self.mass_per_length * gap,
+                        **self.stiffness(),
+                    )
+                ]
+                links += [Link(length=gap / 2.0, mass=section.disk_mass)]
+            kept: dict[str, Any] = {"joint": len(joints), "friction": section.friction}
+            cables += [CableRoute(angle=x, lead=section.lead, **kept) for x in section.hole_angles]
+        whole = {"name": self.name, "base_length": joints[0].disk_offset, "hole_radius": common}
+        return whole | {"joints": joints, "links": links, "cables": cables}

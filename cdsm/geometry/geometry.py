@@ -12,34 +12,30 @@ from functools import cached_property, update_wrapper
 from inspect import signature
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Any, ParamSpec, Self, TypeVar
+from typing import Annotated, Any, ParamSpec, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, model_validator
 
 from cdsm.errors import GeometryError, listed, warn
-from cdsm.geometry import toml
-from cdsm.geometry.beams import Backbone, backbone_fields
+from cdsm.geometry.beams import Backbone
 from cdsm.geometry.chain import STEEPEST, Chain, chain_of
 from cdsm.geometry.parts import MAXIMUM_JOINTS, CableRoute, Disk, Joint, Link
-from cdsm.geometry.uniform import Hinged, Universal, fields_of, same_angle, spread_out
-from cdsm.support import validation
+from cdsm.geometry.uniform import Hinged, Universal, same_angle, spread_out
+from cdsm.support import records, validation
 from cdsm.support.files import read_text, write_text
 from cdsm.support.format import plural
-from cdsm.support.records import CrossFaults, Length, LengthOrZero, Name, read_toml, record
+from cdsm.support.records import CrossFaults, read_toml, record, toml_text
 from cdsm.support.validation import WIDEST, doubts_about_angle, doubts_about_units, instance
 from cdsm.support.values import Printed
 
 _Keywords = ParamSpec("_Keywords")
-_Sizes = TypeVar("_Sizes")
 
 
-def _from_sizes(
-    kind: Callable[_Keywords, _Sizes], fields_of: Callable[[_Sizes], dict[str, Any]]
-) -> Callable[_Keywords, Geometry]:
+def _from_sizes(kind: Callable[_Keywords, Universal | Backbone]) -> Callable[_Keywords, Geometry]:
     """Return a function that builds an arm and has the keywords and the docstring of ``kind``."""
 
     def build(*args: _Keywords.args, **keywords: _Keywords.kwargs) -> Geometry:
-        return Geometry(**fields_of(kind(*args, **keywords)))
+        return Geometry(**kind(*args, **keywords).parts())
 
     update_wrapper(build, kind, updated=())
     shown = signature(kind).replace(return_annotation="Geometry")
@@ -77,13 +73,13 @@ class Geometry(Printed):
     ]
     links: Annotated[tuple[Link, ...], Field(strict=False)]
     cables: Annotated[tuple[CableRoute, ...], Field(strict=False, min_length=1)]
-    base_length: LengthOrZero
-    hole_radius: Length
-    name: Name = "arm"
+    base_length: records.LengthOrZero
+    hole_radius: records.Length
+    name: records.Name = "arm"
 
-    universal = staticmethod(_from_sizes(Universal, fields_of))
-    hinged = staticmethod(_from_sizes(Hinged, fields_of))
-    backbone = staticmethod(_from_sizes(Backbone, backbone_fields))
+    universal = staticmethod(_from_sizes(Universal))
+    hinged = staticmethod(_from_sizes(Hinged))
+    backbone = staticmethod(_from_sizes(Backbone))
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -137,17 +133,13 @@ class Geometry(Printed):
         most = math.pi * max(8, len(self.joints) + 4)
         widest = max((cable.angle for cable in cables), key=abs)
         yield from doubts_about_angle("a hole angle is", widest, most)
-        holes = defaultdict(list)
+        rings = defaultdict[Any, list[str]](list)
         for i, group in enumerate(same_angle(cables)):
             for c in group:
-                for d, disk in enumerate(self.disks_of(cables[c])):
-                    holes[i, d, disk.radius_of(cables[c])].append(c)
-        shared = {tuple(hole) for hole in holes.values() if len(hole) > 1}
-        whole = sorted(hole for hole in shared if not any(set(hole) < set(each) for each in shared))
-        if whole:
-            groups = listed([" and ".join(names[c] for c in hole) for hole in whole], 4, "; ")
+                rings[i, cables[c].radius or self.hole_radius].append(names[c])
+        if shared := [" and ".join(ring) for ring in rings.values() if len(ring) > 1]:
             remedy = "Cables in one hole rub: set them apart by spread=, phase= or hole_angles=."
-            yield f"cables share holes: {groups}. {remedy}"
+            yield f"cables share holes: {listed(shared, 4, '; ')}. {remedy}"
 
     def __str__(self) -> str:
         joints, cables = plural(len(self.joints), "joint"), plural(len(self.cables), "cable")
@@ -261,12 +253,19 @@ class Geometry(Printed):
 
     def to_toml(self) -> str:
         """Return the TOML text from which :meth:`read` builds an equal geometry."""
-        lines = [
-            "# cdsm geometry. Units: m, rad, kg.",
-            "# axes: in the axes of the link before; angle: of the hole about x, from y towards z;",
-            "# joint (of a cable): the joint it drives, from 1; it ends on the disk after it.",
-        ]
-        return "\n".join([*lines, *toml.lines_of(self)]) + "\n"
+        head = """\
+# cdsm geometry. Units: m, rad, kg.
+# axes: in the axes of the link before; angle: of the hole about x, from y towards z;
+# joint (of a cable): the joint it drives, from 1; it ends on the disk after it.
+"""
+        first = {name: getattr(self, name) for name in ("name", "base_length", "hole_radius")}
+        return head + toml_text(first | self._table)
+
+    @property
+    def _table(self) -> dict[str, Any]:
+        """All values that are not the usual ones, as parsed TOML."""
+        table: dict[str, Any] = TypeAdapter(Geometry).dump_python(self, exclude_defaults=True)
+        return table
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the text of :meth:`to_toml` to a file; return its path. FileError on failure."""
@@ -275,11 +274,13 @@ class Geometry(Printed):
     @classmethod
     def from_toml(cls, text: str, source: str | None = None) -> Geometry:
         """Build a geometry from TOML text as :meth:`read` does; errors begin with ``source``."""
+        from cdsm.geometry import toml
+
         try:
             data, rest = toml.split_geometry(read_toml(instance("text", text, str)))
             if "urdf" in rest and not data:
                 raise GeometryError(["urdf: a robot has no geometry; use Manipulator.read"])
-            return toml.build(cls, data)
+            return toml.build(data)
         except GeometryError as error:
             raise GeometryError(error.faults, source) from None
 

@@ -1,17 +1,16 @@
-"""Build a geometry from its tables in TOML, and write its TOML, joint by joint."""
+"""Build a geometry from its tables in TOML."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from cdsm.errors import GeometryError
+from cdsm.geometry.geometry import Geometry
 from cdsm.geometry.uniform import Turn
-from cdsm.support.records import Name, did_you_mean, parse, record, toml_lines
-
-if TYPE_CHECKING:
-    from cdsm.geometry.geometry import Geometry
+from cdsm.support.records import Name, did_you_mean, parse, record
 
 # keys of an ARM.toml that do not belong to the geometry; cables may belong to it
 _ARM_KEYS = (
@@ -33,38 +32,16 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
     return geometry, {key: value for key, value in data.items() if key in others}
 
 
-_NONE = "friction = 0.0", "stiffness = 0.0", "rest_angle = 0.0", "pieces = 1"  # not written
-
-
-@record
-class _Sections:
-    sections: Annotated[tuple[dict[str, Any], ...], Field(strict=False, min_length=1)]
-    spread: Turn = 0.0
-    name: Name = "arm"
-
-
-def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
+def build(data: Mapping[str, Any]) -> Geometry:
     """Build a geometry from parsed TOML as :meth:`Geometry.read`; GeometryError lists faults."""
-    kind = next(
-        (key for key in ("sections", "universal", "hinged", "backbone", "geometry") if key in data),
-        "",
-    )
+    forms = ("sections", "universal", "hinged", "backbone", "geometry")
+    kind = next((key for key in forms if key in data), "")
     if not kind and not data.keys() & {"joints", "links"}:
         found = ", ".join(data) or "nothing"
-        raise GeometryError(
-            [f"holds {found}; give [universal], [hinged], [backbone], [[sections]] or joints"]
-        )
+        forms_known = "[universal], [hinged], [backbone], [[sections]] or joints"
+        raise GeometryError([f"holds {found}; give {forms_known}"])
     if kind == "sections":
-        given = parse(_Sections, data)
-        parts, faults = [], []
-        for i, section in enumerate(given.sections, start=1):
-            try:
-                parts.append(build(cls, section))
-            except GeometryError as error:
-                faults += [f"sections[{i}].{fault}" for fault in error.faults]
-        if faults:
-            raise GeometryError(faults)
-        return cls.sections(parts, spread=given.spread, name=given.name)
+        return Geometry.sections(**vars(parse(_Sections, data)))
     if kind and len(data) > 1:
         outside = [(key, did_you_mean(key, _ARM_KEYS)) for key in data if key != kind]
         inside = f"; if it belongs there, write it below [{kind}]"
@@ -74,20 +51,13 @@ def build(cls: type[Geometry], data: dict[str, Any]) -> Geometry:
     table = data[kind] if kind else data
     if not isinstance(table, dict):
         raise GeometryError([f"{kind}: is {table!r}; give a table [{kind}]"])
-    return (
-        getattr(cls, kind)(**table)
-        if kind in ("universal", "hinged", "backbone")
-        else parse(cls, table)
-    )
+    return parse(Geometry, table) if kind in ("", "geometry") else getattr(Geometry, kind)(**table)
 
 
-def lines_of(geometry: Geometry, prefix: str = "") -> list[str]:
-    """Return the TOML lines of a geometry; ``prefix``: of the names of its tables."""
-    lines = toml_lines(geometry, ("name", "base_length", "hole_radius"))
-    for key in ("joints", "links", "cables"):
-        for part in getattr(geometry, key):
-            rows = toml_lines(part)
-            if key == "joints":
-                rows = [row for row in rows if row not in ("mass = 0.0", "axes = []")]
-            lines += ["", f"[[{prefix}{key}]]", *(row for row in rows if row not in _NONE)]
-    return lines
+@record
+class _Sections:
+    sections: Annotated[
+        tuple[Annotated[dict[str, Any], AfterValidator(build)], ...], Field(strict=False)
+    ]
+    spread: Turn = 0.0
+    name: Name = "arm"

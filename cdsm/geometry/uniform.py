@@ -118,6 +118,30 @@ class Universal(Beam):
         axes = [((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))] * self.joints
         return axes, evenly_spaced(self.joints, self.cables_per_joint or 1)
 
+    def parts(self) -> dict[str, Any]:
+        """Return the fields of the :class:`~cdsm.Geometry` by name."""
+        n, (axes, usual), own = self.joints, self._axes_and_angles(), self.hole_angles
+        given: Sequence[Any] = own or usual
+        angles = given if isinstance(given[0], Sequence) else [given] * n
+        values = [getattr(self, key) for key in _OF_JOINTS]
+        each = [value if isinstance(value, Sequence) else [value] * n for value in values]
+        joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
+        common, beam = each[1][0], self.stiffness()
+        rows = zip(axes, angles, *each, strict=True)
+        for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase, k, rest in rows:
+            R = None if common == R else R
+            spring = {"stiffness": k, "rest_angle": rest}
+            spring["follows"] = 1 if self.coupled and joints else None
+            joints += [
+                Joint(axes=axis, disk_offset=h, limit=top, hole_radius=R, disk_radius=r, **spring)
+            ]
+            links += [Link(length=length, mass=mass, **beam)]
+            kept = {"joint": len(joints), "lead": lead, "friction": mu, "radius": ring}
+            cables += [CableRoute(angle=phi + phase, **kept) for phi in phis]
+        whole = {"name": self.name, "base_length": self.base_length, "hole_radius": common}
+        parts = {"joints": joints, "links": links, "cables": spread_out(cables, self.spread)}
+        return whole | parts
+
 
 @records.record
 class Hinged(Universal):
@@ -135,31 +159,6 @@ class Hinged(Universal):
         rolls = [k * self.twist for k in range(self.joints)]
         axes = [((0.0, math.cos(roll), math.sin(roll)),) for roll in rolls]
         return axes, hinge_hole_angles(rolls, self.cables_per_joint or 2)
-
-
-def fields_of(sizes: Universal) -> dict[str, Any]:
-    """Return the fields of the :class:`~cdsm.Geometry` of such sizes by name."""
-    n, (axes, usual), own = sizes.joints, sizes._axes_and_angles(), sizes.hole_angles
-    given: Sequence[Any] = own or usual
-    angles = given if isinstance(given[0], Sequence) else [given] * n
-    values = [getattr(sizes, key) for key in _OF_JOINTS]
-    each = [value if isinstance(value, Sequence) else [value] * n for value in values]
-    joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
-    common, beam = each[1][0], sizes.stiffness()
-    rows = zip(axes, angles, *each, strict=True)
-    for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase, k, rest in rows:
-        R = None if common == R else R
-        spring = {"stiffness": k, "rest_angle": rest}
-        spring["follows"] = 1 if sizes.coupled and joints else None
-        joints += [
-            Joint(axes=axis, disk_offset=h, limit=top, hole_radius=R, disk_radius=r, **spring)
-        ]
-        links += [Link(length=length, mass=mass, **beam)]
-        kept = {"joint": len(joints), "lead": lead, "friction": mu, "radius": ring}
-        cables += [CableRoute(angle=phi + phase, **kept) for phi in phis]
-    whole = {"name": sizes.name, "base_length": sizes.base_length, "hole_radius": common}
-    parts = {"joints": joints, "links": links, "cables": spread_out(cables, sizes.spread)}
-    return whole | parts
 
 
 def evenly_spaced(joints: int, cables: int) -> list[list[float]]:

@@ -117,7 +117,7 @@ class TipPosition:
             names = arm.cables.names
             loose = {
                 "pull": [-arm.length / cable.gain for cable in arm.cables],
-                "rest_lengths": arm.cable_lengths(home_angles(arm)) + arm.length,
+                "rest_lengths": arm.at(home_angles(arm)).cable_lengths + arm.length,
                 "tension": np.zeros(len(names)),
             }
             values = np.array(loose[name])

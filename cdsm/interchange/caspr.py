@@ -20,10 +20,9 @@ from numpy.typing import ArrayLike
 from cdsm.cable import Cable, Site
 from cdsm.errors import FileError, InvalidInput, unknown
 from cdsm.manipulator import GRAVITY, Manipulator
-from cdsm.support.files import as_path, read_text
+from cdsm.support.files import XmlFault, as_path, numbers, parse_xml, read_text
 from cdsm.support.validation import AXES
 from cdsm.support.values import Array
-from cdsm.support.xml import XmlFault, numbers, parse_xml
 from cdsm.urdf import TIP, E, inertial, joint, origin, urdf_text
 from cdsm.wires.elasticity import Elasticity
 

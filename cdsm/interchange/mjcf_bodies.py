@@ -10,11 +10,11 @@ from lxml import etree
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from cdsm.coupling import Coupling
+from cdsm.joints import Coupling
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
+from cdsm.support.files import parse_xml
 from cdsm.support.values import Array
-from cdsm.support.xml import parse_xml
 
 _MASS, _INERTIA = 1e-6, 1e-9  # least mass [kg] and moment [kg m²] of a moving body in MuJoCo
 _SMALLEST = 1e-12  # a smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero

@@ -122,7 +122,7 @@ def distances(
     if "link_clearance" in kinds:
         radii = {arm._body.locate(d.link)[0]: _BACKBONE * d.hole_radius for d in reversed(disks)}
         rows = [row for row, _ in pose._bones]
-        links = ["the base", *(f"the link after {name}" for name in arm.joint_names)]
+        links = ["the base", *(f"the link after {name}" for name in arm._body.all_joints)]
         radius = np.array([radii.get(row, 0.0) for row in rows])
         lines = np.array(pose.bones).reshape(-1, 2, 3)
         bones = _Bodies.bars([links[row] for row in rows], lines, radius)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cdsm.errors import InvalidInput
 from cdsm.plots import style
 from cdsm.plots.style import MM, N_PER_MM
-from cdsm.support.tidy import check_sweep, status_names
+from cdsm.support.status import check_sweep, status_names
 from cdsm.support.validation import one_of, scalar
 from cdsm.support.values import Array
 

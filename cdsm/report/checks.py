@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation
 
 import cdsm
 from cdsm.errors import CdsmError, listed
-from cdsm.support.format import JointUnits
 from cdsm.support.values import Array
 
 if TYPE_CHECKING:
@@ -181,7 +180,7 @@ def _step(K: Stiffness, moved: list[int]) -> float:
 
 def joint_unit(K: Stiffness) -> Array:
     """Return the unit of each joint (nv,): 1 rad, or the arm's length [m] for a prismatic joint."""
-    return JointUnits(K.posture.arm.slides).levers(K.posture.arm.length)
+    return np.where(K.posture.arm.slides, K.posture.arm.length, 1.0)
 
 
 def _torque_sizes(K: Stiffness) -> Array:

@@ -103,26 +103,9 @@ class JointUnits(NamedTuple):
     slides: NDArray[np.bool_]  # whether each joint slides (nv,)
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Return the SI unit of each joint coordinate: rad, or m for a prismatic joint."""
-        return tuple("m" if slides else "rad" for slides in self.slides)
-
-    @property
     def shown(self) -> tuple[tuple[str, float], ...]:
         """Return the printed unit of each joint, deg or mm, and its value in rad or m."""
         return tuple(("mm", 1e-3) if slides else ("deg", math.pi / 180.0) for slides in self.slides)
-
-    def torque(self, joint: int | None = None) -> str:
-        """Return the unit of torque of one joint, or of all: "N m", "N", or "N m or N" if mixed."""
-        return self.joined("N m", "N", joint)
-
-    def stiffness(self) -> str:
-        """Return the unit of the eigenvalues of K_θ: "N m/rad", "N/m", or both if mixed."""
-        return self.joined("N m/rad", "N/m")
-
-    def levers(self, length: float) -> Array:
-        """Return a scale of each joint coordinate (nv,): 1 rad, or ``length`` [m] if prismatic."""
-        return np.where(self.slides, length, 1.0)
 
     def to_dict(self, names: Sequence[str], q: Array) -> dict[str, object]:
         """Return joint coordinates q (..., nv) for JSON by joint name: angles_rad and ways_m."""

@@ -37,36 +37,32 @@ def track(items: Collection[_Item], what: str, *, wanted: bool = True) -> Iterat
 
 @contextmanager
 def progress_bar(
-    what: str, total: int | None = None, done: int = 0, *, wanted: bool = True, rate: bool = False
+    what: str, total: int | None = None, done: int = 0, *, wanted: bool = True
 ) -> Iterator[Callable[[int], None]]:
     """Show a bar called ``what``, and yield a function that advances it by a number of items.
 
-    ``done`` of the ``total`` items (None: unknown) are finished already. If ``rate`` is True, the
-    bar also shows how many items are finished per second. A bar that is opened while another one
-    is open is never shown, even if the outer one is not ``wanted``.
+    ``done`` of the ``total`` items (None: unknown) are finished already. A bar that is opened while
+    another one is open is never shown, even if the outer one is not ``wanted``.
     """
     terminal = sys.stderr.isatty()
-    if not (wanted and _allowed.get() and (terminal or _lines_wanted.get())):
-        with progress_allowed(False):
-            yield lambda count: None
-        return
-    if not terminal:
-        with progress_allowed(False):
-            yield _lines(what, total, done)
-        return
+    shown = wanted and _allowed.get() and (terminal or _lines_wanted.get())
+    with progress_allowed(False):
+        if shown and terminal:
+            with _bar(what, total, done) as advance:
+                yield advance
+        else:
+            yield _lines(what, total, done) if shown else lambda count: None
+
+
+@contextmanager
+def _bar(what: str, total: int | None, done: int) -> Iterator[Callable[[int], None]]:
     from rich import progress  # slow to import
     from rich.console import Console
 
-    class Rate(progress.ProgressColumn):
-        def render(self, task: progress.Task) -> str:
-            return f"{task.speed:,.0f}/s" if rate and task.speed else ""
-
-    bar = progress.Progress(
-        *(what, progress.BarColumn(), progress.MofNCompleteColumn()),
-        *(Rate(), progress.TimeRemainingColumn()),
-        console=Console(stderr=True),
-        transient=True,
-    )
+    columns = what, progress.BarColumn(), progress.MofNCompleteColumn()
+    console = Console(stderr=True)
+    left = progress.TimeRemainingColumn()
+    bar = progress.Progress(*columns, left, console=console, transient=True)
     task, begun = bar.add_task(what, total=total, completed=done), monotonic()
 
     def advance(count: int) -> None:
@@ -75,8 +71,7 @@ def progress_bar(
         bar.advance(task, count)
 
     try:
-        with progress_allowed(False):
-            yield advance
+        yield advance
     finally:
         bar.stop()
 

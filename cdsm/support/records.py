@@ -7,7 +7,6 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import fields
 from functools import wraps
 from typing import (
     Annotated,
@@ -16,7 +15,6 @@ from typing import (
     cast,
     dataclass_transform,
     get_args,
-    get_origin,
     get_type_hints,
 )
 
@@ -159,12 +157,6 @@ def parse(kind: type[_Record], data: object) -> _Record:
     return _reporting(TypeAdapter(kind).validate_json, kind)(json.dumps(data, default=str))
 
 
-def toml_lines(record: object, keys: Iterable[str] | None = None) -> list[str]:
-    """Return a TOML line for each field of a record, or each of ``keys``, that is not None."""
-    names = keys or [field.name for field in fields(record)]  # type: ignore[arg-type]
-    return toml_text({name: getattr(record, name) for name in names}).splitlines()
-
-
 def did_you_mean(key: str, known: Iterable[str], least: float = 0.6) -> str:
     """Return ``; did you mean …?`` with the known key that is most similar to ``key``.
 
@@ -182,26 +174,10 @@ def faults_at(where: str, error: ValueError) -> list[str]:
     return [f"{where}: {str(error).removeprefix(own)}"]
 
 
-def _homes(kind: Any, name: str = "") -> dict[str, str]:
-    """Return where the keys of a record and its parts belong; "": at the top of the record."""
-    if not is_pydantic_dataclass(kind):
-        inner = f"[{name}]" if get_origin(kind) is tuple else name
-        parts = [_homes(part, inner) for part in get_args(kind)]
-        return {key: place for homes in parts for key, place in homes.items()}
-    hints, homes = get_type_hints(kind), dict[str, str]()
-    for field, hint in () if name else hints.items():
-        homes |= _homes(hint, field)
-    place = f"{'to each' if name.startswith('[') else 'in'} [{name}]" if name else ""
-    return homes | dict.fromkeys(hints, place)
-
-
-def _meant(place: Sequence[object], kind: Any) -> str:
-    """Return where the unknown key at a ``place`` of a record belongs."""
-    homes, key = _homes(kind), str(place[-1])
-    home = homes.get(key, str(place[0]))
-    if home == "" and len(place) > 1:
-        return "; it belongs at the top of the file"
-    return did_you_mean(key, homes) if str(place[0]) in home else f"; it belongs {home}"
+def _keys(kind: Any) -> set[str]:
+    """Return the keys of a record and of its parts."""
+    own = get_type_hints(kind) if is_pydantic_dataclass(kind) else {}
+    return {*own}.union(*map(_keys, (*own.values(), *get_args(kind))))
 
 
 def _faults(error: ValidationError, kind: Any) -> list[str]:
@@ -217,7 +193,9 @@ def _faults(error: ValidationError, kind: Any) -> list[str]:
         elif fault["type"].startswith("missing"):
             listed.append(f"{where}: is missing")
         elif fault["type"] == "unexpected_keyword_argument":
-            hint = _meant(fault["loc"], kind)
+            key = str(fault["loc"][-1])
+            top = len(fault["loc"]) > 1 and key in get_type_hints(kind)
+            hint = "; it belongs at the top of the file" if top else did_you_mean(key, _keys(kind))
             listed.append(f"{where}: is not a key that is known here{hint}")
         elif fault["type"] == "unexpected_positional_argument":
             listed.append(f"{fault['input']!r} is given without its name; give it as a keyword")

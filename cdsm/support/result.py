@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
@@ -10,9 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cdsm.errors import InvalidInput, need
+from cdsm.support.files import as_path, write_file
 from cdsm.support.format import JointUnits, key, plain, span
-from cdsm.support.tidy import data_frame, dataset, write_labelled
 from cdsm.support.values import ReadOnlyState
 
 if TYPE_CHECKING:
@@ -152,12 +155,9 @@ class Result(ReadOnlyState):
         """Return the units that depend on the joints of the arm."""
         if not self._arm:
             return {}
-        units = JointUnits(self._arm.slides)
-        return {
-            "joint": units.joined("rad", "m"),
-            "torque": units.torque(),
-            "joint stiffness": units.stiffness(),
-        }
+        joined = JointUnits(self._arm.slides).joined
+        torque, stiffness = joined("N m", "N"), joined("N m/rad", "N/m")
+        return {"joint": joined("rad", "m"), "torque": torque, "joint stiffness": stiffness}
 
     def _labels(self) -> dict[str, Sequence[object]]:
         """Return the names along each dimension that has names."""
@@ -180,3 +180,62 @@ def _by_name(value: Any, dims: Sequence[str], labels: Mapping[str, Sequence[obje
         return value
     pairs = zip(labels[dims[0]], np.asarray(value), strict=True)
     return {label: _by_name(each, dims[1:], labels) for label, each in pairs}
+
+
+def data_frame(
+    columns: Mapping[str, NDArray[Any] | Sequence[object]],
+    index: str,
+    labels: NDArray[Any] | Sequence[object],
+) -> pandas.DataFrame:
+    """Build a pandas table from columns by name; ``labels`` are its index, called ``index``."""
+    need("sweep", "pandas")
+    import pandas
+
+    return pandas.DataFrame(dict(columns), index=pandas.Index(labels, name=index))
+
+
+def dataset(
+    variables: Mapping[str, tuple[Sequence[str], NDArray[Any], str]],
+    labels: Mapping[str, Sequence[object] | NDArray[Any]],
+    **attributes: str,
+) -> xarray.Dataset:
+    """Build a Dataset from variables, given as (dimensions, values, SI unit) by name.
+
+    ``labels`` are the coordinates of the dimensions; those that no variable has are left out.
+    """
+    need("sweep", "xarray")
+    import xarray
+
+    used = {dim for dims, _, _ in variables.values() for dim in dims}
+    return xarray.Dataset(
+        {
+            name: (tuple(dims), values.copy(), {"units": unit})
+            for name, (dims, values, unit) in variables.items()
+        },
+        {dim: list(values) for dim, values in labels.items() if dim in used},
+        attributes,
+    )
+
+
+def write_labelled(
+    path: str | os.PathLike[str],
+    table: Callable[[], pandas.DataFrame],
+    labelled: Callable[[], xarray.Dataset],
+) -> Path:
+    """Write ``table()`` to a ``.csv`` or ``labelled()`` to a ``.nc``; only this one is called."""
+    suffix = as_path(path).suffix.lower()
+    if suffix not in (".nc", ".csv"):
+        raise InvalidInput("path", f"{str(path)!r} ends neither in .nc (NetCDF) nor in .csv.")
+    if suffix == ".csv":
+        return write_file(path, table().to_csv)
+    need("sweep", "netCDF4")
+    data = labelled()
+
+    def fill(aside: Path) -> None:
+        try:
+            data.to_netcdf(aside, engine="netcdf4")
+        except (RuntimeError, PermissionError) as error:  # HDF5 does not report a full disk
+            free = shutil.disk_usage(aside.parent).free
+            raise OSError(f"{error} ({free} bytes are free there)") from None
+
+    return write_file(path, fill)

@@ -22,8 +22,8 @@ from cdsm.errors import CdsmError, FileError, InvalidInput, need
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import as_path, require_folder
 from cdsm.support.progress import progress_bar
-from cdsm.support.status import Status
-from cdsm.support.tidy import check_sweep, tidy, write_labelled
+from cdsm.support.result import write_labelled
+from cdsm.support.status import Status, check_sweep, tidy
 from cdsm.support.validation import (
     NO_WRENCH,
     XYZ,

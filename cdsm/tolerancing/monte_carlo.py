@@ -167,7 +167,7 @@ def monte_carlo(
     if not budget.tolerances.given:
         raise InvalidInput("tolerances", "are all zero, so all draws are the same; give one.")
     values, status = [], []
-    with progress_bar("Monte Carlo", count, wanted=wanted, rate=True) as advance:
+    with progress_bar("Monte Carlo", count, wanted=wanted) as advance:
         for errors in _draws(budget, start, count):
             found, codes = budget.measurand.of_arms(errors, checked_threads(None))
             values.append(found[codes == Status.OK, 0])

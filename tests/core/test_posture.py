@@ -24,7 +24,7 @@ DISKS = [Disk(link, x, 1, 0.01, R) for link in "abc" for x in (-HALF, HALF)]
 def placed(x: float, y: float, z: float, axis: Array) -> Array:
     pose = np.eye(4)
     pose[:3, 3] = x, y, z
-    pose[:3, 0] = axis
+    pose[:3, :3] = np.array([np.roll(axis, i) for i in range(3)]).T
     return pose
 
 

@@ -303,7 +303,7 @@ def test_files_for_the_workshop(tmp_path: Path) -> None:
     radii = {float(row[4]) for row in holes[1:]}
     assert radii == {round(1e3 * arm.geometry.hole_radius, 4)}
     cables = [line.split(",") for line in paths[4].read_text().splitlines()]
-    lengths: Array = 1e3 * arm.cable_lengths(np.zeros(arm.nv))
+    lengths: Array = 1e3 * arm.at(np.zeros(arm.nv)).cable_lengths
     assert [float(row[4]) for row in cables[1:]] == pytest.approx(lengths.tolist(), abs=1e-4)
     for row in cables[1:]:
         assert float(row[5]) <= float(row[4]) <= float(row[6])
@@ -311,7 +311,7 @@ def test_files_for_the_workshop(tmp_path: Path) -> None:
 
 def test_a_cable_is_cut_for_all_postures_within_the_joint_limits() -> None:
     arm = small_arm()
-    straight = arm.cable_lengths(np.zeros(arm.nv))
+    straight = arm.at(np.zeros(arm.nv)).cable_lengths
     # a segment crosses one joint, so a grid over each joint gives all lengths
     low, high = straight.copy(), straight.copy()
     sides = [np.linspace(-end, end, 41) for end in 0.999 * arm.upper[:2]]

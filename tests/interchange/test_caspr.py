@@ -125,7 +125,7 @@ def assert_is_the_files(path: Path) -> cdsm.Manipulator:
         q = rng.uniform(arm.lower, arm.upper)
         expected = caspr_models.lengths(bodies, cables, q)
         np.testing.assert_allclose(arm.at(q).cable_lengths, expected, rtol=1e-14, atol=0.0)
-        np.testing.assert_allclose(arm.cable_lengths(q), expected, rtol=1e-14, atol=0.0)
+        np.testing.assert_allclose(arm.at(q).cable_lengths, expected, rtol=1e-14, atol=0.0)
     return arm
 
 

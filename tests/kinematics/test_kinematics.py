@@ -159,7 +159,7 @@ def test_targets_of_the_straight_arm_where_the_jacobian_is_singular() -> None:
 def test_a_joint_at_its_limit_is_found_there_and_a_locked_joint_stays() -> None:
     arm = planar_arm(3)
     q = np.array([0.2, arm.upper[1], -0.4])
-    found = cdsm.solve_joint_angles(arm, arm.cable_lengths(q))
+    found = cdsm.solve_joint_angles(arm, arm.at(q).cable_lengths)
     assert found.reachable
     assert found.at_limit == ("joint2",)
     np.testing.assert_allclose(found.angles, q, rtol=0.0, atol=1e-8)
@@ -191,8 +191,8 @@ def test_hinge_stops_at_its_limit_below_target_and_lengths_that_it_cannot_have()
     assert found.angles == -0.9
     assert found.at_limit == ("joint1",)
     assert found.position_error == pytest.approx(0.2 * math.sin((math.pi / 2 - 0.9) / 2))
-    straight = arm.cable_lengths([0.0])
-    away = arm.cable_lengths([0.9]) - straight
+    straight = arm.at([0.0]).cable_lengths
+    away = arm.at([0.9]).cable_lengths - straight
     found = cdsm.solve_joint_angles(arm, straight + 1.5 * away)
     assert found.angles == 0.9
     np.testing.assert_allclose(found.length_error, -0.5 * away, rtol=1e-9)
@@ -219,7 +219,7 @@ def test_no_other_posture_comes_nearer_to_a_target_out_of_reach(kind: str) -> No
 
 def test_measured_lengths_are_reachable_within_their_error() -> None:
     arm = random_arm(2, 5)
-    lengths = arm.cable_lengths(inside(arm, 1, 0.4))
+    lengths = arm.at(inside(arm, 1, 0.4)).cable_lengths
     lengths = lengths + np.random.default_rng(1).normal(0.0, 1e-5, len(arm.cables))
     found = cdsm.solve_joint_angles(arm, lengths, tolerance=1e-3)
     assert found.reachable
@@ -234,7 +234,7 @@ def test_measured_lengths_are_reachable_within_their_error() -> None:
 
 ARM = random_arm(1, 2)
 TIP = ARM.at(np.full(4, 0.1)).tip
-LENGTHS = ARM.cable_lengths(np.zeros(4))
+LENGTHS = ARM.at(np.zeros(4)).cable_lengths
 REFUSED: list[tuple[Any, dict[str, Any], str]] = [
     ([0.1, 0.2], {}, r"target: shape \(2,\).*position \(3,\).*pose \(4, 4\)"),
     ([0.1, math.nan, 0.0], {}, r"target: entry \[1\] is nan"),

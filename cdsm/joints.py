@@ -1,0 +1,165 @@
+"""Joints that follow others, and springs at joints.
+
+A joint of a URDF that mimics another one has θ = multiplier · θ_leader + offset. So the angles of
+all joints are θ = S q + θ_0 with a constant S: torques become Sᵀ τ and stiffness Sᵀ K S, without
+further terms. S also permutes joints whose order the user chose. A spring turns a joint back to its
+angle q_0 by k (θ − q_0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from lxml import etree
+
+from cdsm.errors import GeometryError, InvalidInput
+from cdsm.support.validation import one_of, scalar, within
+from cdsm.support.values import Array, frozen
+
+
+class Mimic(NamedTuple):
+    """What a joint does: multiplier · the angle of the joint ``leader`` + offset [rad or m]."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+class Coupling(NamedTuple):
+    """All n joints, in Pinocchio's order, as functions of the nv independent ones of q."""
+
+    matrix: Array  # S (n, nv)
+    offset: Array  # θ_0 (n,)
+    leaders: tuple[int, ...]  # the independent joints among all
+
+    def angles(self, q: Array) -> Array:
+        """Compute the angles θ (…, n) of all joints from those of the independent ones."""
+        return np.asarray(q @ self.matrix.T + self.offset)
+
+    def square(self, matrix: Array) -> Array:
+        """Compute Sᵀ K S (…, nv, nv)."""
+        return np.asarray(self.matrix.T @ matrix @ self.matrix)
+
+
+def mimics_of(robot: etree._Element) -> dict[str, Mimic]:
+    """Return what each joint of a URDF mimics, if it does."""
+    found = {}
+    for joint in robot.iterfind("joint"):
+        if (mimic := joint.find("mimic")) is not None:
+            factor, offset = mimic.get("multiplier") or 1.0, mimic.get("offset") or 0.0
+            said = Mimic(str(mimic.get("joint")), float(factor), float(offset))
+            found[str(joint.get("name"))] = said
+    return found
+
+
+def coupling_of(
+    mimics: Mapping[str, Mimic], names: tuple[str, ...], leaders: tuple[str, ...]
+) -> Coupling | None:
+    """Multiply chains of followers out; None if no joint follows and the order is the same.
+
+    Raises GeometryError if joints follow each other in a circle, or one that does not move.
+    """
+    if names == leaders:
+        return None
+    S, offset = np.zeros((len(names), len(leaders))), np.zeros(len(names))
+    for i, name in enumerate(names):
+        factor, way = 1.0, [name]
+        while (mimic := mimics.get(way[-1])) is not None:
+            offset[i] += factor * mimic.offset
+            factor *= mimic.multiplier
+            if mimic.leader in way:
+                raise GeometryError(f"joints mimic each other in a circle: {' → '.join(way)}.")
+            if mimic.leader not in names:
+                said = f"joint {way[-1]}: mimics {mimic.leader!r}, which is no joint that moves."
+                raise GeometryError(said)
+            way.append(mimic.leader)
+        S[i, leaders.index(way[-1])] = factor
+    return Coupling(frozen(S), frozen(offset), tuple(names.index(name) for name in leaders))
+
+
+def limits_of(coupling: Coupling, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Return the limits of φ (nv,) that keep all joints within theirs (n,)."""
+    low, high = np.full(len(coupling.leaders), -np.inf), np.full(len(coupling.leaders), np.inf)
+    for i, j in zip(*np.nonzero(coupling.matrix), strict=True):
+        factor = coupling.matrix[i, j]
+        ends = sorted((end - coupling.offset[i]) / factor for end in (lower[i], upper[i]))
+        low[j], high[j] = max(low[j], ends[0]), min(high[j], ends[1])
+    return frozen(low), frozen(high)
+
+
+Spring = float | Sequence[float]
+"""Stiffness of a spring [N m/rad], or [N/m] at a prismatic joint; or (stiffness, free angle)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """Springs of all n joints; nv of them are independent.
+
+    Attributes:
+        joints: Names of the joints in Pinocchio's order, those that follow others included.
+        stiffness: k (n,) [N m/rad], [N/m] for prismatic joints; 0: none.
+        angle: q_0 (n,) without torque [rad], [m] for prismatic joints.
+    """
+
+    joints: tuple[str, ...]
+    stiffness: Array
+    angle: Array
+    _coupling: Coupling | None = None
+
+    def torque(self, q: Array) -> Array:
+        """Compute the derivative of the energy ½ Σ k (θ − q_0)² by q (nv,) [N m]."""
+        if self._coupling is None:
+            return self.stiffness * (q - self.angle)
+        pulled = self.stiffness * (self._coupling.angles(q) - self.angle)
+        return np.asarray(pulled @ self._coupling.matrix)
+
+    @cached_property
+    def matrix(self) -> Array:
+        """Second derivative of the energy (nv, nv) [N m/rad]: diag k, or Sᵀ diag k S."""
+        K = np.diag(self.stiffness)
+        return frozen(self._coupling.square(K) if self._coupling else K)
+
+    @property
+    def given(self) -> dict[str, tuple[float, float]]:
+        """Stiffness and angle of each spring by the name of its joint."""
+        rows = zip(self.joints, self.stiffness.tolist(), self.angle.tolist(), strict=True)
+        return {name: (k, angle) for name, k, angle in rows if k or angle}
+
+    @property
+    def sprung(self) -> list[int]:
+        """Indices of the joints that have a spring."""
+        return np.flatnonzero(self.stiffness).tolist()
+
+    @cached_property
+    def rest(self) -> Array:
+        """Joint angles q (nv,) [rad] where the springs rest; 0 where there are none."""
+        if self._coupling is None:
+            return self.angle
+        S, root = self._coupling.matrix, np.sqrt(self.stiffness)
+        free = root * (self.angle - self._coupling.offset)
+        found = np.linalg.lstsq(S * root[:, None], free, rcond=None)[0]
+        return frozen(np.asarray(found, dtype=np.float64))
+
+
+def springs_of(given: object, joints: tuple[str, ...], coupling: Coupling | None) -> Springs:
+    """Check springs by the name of their joint, and return those of all ``joints``.
+
+    Raises InvalidInput, also if there is no such joint.
+    """
+    if not isinstance(given, Mapping):
+        said = f"{given!r} given; give a dict of joint names and stiffnesses [N m/rad]."
+        raise InvalidInput("springs", said)
+    k, angle = np.zeros(len(joints)), np.zeros(len(joints))
+    for name, spring in given.items():
+        j = joints.index(one_of("joint", name, joints))
+        pair = list(spring) if isinstance(spring, Sequence) else [spring, 0.0]
+        if len(pair) != 2:
+            raise InvalidInput(f"springs[{name!r}]", "give a stiffness, or (stiffness, angle).")
+        k[j], angle[j] = (scalar(f"springs[{name!r}]", each) for each in pair)
+        if fault := within("spring", k[j], zero=True):
+            raise InvalidInput(f"springs[{name!r}]", f"{fault}.")
+    return Springs(joints, frozen(k), frozen(angle), coupling)
