@@ -1,4 +1,4 @@
-"""Build the URDF of a :class:`Geometry`.
+"""Build the URDF of a :class:`Geometry`, and check it by reading it back.
 
 The links are ``base_link`` (empty), ``base_disk`` (fixed to it), ``cross{k}`` (universal joints
 only), ``link{k}`` and ``tool0`` (at the end of the last link). The joints are ``joint{k}_1`` and
@@ -17,9 +17,11 @@ import numpy as np
 from lxml import etree
 from lxml.builder import ElementMaker
 
+from cdsm.errors import GeometryError
 from cdsm.geometry import Geometry
 from cdsm.geometry.chain import Axis, Body
-from cdsm.support.files import write_text
+from cdsm.rigid_body import RigidBody
+from cdsm.support.files import write_file
 from cdsm.support.validation import instance
 from cdsm.support.values import Array
 
@@ -84,13 +86,38 @@ def inertial(mass: float, inertia: Array, *place: etree._Element) -> etree._Elem
 
 
 def write_urdf(geometry: Geometry, path: str | os.PathLike[str]) -> Path:
-    """Write the URDF of an arm, and return its path.
+    """Write the URDF of an arm, check it with two parsers, and return its path.
+
+    Pinocchio and yourdfpy read a temporary file before it replaces ``path``. They must agree on the
+    pose of the tip at the zero posture, at both limits and at random postures.
 
     Raises:
         InvalidInput: ``geometry`` is not a Geometry.
         FileError: The file cannot be written; an existing file stays unchanged.
+        GeometryError: The two parsers disagree.
     """
-    return write_text(path, to_urdf(geometry))
+    text = to_urdf(geometry)
+    return write_file(path, lambda aside: _write_and_read_back(aside, text, geometry.length))
+
+
+def _write_and_read_back(path: Path, text: str, length: float) -> None:
+    import yourdfpy  # slow to import
+
+    path.write_bytes(text.encode())
+    ours = RigidBody(text, TIP, np.zeros(3))
+    theirs = yourdfpy.URDF.load(str(path), load_meshes=False)
+    if set(ours.link_names) != set(theirs.link_map):
+        named = f"Pinocchio reads the links {ours.link_names}, yourdfpy {list(theirs.link_map)}"
+        raise GeometryError(f"{named}; the URDF is not written.")
+    random = np.random.default_rng(0).uniform(-1.0, 1.0, (2, ours.nv)) * ours.upper
+    for q in (np.zeros(ours.nv), ours.lower, ours.upper, *random):
+        theirs.update_cfg(dict(zip(ours.joint_names, q, strict=True)))
+        # only the tip: all joints move it, and yourdfpy takes long to compute the pose of a link
+        difference = abs(ours.tip(q)[0] - theirs.get_transform(TIP, "base_link")).max()
+        # rounding of rotations and lengths adds up over the joints
+        if not difference < 1e-13 * (1 + ours.nv) * max(1.0, length):
+            doubt = f"Pinocchio and yourdfpy disagree on the pose of the tip by {difference:.3g}"
+            raise GeometryError(f"{doubt} at q = {q.tolist()}; the URDF is not written.")
 
 
 def _body(geometry: Geometry, body: Body) -> etree._Element:
