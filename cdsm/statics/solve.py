@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -123,27 +122,20 @@ def settle(f: Balance, q: Array) -> tuple[Point, bool]:
 
     Returns the last point, and whether it is an equilibrium.
     """
-    here, found = _descend(f, f(q / f.unit), 1e-3 * f.k)
-    if not found:  # rarely: follow the overdamped motion instead
-        there = f.attempt(_flow(f, q / f.unit))
-        here, found = _descend(f, there, 1e-3 * f.k) if there else (here, False)
-    return here, found
+    return _descend(f, f(q / f.unit), 1e-3 * f.k)
 
 
 def continued(f: Balance, guesses: Iterable[Array], before: Array) -> Point | None:
     """Find the stable equilibrium near the angles ``before`` (nv,), as a load changes a little.
 
-    The searches begin at the points ``guesses``: Newton's method, then scipy's hybrid method.
-    Returns None if none finds one to which no joint moves by more than 0.1 rad.
+    The searches begin at the points ``guesses``. Returns None if none finds one to which no joint
+    moves by more than 0.1 rad.
     """
-    for search in (_descend, _hybrid):
-        for x in guesses:
-            try:
-                here, found = search(f, f(x), 0.0, before / f.unit)
-            except (CdsmError, np.linalg.LinAlgError, ValueError):
-                continue
-            if found:
-                return here
+    for x in guesses:
+        point = f.attempt(x)
+        here, found = _descend(f, point, 0.0, before / f.unit) if point else (None, False)
+        if found:
+            return here
     return None
 
 
@@ -219,37 +211,6 @@ def _solved(K: Array, torque: Array) -> Array:
         return np.asarray(np.linalg.solve(K, torque))
     except np.linalg.LinAlgError:
         return np.asarray(np.linalg.lstsq(K, torque, rcond=None)[0])
-
-
-def _flow(f: Balance, x: Array) -> Array:
-    """Return where the overdamped motion x′ = −f(x)/k from x ends, or is after 3000 postures."""
-    from scipy.integrate import solve_ivp  # slow to import, and rarely needed
-
-    calls = count()
-
-    def speed(_: float, x: Array) -> Array:
-        next(calls)
-        return -f(x).value / f.k
-
-    def moving(_: float, x: Array) -> float:
-        return -1.0 if next(calls) > 3000 else float(abs(f(x).value).max()) / f.k - 1e-6
-
-    moving.terminal, moving.direction = True, -1.0  # type: ignore[attr-defined]
-    options = {"events": moving, "rtol": 1e-3, "atol": 1e-5, "first_step": 1e-2}
-    try:
-        jac = {"jac": lambda _, x: -f(x).slope / f.k}
-        return np.asarray(solve_ivp(speed, (0.0, 1e6), x, "BDF", **jac, **options).y[:, -1])
-    except (CdsmError, np.linalg.LinAlgError, ValueError):
-        return x
-
-
-def _hybrid(f: Balance, here: Point, shift: float, home: Array) -> tuple[Point, bool]:
-    """Hybrid method of scipy, which stops at a step length, not at a residual."""
-    from scipy.optimize import root  # slow to import, and rarely needed
-
-    options = {"xtol": 1e-11, "factor": 0.1}
-    found = root(lambda x: f(x)[2:4], here.x, jac=True, method="hybr", options=options)
-    return _descend(f, f(found.x), shift, home)
 
 
 def equilibrium_error(
