@@ -74,7 +74,7 @@ class Balance:
         holding: Array | float = 0.0,
     ) -> None:
         arm = reference.arm
-        self._at, self._holding = at, holding
+        self.reference, self._at, self._holding = reference, at, holding
         self.unit = np.where(arm.slides, arm.length, 1.0)
         touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
         if arm.is_serpentine:
@@ -117,12 +117,15 @@ class Balance:
         return step / max(1.0, float((abs(step) / (_LONGEST + room)).max()))
 
 
-def settle(f: Balance, q: Array) -> tuple[Point, bool]:
+def settle(f: Balance, q: Array, reached: float = 0.0, load: str = "the load") -> Point:
     """Find the stable equilibrium to which the arm descends from the angles q (nv,).
 
-    Returns the last point, and whether it is an equilibrium.
+    Raises EquilibriumError, which says that the part ``reached`` of ``load`` was borne.
     """
-    return _descend(f, f(q / f.unit), 1e-3 * f.k)
+    here, found = _descend(f, f(q / f.unit), 1e-3 * f.k)
+    if not found:
+        raise _not_found(f.reference, here, reached, load)
+    return here
 
 
 def continued(f: Balance, guesses: Iterable[Array], before: Array) -> Point | None:
@@ -213,10 +216,8 @@ def _solved(K: Array, torque: Array) -> Array:
         return np.asarray(np.linalg.lstsq(K, torque, rcond=None)[0])
 
 
-def equilibrium_error(
-    reference: Posture, point: Point, reached: float, load: str = "the load"
-) -> EquilibriumError:
-    """Return the error of a search that ended at ``point``, beyond the part ``reached`` of a load.
+def _not_found(reference: Posture, point: Point, reached: float, load: str) -> EquilibriumError:
+    """Return the error of a search that ended at ``point``.
 
     It names the joint with the largest residual torque, and a cable of which two sites meet there.
     """
