@@ -14,8 +14,6 @@ from cdsm.stiffness_matrix.value import FLAT, REGULAR, UNMOVED
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 
-_CLEAR = 1e3 * REGULAR
-
 INVERSE = ("along", "compliance", "cartesian")
 """Readings of K_θ⁻¹."""
 
@@ -28,8 +26,7 @@ def read(
     Args:
         names: Any of ``margin``, ``along``, ``compliance``, ``cartesian``, ``pseudoinverse``.
         K: K_θ (N, nv, nv).
-        parts: Sum of the magnitudes of its terms (N, nv, nv). Of their diagonals alone (N, nv), all
-            that is not clearly regular is called singular.
+        parts: Sum of the magnitudes of its terms (N, nv, nv).
         jacobian: J_X (N, 6, nv).
         directions: Unit vectors u (D, 3) of ``along``.
     """
@@ -68,13 +65,12 @@ def read(
 
 def _inverse(K: Array, parts: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return K_θ⁻¹ and where it does not exist; there it is NaN."""
-    clear = parts.ndim == 2
-    D = parts if clear else np.diagonal(parts, axis1=1, axis2=2)
+    D = np.diagonal(parts, axis1=1, axis2=2)
     with np.errstate(all="ignore"):
         scale = 1.0 / np.sqrt(D)
         both = scale[:, :, None] * scale[:, None]
         A = K * both
-        least = np.full(len(K), _CLEAR) if clear else REGULAR * (parts * both).max(axis=(1, 2))
+        least = REGULAR * (parts * both).max(axis=(1, 2))
         try:
             inverse = np.linalg.inv(A)
         except np.linalg.LinAlgError:  # at least one of them is singular to the last bit
@@ -84,7 +80,7 @@ def _inverse(K: Array, parts: Array) -> tuple[Array, NDArray[np.bool_]]:
         # 1/|A⁻¹| is a lower bound of the smallest singular value of A
         singular = ~(least * np.sqrt((inverse**2).sum(axis=(1, 2))) < 1.0)
     regular = np.flatnonzero(singular & (D.min(axis=1) > 0.0))
-    if regular.size and not clear:
+    if regular.size:
         values = np.linalg.svd(A[regular], compute_uv=False)[:, -1]
         singular[regular] = ~(values > least[regular])
     inverse[singular] = np.nan
