@@ -17,8 +17,8 @@ from cdsm.batch.quantities import (
     TERMS,
     Codes,
     joint_axes,
+    read,
 )
-from cdsm.batch.readings import read
 from cdsm.batch.rows import Body, Pose, one_by_one, rows_of, side_by_side
 from cdsm.errors import CdsmError
 from cdsm.manipulator import LIMIT_SLACK

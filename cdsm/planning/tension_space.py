@@ -24,7 +24,7 @@ from cdsm.errors import ElasticityRangeError, InfeasibleTension, SingularStiffne
 from cdsm.planning.gradient import form_by_tension
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.stiffness_matrix.instability import verdict
+from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.validation import SMALLEST, instance
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, advice, distribute_tension, too_few_cables

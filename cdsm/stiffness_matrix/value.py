@@ -17,7 +17,7 @@ import numpy as np
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
-from cdsm.stiffness_matrix.instability import Remedy, find_remedies, verdict
+from cdsm.stiffness_matrix.prints import Remedy, find_remedies, verdict
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.format import coordinates, plain
 from cdsm.support.result import Result, quantity, unit
