@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Final, Literal, final
 
 import numpy as np
@@ -30,8 +31,22 @@ _STIFFER: Final = ((10.0, 100.0, 1000.0),)  # few, since λ rises with s
 _MORE_OR_LESS: Final = np.geomspace(1.0, 100.0, 21)[1:], np.geomspace(1.0, 1e-3, 31)[1:]
 
 
-def existing(read: Callable[[], object]) -> object:
-    """Return a reading of a stiffness, or None if it does not exist."""
+def readings(K: Stiffness) -> dict[str, object]:
+    """Return what the JSON of a stiffness has besides its fields; None for what does not exist."""
+    return {
+        "tip_position_m": K.posture.tip[:3, 3],
+        "cable_length_m": K.posture.cable_lengths,
+        "model": model_of(K),
+        "along_N_per_m": [_existing(partial(K.along, u)) for u in "xyz"],
+        "cartesian_N_per_m": _existing(lambda: K.cartesian),
+        "pseudoinverse_N_per_m": _existing(K.pseudoinverse),
+        "compliance": _existing(lambda: K.compliance),
+        "stable": K.is_stable,
+        "remedies": {each.change: each.factor for each in K.remedies},
+    }
+
+
+def _existing(read: Callable[[], object]) -> object:
     with suppress(SingularStiffness):
         return read()
     return None
@@ -65,7 +80,7 @@ def notes(K: Stiffness) -> tuple[str, ...]:
         _ = K.cartesian
     except SingularStiffness as error:
         missing = ["-: K_θ is singular, the arm is about to buckle"]
-        if existing(lambda: K.compliance) is not None:
+        if _existing(lambda: K.compliance) is not None:
             fixed = f"inf, -: the tip cannot move along {axis_of(error.direction)}"
             missing = [f"{fixed}; cartesian: in the plane of other axes"]
     state, unit = "stable" if K.is_stable else "UNSTABLE", K.posture.arm.stiffness_unit()
