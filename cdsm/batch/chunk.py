@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
@@ -32,7 +30,6 @@ if TYPE_CHECKING:
     from cdsm.batch.solution import Rows
 
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
-_Result = TypeVar("_Result")
 
 _LOST = (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES)
 _NO_TENSION = (*_LOST, Status.INFEASIBLE, Status.SOLVER_FAILED)
@@ -51,10 +48,9 @@ class Chunk:
         width: int,
         status: Codes,
         memory: dict[str, Array],
-        turn: threading.Lock,
     ) -> None:
         self._rows, self._kernels, self._part, self._status = rows, kernels, part, status
-        self._memory, self._turn = memory, turn
+        self._memory = memory
         self._table, self._names = rows_of(rows.arm), set(rows.names)
         self._q = rows.q[part]
         self._width = width if kernels.COMPILED else len(self._q)
@@ -69,7 +65,7 @@ class Chunk:
         every = table.coupling.angles(self._q) if table.coupling else self._q
         W, q = self._lanes(rows.wrench), side_by_side(every[:, table.order], self._width)
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
-        self._aside(self._kernels.pose, table.arm, self._body(), q, W, at)
+        self._kernels.pose(table.arm, self._body(), q, W, at)
         if rows.arm.has_springs:
             at.torque[...] -= self._joint_springs() * (q - table.free[:, None])
         full, at = at, self._reduced(at)
@@ -108,21 +104,18 @@ class Chunk:
         )
 
     def _of_posture(self, at: Pose) -> dict[str, Array]:
-        count = len(self._q)
-
-        def tip() -> Array:  # from the columns of the rotation, and the position
-            pose = np.zeros((count, 4, 4))
-            pose[:, :3], pose[:, 3, 3] = self._alone(at.tip).swapaxes(1, 2), 1.0
-            return pose
-
-        makers: dict[str, Callable[[], Array]] = {
-            "tip": tip,
-            "jacobian": lambda: self._jacobian(at),
-            "cable_lengths": lambda: self._alone(at.length),
-            "length_jacobian": lambda: self._alone(at.jacobian),
-            "gravity_torque": lambda: self._alone(at.gravity),
+        found = {
+            "cable_lengths": self._alone(at.length),
+            "gravity_torque": self._alone(at.gravity),
         }
-        return {name: make() for name, make in makers.items() if name in self._names}
+        if "tip" in self._names:  # from the columns of the rotation, and the position
+            found["tip"] = pose = np.zeros((len(self._q), 4, 4))
+            pose[:, :3], pose[:, 3, 3] = self._alone(at.tip).swapaxes(1, 2), 1.0
+        if "jacobian" in self._names:
+            found["jacobian"] = self._jacobian(at)
+        if "length_jacobian" in self._names:
+            found["length_jacobian"] = self._alone(at.jacobian)
+        return found
 
     def _tensions(self, at: Pose) -> Array:
         """Return F (B, C, W): given, distributed, or 0 if nothing that is asked for depends on it.
@@ -137,7 +130,7 @@ class Chunk:
         low, high = map(self._lanes, rows.bounds)
         F, good = np.empty(shape), np.zeros((shape[0], shape[2]), dtype=np.bool_)
         if len(self._table.arm.pairs):
-            self._aside(self._kernels.guess, self._table.arm, at, low, high, F, good)
+            self._kernels.guess(self._table.arm, at, low, high, F, good)
         for n in np.flatnonzero(~self._alone(good) & (status == Status.OK)):
             b, w = divmod(int(n), self._width)
             row = at.jacobian[b, ..., w], at.torque[b, :, w], low[b, :, w], high[b, :, w]
@@ -157,7 +150,7 @@ class Chunk:
         found["joint"] = terms.sum(axis=1)
         if wanted:
             K, parts = found["joint"][fine], abs(terms[fine]).sum(axis=1)
-            read_off, codes = self._aside(read, wanted, K, parts, self._jacobian(at)[fine], u)
+            read_off, codes = read(wanted, K, parts, self._jacobian(at)[fine], u)
             for name, value in read_off.items():
                 found[name] = np.full((len(status), *value.shape[1:]), np.nan)
                 found[name][fine] = value
@@ -178,7 +171,7 @@ class Chunk:
             shape, moment = (len(F), len(u), self._width), bool(W[:, 3:].any())
             along, pivot = np.empty(shape), np.empty(shape[::2])
             kernel = self._kernels.along
-            self._aside(kernel, K, size, at.tip_jacobian, u, moment, along, pivot)
+            kernel(K, size, at.tip_jacobian, u, moment, along, pivot)
             if not (self._alone(pivot)[fine] > _PIVOT).all():
                 return None
             found["along"] = self._alone(along)
@@ -188,7 +181,7 @@ class Chunk:
         """Compute the terms (B, 4, nv, nv, W) of K_θ without springs, or 1: their sum."""
         B, nv, _ = at.gravity.shape
         K, size = self._empty("K", B, count, nv, nv), self._empty("size", B, nv)
-        self._aside(self._kernels.stiffness, self._table.arm, at, F, k, W, K, size)
+        self._kernels.stiffness(self._table.arm, at, F, k, W, K, size)
         return K, size
 
     def _joint_springs(self) -> Array:
@@ -227,14 +220,6 @@ class Chunk:
         )
         lost = np.isin(status, kinds)
         return np.where(lost.reshape(-1, *[1] * (value.ndim - 1)), np.nan, value)
-
-    def _aside(self, function: Callable[..., _Result], *arguments: object) -> _Result:
-        """Compute while another thread has its turn at the small calls of numpy in between."""
-        self._turn.release()
-        try:
-            return function(*arguments)
-        finally:
-            self._turn.acquire()
 
     def _empty(self, name: str, blocks: int, *shape: int) -> Array:
         """Return memory that the next chunk uses again: fresh pages cost as much as kernels."""

@@ -57,7 +57,7 @@ def compile_ahead() -> None:
     import cdsm
     from cdsm import kernels
 
-    arm, turn = cdsm.presets.virtual_prototype(), threading.Lock()
+    arm = cdsm.presets.virtual_prototype()
     F = np.full((1, len(arm.cables)), 50.0)
     rows = Rows(
         arm=arm,
@@ -67,8 +67,8 @@ def compile_ahead() -> None:
         bounds=(F, np.full_like(F, np.inf)),
         directions=np.eye(3),
     )
-    with turn, np.errstate(all="ignore"):
-        Chunk(rows, kernels, slice(1), 1, np.zeros(1, np.uint8), {}, turn).quantities()
+    with np.errstate(all="ignore"):
+        Chunk(rows, kernels, slice(1), 1, np.zeros(1, np.uint8), {}).quantities()
 
 
 @cache
@@ -156,13 +156,12 @@ class Rows:
         shapes = shapes_of(arm.nv, len(arm.cables), len(self.directions))
         values = {name: np.empty((count, *shapes[name])) for name in self.names}
 
-        # to pass on the interpreter's lock at each small call would take longer than the call
-        scratch, turn = threading.local(), threading.Lock()
+        scratch = threading.local()
 
         def fill(part: slice) -> None:
             memory = scratch.__dict__.setdefault("of", {})
-            with turn, np.errstate(all="ignore"):
-                found = Chunk(self, kernels, part, width, status[part], memory, turn).quantities()
+            with np.errstate(all="ignore"):
+                found = Chunk(self, kernels, part, width, status[part], memory).quantities()
             for name in self.names:
                 values[name][part] = found[name]
 
