@@ -25,7 +25,7 @@ from cdsm.control.run import Outcome, TrackingRun
 from cdsm.control.sensors import Sensors
 from cdsm.control.stiffness_loop import StiffnessLoop, reference_at
 from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, listed
-from cdsm.friction.band import half_width
+from cdsm.friction.stick import half_width
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
 from cdsm.posture import Posture
