@@ -148,22 +148,20 @@ class WeightTest(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences if, without the weight, the arm leaves its reference, or is not stable."""
-        moved, said = f"by {coordinates(1e3 * self.unloaded.displacement)} mm", list[str]()
-        if self.left_reference and self.history is None:
-            said += [
-                "LEFT ITS REFERENCE: before the weight the arm did not stay there; the tip moved "
-                f"{moved}, from where all this is measured"
-            ]
-        elif self.left_reference and self.history is not None:
-            said += [
-                "LEFT ITS REFERENCE: without friction the arm does not stay there before the "
-                f"weight; its tip moves {moved}, from where all that is linear or frictionless is "
-                "measured. With friction it moves by "
-                f"{coordinates(1e3 * self.history.displacement[0])} mm"
-            ]
+        said, history = list[str](), self.history
+        if self.left_reference:
+            moved = coordinates(1e3 * self.unloaded.displacement)
+            without = "without friction " if history else ""
+            left = (
+                f"before the weight the arm did not stay there; {without}its tip moved by {moved} "
+            )
+            left += f"mm, from where all that is {without or 'shown '}is measured"
+            if history:
+                left += f"; with friction by {coordinates(1e3 * history.displacement[0])} mm"
+            said.append(f"LEFT ITS REFERENCE: {left}")
         if not self.unloaded.stable:
             said.append("NEUTRAL: before the weight, not every joint is brought back")
-        return (*said, *(self.history.warnings if self.history else ()))
+        return (*said, *(history.warnings if history else ()))
 
     def plot(self) -> Figure:
         """Plot load [N] against tip displacement [mm], and the tension of each cable [N]."""
