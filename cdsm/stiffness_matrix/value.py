@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 Friction = Literal["frictionless", "stuck", "sliding"]
 Term = Literal["active", "passive", "gravity", "load", "springs", "joint"]
+Joints = slice | NDArray[np.intp]
 
 REGULAR = 1e-8  # least relative singular value of K_θ; its inverse has 6 correct digits there
 FLAT = 1e-6  # least relative singular value of J_v; a 3×3 stiffness has 4 correct digits there
@@ -191,7 +192,7 @@ class Stiffness(Result):
     def _inverse(self) -> Array:
         return self._inverse_of(slice(None))
 
-    def _inverse_of(self, joints: slice | NDArray[np.intp]) -> Array:
+    def _inverse_of(self, joints: Joints) -> Array:
         """K_θ⁻¹ (n, n) of n joints, all others held; or SingularStiffness with the motion."""
         K, P = (matrix[joints][:, joints] for matrix in (self.joint, self._magnitudes))
         D = P.diagonal()
@@ -230,9 +231,7 @@ class Stiffness(Result):
             raise SingularStiffness(said, u)
         return B / S, V[: len(U)]
 
-    def _along(
-        self, u: Array, joints: slice | NDArray[np.intp] = slice(None)
-    ) -> tuple[float, Array]:
+    def _along(self, u: Array, joints: Joints = slice(None)) -> tuple[float, Array]:
         """Return stiffness along a unit vector u [N/m] and motion of the joints per force (n,)."""
         torque = (u @ self.posture.jacobian[:3])[joints]
         if not self._moves(torque):
@@ -256,9 +255,8 @@ class Stiffness(Result):
     def shares(self, direction: Direction) -> Shares:
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
-        If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity, load and springs, and so is along(u). SingularStiffness also if
-        it is inf.
+        If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ, and K_θ
+        is a sum over cables, gravity, load and springs. SingularStiffness also if it is inf.
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)
@@ -291,10 +289,7 @@ class Stiffness(Result):
         return self
 
     def plot(self) -> Figure:
-        """Plot the arm in mm and, if it is stable, the compliance at its tip as an ellipsoid.
-
-        Cables are coloured by tension if :attr:`distribution` is given.
-        """
+        """Plot the arm in mm, coloured by distributed tension; if stable, its compliance too."""
         return self.posture.plot(self.distribution, self)
 
     def to_dict(self) -> dict[str, object]:
