@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
@@ -17,20 +15,21 @@ from cdsm.batch.quantities import (
     TERMS,
     Codes,
     joint_axes,
+    read,
 )
-from cdsm.batch.readings import read
 from cdsm.batch.rows import Body, Pose, one_by_one, rows_of, side_by_side
-from cdsm.batch.search import explained, search
+from cdsm.errors import CdsmError
 from cdsm.manipulator import LIMIT_SLACK
 from cdsm.routing import SHORTEST_SEGMENT
 from cdsm.support.status import Status
 from cdsm.support.values import Array, frozen
+from cdsm.tension.infeasibility import is_infeasible
+from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve
 
 if TYPE_CHECKING:
     from cdsm.batch.solution import Rows
 
 _Scalar = TypeVar("_Scalar", np.float64, np.bool_)
-_Result = TypeVar("_Result")
 
 _LOST = (Status.BEYOND_LIMITS, Status.COINCIDENT_SITES)
 _NO_TENSION = (*_LOST, Status.INFEASIBLE, Status.SOLVER_FAILED)
@@ -49,10 +48,9 @@ class Chunk:
         width: int,
         status: Codes,
         memory: dict[str, Array],
-        turn: threading.Lock,
     ) -> None:
         self._rows, self._kernels, self._part, self._status = rows, kernels, part, status
-        self._memory, self._turn = memory, turn
+        self._memory = memory
         self._table, self._names = rows_of(rows.arm), set(rows.names)
         self._q = rows.q[part]
         self._width = width if kernels.COMPILED else len(self._q)
@@ -67,7 +65,7 @@ class Chunk:
         every = table.coupling.angles(self._q) if table.coupling else self._q
         W, q = self._lanes(rows.wrench), side_by_side(every[:, table.order], self._width)
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
-        self._aside(self._kernels.pose, table.arm, self._body(), q, W, at)
+        self._kernels.pose(table.arm, self._body(), q, W, at)
         if rows.arm.has_springs:
             at.torque[...] -= self._joint_springs() * (q - table.free[:, None])
         full, at = at, self._reduced(at)
@@ -106,21 +104,18 @@ class Chunk:
         )
 
     def _of_posture(self, at: Pose) -> dict[str, Array]:
-        count = len(self._q)
-
-        def tip() -> Array:  # from the columns of the rotation, and the position
-            pose = np.zeros((count, 4, 4))
-            pose[:, :3], pose[:, 3, 3] = self._alone(at.tip).swapaxes(1, 2), 1.0
-            return pose
-
-        makers: dict[str, Callable[[], Array]] = {
-            "tip": tip,
-            "jacobian": lambda: _jacobian(at, np.arange(count)),
-            "cable_lengths": lambda: self._alone(at.length),
-            "length_jacobian": lambda: self._alone(at.jacobian),
-            "gravity_torque": lambda: self._alone(at.gravity),
+        found = {
+            "cable_lengths": self._alone(at.length),
+            "gravity_torque": self._alone(at.gravity),
         }
-        return {name: make() for name, make in makers.items() if name in self._names}
+        if "tip" in self._names:  # from the columns of the rotation, and the position
+            found["tip"] = pose = np.zeros((len(self._q), 4, 4))
+            pose[:, :3], pose[:, 3, 3] = self._alone(at.tip).swapaxes(1, 2), 1.0
+        if "jacobian" in self._names:
+            found["jacobian"] = self._jacobian(at)
+        if "length_jacobian" in self._names:
+            found["length_jacobian"] = self._alone(at.jacobian)
+        return found
 
     def _tensions(self, at: Pose) -> Array:
         """Return F (B, C, W): given, distributed, or 0 if nothing that is asked for depends on it.
@@ -135,82 +130,58 @@ class Chunk:
         low, high = map(self._lanes, rows.bounds)
         F, good = np.empty(shape), np.zeros((shape[0], shape[2]), dtype=np.bool_)
         if len(self._table.arm.pairs):
-            self._aside(self._kernels.guess, self._table.arm, at, low, high, F, good)
+            self._kernels.guess(self._table.arm, at, low, high, F, good)
         for n in np.flatnonzero(~self._alone(good) & (status == Status.OK)):
             b, w = divmod(int(n), self._width)
-            at_row = at.jacobian[b, ..., w], at.torque[b, :, w], low[b, :, w], high[b, :, w]
-            F[b, :, w], status[n] = search(rows.arm, *at_row)
-            if status[n] == Status.SOLVER_FAILED and rows.body is None:
-                wrench = rows.wrench[(self._part.start + n) % len(rows.wrench)]
-                F[b, :, w], status[n] = explained(rows.arm, self._q[n], *at_row[2:], wrench)
+            row = at.jacobian[b, ..., w], at.torque[b, :, w], low[b, :, w], high[b, :, w]
+            F[b, :, w], status[n] = _least(nondimensional(*row, rows.arm.length))
         return F
 
     def _of_stiffness(self, full: Pose, at: Pose, F: Array, k: Array, W: Array) -> dict[str, Array]:
         """Compute K_θ, its terms if they are needed, and what is read off it."""
         names, status, u = self._names, self._status, self._rows.directions
-        wanted, fine = names & set(READINGS), np.flatnonzero(status == Status.OK)
-        apart = self._table.reduction is not None or not names.isdisjoint(TERMS)
-        K, size = self._terms(full, F, k, W, apart=apart)
-        found: dict[str, Array] = {}
-        if apart:
-            terms = self._with_springs(self._alone(K))
-            found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
-            found["joint"], parts = terms.sum(axis=1), abs(terms).sum(axis=1)
-        elif self._kernels.COMPILED and wanted == {"along"}:
-            if "joint" in names:
-                found["joint"] = self._alone(K[:, 0]).copy()
-            shape = len(F), len(u), self._width
-            along, pivot, moment = np.empty(shape), np.empty(shape[::2]), bool(W[:, 3:].any())
-            # a copy is writable, whatever u is: the kernel compiles once
-            kernel = self._kernels.along
-            self._aside(kernel, K, size, at.tip_jacobian, u.copy(), moment, along, pivot)
-            found["along"] = self._alone(along)
-            self._read_anew(fine[~(self._alone(pivot)[fine] > _PIVOT)], wanted, at, F, k, W, found)
-            return found
-        else:
-            found["joint"], parts = self._alone(K[:, 0]).copy(), self._alone(size)
-        if not wanted:
-            return found
-        of_tip = _jacobian(at, fine)
-        read_off, codes = self._aside(read, wanted, found["joint"][fine], parts[fine], of_tip, u)
-        for name, value in read_off.items():
-            found[name] = np.full((len(status), *value.shape[1:]), np.nan)
-            found[name][fine] = value
-        status[fine] = codes
-        if not apart:
-            self._read_anew(fine[codes == Status.SINGULAR], wanted, at, F, k, W, found)
+        wanted, fine = names & set(READINGS), status == Status.OK
+        if self._kernels.COMPILED and self._table.reduction is None:
+            simple = names.isdisjoint(TERMS) and wanted <= {"along"}
+            if simple and (found := self._along(at, F, k, W, fine)) is not None:
+                return found
+        terms = self._with_springs(self._alone(self._terms(full, F, k, W, 4)[0]))
+        found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
+        found["joint"] = terms.sum(axis=1)
+        if wanted:
+            K, parts = found["joint"][fine], abs(terms[fine]).sum(axis=1)
+            read_off, codes = read(wanted, K, parts, self._jacobian(at)[fine], u)
+            for name, value in read_off.items():
+                found[name] = np.full((len(status), *value.shape[1:]), np.nan)
+                found[name][fine] = value
+            status[fine] = codes
         return found
 
-    def _read_anew(
-        self,
-        rows: NDArray[np.intp],
-        wanted: set[str],
-        at: Pose,
-        F: Array,
-        k: Array,
-        W: Array,
-        found: dict[str, Array],
-    ) -> None:
-        """Fill what is ``wanted`` in ``rows`` that may be singular, which their terms decide."""
-        if not rows.size:
-            return
-        *pose, F, k, W = (self._picked(x, rows) for x in (*at, F, k, W))
-        some = Pose(*pose)
-        terms = one_by_one(self._terms(some, F, k, W, apart=True)[0], rows.size)
-        terms, of_tip = self._with_springs(terms, rows), _jacobian(some, np.arange(rows.size))
-        parts, u = abs(terms).sum(axis=1), self._rows.directions
-        read_off, self._status[rows] = read(wanted, terms.sum(axis=1), parts, of_tip, u)
-        for name, value in read_off.items():
-            found[name][rows] = value
-
-    def _terms(self, at: Pose, F: Array, k: Array, W: Array, *, apart: bool) -> tuple[Array, Array]:
-        B, nv, _ = at.gravity.shape
-        K = self._empty("K", B, 4 if apart else 1, nv, nv)
-        size = self._empty("size", B, nv)
-        self._aside(self._kernels.stiffness, self._table.arm, at, F, k, W, K, size)
-        if self._rows.arm.has_springs and not apart:
-            K[:, 0, range(nv), range(nv)] += self._joint_springs()
+    def _along(
+        self, at: Pose, F: Array, k: Array, W: Array, fine: NDArray[np.bool_]
+    ) -> dict[str, Array] | None:
+        """Compute K_θ and ``along`` without the terms; None if one row may be singular."""
+        K, size = self._terms(at, F, k, W, 1)
+        if self._rows.arm.has_springs:
+            K[:, 0, range(K.shape[2]), range(K.shape[2])] += self._joint_springs()
             size += self._joint_springs()
+        found = {"joint": self._alone(K[:, 0]).copy()} if "joint" in self._names else {}
+        if "along" in self._names:
+            u = self._rows.directions.copy()  # writable, whatever u is: the kernel compiles once
+            shape, moment = (len(F), len(u), self._width), bool(W[:, 3:].any())
+            along, pivot = np.empty(shape), np.empty(shape[::2])
+            kernel = self._kernels.along
+            kernel(K, size, at.tip_jacobian, u, moment, along, pivot)
+            if not (self._alone(pivot)[fine] > _PIVOT).all():
+                return None
+            found["along"] = self._alone(along)
+        return found
+
+    def _terms(self, at: Pose, F: Array, k: Array, W: Array, count: int) -> tuple[Array, Array]:
+        """Compute the terms (B, 4, nv, nv, W) of K_θ without springs, or 1: their sum."""
+        B, nv, _ = at.gravity.shape
+        K, size = self._empty("K", B, count, nv, nv), self._empty("size", B, nv)
+        self._kernels.stiffness(self._table.arm, at, F, k, W, K, size)
         return K, size
 
     def _joint_springs(self) -> Array:
@@ -223,15 +194,14 @@ class Chunk:
         k = self._rows.joint_springs
         return None if k is None else k[self._part][:, self._table.order]
 
-    def _with_springs(self, terms: Array, rows: NDArray[np.intp] | None = None) -> Array:
-        """Return the terms (n, 4 or 5, nv, nv) of K_θ, from the kernels' of some ``rows``."""
+    def _with_springs(self, terms: Array) -> Array:
+        """Return the terms (n, 4 or 5, nv, nv) of K_θ, from those of the kernels."""
         if (S := self._table.reduction) is not None:
             terms = S.T @ terms @ S
         if not self._rows.arm.has_springs and "springs" not in self._names:
             return terms
         springs = self._table.springs[None]
         if (k := self._own_springs()) is not None:
-            k = k if rows is None else k[rows]
             S = np.eye(k.shape[1]) if S is None else S
             springs = S.T @ (k[:, :, None] * S)
         springs = np.broadcast_to(springs[:, None], (len(terms), 1, *terms.shape[2:]))
@@ -250,14 +220,6 @@ class Chunk:
         )
         lost = np.isin(status, kinds)
         return np.where(lost.reshape(-1, *[1] * (value.ndim - 1)), np.nan, value)
-
-    def _aside(self, function: Callable[..., _Result], *arguments: object) -> _Result:
-        """Compute while another thread has its turn at the small calls of numpy in between."""
-        self._turn.release()
-        try:
-            return function(*arguments)
-        finally:
-            self._turn.acquire()
 
     def _empty(self, name: str, blocks: int, *shape: int) -> Array:
         """Return memory that the next chunk uses again: fresh pages cost as much as kernels."""
@@ -281,13 +243,19 @@ class Chunk:
     def _alone(self, x: NDArray[_Scalar]) -> NDArray[_Scalar]:
         return one_by_one(x, len(self._q))
 
-    def _picked(self, x: Array, rows: NDArray[np.intp]) -> Array:
-        b, w = np.divmod(rows, self._width)
-        return side_by_side(x[b, ..., w], self._width)
+    def _jacobian(self, at: Pose) -> Array:
+        """Return J_X (n, 6, nv), in the kernels' order of joints."""
+        J = self._alone(at.tip_jacobian).swapaxes(2, 3)
+        return np.ascontiguousarray(J).reshape(len(J), 6, -1)
 
 
-def _jacobian(at: Pose, rows: NDArray[np.intp]) -> Array:
-    """Return J_X (n, 6, nv) of some rows, in the kernels' order of joints."""
-    b, w = np.divmod(rows, at.shortest.shape[1])
-    both = np.ascontiguousarray(at.tip_jacobian[b, ..., w].swapaxes(2, 3))
-    return both.reshape(len(rows), 6, at.gravity.shape[1])
+def _least(problem: Problem) -> tuple[Array, Status]:
+    """Return the least tensions F (C,) [N] and OK, or the reason why there are none."""
+    try:
+        x = solve(problem, DEFAULT_SOLVER)
+        if not isinstance(x, str):
+            return x * problem.force, Status.OK
+        failed = Status.INFEASIBLE if is_infeasible(problem) else Status.SOLVER_FAILED
+    except CdsmError:  # a solver broke down
+        failed = Status.SOLVER_FAILED
+    return problem.low * problem.force, failed

@@ -10,8 +10,13 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.batch.distribution import Tensions
-from cdsm.batch.inputs import checked_threads, given_tension, given_wrench, postures
+from cdsm.batch.distribution import (
+    Tensions,
+    checked_threads,
+    given_tension,
+    given_wrench,
+    postures,
+)
 from cdsm.batch.quantities import DIMENSIONS, OF_POSTURE, Codes, OfPostures
 from cdsm.batch.solution import Rows
 from cdsm.errors import InvalidInput, unknown

@@ -22,7 +22,7 @@ import numpy as np
 
 from cdsm.batch.chunk import Chunk
 from cdsm.batch.quantities import Codes, shapes_of
-from cdsm.batch.rows import ArmRows, Body, Pose, rows_of
+from cdsm.batch.rows import ArmRows, Body, rows_of
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array
 
@@ -55,19 +55,20 @@ def kernels_for(arm: ArmRows, count: int) -> ModuleType:
 def compile_ahead() -> None:
     """Compile all kernels, unless numba has kept them on disk."""
     import cdsm
-
-    arm = rows_of(cdsm.presets.virtual_prototype())
-    nv, C, W = len(arm.order), len(arm.arm.pulls), 1
     from cdsm import kernels
 
-    at = Pose(*(np.empty((1, *shape, W)) for shape in arm.shapes.values()))
-    q, wrench = np.zeros((1, nv, W)), np.zeros((1, 6, W))
-    F, K, size = np.ones((1, C, W)), np.empty((1, 1, nv, nv, W)), np.empty((1, nv, W))
-    kernels.pose(arm.arm, arm.body(W), q, wrench, at)
-    kernels.guess(arm.arm, at, F, 2.0 * F, np.empty_like(F), np.empty((1, W), dtype=np.bool_))
-    kernels.stiffness(arm.arm, at, F, F, wrench, K, size)
-    u, out = np.eye(3), np.empty((1, 3, W))
-    kernels.along(K, size, at.tip_jacobian, u, False, out, np.empty((1, W)))
+    arm = cdsm.presets.virtual_prototype()
+    F = np.full((1, len(arm.cables)), 50.0)
+    rows = Rows(
+        arm=arm,
+        q=np.full((1, arm.nv), 0.1),
+        wrench=np.zeros((1, 6)),
+        names=("along",),
+        bounds=(F, np.full_like(F, np.inf)),
+        directions=np.eye(3),
+    )
+    with np.errstate(all="ignore"):
+        Chunk(rows, kernels, slice(1), 1, np.zeros(1, np.uint8), {}).quantities()
 
 
 @cache
@@ -155,13 +156,12 @@ class Rows:
         shapes = shapes_of(arm.nv, len(arm.cables), len(self.directions))
         values = {name: np.empty((count, *shapes[name])) for name in self.names}
 
-        # to pass on the interpreter's lock at each small call would take longer than the call
-        scratch, turn = threading.local(), threading.Lock()
+        scratch = threading.local()
 
         def fill(part: slice) -> None:
             memory = scratch.__dict__.setdefault("of", {})
-            with turn, np.errstate(all="ignore"):
-                found = Chunk(self, kernels, part, width, status[part], memory, turn).quantities()
+            with np.errstate(all="ignore"):
+                found = Chunk(self, kernels, part, width, status[part], memory).quantities()
             for name in self.names:
                 values[name][part] = found[name]
 

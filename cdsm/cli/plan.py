@@ -221,7 +221,7 @@ def design(
     The folder gets the Pareto front as table and figure, and the arm with its files. A deflection
     is how far the load moves the tip, to first order, with motors that are locked before it acts.
     """
-    from cdsm.batch.inputs import checked_threads
+    from cdsm.batch.distribution import checked_threads
     from cdsm.design.problem_file import read_problem
     from cdsm.design.search import require_smooth
     from cdsm.support.files import make_folder, write_text

@@ -30,7 +30,7 @@ from cdsm.control.plants import (
 from cdsm.control.run import Outcome, TrackingRun
 from cdsm.control.sensing import Observer, Sensors
 from cdsm.errors import CdsmError, ElasticityRangeError, EquilibriumError, InvalidInput, listed
-from cdsm.friction.band import half_width
+from cdsm.friction.stick import half_width
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_change
 from cdsm.planning.path_plan import PathPlan

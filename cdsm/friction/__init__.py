@@ -7,5 +7,5 @@ bending stiffness of the strand, and one coefficient for static and kinetic fric
 coefficient to see what may stick, and the kinetic one to see what slides.
 """
 
-from cdsm.friction.band import RestBand as RestBand
 from cdsm.friction.stick import Breakaway as Breakaway
+from cdsm.friction.stick import RestBand as RestBand

@@ -1,16 +1,23 @@
-"""Tensions, slips and tangent of cables at a posture; each cable is a chain of segments."""
+"""Tensions, slips, tangent and stiffness of cables at a posture: chains of segments."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
+from cdsm.posture import Posture
 from cdsm.routing import Indices
-from cdsm.support.values import Array
+from cdsm.segments import STRAIGHT
+from cdsm.stiffness_matrix import Friction, Stiffness, assemble
+from cdsm.support.values import Array, frozen
+from cdsm.tension import Tension
 from cdsm.wires.elasticity import Elasticity
+
+Flags = NDArray[np.bool_]
 
 _STEPS = 60  # most Newton steps: linear laws need one, strands 3 to 6
 _UNDAMPED = 20  # full Newton steps; later ones are shortened, since full ones may cycle at a kink
@@ -179,3 +186,56 @@ def chain_tangent(
     free[block[start[:-1][forced]]] = False
     common = np.where(free, 1.0 / np.where(free, total, 1.0), 0.0)[:, None] * pull
     return np.asarray(T[:, None] * (common[block] + psi))
+
+
+def can_stick(pose: Posture) -> Flags:
+    """Return in which holes a cable can stick (P,): those with friction where the cable bends."""
+    segments = pose.segments
+    return np.asarray((segments.chains.friction > 0.0) & (segments.wrap > STRAIGHT))
+
+
+def assemble_segments(
+    pose: Posture,
+    tension: Array,
+    sliding: Flags,
+    wrench: Array,
+    friction: Friction,
+    distribution: Tension | None = None,
+) -> Stiffness:
+    """Compute the stiffness from checked tensions T (S,) [N] of the segments.
+
+    ``sliding`` (P,) marks the holes in which cables slide. Raises ElasticityRangeError if a tension
+    is outside the domain of its law.
+    """
+    segments, laws = pose.segments, pose.segments.chains.laws
+    chains, length = segments.chains, segments.lengths
+    k = laws.stiffness(length, tension)
+    # (1 + ε) of the wire: the spring in series is part of the length
+    rest_length = laws.original_lengths(length, tension)
+    stretch = (length - laws.series * (tension - laws.rest)) / rest_length
+    compliance = np.divide(1.0, k * stretch, out=np.zeros_like(k), where=k > 0.0)
+    slides = np.zeros(length.size, dtype=np.bool_)
+    slides[chains.hole] = sliding | ~can_stick(pose)
+    turning = np.zeros_like(segments.length_jacobian)
+    turning[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian
+    T = np.where(tension > 0.0, tension, 1e-100)  # a slack segment would have no weight
+    state = ChainState(T, rest_length, np.zeros_like(T), slides, stretch, compliance)
+    forced = k[chains.start[:-1]] == 0.0
+    gradient = chain_tangent(chains.start, forced, state, segments.length_jacobian, turning)
+    passive, active = segments.length_jacobian.T @ gradient, segments.active(tension)
+    if friction == "stuck":
+        passive = (passive + passive.T) / 2.0  # symmetric but for rounding
+    F = frozen(tension[chains.start[:-1]])
+    k = pose.arm._laws.stiffness(pose.cable_lengths, F)
+    frictionless = assemble(pose, F, wrench, k, distribution)
+    return replace(
+        frictionless,
+        active=active,
+        passive=frozen(passive),
+        joint=frozen(
+            active + passive + frictionless.gravity + frictionless.load + frictionless.springs
+        ),
+        friction=friction,
+        segment_tension=frozen(tension),
+        tension_gradient=frozen(gradient),
+    )

@@ -29,7 +29,7 @@ from cdsm.posture import Posture
 from cdsm.report.checks import TOLERANCE, balance_error
 from cdsm.statics.modes import vibrations
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.stiffness_matrix.instability import verdict
+from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.files import write_text
 from cdsm.support.format import JointUnits, coordinates
 from cdsm.support.validation import RANGES, instance, one_of, scalar

@@ -24,7 +24,7 @@ from scipy.optimize import brentq, minimize
 from cdsm.errors import ElasticityRangeError, InfeasibleTension, InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness, stiffness
-from cdsm.stiffness_matrix.instability import verdict
+from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.validation import SMALLEST, instance
 from cdsm.support.values import Array, frozen
 from cdsm.tension import Tension, advice, distribute_tension, too_few_cables

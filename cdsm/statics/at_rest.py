@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, final
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.errors import InvalidInput, SingularStiffness
+from cdsm.errors import InvalidInput
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import FLAT
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from cdsm.report import Report
 
 _NEUTRAL = 1e-2  # smallest eigenvalue over the magnitudes of its terms: they cancel, to 1 %
-_IMMOBILE = 1e-14  # a compliance below this part of the norm of C_vv is rounding
 
 
 @final
@@ -204,21 +202,8 @@ class Equilibrium(Result):
         Raises:
             SingularStiffness: K_θ of these joints is singular.
         """
-        if not self.at_limit:
-            return self.stiffness.compliance
-        free, nv = self._free, self.stop_torque.size
-        K, J = self.stiffness.joint[np.ix_(free, free)], self.pose.jacobian[:, free]
-        _, values, right = np.linalg.svd(K)
-        if free.size and not values[-1] > FLAT * values[0]:
-            mode = np.zeros(nv)
-            mode[free] = right[-1]
-            raise SingularStiffness(
-                "K_θ of the joints off their stops is singular, most at "
-                f"{self.pose.arm.joint_names[int(abs(mode).argmax())]}: the arm is about to buckle "
-                "there.",
-                frozen(mode),
-            )
-        return frozen(J @ np.linalg.solve(K, J.T))
+        J = self.pose.jacobian[:, self._free]
+        return frozen(J @ self.stiffness._inverse_of(self._free) @ J.T)
 
     def report(self) -> Report:
         """Check the stiffness here, as :meth:`Stiffness.report` does."""
@@ -236,11 +221,7 @@ class Equilibrium(Result):
             InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
             SingularStiffness: K_θ of the joints that are not at stops is singular.
         """
-        if not self.at_limit:
-            return self.stiffness.along(direction)
-        u, C = unit_direction("direction", direction), self.compliance[:3, :3]
-        compliance = float(u @ C @ u)
-        return 1.0 / compliance if abs(compliance) > _IMMOBILE * np.linalg.norm(C) else math.inf
+        return self.stiffness._along(unit_direction("direction", direction), self._free)[0]
 
     def plot(self) -> Figure:
         """Plot the arm in mm at the reference (grey) and at the equilibrium."""

@@ -12,20 +12,13 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.at_rest import Equilibrium
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import (
-    Balance,
-    Point,
-    continued,
-    equilibrium_error,
-    settle,
-    stable_between,
-)
+from cdsm.statics.solve import Balance, Point, continued, settle, stable_between
 from cdsm.stiffness_matrix import checked_tension, stiffness
 from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
 from cdsm.support.values import Array
 from cdsm.tension import Tension
 
-_SHORTEST = 2.0**-10  # shortest step, as a part of the load
+_FINEST = 2.0**-12  # relative precision of a buckling load; absolute below 1e-9 of the load
 _HELD = 1e-9  # least stiffness of a joint without load, over the largest
 
 Model = Callable[[float], LockedArm]
@@ -62,31 +55,37 @@ def equilibrium(
     K = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
     W = K.wrench if wrench is None else wrench_vector("wrench", wrench)
     pose.arm._angles(pose.q, True)  # within the joint limits
-    return locked_equilibrium(LockedArm(pose, K.tension, W))
+    arm = LockedArm(pose, K.tension, W)
+    return as_equilibrium(arm, _settled(arm, pose))
 
 
-def locked_equilibrium(arm: LockedArm) -> Equilibrium:
-    """Return the equilibrium to which an arm descends from its reference; see :func:`equilibrium`.
+def climb(
+    model: Model, before: Posture, stop_torque: Array, share: float, goal: float
+) -> tuple[Point | None, float]:
+    """Follow a stable equilibrium while its ``share`` of load and pull grows to ``goal``.
 
-    Raises ElasticityRangeError and EquilibriumError.
+    It is at the posture ``before``, where the stops push with ``stop_torque`` (nv,) [N m]. Returns
+    the last equilibrium before the arm jumps, None if that is this one; and its share.
     """
-    f = Balance(arm.at, arm.reference, arm.at_pose(arm.reference))
-    found, converged = settle(f, arm.reference.q)
-    if not converged:
-        raise equilibrium_error(arm.reference, found, 0.0)
-    return as_equilibrium(arm, found)
+    here, step = None, goal - share
+    while share < goal:
+        part = min(goal, share + step)
+        arm = model(part)
+        f = Balance(arm.at, arm.reference, arm.at_pose(before))
+        found = continued(f, (before.q / f.unit - stop_torque * f.unit / f.k,), before.q)
+        if found is not None and stable_between(arm.at, before.q, found.state.pose.q):
+            here, share, step = found, part, 2.0 * step
+            before, stop_torque = found.state.pose, found.stop_torque
+        elif step > _FINEST * max(share, 1e-9):
+            step /= 2.0
+        else:
+            break
+    return here, share
 
 
-def followed(arm: LockedArm, before: Posture, stop_torque: Array) -> Point | None:
-    """Follow a stable equilibrium while load or motors change a little, without a jump.
-
-    It is at the posture ``before``, where the stops push with ``stop_torque`` (nv,) [N m].
-    """
-    f = Balance(arm.at, arm.reference, arm.at_pose(before))
-    found = continued(f, (before.q / f.unit - stop_torque * f.unit / f.k,), before.q)
-    if found is not None and stable_between(arm.at, before.q, found.state.pose.q):
-        return found
-    return None
+def _settled(arm: LockedArm, start: Posture, reached: float = 0.0) -> Point:
+    """Return the equilibrium to which an arm descends from the posture ``start``."""
+    return settle(Balance(arm.at, arm.reference, arm.at_pose(start)), start.q, reached)
 
 
 def as_equilibrium(arm: LockedArm, found: Point, branch: float = 1.0) -> Equilibrium:
@@ -150,10 +149,16 @@ def forward_statics(
     value = given[named[0]]
     assert value is not None
     model = _model(arm, named[0], value, home, begin, W)
+    loaded = model(1.0)
     if start is not None:
-        return locked_equilibrium(model(1.0))
+        return as_equilibrium(loaded, _settled(loaded, begin))
     _require_held(model(0.0), home)
-    return _raised(model, home)
+    here = _settled(model(0.0), home)
+    last, branch = climb(model, here.state.pose, here.stop_torque, 0.0, 1.0)
+    here = last or here
+    if branch < 1.0:
+        here = _settled(loaded, here.state.pose, branch)
+    return as_equilibrium(loaded, here, branch)
 
 
 def home_angles(arm: Manipulator) -> Array:
@@ -191,10 +196,6 @@ def _model(
     return model
 
 
-def _balance(arm: LockedArm, near: Posture) -> Balance:
-    return Balance(arm.at, arm.reference, arm.at_pose(near))
-
-
 def _require_held(arm: LockedArm, home: Posture) -> None:
     """Raise EquilibriumError if a joint has no stiffness without load and pull."""
     state = arm.at_pose(home)
@@ -206,25 +207,3 @@ def _require_held(arm: LockedArm, home: Posture) -> None:
     said = f"nothing holds {name} where the cables do not pull. Give it a spring: "
     said += f'with_springs({{"{name}": k}}); or start= where the load acts already'
     raise EquilibriumError(said, state.residual, 0.0, name)
-
-
-def _raised(model: Model, home: Posture) -> Equilibrium:
-    """Raise load and pull from nothing, step by step; go on from where the branch ends."""
-    f = _balance(model(0.0), home)
-    here, converged = settle(f, home.q)
-    if not converged:
-        raise equilibrium_error(home, here, 0.0)
-    share, step, branch = 0.0, 1.0, 1.0
-    while share < 1.0:
-        goal, before = min(1.0, share + step), here.state.pose
-        found = followed(model(goal), before, here.stop_torque)
-        if found is not None:
-            here, share, step = found, goal, 2.0 * step
-        elif step > _SHORTEST:
-            step /= 2.0
-        else:
-            branch, share = share, 1.0
-            here, converged = settle(_balance(model(1.0), before), before.q)
-            if not converged:
-                raise equilibrium_error(home, here, branch)
-    return as_equilibrium(model(1.0), here, branch)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import cdsm
 from cdsm.errors import InvalidInput
-from cdsm.friction.stick import assemble_segments
+from cdsm.friction.capstan import assemble_segments
 from cdsm.posture import Posture
 from cdsm.statics.at_rest import Equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm

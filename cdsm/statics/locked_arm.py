@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from copy import copy
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,11 @@ from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.solve import ArmState
 from cdsm.stiffness_matrix import Stiffness, assemble
-from cdsm.support.validation import RANGES
 from cdsm.support.values import Array, frozen
 from cdsm.wires.elasticity import Elasticity
 
 _ROUNDING = 1e-9  # a tension outside the domain of a law by at most this part is rounding
+_HUGE = 1e12  # no tension [N] is beyond
 
 Indices = slice | NDArray[np.intp]
 
@@ -45,20 +45,22 @@ class LockedArm:
         self.tension_held = tension_held
         laws, L = reference.arm._laws, reference.cable_lengths
         self.rest_length: Array | None = None  # motors that hold tensions hold no length
-        self._laws = []
+        self._laws: list[_LockedLaw] = []
         if tension_held:
             return
-        own = laws.original_lengths(L, tension)
-        if rest_length is not None:
-            own = frozen(np.where(reference.arm.cables.position_controlled, rest_length, L))
-        self.rest_length = own
+        own, length = laws.original_lengths(L, tension), L
+        if rest_length is not None:  # at ``tension``, wire and spring have their rest lengths
+            own = length = np.where(reference.arm.cables.position_controlled, rest_length, L)
+        self.rest_length = frozen(own)
         for law, of in laws.held:
-            lengths = None if rest_length is not None else L[of]
-            parts = (own[of], laws.series[of], tension[of], lengths)
-            try:
-                self._laws.append((law, of, _LockedLaw(law, *parts)))
-            except ElasticityRangeError as error:
-                raise laws.naming(error, of) from None
+            F = tension[of]
+            locked = _LockedLaw(law, of, own[of], laws.series[of], F, law.strain(F), length[of])
+            none = np.flatnonzero(locked.elongation(np.full(F.shape, law.low))[1] <= 0.0)
+            if none.size:
+                said = "stretches the series spring by more than the whole cable: no wire is left. "
+                said += "Give the cable a longer lead, a stiffer spring or less tension."
+                raise laws.naming(ElasticityRangeError(said, F[none].tolist(), none.tolist()), of)
+            self._laws.append(locked)
 
     def under(self, wrench: Array) -> LockedArm:
         """Return the arm under another wrench (6,), its motors as they are."""
@@ -87,77 +89,50 @@ class LockedArm:
     def stiffness(self, pose: Posture) -> Stiffness:
         """Return K_θ at a posture; ElasticityRangeError if a tension is outside its law."""
         F, k = self._tensions(pose)
-        for law, of, _ in self._laws:
-            require_domain(pose.arm, law, of, F[of])
+        for each in self._laws:
+            require_domain(pose.arm, each.law, each.of, F[each.of])
         lengths = pose.cable_lengths if self.tension_held else self.rest_length
         return assemble(pose, frozen(F), self.wrench, frozen(k), free_length=lengths)
 
     def _tensions(self, pose: Posture) -> tuple[Array, Array]:
         F, k = self.tension.copy(), np.zeros(self.tension.size)
-        for _, of, locked in self._laws:
-            F[of], k[of] = locked.tension(pose.cable_lengths[of])
+        for each in self._laws:
+            F[each.of], k[each.of] = each.tension(pose.cable_lengths[each.of])
         return F, k
 
 
-class _LockedLaw:
-    """Tension as a function of length, of the n position-controlled cables with one law.
+class _LockedLaw(NamedTuple):
+    """The n position-controlled cables with one law, in their order; arrays are (n,)."""
 
-    Arrays are (n,). ``tension`` [N] is that at the cable lengths ``lengths`` [m]; if these are
-    None, the wire has no strain at its rest length.
-    """
+    law: Elasticity
+    of: Indices
+    rest_length: Array  # [m]
+    series: Array  # compliance of the springs [m/N]
+    start: Array  # a tension F_0 [N]
+    strain: Array  # of the wire at F_0
+    length: Array  # of the cable at F_0 [m]
 
-    def __init__(
-        self,
-        law: Elasticity,
-        rest_length: Array,
-        series: Array,
-        tension: Array,
-        lengths: Array | None,
-    ) -> None:
-        self._law, self._rest_length, self._series, self._near = law, rest_length, series, tension
-        self._low = np.full(tension.shape, law.low)
-        self._high = np.full(tension.shape, min(law.high, RANGES["tension"].high))
-        self._least_strain = law.strain(law.low)
-        none, softest = self._elongation(self._low)
-        if (softest <= 0.0).any():
-            which = np.flatnonzero(softest <= 0.0).tolist()
-            problem = "stretches the series spring by more than the whole cable: no wire is left. "
-            problem += "Give the cable a longer lead, a stiffer spring or less tension."
-            raise ElasticityRangeError(problem, tension[which].tolist(), which)
-        self._below, self._above, self._span = 1.0 / softest, none, self._high  # no upper end
-        if math.isfinite(law.high):
-            self._span, stiffest = self._elongation(self._high)
-            self._above = 1.0 / stiffest
-        # the length at which the law begins, where F is its lower end
-        self._start = rest_length * (1.0 + self._least_strain) + (law.low - law.rest) * series
-        if lengths is not None:
-            self._start = lengths - self._elongation(law._inside(tension))[0]
-
-    def _elongation(self, F: Array) -> tuple[Array, Array]:
-        """Compute the elongation from the lower end of the law to F [m], and its slope [m/N]."""
-        strain, EA = self._law._evaluate(F)
-        wire = self._rest_length * (strain - self._least_strain)
-        return wire + (F - self._law.low) * self._series, self._rest_length / EA + self._series
+    def elongation(self, F: Array) -> tuple[Array, Array]:
+        """Compute the elongation from F_0 to F [m], and its slope [m/N]."""
+        inside = np.minimum(np.maximum(F, self.law.low), self.law.high)
+        strain, EA = self.law._evaluate(inside)
+        slope = self.rest_length / EA + self.series
+        wire = self.rest_length * (strain - self.strain)
+        return wire + (inside - self.start) * self.series + (F - inside) * slope, slope
 
     def tension(self, lengths: Array) -> tuple[Array, Array]:
-        """Compute F [N] and dF/dL [N/m] (n,) at lengths L [m]: Newton's method in a bracket."""
-        elongation = lengths - self._start
-        inside = np.minimum(np.maximum(elongation, 0.0), self._span)
-        low, high, F = self._low, self._high, self._near
+        """Compute F [N] and dF/dL [N/m] at lengths L [m]: Newton's method in a bracket."""
+        wanted, F = lengths - self.length, self.start
+        low, high = np.full((2, F.size), [[-_HUGE], [_HUGE]])
         for _ in range(200):
-            reached, compliance = self._elongation(F)
-            error = reached - inside
-            newton = F - error / compliance
-            if (abs(newton - F) <= 1e-13 * np.maximum(F, 1.0)).all():
+            reached, slope = self.elongation(F)
+            error = reached - wanted
+            newton = F - error / slope
+            if (abs(newton - F) <= 1e-13 * np.maximum(abs(F), 1.0)).all():
                 break
             low, high = np.where(error < 0.0, F, low), np.where(error > 0.0, F, high)
             F = np.where((low <= newton) & (newton <= high), newton, (low + high) / 2.0)
-        k, excess = 1.0 / compliance, elongation - inside
-        if np.count_nonzero(excess):
-            k = np.where(excess == 0.0, k, np.where(excess < 0.0, self._below, self._above))
-            F = np.maximum(F + k * excess, 0.0)
-            k[(F == 0.0) & (excess < 0.0)] = 0.0
-        return F, k
+        return np.maximum(F, 0.0), np.where(F < 0.0, 0.0, 1.0 / slope)
 
 
 def require_domain(

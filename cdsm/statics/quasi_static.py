@@ -17,7 +17,7 @@ import numpy as np
 from cdsm.friction.capstan import ChainProblem, ChainState, chain_tangent
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm, require_domain
-from cdsm.statics.solve import ArmState, Balance, Point, continued, equilibrium_error, settle
+from cdsm.statics.solve import ArmState, Balance, Point, continued, settle
 from cdsm.support.values import Array, frozen
 
 _SHORTEST = 2.0**-8  # shortest sub-step, as a part of the step between two loads
@@ -112,9 +112,7 @@ class QuasiStaticArm:
                 part, motion = (goal - done) / 2.0, 0.0 * motion
                 continue
             if found is None:
-                found, snapped = settle(f, old.pose.q)
-                if not snapped:
-                    raise equilibrium_error(self.reference, found, done, what)
+                found, snapped = settle(f, old.pose.q, done, what), True
             new = found.state
             assert isinstance(new, ChainArmState)
             start, end, now = self._jumps(old), self._jumps(new), new.chain.slip

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -75,7 +74,7 @@ class Balance:
         holding: Array | float = 0.0,
     ) -> None:
         arm = reference.arm
-        self._at, self._holding = at, holding
+        self.reference, self._at, self._holding = reference, at, holding
         self.unit = np.where(arm.slides, arm.length, 1.0)
         touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
         if arm.is_serpentine:
@@ -118,32 +117,28 @@ class Balance:
         return step / max(1.0, float((abs(step) / (_LONGEST + room)).max()))
 
 
-def settle(f: Balance, q: Array) -> tuple[Point, bool]:
+def settle(f: Balance, q: Array, reached: float = 0.0, load: str = "the load") -> Point:
     """Find the stable equilibrium to which the arm descends from the angles q (nv,).
 
-    Returns the last point, and whether it is an equilibrium.
+    Raises EquilibriumError, which says that the part ``reached`` of ``load`` was borne.
     """
     here, found = _descend(f, f(q / f.unit), 1e-3 * f.k)
-    if not found:  # rarely: follow the overdamped motion instead
-        there = f.attempt(_flow(f, q / f.unit))
-        here, found = _descend(f, there, 1e-3 * f.k) if there else (here, False)
-    return here, found
+    if not found:
+        raise _not_found(f.reference, here, reached, load)
+    return here
 
 
 def continued(f: Balance, guesses: Iterable[Array], before: Array) -> Point | None:
     """Find the stable equilibrium near the angles ``before`` (nv,), as a load changes a little.
 
-    The searches begin at the points ``guesses``: Newton's method, then scipy's hybrid method.
-    Returns None if none finds one to which no joint moves by more than 0.1 rad.
+    The searches begin at the points ``guesses``. Returns None if none finds one to which no joint
+    moves by more than 0.1 rad.
     """
-    for search in (_descend, _hybrid):
-        for x in guesses:
-            try:
-                here, found = search(f, f(x), 0.0, before / f.unit)
-            except (CdsmError, np.linalg.LinAlgError, ValueError):
-                continue
-            if found:
-                return here
+    for x in guesses:
+        point = f.attempt(x)
+        here, found = _descend(f, point, 0.0, before / f.unit) if point else (None, False)
+        if found:
+            return here
     return None
 
 
@@ -221,41 +216,8 @@ def _solved(K: Array, torque: Array) -> Array:
         return np.asarray(np.linalg.lstsq(K, torque, rcond=None)[0])
 
 
-def _flow(f: Balance, x: Array) -> Array:
-    """Return where the overdamped motion x′ = −f(x)/k from x ends, or is after 3000 postures."""
-    from scipy.integrate import solve_ivp  # slow to import, and rarely needed
-
-    calls = count()
-
-    def speed(_: float, x: Array) -> Array:
-        next(calls)
-        return -f(x).value / f.k
-
-    def moving(_: float, x: Array) -> float:
-        return -1.0 if next(calls) > 3000 else float(abs(f(x).value).max()) / f.k - 1e-6
-
-    moving.terminal, moving.direction = True, -1.0  # type: ignore[attr-defined]
-    options = {"events": moving, "rtol": 1e-3, "atol": 1e-5, "first_step": 1e-2}
-    try:
-        jac = {"jac": lambda _, x: -f(x).slope / f.k}
-        return np.asarray(solve_ivp(speed, (0.0, 1e6), x, "BDF", **jac, **options).y[:, -1])
-    except (CdsmError, np.linalg.LinAlgError, ValueError):
-        return x
-
-
-def _hybrid(f: Balance, here: Point, shift: float, home: Array) -> tuple[Point, bool]:
-    """Hybrid method of scipy, which stops at a step length, not at a residual."""
-    from scipy.optimize import root  # slow to import, and rarely needed
-
-    options = {"xtol": 1e-11, "factor": 0.1}
-    found = root(lambda x: f(x)[2:4], here.x, jac=True, method="hybr", options=options)
-    return _descend(f, f(found.x), shift, home)
-
-
-def equilibrium_error(
-    reference: Posture, point: Point, reached: float, load: str = "the load"
-) -> EquilibriumError:
-    """Return the error of a search that ended at ``point``, beyond the part ``reached`` of a load.
+def _not_found(reference: Posture, point: Point, reached: float, load: str) -> EquilibriumError:
+    """Return the error of a search that ended at ``point``.
 
     It names the joint with the largest residual torque, and a cable of which two sites meet there.
     """

@@ -14,8 +14,9 @@ from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
 from cdsm.statics.at_rest import Equilibrium
-from cdsm.statics.forward import as_equilibrium, equilibrium, followed
+from cdsm.statics.forward import as_equilibrium, climb, equilibrium
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
+from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
@@ -30,7 +31,6 @@ SLIDING = 1.25  # an arm slides if its tangent is at most so many times the fric
 
 _MEASURED = 1e-12  # least displacement, over the arm's length, with about three correct digits
 _DISPLACED = 1e-9  # least displacement, over the arm's length, above the rounding of equilibrium
-_FINEST = 2.0**-12  # relative precision of a buckling load; absolute below 1e-9 of the load
 
 
 @final
@@ -148,22 +148,20 @@ class WeightTest(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences if, without the weight, the arm leaves its reference, or is not stable."""
-        moved, said = f"by {coordinates(1e3 * self.unloaded.displacement)} mm", list[str]()
-        if self.left_reference and self.history is None:
-            said += [
-                "LEFT ITS REFERENCE: before the weight the arm did not stay there; the tip moved "
-                f"{moved}, from where all this is measured"
-            ]
-        elif self.left_reference and self.history is not None:
-            said += [
-                "LEFT ITS REFERENCE: without friction the arm does not stay there before the "
-                f"weight; its tip moves {moved}, from where all that is linear or frictionless is "
-                "measured. With friction it moves by "
-                f"{coordinates(1e3 * self.history.displacement[0])} mm"
-            ]
+        said, history = list[str](), self.history
+        if self.left_reference:
+            moved = coordinates(1e3 * self.unloaded.displacement)
+            without = "without friction " if history else ""
+            left = (
+                f"before the weight the arm did not stay there; {without}its tip moved by {moved} "
+            )
+            left += f"mm, from where all that is {without or 'shown '}is measured"
+            if history:
+                left += f"; with friction by {coordinates(1e3 * history.displacement[0])} mm"
+            said.append(f"LEFT ITS REFERENCE: {left}")
         if not self.unloaded.stable:
             said.append("NEUTRAL: before the weight, not every joint is brought back")
-        return (*said, *(self.history.warnings if self.history else ()))
+        return (*said, *(history.warnings if history else ()))
 
     def plot(self) -> Figure:
         """Plot load [N] against tip displacement [mm], and the tension of each cable [N]."""
@@ -259,8 +257,20 @@ def weight_test(
     else:
         unloaded, held = equilibrium(pose, tension, wrench), pose
     states, added, W = [unloaded], np.append(force, np.zeros(3)), unloaded.wrench
+
+    def model(share: float) -> LockedArm:
+        return unloaded._model.under(frozen(W + share * added))
+
     for i in range(steps):
-        states.append(_follow(states[-1], W, added, i / steps, (i + 1) / steps))
+        here, goal = states[-1], (i + 1) / steps
+        found, reached = climb(model, here.pose, here.stop_torque, i / steps, goal)
+        here = as_equilibrium(model(reached), found) if found else here
+        if reached < goal:
+            worst = int(abs(here.stiffness.critical_direction).argmax())
+            joint, load = pose.arm.joint_names[worst], reached * np.linalg.norm(force)
+            said = f"the arm buckles at {100.0 * reached:.4g} % of the load, under {load:.4g} N"
+            raise EquilibriumError(f"{said}: {joint} buckles", here.residual, reached, joint)
+        states.append(here)
     test = WeightTest(force=force, unloaded=unloaded, states=tuple(states[1:]))
     if math.isinf(test.frictionless) and math.isfinite(test.tangent):
         said = f"{np.abs(force).max():.3g} N moves the tip by rounding only; hang at least "
@@ -274,27 +284,3 @@ def weight_test(
         breakaway=breakaway(held, unloaded.reference_tension, force, W),
         history=load_cycle(pose, tension, W + np.arange(steps + 1)[:, None] / steps * added),
     )
-
-
-def _follow(
-    before: Equilibrium, wrench: Array, added: Array, reached: float, goal: float
-) -> Equilibrium:
-    """Follow the stable equilibrium ``before`` while the load wrench + λ · added grows.
-
-    λ grows from ``reached`` to ``goal``. Raises EquilibriumError if the arm buckles.
-    """
-    step = goal - reached
-    while reached < goal:
-        part = min(goal, reached + step)
-        arm = before._model.under(frozen(wrench + part * added))
-        found = followed(arm, before.pose, before.stop_torque)
-        if found is not None:
-            before, reached, step = as_equilibrium(arm, found), part, 2.0 * step
-        elif step > _FINEST * max(reached, 1e-9):
-            step /= 2.0
-        else:
-            worst = int(abs(before.stiffness.critical_direction).argmax())
-            joint, load = before.pose.arm.joint_names[worst], reached * np.linalg.norm(added)
-            problem = f"the arm buckles at {100.0 * reached:.4g} % of the load, under {load:.4g} N"
-            raise EquilibriumError(f"{problem}: {joint} buckles", before.residual, reached, joint)
-    return before

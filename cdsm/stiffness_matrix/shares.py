@@ -9,8 +9,7 @@ import numpy as np
 
 import cdsm
 from cdsm.posture import Posture
-from cdsm.stiffness_matrix.instability import verdict
-from cdsm.stiffness_matrix.prints import model_of
+from cdsm.stiffness_matrix.prints import model_of, verdict
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import one_of

@@ -9,15 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal, final, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
-from cdsm.stiffness_matrix.instability import Remedy, find_remedies, verdict
+from cdsm.stiffness_matrix.prints import Remedy, find_remedies, verdict
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.format import coordinates, plain
 from cdsm.support.result import Result, quantity, unit
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 Friction = Literal["frictionless", "stuck", "sliding"]
 Term = Literal["active", "passive", "gravity", "load", "springs", "joint"]
+Joints = slice | NDArray[np.intp]
 
 REGULAR = 1e-8  # least relative singular value of K_θ; its inverse has 6 correct digits there
 FLAT = 1e-6  # least relative singular value of J_v; a 3×3 stiffness has 4 correct digits there
@@ -188,14 +190,15 @@ class Stiffness(Result):
 
     @cached_property
     def _inverse(self) -> Array:
-        """K_θ⁻¹ (nv, nv), or SingularStiffness with the joint motion."""
-        P = self._magnitudes
+        return self._inverse_of(slice(None))
+
+    def _inverse_of(self, joints: Joints) -> Array:
+        """K_θ⁻¹ (n, n) of n joints, all others held; or SingularStiffness with the motion."""
+        K, P = (matrix[joints][:, joints] for matrix in (self.joint, self._magnitudes))
         D = P.diagonal()
-        if not D.min() > 0.0:
-            raise _singular("next to nothing holds the arm", np.eye(D.size)[D.argmin()])
-        scale = 1.0 / np.sqrt(D)
+        scale = 1.0 / np.sqrt(np.where(D > 0.0, D, 1.0))
         both = scale * scale[:, None]
-        scaled, least = self.joint * both, REGULAR * float((P * both).max())
+        scaled, least = K * both, REGULAR * float((P * both).max(initial=0.0))
         try:
             inverse = np.linalg.inv(scaled)
         except np.linalg.LinAlgError:
@@ -204,7 +207,13 @@ class Stiffness(Result):
         if not least * math.sqrt(np.vdot(inverse, inverse)) < 1.0:
             _, values, rows = np.linalg.svd(scaled)
             if not values[-1] > least:
-                raise _singular("the arm is just about to buckle", rows[-1] * scale)
+                motion = np.zeros(len(self.joint))
+                motion[joints] = rows[-1] * scale
+                motion = frozen(motion / np.linalg.norm(motion))
+                why = "the arm is just about to buckle"
+                why = why if D.all() else "next to nothing holds the arm"
+                said = f"K_θ is singular: {why} in the joint motion {coordinates(motion)}. "
+                raise SingularStiffness(said + "Change the tensions or the posture.", motion)
         return inverse * both
 
     def _decompose(self, U: Array) -> tuple[Array, Array]:
@@ -222,18 +231,19 @@ class Stiffness(Result):
             raise SingularStiffness(said, u)
         return B / S, V[: len(U)]
 
-    def _along(self, u: Array) -> tuple[float, Array]:
-        """Return stiffness along a unit vector u [N/m] and joint motion per force along u (nv,)."""
-        torque = u @ self.posture.jacobian[:3]
+    def _along(self, u: Array, joints: Joints = slice(None)) -> tuple[float, Array]:
+        """Return stiffness along a unit vector u [N/m] and motion of the joints per force (n,)."""
+        torque = (u @ self.posture.jacobian[:3])[joints]
         if not self._moves(torque):
             return math.inf, np.zeros_like(torque)
-        motion = self._inverse @ torque
+        inverse = self._inverse if isinstance(joints, slice) else self._inverse_of(joints)
+        motion = inverse @ torque
         compliance = float(torque @ motion)
         return 1.0 / compliance if compliance else math.inf, motion
 
     def _moves(self, torque: Array) -> bool:
-        """Return whether a tip force with joint torques J_vᵀ u (nv,) moves any joint."""
-        return bool(abs(torque).max() > UNMOVED * abs(self.posture.jacobian[:3]).max())
+        """Whether a tip force with joint torques J_vᵀ u moves any joint."""
+        return bool(abs(torque).max(initial=0.0) > UNMOVED * abs(self.posture.jacobian[:3]).max())
 
     def _require_mobile(self, u: Array) -> None:
         """Raise SingularStiffness if a tip force along a unit vector u (3,) moves no joint."""
@@ -245,9 +255,8 @@ class Stiffness(Result):
     def shares(self, direction: Direction) -> Shares:
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
 
-        If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ. K_θ is a
-        sum over cables, gravity, load and springs, and so is along(u). SingularStiffness also if
-        it is inf.
+        If δθ is the joint motion per unit tip displacement along u, along(u) = δθᵀ K_θ δθ, and K_θ
+        is a sum over cables, gravity, load and springs. SingularStiffness also if it is inf.
         """
         u = unit_direction("direction", direction)
         self._require_mobile(u)
@@ -280,32 +289,12 @@ class Stiffness(Result):
         return self
 
     def plot(self) -> Figure:
-        """Plot the arm in mm and, if it is stable, the compliance at its tip as an ellipsoid.
-
-        Cables are coloured by tension if :attr:`distribution` is given.
-        """
+        """Plot the arm in mm, coloured by distributed tension; if stable, its compliance too."""
         return self.posture.plot(self.distribution, self)
 
     def to_dict(self) -> dict[str, object]:
         """Return the stiffness in SI for JSON, units in the keys; None for what does not exist."""
-        more = {
-            "tip_position_m": self.posture.tip[:3, 3],
-            "cable_length_m": self.posture.cable_lengths,
-            "model": prints.model_of(self),
-            "along_N_per_m": [prints.existing(partial(self.along, u)) for u in "xyz"],
-            "cartesian_N_per_m": prints.existing(lambda: self.cartesian),
-            "pseudoinverse_N_per_m": prints.existing(self.pseudoinverse),
-            "compliance": prints.existing(lambda: self.compliance),
-            "stable": self.is_stable,
-            "remedies": {each.change: each.factor for each in self.remedies},
-        }
-        return super().to_dict() | plain(more)
+        return super().to_dict() | plain(prints.readings(self))
 
     def __str__(self) -> str:
         return "\n".join([*self.warnings, *prints.table(self), *prints.notes(self)])
-
-
-def _singular(why: str, motion: Array) -> SingularStiffness:
-    motion = frozen(motion / np.linalg.norm(motion))
-    said = f"K_θ is singular: {why} in the joint motion {coordinates(motion)}. "
-    return SingularStiffness(said + "Change the tensions or the posture.", motion)

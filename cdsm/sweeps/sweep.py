@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdsm.batch.inputs import given_wrench
+from cdsm.batch.distribution import given_wrench
 from cdsm.errors import CdsmError, FileError, InvalidInput, need
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import as_path, require_folder

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NoReturn
+from contextlib import suppress
+from typing import Final, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from cdsm.support.format import plural
 from cdsm.support.values import Array, frozen
 from cdsm.tension.solvers import HINT, OPTIMAL, OPTIMALITY, Problem, least
 
+_PROOF: Final = 1e-8  # least missing torque, per largest moment arm × force, that proves anything
+_ROUNDING: Final = 1e-11  # a cable that pulls less than this against it does not pull
+
 
 def explain(
     pose: Posture, problem: Problem, solver: str, fault: str, free: NDArray[np.bool_]
@@ -24,22 +28,9 @@ def explain(
     ``free`` (C,) marks the cables without a fixed tension; only their bounds may widen. ``fault``
     says what the solver returned. Raises InfeasibleTension, or CdsmError if tensions exist.
     """
+    F, missed = _nearest(problem)
     A, b, low, high, arm, force = problem
-    nv, count = A.shape
-    # variables: F, then the positive and the negative part of the missing torque; HiGHS drops
-    # entries below 1e-9, so each cable is scaled by its own largest moment arm
-    lever = abs(A).max(axis=0)
-    lever[lever == 0.0] = 1.0
-    nearest = least(
-        np.repeat([0.0, 1.0], [count, 2 * nv]),
-        A_eq=np.hstack([A / lever, np.eye(nv), -np.eye(nv)]),
-        b_eq=b,
-        bounds=[*zip(low * lever, high * lever, strict=True), *[(0.0, None)] * (2 * nv)],
-    )
-    if nearest.status != OPTIMAL:  # it is feasible and bounded by construction
-        raise solver_failed("highs", f"cannot tell whether tensions exist: {nearest.message}")
-    F = nearest.x[:count] / lever
-    if nearest.fun <= OPTIMALITY:
+    if missed <= OPTIMALITY:
         exists = f"{fault}, though one exists with tensions of up to {F.max() * force:.2g} N"
         edge = "the arm may be at the edge of what its cables can balance"
         raise solver_failed(solver, f"{exists}: {edge}. {HINT}")
@@ -100,6 +91,49 @@ def too_few_cables(arm: Manipulator) -> str:
         return f"{said} come to rest: {finds}. "
     needed = f"cables only pull, so at least {joints + 1} are needed"
     return f"{plural(count, 'cable')} alone cannot hold {plural(joints, 'joint')}: {needed}. "
+
+
+def is_infeasible(problem: Problem) -> bool:
+    """Whether no tensions within the bounds balance the arm.
+
+    With x = F − low ≥ 0, the residual r of min ‖A x − b‖ is a proof by Farkas: rᵀA ≤ 0 < rᵀb.
+    Bounds above become equations x + s = high − low with slacks s ≥ 0. The rare rest is decided by
+    linear programming, which is slower.
+    """
+    from scipy.optimize import nnls  # slow to import
+
+    A, b, low, high, *_ = problem
+    upper = np.flatnonzero(high < np.inf)
+    bounded, none = np.eye(low.size)[upper], np.zeros((b.size, upper.size))
+    A = np.block([[A, none], [bounded, np.eye(upper.size)]])
+    b = np.concatenate([b - problem.A @ low, (high - low)[upper]])
+    with suppress(RuntimeError):  # too many iterations
+        x, missing = nnls(A, b)
+        r = b - A @ x
+        work, most = r @ b, abs(A).max(axis=0) * abs(r).max()
+        proof = missing > _PROOF and work > _PROOF * (abs(r) @ abs(b))
+        if proof and ((r @ A) <= _ROUNDING * most).all():
+            return True
+    return _nearest(problem)[1] > OPTIMALITY
+
+
+def _nearest(problem: Problem) -> tuple[Array, float]:
+    """Return the tensions (C,) [-] that miss the balance least, and the torque they miss [-]."""
+    A, b, low, high, *_ = problem
+    nv, count = A.shape
+    # variables: F, then the positive and the negative part of the missing torque; HiGHS drops
+    # entries below 1e-9, so each cable is scaled by its own largest moment arm
+    lever = abs(A).max(axis=0)
+    lever[lever == 0.0] = 1.0
+    nearest = least(
+        np.repeat([0.0, 1.0], [count, 2 * nv]),
+        A_eq=np.hstack([A / lever, np.eye(nv), -np.eye(nv)]),
+        b_eq=b,
+        bounds=[*zip(low * lever, high * lever, strict=True), *[(0.0, None)] * (2 * nv)],
+    )
+    if nearest.status != OPTIMAL:  # it is feasible and bounded by construction
+        raise solver_failed("highs", f"cannot tell whether tensions exist: {nearest.message}")
+    return nearest.x[:count] / lever, float(nearest.fun)
 
 
 def _widening(problem: Problem, free: NDArray[np.bool_]) -> float:

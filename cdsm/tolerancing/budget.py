@@ -16,7 +16,7 @@ import cdsm
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
-from cdsm.stiffness_matrix.instability import verdict
+from cdsm.stiffness_matrix.prints import verdict
 from cdsm.support.format import span, with_uncertainty
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.status import Status

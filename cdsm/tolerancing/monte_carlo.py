@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.batch.inputs import checked_threads
+from cdsm.batch.distribution import checked_threads
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput
 from cdsm.posture import Posture

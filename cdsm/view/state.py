@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import cdsm
 from cdsm.errors import CdsmError
-from cdsm.friction.stick import can_stick
+from cdsm.friction.capstan import can_stick
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture

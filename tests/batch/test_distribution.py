@@ -1,13 +1,12 @@
 """Tensions at many postures: each row the optimum of the single posture, or proof of none."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
 import cdsm
-from cdsm.batch import Tensions, chunk, search
+from cdsm.batch import Tensions, chunk
 from cdsm.support.values import Array
 from tests.batch.test_evaluation import custom_arm
 from tests.support.arms import STEEL, mixed_arm, random_arm, readme_geometry
@@ -136,27 +135,23 @@ def test_rounding_on_a_joint_that_no_cable_turns_is_no_missing_torque() -> None:
     np.testing.assert_allclose(batch.values[0], single.values, rtol=1e-9)
 
 
-def test_rows_that_the_solver_leaves_open_go_to_the_single_posture(
+def test_rows_that_the_solver_leaves_open_are_infeasible_only_with_a_proof(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     arm = shallow_arm(3)
     q, wrench = postures(arm, 60, 0.9), 0.1 * loads(60)
     expected = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     assert 5 < np.count_nonzero(expected.ok) < 55
-
-    def open_(arm: object, J: object, torque: object, low: Array, *_: Any) -> Any:
-        return low, cdsm.Status.SOLVER_FAILED
-
-    monkeypatch.setattr(chunk, "search", open_)
+    monkeypatch.setattr(chunk, "solve", lambda *_: "found nothing")
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
-    np.testing.assert_array_equal(found.status, expected.status)
-    scale = np.nanmax(expected.values)
-    np.testing.assert_allclose(found.values, expected.values, rtol=0.0, atol=EXACT * scale)
+    np.testing.assert_array_equal(found.status[~expected.ok], expected.status[~expected.ok])
+    lost = found.status[expected.ok]
+    assert set(lost.tolist()) <= {cdsm.Status.OK, cdsm.Status.SOLVER_FAILED}
 
-    def failing(*_: Any) -> None:
+    def failing(*_: object) -> None:
         raise cdsm.CdsmError("solver failed.", "SOLVER_FAILED")
 
-    monkeypatch.setattr(search, "distribute_tension", failing)
+    monkeypatch.setattr(chunk, "solve", failing)
     found = cdsm.distribute_tensions(arm, q, 5.0, wrench=wrench)
     lost = found.status == cdsm.Status.SOLVER_FAILED
     assert lost[~expected.ok].all()

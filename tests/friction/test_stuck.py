@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 import cdsm
 from cdsm import presets
-from cdsm.friction.stick import assemble_segments
+from cdsm.friction.capstan import assemble_segments
 from cdsm.support.values import Array
 from tests.support import arms
 from tests.support.differences import assert_second_order, gravity_energy
