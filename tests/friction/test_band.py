@@ -133,3 +133,12 @@ def test_without_friction_there_is_one_rest() -> None:
     pose, F = prototype(0.0)
     band = cdsm.rest_band(pose, F, "z")
     assert band.low == band.high == band.breakaway == 0.0
+
+
+@pytest.mark.parametrize(
+    ("friction", "expected"), [(0.1, (0.081, 0.080, 0.082)), (0.2, (0.162, 0.160, 0.165))]
+)
+def test_numbers_of_the_virtual_prototype(friction: float, expected: Array) -> None:
+    """Half-widths [mm] of an independent program."""
+    found = [1e3 * cdsm.rest_band(*prototype(friction), axis).high for axis in "xyz"]
+    np.testing.assert_allclose(found, expected, atol=6e-4)

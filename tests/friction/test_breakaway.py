@@ -135,3 +135,13 @@ def test_load_comes_on_top_of_the_wrench() -> None:
     found = cdsm.breakaway(pose, arms.random_tension(pose.arm, 3), "y", wrench)
     np.testing.assert_array_equal(found.stiffness.wrench, wrench)
     assert 0.0 < found.load < math.inf
+
+
+@pytest.mark.parametrize(("bound", "expected"), [(15.0, 0.27), (50.0, 0.71), (120.0, 1.61)])
+def test_numbers_of_the_virtual_prototype(bound: float, expected: float) -> None:
+    """First slip in z of an independent program at μ = 0.1, with and without lead: two digits."""
+    for lead in (0.0, 0.3):
+        arm = presets.virtual_prototype(lead=lead, friction=0.1, original_length="stretched")
+        pose = arm.at(np.full(10, presets.TEN_DEGREES))
+        found = cdsm.breakaway(pose, cdsm.distribute_tension(pose, bound), "z")
+        assert found.load == pytest.approx(expected, abs=0.007)

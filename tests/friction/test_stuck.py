@@ -226,3 +226,29 @@ def test_what_needs_the_frictionless_stiffness_and_no_direction_are_refused() ->
     for ask in (cdsm.breakaway, cdsm.rest_band):
         with pytest.raises(cdsm.InvalidInput, match="direction: is the zero vector"):
             ask(STUCK_POSE, STUCK_F, (0.0, 0.0, 0.0))
+
+
+NUMBERS = {
+    # lead, bound, law: frictionless and stuck along x, y, z [N/mm]
+    (0.0, 15.0): ((11.2, 11.4, 12.0), (25.8, 25.5, 26.0)),
+    (0.0, 50.0): ((52.8, 52.4, 55.5), (109.0, 98.5, 103.0)),
+    (0.0, 120.0): ((95.5, 93.8, 98.8), (196.0, 174.0, 181.0)),
+    (0.3, 50.0): ((15.4, 12.9, 14.3), (109.0, 98.5, 103.0)),
+}
+
+
+@pytest.mark.parametrize("case", NUMBERS)
+def test_numbers_of_the_virtual_prototype(case: tuple[float, float]) -> None:
+    """An independent program, with the stretched length and another member of Eq. 19's family.
+
+    At 15 N the two laws differ by 0.7 %; the original lengths raise all numbers by 3 to 4 %.
+    """
+    lead, bound = case
+    for original, off in (("stretched", 0.014), ("unstrained", 0.05)):
+        arm = presets.virtual_prototype(lead=lead, friction=0.1, original_length=original)  # type: ignore[arg-type]
+        pose = arm.at(np.full(10, np.deg2rad(10.0)))
+        pull = cdsm.distribute_tension(pose, minimum=bound)
+        free, stuck = cdsm.stiffness(pose, pull), cdsm.stuck_stiffness(pose, pull)
+        for K, expected in zip((free, stuck), NUMBERS[case], strict=True):
+            found = [K.along(axis) / 1000.0 for axis in "xyz"]
+            np.testing.assert_allclose(found, expected, rtol=off)

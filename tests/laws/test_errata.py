@@ -9,7 +9,7 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import linprog
 
 import cdsm
-from cdsm.paper.experiments import TABLE_II, TABLE_II_SWAPPED
+from cdsm.paper.experiments import CHECK, MEASURED, TABLE_II, TABLE_II_SWAPPED
 from cdsm.paper.strand import EQ19_PRINTED, HALF_UNITS, JOIN, LEVEL, eq19_as_printed, left_open
 from cdsm.support.values import Array
 from tests.core.test_urdf import eq1, eq2, eq3, table1
@@ -213,3 +213,34 @@ def test_table2_contradicts_its_caption_unless_x_and_y_are_exchanged_in_rows_2_t
         and (np.diff(columns[1]) > 0.0).all()
     ]
     assert both == [(False, True, True, True, False)]
+
+
+def test_eq19_law_is_within_the_band_of_its_digits() -> None:
+    F = np.array([2.3, 5.0, 20.0, 31.0, 100.0, 400.0, 810.0])
+    low, high = digits.band(F)
+    assert (low < REPAIRED.polynomial(F)).all()
+    assert (REPAIRED.polynomial(F) < high).all()
+
+
+def test_section_vb_error_is_relative_to_the_model() -> None:
+    off = CHECK - MEASURED
+    assert off / CHECK == pytest.approx(0.0575, abs=1e-4)
+    assert off / MEASURED == pytest.approx(0.061, abs=1e-3)
+
+
+@pytest.mark.parametrize("table", [TABLE_II, TABLE_II_SWAPPED], ids=["printed", "exchanged"])
+def test_table2_increment_is_last_minus_first_over_first(table: Array) -> None:
+    np.testing.assert_allclose(table[-1] / table[0] - 1.0, (2.11, 3.61, 2.97), atol=0.006)
+    assert (abs(table[-1] / table[0] - (2.11, 3.61, 2.97)) > 0.9).all()
+
+
+def test_fig6_increase_by_4_24_times_is_a_ratio_of_5_24() -> None:
+    """Recomputed on the virtual prototype, from a lower bound of 15 N to one of 120 N."""
+    arm = cdsm.presets.virtual_prototype(original_length="stretched")
+    pose = arm.at(np.full(10, cdsm.presets.TEN_DEGREES))
+    first, last = (
+        cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=bound)).pseudoinverse()[0, 0]
+        for bound in (15.0, 120.0)
+    )
+    assert last / first - 1.0 == pytest.approx(4.24, rel=0.02)
+    assert last / first == pytest.approx(5.24, rel=0.02)

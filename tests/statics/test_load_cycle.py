@@ -213,3 +213,44 @@ def test_snap_through_is_a_warning() -> None:
     # without friction the arm buckles on the same way
     with pytest.raises(cdsm.EquilibriumError, match="buckles at 7"):
         cdsm.weight_test(pose, cdsm.distribute_tension(pose, 30.0), -load[:3], steps=1)
+
+
+def test_dissipation_converges_with_the_sub_steps() -> None:
+    pose, pull = prototype(0.1)
+    lost = [
+        cdsm.load_cycle(pose, pull, along_z(6.0, -6.0, 6.0), substeps=n).dissipated.sum()
+        for n in (2, 4, 8, 64)
+    ]
+    errors = abs(np.array(lost[:-1]) / lost[-1] - 1.0)
+    assert errors[1] < 0.02
+    assert (np.diff(errors) < 0.0).all()
+
+
+@pytest.mark.parametrize("load", [0.5, 5.2, 15.0])
+def test_tangent_is_the_derivative_of_the_history(load: float) -> None:
+    pose, pull = prototype(0.1)
+    step = 1e-3
+    path = along_z(load - step, load, load + step)
+    history = cdsm.load_cycle(pose, pull, path)
+    if (history.sliding[0] != history.sliding[2]).any():
+        pytest.fail("a hole begins to slide at this load; choose another one")
+    numerical = 2.0 * step / (history.tip[2] - history.tip[0])[2]
+    assert history.stiffness(1).along("z") == pytest.approx(numerical, rel=1e-5)
+
+
+PROTOTYPE = {  # μ: secants at 0.25, 1, 2, 20 N [N/mm], left over after 20 N [µm], holes that slide
+    0.05: ((257.6, 93.4, 55.9, 39.2), 34.0, 67),
+    0.2: ((257.6, 258.0, 250.0, 44.9), 59.0, 53),
+}
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.2])
+def test_numbers_of_an_independent_program_on_the_prototype(mu: float) -> None:
+    secants, left, holes = PROTOTYPE[mu]
+    pose, pull = prototype(mu)
+    forces = np.array([0.25, 1.0, 2.0, 20.0])
+    history = cdsm.load_cycle(pose, pull, along_z(*forces, 0.0))
+    z = 1000.0 * history.displacement[:, 2]
+    np.testing.assert_allclose(forces / z[:4], secants, rtol=1e-2)
+    assert 1000.0 * z[4] == pytest.approx(left, abs=1.0)
+    assert abs(np.count_nonzero(history.sliding[3]) - holes) <= 3
