@@ -196,7 +196,8 @@ class Elasticity:
             outside = (self.low > F) | (self.high < F)
             few, many = bool(F.min() < self.low), bool(F.max() > self.high)
             bounds = [f"a minimum of {rounded(self.low, up=True)} N or more"] if few else []
-            bounds += [f"a maximum of {rounded(self.high, up=False)} N or less"] if many else []
+            highest = rounded(self.high, up=False)
+            bounds += [f"a maximum of {highest} N or less, and a minimum below it"] if many else []
             slack = "; slack_below() (in ARM.toml: slack_below = true) continues one to 0 N" * few
             raise ElasticityRangeError(
                 f"outside the domain {self._span} of the elasticity. Give {' and '.join(bounds)}, "
