@@ -133,3 +133,18 @@ def test_files_hold_followers_and_springs(tmp_path: Path) -> None:
 def test_couplings_that_cannot_be_are_named(follows: dict[str, str], said: str) -> None:
     with pytest.raises(cdsm.GeometryError, match=said):
         robot(follows)
+
+
+def test_joints_follow_in_mujoco_too() -> None:
+    """Its equations hold at the posture and along S."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(ARM, ARM.at(PHI), TENSION))
+    data, order = mujoco.MjData(model), [model.joint(name).qposadr[0] for name in "abcd"]
+    np.testing.assert_allclose(model.qpos0[order], THETA, atol=1e-15)
+    for step in np.eye(2):
+        data.qpos[:] = model.qpos0
+        data.qpos[order] += S @ step
+        mujoco.mj_forward(model, data)
+        equations = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        assert equations.sum() == 2
+        np.testing.assert_allclose(data.efc_pos[equations], 0.0, atol=1e-14)
