@@ -42,8 +42,7 @@ class State(NamedTuple):
 class TreeArrays(NamedTuple):
     """The kinematic tree as plain arrays: row 0 is the base, row i Pinocchio's joint i."""
 
-    parent: NDArray[np.intp]  # row of the joint before, (nv+1,)
-    order: NDArray[np.intp]  # rows, sorted so that each joint comes after its parent (nv,)
+    parent: NDArray[np.intp]  # row of the joint before, a smaller one, (nv+1,)
     rotation: Array  # frame of each joint in that of its parent at q = 0 (nv+1, 3, 3)
     translation: Array  # (nv+1, 3) [m]
     twist: Array  # unit twist of each joint in its own frame (nv+1, 6), linear part first
@@ -176,7 +175,6 @@ class RigidBody:
         places, inertias = list(model.jointPlacements), list(model.inertias)
         return TreeArrays(
             parent=np.array(self.parent, dtype=np.intp),
-            order=np.arange(1, 1 + len(self.all_joints)),
             rotation=np.array([place.rotation for place in places]),
             translation=np.array([place.translation for place in places]),
             twist=self._twists,

@@ -14,7 +14,6 @@ from cdsm.batch.quantities import (
     READINGS,
     TERMS,
     Codes,
-    joint_axes,
     read,
 )
 from cdsm.batch.rows import Body, Pose, one_by_one, rows_of, side_by_side
@@ -63,7 +62,7 @@ class Chunk:
             beyond = ((self._q < low) | (self._q > high)).any(axis=1)
             status[beyond] = Status.BEYOND_LIMITS
         every = table.coupling.angles(self._q) if table.coupling else self._q
-        W, q = self._lanes(rows.wrench), side_by_side(every[:, table.order], self._width)
+        W, q = self._lanes(rows.wrench), side_by_side(every, self._width)
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
         self._kernels.pose(table.arm, self._body(), q, W, at)
         if rows.arm.has_springs:
@@ -192,7 +191,7 @@ class Chunk:
     def _own_springs(self) -> Array | None:
         """Return the springs of each row (N, n), or None if all have those of the arm."""
         k = self._rows.joint_springs
-        return None if k is None else k[self._part][:, self._table.order]
+        return None if k is None else k[self._part]
 
     def _with_springs(self, terms: Array) -> Array:
         """Return the terms (n, 4 or 5, nv, nv) of K_θ, from those of the kernels."""
@@ -208,11 +207,8 @@ class Chunk:
         return np.concatenate([terms, springs], axis=1)
 
     def _finished(self, name: str, value: Array) -> Array:
-        """Put the joints in the order of q; NaN where the quantity does not exist."""
-        status, place = self._status, self._table.place
-        if not self._table.is_sorted and self._table.reduction is None:
-            for axis in range(value.ndim - joint_axes(name), value.ndim):
-                value = value.take(place, axis=axis)
+        """Put NaN where the quantity does not exist."""
+        status = self._status
         if not status.any():
             return value
         kinds = (
@@ -244,7 +240,7 @@ class Chunk:
         return one_by_one(x, len(self._q))
 
     def _jacobian(self, at: Pose) -> Array:
-        """Return J_X (n, 6, nv), in the kernels' order of joints."""
+        """Return J_X (n, 6, nv)."""
         J = self._alone(at.tip_jacobian).swapaxes(2, 3)
         return np.ascontiguousarray(J).reshape(len(J), 6, -1)
 

@@ -78,11 +78,6 @@ def shapes_of(nv: int, cables: int, directions: int) -> dict[str, tuple[int, ...
     }
 
 
-def joint_axes(name: str) -> int:
-    """Return how many of the last axes of a quantity go over the joints."""
-    return sum(each in _JOINTS for each in DIMENSIONS[name][0])
-
-
 class OfPostures(Result):
     """Base class of results with a row for each of B postures.
 

@@ -71,16 +71,14 @@ class Pose(NamedTuple):
 
 
 class ArmRows:
-    """Arrays of an arm, its joints sorted so that each comes after its parent.
+    """Arrays of an arm; its joints are in Pinocchio's order, each after its parent.
 
     Attributes:
-        order: Joint of q in each place of the kernels (nv,).
-        place: Place of each joint of q, the inverse permutation (nv,).
         coupling: How the n joints follow from those of q; None: they are those of q.
-        reduction: S (n, nv) of the coupling, or None; its rows are in the kernels' order.
+        reduction: S (n, nv) of the coupling, or None.
         spring: Stiffness of the spring of each joint (n,).
         free: Angle of each joint at which its spring has no torque (n,).
-        springs: Their part of K_θ (nv, nv), in the order in which the kernels give the others.
+        springs: Their part of K_θ (nv, nv).
         arm: What all variants of the arm share.
         shapes: Of the arrays of :class:`Pose`, for one posture.
         dimensions: Those of the arm: a :class:`Body` without axes of blocks and postures.
@@ -88,33 +86,23 @@ class ArmRows:
 
     def __init__(self, arm: Manipulator) -> None:
         tree, routing = arm._body.arrays(), arm._routing
-        first = tree.order
-        nv = len(first)
-        self.order = first - 1
-        self.place = np.argsort(self.order)
+        parent = tree.parent[1:]
+        nv = len(parent)
         self.coupling, springs = arm._body.coupling, arm.springs
-        self.spring, self.free = springs.stiffness[self.order], springs.angle[self.order]
-        matrix = springs.matrix
-        self.reduction = None if self.coupling is None else self.coupling.matrix[self.order]
-        if self.reduction is None:
-            matrix = matrix[self.order[:, None], self.order]
-        self.springs = frozen(matrix)
-        self.is_sorted = bool((self.order == np.arange(nv)).all())
-        frame = np.append(0, 1 + self.place)  # of each row of the tree
-        rows = np.append(0, first)
-        parent = frame[tree.parent[first]]
+        self.spring, self.free, self.springs = springs.stiffness, springs.angle, springs.matrix
+        self.reduction = None if self.coupling is None else self.coupling.matrix
         moves = np.eye(nv, dtype=np.bool_)
         for j in range(nv):
             if parent[j]:
                 moves[j] |= moves[parent[j] - 1]
-        axis, slide = tree.twist[first, 3:], tree.twist[first, :3]
+        axis, slide = tree.twist[1:, 3:], tree.twist[1:, :3]
         about = axis[:, :, None] * axis[:, None, :]
         about[~axis.any(axis=1)] = np.eye(3)  # a joint that slides does not turn
         cross = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
-        rotation = tree.rotation[first]
+        rotation = tree.rotation[1:]
         ends = np.stack([routing.cable, routing.first, routing.second], axis=1)
         real = routing.sign != 0.0
-        path = np.where(real, self.place[routing.path], 0)
+        path = np.where(real, routing.path, 0)
         pulls = np.zeros((len(arm.cables), nv), dtype=np.bool_)
         pulls[np.broadcast_to(ends[:, :1], path.shape)[real], path[real]] = True
         self.arm = Arm(
@@ -123,23 +111,23 @@ class ArmRows:
             axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
             slide=frozen((rotation @ slide[:, :, None])[:, :, 0].copy()),
             moves=frozen(moves),
-            frame=frozen(frame[routing.row]),
+            frame=frozen(routing.row.copy()),
             ends=frozen(ends),
             path=frozen(path),
             sign=frozen(routing.sign.copy()),
             pulls=frozen(pulls),
-            tip=int(frame[tree.tip]),
+            tip=tree.tip,
             tip_rotation=frozen(tree.tip_rotation),
             gravity=frozen(np.array(arm.gravity)),
             least=NO_ARM * arm.length,
             **(_found([], []) if self.coupling else _blocks(pulls)),
         )
         self.dimensions = Body(
-            shift=tree.translation[first],
+            shift=tree.translation[1:],
             site=routing.point,
-            centre=tree.centre[rows],
+            centre=tree.centre,
             tip=tree.tip_point,
-            mass=tree.mass[rows],
+            mass=tree.mass,
             fixed=routing.fixed,
         )
         self.body = cache(self._body)

@@ -69,7 +69,7 @@ class Inputs:
         self._of_cable = np.eye(len(cables))[of[self._first]]
         each = [(c.name, i, site) for c in cables for i, site in enumerate(c.sites, 1)]
         sites = [f"{name} on {site.link}, site {i}" for name, i, site in each]
-        moved = ("base", *(arm.springs.joints[j] for j in table.order))
+        moved = ("base", *arm.springs.joints)
         self.labels: dict[str, Sequence[str]] = {
             "rigidity": cables.names,
             "spring": [c.name for c in cables if c.series_stiffness < math.inf],
@@ -209,7 +209,7 @@ def _motions(arm: Manipulator, names: Sequence[str]) -> Iterator[tuple[str, str,
                     yield "link_length", own.link, at, -along
     for link in links:
         row, rotation, _ = arm._body.locate(link)
-        frame, along = 1 + int(table.place[row - 1]), rotation @ [1.0, 0.0, 0.0]
-        yield "link_length", link, site + 3 * frame, along / 2.0
-        following = np.flatnonzero(table.arm.parent == frame).tolist()
+        along = rotation @ [1.0, 0.0, 0.0]
+        yield "link_length", link, site + 3 * row, along / 2.0
+        following = np.flatnonzero(table.arm.parent == row).tolist()
         yield "link_length", link, 3 * following[0] if following else centre, along
