@@ -107,15 +107,6 @@ class Uncertainty(Result):
         low, high = (self.value + s * k * self.standard_uncertainty for s in (-1.0, 1.0))
         return low, high
 
-    def largest_inputs(self, count: int = 5) -> tuple[tuple[str, str, float], ...]:
-        """Return the ``count`` inputs x that contribute most: source, name, |∂f/∂x| u(x) in SI."""
-        found = []
-        for source, inputs, tolerance in self.measurand.inputs.groups(self.tolerances):
-            parts = abs(self.sensitivities[source][inputs]) * tolerance.standard
-            names = [self.measurand.inputs.labels[source][i] for i in inputs]
-            found += [(source, *pair) for pair in zip(names, parts.tolist(), strict=True)]
-        return tuple(sorted(found, key=lambda part: -part[2])[:count])
-
     def plot(self) -> Figure:
         """Plot the contributions to the standard uncertainty, one bar per source."""
         return cdsm.plots.plot_uncertainty(self)
