@@ -13,7 +13,7 @@ import cdsm
 from cdsm.view import serve
 from cdsm.view.live_view import View
 from tests.support.patience import HANGS
-from tests.view.test_state import DEGREES, STABLE, UNSTABLE, along, soft_arm
+from tests.view.test_state import DEGREES, STABLE, UNSTABLE, along, rod, soft_arm
 
 pytest.importorskip("viser", reason="the extra [view] is not installed")
 pytestmark = pytest.mark.browser
@@ -24,7 +24,7 @@ PATIENCE = 1e3 * HANGS
 """Milliseconds that a condition may take to come; a busy machine draws a frame in seconds."""
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """Chromium without a window, its WebGL in software."""
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -37,6 +37,12 @@ def browser() -> Iterator[Any]:
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
         yield chromium
         chromium.close()
+
+
+@pytest.fixture(scope="module")
+def view() -> Iterator[View]:
+    with serve(soft_arm(), port=0, q=np.deg2rad(DEGREES), minimum=STABLE, maximum=200.0) as shared:
+        yield shared
 
 
 class Page:
@@ -68,12 +74,12 @@ class Page:
         slider.locator("xpath=..").locator("input[inputmode=decimal]").fill(f"{value:g}")
 
 
-def test_a_page_shows_the_numbers_of_the_api_and_asks_nobody_else(browser: Any) -> None:
-    with serve(soft_arm(), port=0, q=np.deg2rad(DEGREES), minimum=STABLE, maximum=200.0) as view:
-        check_page(Page(browser, view.url), view)
+@pytest.fixture(scope="module")
+def page(browser: Any, view: View) -> Page:
+    return Page(browser, view.url)
 
 
-def check_page(page: Page, view: View) -> None:
+def test_a_page_shows_the_numbers_of_the_api_and_asks_nobody_else(page: Page, view: View) -> None:
     def check(degrees: list[float], minimum: float, force_z: float = 0.0) -> None:
         pose = view.arm.at(np.deg2rad(degrees))
         pull = cdsm.distribute_tension(pose, minimum, 200.0, (0.0, 0.0, force_z, 0.0, 0.0, 0.0))
@@ -97,3 +103,14 @@ def check_page(page: Page, view: View) -> None:
     own = re.compile(f"{re.escape(view.url)}|blob:{re.escape(view.url)}|data:")
     assert [url for url in page.requests if not own.match(url)] == []
     assert page.errors == []
+
+
+def test_sliders_of_motors_pull_an_arm_with_few_cables(browser: Any) -> None:
+    arm = rod()
+    with serve(arm, port=0) as view:
+        page = Page(browser, view.url)
+        assert page.page.get_by_text("least tension [N]").count() == 0
+        page.type("cable6_1 [mm]", -4.0)
+        rest = cdsm.forward_statics(arm, pull=[-0.004, 0.0, 0.0])
+        page.says("stiffness along x, y, z", along(rest.stiffness))
+        assert not page.errors
