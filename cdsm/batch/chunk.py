@@ -93,8 +93,9 @@ class Chunk:
 
     def _reduced(self, at: Pose) -> Pose:
         """Return derivatives by the independent joints in place of those by all."""
-        if (S := self._table.reduction) is None:
+        if self._table.coupling is None:
             return at
+        S = self._table.coupling.matrix
         return at._replace(
             jacobian=np.einsum("bcjw,jk->bckw", at.jacobian, S),
             gravity=np.einsum("bjw,jk->bkw", at.gravity, S),
@@ -140,7 +141,7 @@ class Chunk:
         """Compute K_θ, its terms if they are needed, and what is read off it."""
         names, status, u = self._names, self._status, self._rows.directions
         wanted, fine = names & set(READINGS), status == Status.OK
-        if self._kernels.COMPILED and self._table.reduction is None:
+        if self._kernels.COMPILED and self._table.coupling is None:
             simple = names.isdisjoint(TERMS) and wanted <= {"along"}
             if simple and (found := self._along(at, F, k, W, fine)) is not None:
                 return found
@@ -195,14 +196,14 @@ class Chunk:
 
     def _with_springs(self, terms: Array) -> Array:
         """Return the terms (n, 4 or 5, nv, nv) of K_θ, from those of the kernels."""
-        if (S := self._table.reduction) is not None:
-            terms = S.T @ terms @ S
+        if (coupling := self._table.coupling) is not None:
+            terms = coupling.square(terms)
         if not self._rows.arm.has_springs and "springs" not in self._names:
             return terms
         springs = self._table.springs[None]
         if (k := self._own_springs()) is not None:
-            S = np.eye(k.shape[1]) if S is None else S
-            springs = S.T @ (k[:, :, None] * S)
+            springs = k[:, :, None] * np.eye(k.shape[1])
+            springs = springs if coupling is None else coupling.square(springs)
         springs = np.broadcast_to(springs[:, None], (len(terms), 1, *terms.shape[2:]))
         return np.concatenate([terms, springs], axis=1)
 

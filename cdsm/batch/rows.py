@@ -75,7 +75,6 @@ class ArmRows:
 
     Attributes:
         coupling: How the n joints follow from those of q; None: they are those of q.
-        reduction: S (n, nv) of the coupling, or None.
         spring: Stiffness of the spring of each joint (n,).
         free: Angle of each joint at which its spring has no torque (n,).
         springs: Their part of K_θ (nv, nv).
@@ -90,7 +89,6 @@ class ArmRows:
         nv = len(parent)
         self.coupling, springs = arm._body.coupling, arm.springs
         self.spring, self.free, self.springs = springs.stiffness, springs.angle, springs.matrix
-        self.reduction = None if self.coupling is None else self.coupling.matrix
         moves = np.eye(nv, dtype=np.bool_)
         for j in range(nv):
             if parent[j]:
