@@ -23,7 +23,7 @@ from cdsm.manipulator import GRAVITY
 from cdsm.support import records
 from cdsm.support.files import read_text
 from cdsm.support.records import EACH, ONE, CrossFaults, laid_over, read_toml, record
-from cdsm.support.validation import Axis, gravity_vector, one_of
+from cdsm.support.validation import gravity_vector, one_of
 from cdsm.tolerances import Tolerances
 from cdsm.tolerances import from_table as read_tolerances
 from cdsm.wires.catalogue import WIRES, Wire, as_wire, from_table, is_file, read_law, table_of
@@ -134,7 +134,7 @@ def _law_of(wire: Any, known: Mapping[str, Any]) -> Elasticity:
 
 
 _Gravity = Annotated[
-    Annotated[Axis, Tag(ONE)] | Annotated[records.Direction, Tag(EACH)],
+    Annotated[Any, Tag(ONE)] | Annotated[records.Direction, Tag(EACH)],
     Discriminator(records.one_or_each),
     AfterValidator(lambda given: gravity_vector("gravity", given)),
 ]

@@ -12,11 +12,10 @@ from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import positive
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.forward import forward_statics, home_angles
+from cdsm.statics.forward import forward_statics
 from cdsm.support.validation import (
     NO_WRENCH,
     number_array,
-    one_of,
     scalar,
     wrench_vector,
 )
@@ -112,20 +111,9 @@ class TipPosition:
     def _rest(self, arm: Manipulator, near: Posture | None = None) -> Posture:
         """Compute where a model of the arm rests, sought from a posture ``near``."""
         (name,) = self._given
-        given = getattr(self, name)
-        if isinstance(given, dict):
-            names = arm.cables.names
-            loose = {
-                "pull": [-arm.length / cable.gain for cable in arm.cables],
-                "rest_lengths": arm.at(home_angles(arm)).cable_lengths + arm.length,
-                "tension": np.zeros(len(names)),
-            }
-            values = np.array(loose[name])
-            for cable, value in given.items():
-                values[names.index(one_of("cable", cable, names))] = value
-            given = values
         start = None if near is None else near.q
-        return forward_statics(arm, **{name: given}, wrench=self.wrench, start=start).pose
+        given = {name: getattr(self, name)}
+        return forward_statics(arm, **given, wrench=self.wrench, start=start).pose
 
     def _coordinates(self, pose: Posture) -> Array:
         """Return the coordinates of the tip of a model that were measured."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +15,7 @@ from cdsm.statics.at_rest import Equilibrium
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import Balance, Point, continued, settle, stable_between
 from cdsm.stiffness_matrix import checked_tension, stiffness
-from cdsm.support.validation import NO_WRENCH, instance, vector, wrench_vector
+from cdsm.support.validation import NO_WRENCH, instance, one_of, scalar, vector, wrench_vector
 from cdsm.support.values import Array
 from cdsm.tension import Tension
 
@@ -23,6 +24,9 @@ _HELD = 1e-9  # least stiffness of a joint without load, over the largest
 
 Model = Callable[[float], LockedArm]
 """Arm under a share of the load and of the pull."""
+
+OfCables = ArrayLike | Mapping[str, float]
+"""A number for each cable (C,), or numbers by the names of cables; the other cables are loose."""
 
 
 def equilibrium(
@@ -105,19 +109,20 @@ def as_equilibrium(arm: LockedArm, found: Point, branch: float = 1.0) -> Equilib
 def forward_statics(
     arm: Manipulator,
     *,
-    tension: ArrayLike | None = None,
-    rest_lengths: ArrayLike | None = None,
-    pull: ArrayLike | None = None,
+    tension: OfCables | None = None,
+    rest_lengths: OfCables | None = None,
+    pull: OfCables | None = None,
     wrench: ArrayLike = NO_WRENCH,
     start: ArrayLike | None = None,
 ) -> Equilibrium:
     """Compute where an arm comes to rest, from what its motors do.
 
     Solve J_Lᵀ F + g + k (q − q_0) = J_Xᵀ W for q, between the joint limits. Joints that no cable
-    holds need springs. Exactly one of ``tension``, ``rest_lengths`` and ``pull`` is given. With
-    given tensions, cables add no stiffness of their own (k_c = 0); motors that hold lengths are
-    locked, and k_c counts. :attr:`Equilibrium.motors` says which: the two stiffnesses of one
-    posture can differ by a factor of ten.
+    holds need springs. Exactly one of ``tension``, ``rest_lengths`` and ``pull`` is given: (C,), or
+    a dict by the names of cables, the others being loose. With given tensions, cables add no
+    stiffness of their own (k_c = 0); motors that hold lengths are locked, and k_c counts.
+    :attr:`Equilibrium.motors` says which: the two stiffnesses of one posture can differ by a factor
+    of ten.
 
     Args:
         arm: The arm.
@@ -132,8 +137,9 @@ def forward_statics(
             jumped on the way.
 
     Raises:
-        InvalidInput: Not exactly one of the three is given, or an argument has the wrong shape; or
-            motors hold rest lengths, but ``original_length`` of the arm is ``"stretched"``.
+        InvalidInput: Not exactly one of the three is given, an argument has the wrong shape, or a
+            cable does not exist; or motors hold rest lengths, but ``original_length`` of the arm is
+            ``"stretched"``.
         ElasticityRangeError: Motors hold lengths, and a tension is outside the domain of its law.
         EquilibriumError: No stable equilibrium was found, or nothing holds a joint.
     """
@@ -146,9 +152,7 @@ def forward_statics(
     W = wrench_vector("wrench", wrench)
     home = arm.at(home_angles(arm))
     begin = home if start is None else arm.at(start)
-    value = given[named[0]]
-    assert value is not None
-    model = _model(arm, named[0], value, home, begin, W)
+    model = _model(arm, named[0], _of_all(arm, named[0], given[named[0]]), home, begin, W)
     loaded = model(1.0)
     if start is not None:
         return as_equilibrium(loaded, _settled(loaded, begin))
@@ -164,6 +168,21 @@ def forward_statics(
 def home_angles(arm: Manipulator) -> Array:
     """Return the angles q_0 of the springs (nv,), or the joint limits next to them."""
     return np.clip(arm.springs.rest, arm.lower, arm.upper)
+
+
+def _of_all(arm: Manipulator, name: str, value: Any) -> ArrayLike:
+    """Return what all motors do (C,); cables that a dict does not name are loose."""
+    if not isinstance(value, Mapping):
+        return value  # type: ignore[no-any-return]
+    numbers = {
+        "tension": np.zeros(len(arm.cables)),
+        "rest_lengths": arm.at(home_angles(arm)).cable_lengths + arm.length,
+        "pull": np.array([-arm.length / cable.gain for cable in arm.cables]),
+    }[name]
+    for cable, number in value.items():
+        c = arm.cables.names.index(one_of("cable", cable, arm.cables.names))
+        numbers[c] = scalar(f"{name}[{cable!r}]", number)
+    return numbers
 
 
 def _model(

@@ -102,8 +102,8 @@ def named_columns(
     """Return index and unit of each column of a table, by the name of the column.
 
     Columns with other names than the ``known`` ones are allowed, unless they are almost a known
-    name. ``refuse`` is called, which raises an error, for those, for a name that is given twice,
-    for semicolons between the columns, and for a row with more cells than the header.
+    name or hold angles. ``refuse`` is called, which raises an error, for those, for a name that is
+    given twice, for semicolons between the columns, and for a row with more cells than the header.
     """
     width = len(table.header)
     if width == 1 and ";" in table.header[0]:
@@ -118,9 +118,9 @@ def named_columns(
         near = difflib.get_close_matches(name, as_long, 1, 0.8)
         if name in found:
             refuse(f"has two columns called {name}; give each once")
-        if near and name not in known:
-            there = f"did you mean {near[0]}? There are {listed(known)}"
-            refuse(f"has a column {name}, which is not known; {there}")
+        if name not in known and (near or unit in ANGLE):
+            there = f"did you mean {near[0]}? There are" if near else "there are"
+            refuse(f"has a column {name}, which is not known; {there} {listed(known)}")
         found[name] = at, unit
     return found
 

@@ -259,7 +259,7 @@ def axis_vector(name: str, axis: str) -> tuple[float, float, float]:
 def gravity_vector(name: str, value: Direction) -> Array:
     """Return gravity (3,) [m/s²], read-only, from a vector or an axis (9.81 m/s² along it)."""
     given = 9.81 * np.array(axis_vector(name, value)) if isinstance(value, str) else value
-    return vector(name, given, 3, "gravity in base axes [m/s²]", "gravity")
+    return vector(name, given, 3, "gravity in base axes [m/s²], or an axis such as -z", "gravity")
 
 
 def unit_directions(name: str, value: Direction | Iterable[Direction]) -> Array:

@@ -141,6 +141,7 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
     [
         ("gravity = [", "gravty = [", "did you mean gravity?"),
         ("-9.81", "-9.81e9", "gravity"),
+        ("[0.0, -9.81, 0.0]", "9.81", "gravity in base axes [m/s²], or an axis such as -z"),
         ("minimum = 5.0", "minimum = -5.0", "minimum: -5 N given; cables only pull"),
         ("minimum = 5.0", "minimum = 5.0\nmaximum = 2.0", "maximum: 2 N given, below the minimum"),
         ("minimum = 5.0", "lead = 5.0", "lead: stands outside [universal]"),

@@ -97,6 +97,7 @@ def test_positions_come_out_in_si(tmp_path: Path) -> None:
         (f"{HEAD}a,nan,5,3,\n", "line 2, column x: 'nan'"),
         (f"{HEAD}a,,,3,\n", "line 2: no coordinate was measured"),
         ("x [mm],cable3_9 [mm]\n90,3\n", "column cable3_9, which is not known"),
+        ("x [mm],jointx [deg]\n90,3\n", "column jointx, which is not known"),
         ("x [mm]\n90\n", "one of a cable, such as cable3_1"),
         ("x,cable3_1 [mm]\n90,3\n", "column x has no unit"),
         ("x [mm],cable3_1 [mm],cable3_2 [N]\n90,3,2\n", r"call it cable3_2 \[mm\]"),

@@ -1,5 +1,6 @@
 """Where an arm comes to rest from what its motors do, and how stiff it is there."""
 
+import math
 from functools import partial
 from typing import Any
 
@@ -66,10 +67,24 @@ def test_motors_that_hold_lengths_are_stiffer_than_those_that_hold_tensions() ->
     assert locked.along("z") > 2.0 * held.along("z")
 
 
+@pytest.mark.parametrize("what", ["tension", "rest_lengths", "pull"])
+def test_cables_that_a_dict_does_not_name_are_loose(what: str) -> None:
+    rest = cdsm.forward_statics(ARM, tension=[4.0, 0.0, 0.0])
+    left = rest.pose.cable_lengths[0] / (1.0 + 4.0 / 2e4)
+    straight = ARM.at(np.zeros(ARM.nv)).cable_lengths[0]
+    own = {"tension": 4.0, "rest_lengths": left, "pull": straight - left}
+    given: Any = {what: {ARM.cables.names[0]: own[what]}}
+    found = cdsm.forward_statics(ARM, **given)
+    np.testing.assert_allclose(found.tension, [4.0, 0.0, 0.0], atol=1e-7)
+    np.testing.assert_allclose(found.pose.q, rest.pose.q, atol=1e-8)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
         ({}, "none given"),
+        ({"pull": {"cable9_1": 0.0}}, "cable9_1"),
+        ({"pull": {"cable8_1": math.nan}}, "pull.'cable8_1'.: nan"),
         ({"tension": TENSION, "pull": TENSION}, "tension and pull given"),
         ({"tension": [1.0, 2.0]}, r"\(3,\) needed"),
         ({"tension": [-1.0, 0.0, 0.0]}, "cables only pull"),
