@@ -23,7 +23,7 @@ from lxml import etree
 from numpy.typing import ArrayLike
 
 from cdsm.errors import InvalidInput, warn
-from cdsm.interchange.mjcf_bodies import Carried, add_bodies, couple, mass_matrix, row
+from cdsm.interchange.mjcf_bodies import LEAST_INERTIA, add_bodies, couple, row
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.report.checks import TOLERANCE, balance_error
@@ -95,11 +95,10 @@ def to_mjcf(
       cables, and springs softer than F/L, are motors without ``ctrl``.
 
     The time step is 1, 2 or 5 times a power of ten [s], at most 0.2/ω and MuJoCo's 2 ms, with the
-    highest natural frequency ω [rad/s] of K_θ and the exported bodies. Moving bodies without mass
-    get 1e-6 kg and 1e-9 kg m². Each cable has the damping c = β k [N s/m], with β such that the
-    least damped mode that gets half of its ω² or more from the cables has the ``damping_ratio``.
-    A comment at the top states all this. If K_θ is not positive definite, it says UNSTABLE, and a
-    warning is issued.
+    highest natural frequency ω [rad/s] of the arm. Bodies without mass get 1e-6 kg and 1e-9 kg m².
+    Each cable has the damping c = β k [N s/m], with β such that the least damped mode that gets
+    half of its ω² or more from the cables has the ``damping_ratio``. A comment at the top states
+    all this. If K_θ is not positive definite, it says UNSTABLE, and a warning is issued.
 
     Args:
         arm: The arm.
@@ -114,7 +113,6 @@ def to_mjcf(
         InvalidInput: Only one of ``pose`` and ``tension`` is given, the posture is of another arm,
             both dampings are given, or an argument is invalid. ``actuators`` is unknown.
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
-        SingularStiffness: A motion of the arm moves no link with mass.
     """
     model = mujoco_model(arm, pose, tension, actuators, damping_ratio, damping)
     if model.unstable is not None:
@@ -177,9 +175,9 @@ def mujoco_model(
     coupling, q = arm._body.coupling, np.zeros(arm.nv) if pose is None else pose.q
     angles = coupling.angles(q) if coupling else q
     start = dict(zip(arm._body.all_joints, angles.tolist(), strict=True))
-    masses = add_bodies(root, arm, start)
+    add_bodies(root, arm, start)
     of_joints = 0.0 if damping is None else float(damping)
-    step, of_cables, said = _motion(arm, K, masses, damping_ratio, damping)
+    step, of_cables, said = _motion(arm, K, damping_ratio, damping)
     option.set("timestep", repr(step))
     joints = list(root.iter("joint"))  # in MuJoCo's order, depth first
     for joint in joints:
@@ -207,11 +205,7 @@ def mujoco_model(
 
 
 def _motion(
-    arm: Manipulator,
-    K: Stiffness | None,
-    masses: list[Carried],
-    ratio: float | None,
-    damping: float | None,
+    arm: Manipulator, K: Stiffness | None, ratio: float | None, damping: float | None
 ) -> tuple[float, Array, list[str]]:
     """Choose the time step [s] and the damping of each cable (C,) [N s/m]; say both in lines.
 
@@ -221,7 +215,8 @@ def _motion(
     unit = JointUnits(arm.slides).joined("N m s/rad", "N s/m")
     damped = f"{damping or 0.0:.4g} {unit} at every joint"
     if K is not None:
-        squares, shapes = vibrations(K, mass_matrix(K.posture, masses))
+        M = arm._body.mass_matrix(K.posture.q) + LEAST_INERTIA * np.eye(arm.nv)
+        squares, shapes = vibrations(K, M)
         fastest = math.sqrt(abs(squares).max())
         step = next((each for each in _STEPS if each * fastest <= _PHASE), _STEPS[-1])
         of = f"for frequencies up to {fastest / math.tau:.4g} Hz"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from lxml import etree
@@ -12,46 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from cdsm.joints import Coupling
 from cdsm.manipulator import Manipulator
-from cdsm.posture import Posture
 from cdsm.support.files import parse_xml
 from cdsm.support.values import Array
 
-_MASS, _INERTIA = 1e-6, 1e-9  # least mass [kg] and moment [kg m²] of a moving body in MuJoCo
+_MASS, LEAST_INERTIA = 1e-6, 1e-9  # of bodies without mass in MuJoCo [kg], [kg m²]
 _SMALLEST = 1e-12  # a smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero
 _ROUNDING = 1e-9  # relative; MuJoCo refuses a moment of inertia above the sum of the other two
 _SITE, _STICK = 1e-3, 0.008  # radius [m] of a drawn hole; of a stick over the length of the arm
 _GHOST = {"contype": "0", "conaffinity": "0", "mass": "0"}  # drawn, without mass or contacts
 
 
-class Carried(NamedTuple):
-    """Rigid body that a link carries; its centre and inertia are in the frame of the link."""
-
-    link: str
-    mass: float  # m [kg]
-    centre: Array  # centre of mass (3,) [m]
-    inertia: Array  # I about the centre of mass (3, 3) [kg m²]
-
-
-def mass_matrix(pose: Posture, carried: Iterable[Carried]) -> Array:
-    """Compute the joint-space mass matrix (nv, nv) [kg m²] of the bodies ``carried`` alone.
-
-    M = Σ (m J_vᵀ J_v + J_ωᵀ I J_ω). J_v and J_ω are the Jacobians of the velocity of the centre of
-    mass and of the angular velocity of a body.
-    """
-    body = pose.arm._body
-    M = np.zeros(2 * (len(body.all_joints),))
-    for link, mass, centre, inertia in carried:
-        place = pose.link_pose(link)
-        joints = np.array(body.joints_to(body.locate(link)[0]), dtype=np.intp) - 1
-        angular, R = pose._twist[3:, joints], place[:3, :3]
-        linear = pose._twist[:3, joints] + np.cross(angular.T, R @ centre + place[:3, 3]).T
-        turned = angular.T @ R
-        M[np.ix_(joints, joints)] += mass * linear.T @ linear + turned @ inertia @ turned.T
-    return body.coupling.square(M) if body.coupling else M
-
-
-def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> list[Carried]:
-    """Add the tree of links to ``root``; return mass and inertia of each body that has a mass.
+def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float]) -> None:
+    """Add the tree of links to ``root``.
 
     The file has the links at the joint coordinates ``start`` [rad or m], by joint name. MuJoCo
     moves a joint by qpos − ref from its place in the file. Since ref is ``start``, a new ``mjData``
@@ -66,12 +37,11 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
     world = etree.SubElement(root, "worldbody")
     # MuJoCo reserves the name world for its root
     bodies = {base: world if base == "world" else etree.SubElement(world, "body", name=base)}
-    moving: dict[str, bool] = {base: False}
-    masses: list[Carried] = []
     for name in (queue := [base]):
         body, link = bodies[name], links[name]
         below = [joint for joint in joints if joint.find("parent").get("link") == name]
-        masses += [] if body is world else _inertial(body, link, moving[name])
+        if body is not world:
+            _add_inertia(body, link)
         drawn = [_shape(body, visual) for visual in link.findall("visual")]
         if not any(drawn):
             thick = _STICK * arm.length
@@ -93,7 +63,6 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
             queue.append(child)
             bodies[child] = etree.SubElement(body, "body", name=child)
             place, turn = _place(joint)
-            moving[child] = moving[name] or joint.get("type") != "fixed"
             if joint.get("type") != "fixed":
                 axis, limit = _numbers(joint.find("axis"), "xyz", "1 0 0"), joint.find("limit")
                 q = start.get(joint.get("name"), 0.0)
@@ -109,40 +78,32 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
                     of_joint |= {"stiffness": repr(k), "springref": repr(free)}
                 etree.SubElement(bodies[child], "joint", of_joint)
             bodies[child].attrib.update(_placed(place, turn))
-    return masses
 
 
-def _inertial(body: etree._Element, link: etree._Element, moves: bool) -> list[Carried]:
-    """Write the mass and inertia of a link to its body; return them in a list of one entry.
+def _add_inertia(body: etree._Element, link: etree._Element) -> None:
+    """Write the mass and inertia of a link to its body; change moments that MuJoCo refuses.
 
-    A massless link that ``moves`` gets 1e-6 kg and 1e-9 kg m²; its weight is compensated. For a
-    massless link that does not move, nothing is written, and the list is empty.
+    A body without mass gets a least one, without weight.
     """
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
-    if mass > _SMALLEST:
-        place, turn = _place(inertial)
-        tensor = _inertia(inertial.find("inertia"), turn.as_matrix())
-    elif moves:
+    if mass <= _SMALLEST:
         body.set("gravcomp", "1")
-        mass, place, tensor = _MASS, np.zeros(3), _INERTIA * np.eye(3)
-    else:
-        return []
-    full = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    etree.SubElement(body, "inertial", pos=row(place), mass=repr(mass), fullinertia=row(full))
-    return [Carried(str(link.get("name")), mass, place, tensor)]
-
-
-def _inertia(inertia: etree._Element, R: Array) -> Array:
-    """Read an inertia (3, 3) [kg m²], rotate it by R, and change moments that MuJoCo refuses."""
-    keys = [[f"i{min(a, b)}{max(a, b)}" for b in "xyz"] for a in "xyz"]
+        least = {"mass": repr(_MASS), "diaginertia": row([LEAST_INERTIA] * 3)}
+        etree.SubElement(body, "inertial", pos="0 0 0", **least)
+        return
+    (place, turn), inertia = _place(inertial), inertial.find("inertia")
+    R, keys = turn.as_matrix(), [[f"i{min(a, b)}{max(a, b)}" for b in "xyz"] for a in "xyz"]
     tensor = R @ np.array([[float(inertia.get(key)) for key in each] for each in keys]) @ R.T
     moments, axes = np.linalg.eigh(tensor)
-    taken = np.maximum(moments, _INERTIA) if moments[0] < _SMALLEST else moments.copy()
+    taken = np.maximum(moments, LEAST_INERTIA) if moments[0] < _SMALLEST else moments.copy()
     # first correct a needle: the largest moment must not fall below the second
     taken[0] = max(taken[0], 2.0 * _ROUNDING * taken[1])
     taken[2] = min(taken[2], (1.0 - _ROUNDING) * (taken[0] + taken[1]))
-    return tensor if (taken == moments).all() else np.asarray(axes @ np.diag(taken) @ axes.T)
+    if not (taken == moments).all():
+        tensor = axes * taken @ axes.T
+    full = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    etree.SubElement(body, "inertial", pos=row(place), mass=repr(mass), fullinertia=row(full))
 
 
 def _shape(body: etree._Element, visual: etree._Element) -> bool:
