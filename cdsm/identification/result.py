@@ -189,8 +189,6 @@ class Identification(Result):
             raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
         problem, rise = self._problem, float(ndtri((1.0 + level) / 2.0) ** 2)
         best = problem.point(self.values)
-        best = np.where(self.values == problem.low, 0.0, best)
-        best = np.where(self.values == problem.high, 1.0, best)
         jacobian, found = self.jacobian * problem.slope(best), dict[str, tuple[float, float]]()
         with progress_allowed(progress):
             for i in track(range(best.size), "finding the confidence of the parameters"):

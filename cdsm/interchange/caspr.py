@@ -24,7 +24,7 @@ from cdsm.support.files import XmlFault, as_path, numbers, parse_xml, read_text
 from cdsm.support.validation import AXES
 from cdsm.support.values import Array
 from cdsm.urdf import TIP, E, inertial, joint, origin, urdf_text
-from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.elasticity import Elasticity, checked_law
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -95,14 +95,12 @@ def read_caspr(
             other joints, cables that are not ideal, pulleys. The first such part is named.
         GeometryError: A link has impossible moments of inertia.
     """
-    if not isinstance(elasticity, Elasticity):
-        raise InvalidInput("elasticity", f"{elasticity!r} given; an Elasticity is needed.")
+    checked_law(elasticity)
     path = as_path(bodies)
     if path.is_dir():
         path, of_cables = (_one_file(path, kind) for kind in ("bodies", "cables"))
     elif cables is None:
-        problem = "not given; give the file of the cables too, or the folder of both."
-        raise InvalidInput("cables", problem)
+        raise InvalidInput("cables", "give the file of the cables too, or the folder of both.")
     else:
         of_cables = as_path(cables)
     with _reading(path) as read:
@@ -217,8 +215,6 @@ def _joints(name: str, element: etree._Element) -> list[tuple[str, str, Any, Any
             raise XmlFault(f"{name}: joint q_min {lower:g} is above q_max {upper:g}")
         tail = {"?": "turn", "!": "slide"}.get(axis, f"slide_{axis.lower()}" * axis.isupper())
         xyz = AXES.get(axis.lower()) or numbers(f"{name}: joint axis", element.get("axis"), 3)
-        if not any(xyz):
-            raise XmlFault(f"{name}: joint axis {xyz} has no direction")
         kind = "prismatic" if axis in "XYZ!" else "revolute"
         limit = E.limit(effort=0.0, velocity=0.0, lower=lower, upper=upper)
         found.append((kind, f"{name}_{tail or axis}", E.axis(xyz=xyz), limit))

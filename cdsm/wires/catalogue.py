@@ -44,7 +44,7 @@ Wire = Elasticity | str | float | os.PathLike[str]
 def as_wire(wire: Wire) -> Elasticity:
     """Return the law of a wire: itself, by a name of :data:`WIRES`, EA [N], or a WIRE.toml.
 
-    Raises InvalidInput, InvalidInput (another type, or EA outside its range) or FileError.
+    Raises InvalidInput (also for another type, or EA outside its range) or FileError.
     """
     if isinstance(wire, Elasticity):
         return wire
