@@ -9,10 +9,10 @@ from typing import final
 import numpy as np
 
 from cdsm.errors import InvalidInput, listed
-from cdsm.identification.identify import check_measurements, identify, independent_readings
+from cdsm.identification.identify import check_measurements, identify
 from cdsm.identification.measurement import Measurement
 from cdsm.identification.problem import Problem, Test
-from cdsm.identification.result import Identification, likely
+from cdsm.identification.result import Identification, independent_readings, likely
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import aligned, plural
 from cdsm.support.progress import progress_allowed, track
@@ -73,18 +73,7 @@ class Explanations(Result):
 
         Alone, each of them lowers χ² of the arm as it is; beside the best one, it has no part.
         """
-        return tuple(name for name in self.names[1:] if self._relation(name) == "exclusive")
-
-    def _relation(self, name: str) -> str:
-        i, both = self.names.index(name), self.together[name]
-        fall = self.alone[0].chi_square - both.chi_square
-        if fall > _NEEDED:
-            return "both"
-        if float(self.unexplained @ self.unexplained) - self.alone[i].chi_square < _NEEDED:
-            return "idle"
-        if self.explains[i]:
-            return "either"
-        return "exclusive" if fall < _NOTHING else "possible"
+        return tuple(name for name in self.names[1:] if self._beside(name)[0] == "exclusive")
 
     def __str__(self) -> str:
         in_mm = not any(isinstance(each, Measurement) for each in self.alone[0].measurements)
@@ -120,33 +109,30 @@ class Explanations(Result):
             said.append(f"{_verb(bad, 'does', 'do')} not.")
         if not good:
             said.append(f"None alone explains these measurements; {best} leaves the least χ².")
-        return (*said, *(self._beside(name) for name in self.names[1:]))
+        return (*said, *(self._beside(name)[1] for name in self.names[1:]))
 
-    def _beside(self, name: str) -> str:
-        best, both = self.best, self.together[name]
+    def _beside(self, name: str) -> tuple[str, str]:
+        """Return how a parameter relates to the best one: in a word, and in a sentence."""
+        i, best, both = self.names.index(name), self.best, self.together[name]
         fall = max(0.0, self.alone[0].chi_square - both.chi_square)
         values = ", ".join(f"{key} = {x:.4g}" for key, x in both.parameters.items())
-        alike = [each for each in both.warnings if each.startswith("not identifiable")]
-        match self._relation(name):
-            case "both":
-                return (
-                    f"{best} and {name} together explain more: χ² falls by {fall:.3g} ({values})."
-                )
-            case "idle":
-                return f"{name} alone or beside {best} changes nothing that these readings show."
-            case "either":
-                why = f" {alike[0]}" if alike else ""
-                return f"{best} or {name}: these readings do not tell which one.{why}"
-            case "exclusive":
-                return (
-                    f"{best} and {name} exclude each other: both act on these readings alone, but "
-                    f"beside {best} no part is left for {name} (χ² falls by {fall:.2g})."
-                )
+        if fall > _NEEDED:
+            said = f"{best} and {name} together explain more: χ² falls by {fall:.3g} ({values})."
+            return "both", said
+        if float(self.unexplained @ self.unexplained) - self.alone[i].chi_square < _NEEDED:
+            said = f"{name} alone or beside {best} changes nothing that these readings show."
+            return "idle", said
+        if self.explains[i]:
+            alike = [f" {each}" for each in both.warnings if each.startswith("not identifiable")]
+            said = f"{best} or {name}: these readings do not tell which one."
+            return "either", said + "".join(alike[:1])
+        if fall < _NOTHING:
+            said = f"{best} and {name} exclude each other: both act on these readings alone, but "
+            said += f"beside {best} no part is left for {name} (χ² falls by {fall:.2g})."
+            return "exclusive", said
         r = both.correlation[0, 1]
-        return (
-            f"{name} beside {best} is possible, not needed: χ² falls by {fall:.3g}, less than "
-            f"{_NEEDED} ({values}, correlated at {r:+.2f})."
-        )
+        said = f"{name} beside {best} is possible, not needed: χ² falls by {fall:.3g}, less than "
+        return "possible", f"{said}{_NEEDED} ({values}, correlated at {r:+.2f})."
 
     def _labels(self) -> dict[str, Sequence[object]]:
         return {"explanation": self.names, "reading": self.alone[0].reading_names}

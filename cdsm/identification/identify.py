@@ -10,7 +10,7 @@ import numpy as np
 from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import Measurement, WeightLoop, name_of
 from cdsm.identification.problem import Problem, TensionOf, Test
-from cdsm.identification.result import Identification
+from cdsm.identification.result import Identification, independent_readings
 from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import plural
@@ -101,12 +101,6 @@ def identify(
     )
 
 
-def independent_readings(measurements: Sequence[Test]) -> int:
-    """Return the number of readings, less one for each axis of a loop: its offset is unknown."""
-    offsets = sum(len(each.axes) for each in measurements if isinstance(each, WeightLoop))
-    return sum(each._readings.size for each in measurements) - offsets
-
-
 def check_measurements(measurements: object) -> None:
     """Raise InvalidInput if these are no measurements, or planned ones without readings."""
     kinds = Measurement | WeightLoop | TipPosition
@@ -128,8 +122,6 @@ def _checked_bounds(free: object) -> dict[str, tuple[float, float]]:
         raise InvalidInput("free", f"{free!r} given; {said}")
     bounds = {}
     for name, limits in free.items():
-        if not isinstance(name, str):
-            raise InvalidInput("free", f"{name!r} is no name of a parameter.")
         low, high = vector(f"free[{name!r}]", limits, 2, "the bounds (low, high)").tolist()
         # within closer bounds, rounding would hide the finite differences
         if not high - low > 1e-9 * max(abs(low), abs(high)):

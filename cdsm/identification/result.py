@@ -39,6 +39,12 @@ def likely(chi_square: float, freedom: int) -> bool:
     return not freedom or float(chdtrc(freedom, chi_square)) >= _UNLIKELY
 
 
+def independent_readings(measurements: Sequence[Test]) -> int:
+    """Return the number of readings, less one for each axis of a loop: its offset is unknown."""
+    offsets = sum(len(each.axes) for each in measurements if isinstance(each, WeightLoop))
+    return sum(each._readings.size for each in measurements) - offsets
+
+
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Identification(Result):
@@ -117,8 +123,7 @@ class Identification(Result):
     @quantity("1")
     def freedom(self) -> int:
         """Degrees of freedom of χ²: n − :attr:`rank`, less one offset per axis of each loop."""
-        loops = (each for each in self.measurements if isinstance(each, WeightLoop))
-        return len(self.predicted) - sum(len(loop.axes) for loop in loops) - self.rank
+        return independent_readings(self.measurements) - self.rank
 
     @property
     def reduced_chi_square(self) -> float:
