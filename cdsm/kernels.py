@@ -250,15 +250,19 @@ def pose(arm: Arm, body: Body, q: Array, wrench: Array, at: Pose) -> None:
             _add_dot(JX[0, j], wrench[b, :3], torque)
             _add_dot(JX[1, j], wrench[b, 3:], torque)
             for w in each(torque):
-                torque[w] -= at.gravity[b, j, w]
+                turned = body.spring[own, j, w] * (q[b, j, w] - arm.free[j])
+                torque[w] -= at.gravity[b, j, w] + turned
 
 
 @kernel
-def stiffness(arm: Arm, at: Pose, F: Array, k: Array, wrench: Array, K: Array, size: Array) -> None:
+def stiffness(
+    arm: Arm, body: Body, at: Pose, F: Array, k: Array, wrench: Array, K: Array, size: Array
+) -> None:
     """Fill K_θ for tensions F and cable stiffnesses k (B, C, W), by Eq. 16.
 
-    K is (B, 4, nv, nv, W) for the active, passive, gravity and load terms, or (B, 1, …) for their
-    sum. ``size`` (B, nv, W) is, then only, the sum of the magnitudes of their diagonals.
+    K is (B, 5, nv, nv, W) for the active, passive, gravity, load and spring terms, (B, 4, …) of an
+    arm without springs, or (B, 1, …) for their sum. ``size`` (B, nv, W) is, then only, the sum of
+    the magnitudes of their diagonals.
     """
     nv, C, W = len(arm.parent), F.shape[1], F.shape[2]
     apart, sum_of = K.shape[1] // 4, np.empty((nv, W))
@@ -298,6 +302,10 @@ def stiffness(arm: Arm, at: Pose, F: Array, k: Array, wrench: Array, K: Array, s
                     if arm.moves[j, i]:
                         _add_dot(a, of[j], term[i, j])
             _note(term, sum_of, size[b])
+        if K.shape[1] != 4:
+            for j in range(nv):
+                _add(body.spring[b % len(body.spring), j], K[b, 4 * apart, j, j])
+            _note(K[b, 4 * apart], sum_of, size[b])
         for n in range(K.shape[1]):
             for i in range(nv):
                 for j in range(i):

@@ -65,8 +65,6 @@ class Chunk:
         W, q = self._lanes(rows.wrench), side_by_side(every, self._width)
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
         self._kernels.pose(table.arm, self._body(), q, W, at)
-        if rows.arm.has_springs:
-            at.torque[...] -= self._joint_springs() * (q - table.free[:, None])
         full, at = at, self._reduced(at)
         short = self._alone(at.shortest) < SHORTEST_SEGMENT
         status[short & (status == Status.OK)] = Status.COINCIDENT_SITES
@@ -145,7 +143,9 @@ class Chunk:
             simple = names.isdisjoint(TERMS) and wanted <= {"along"}
             if simple and (found := self._along(at, F, k, W, fine)) is not None:
                 return found
-        terms = self._with_springs(self._alone(self._terms(full, F, k, W, 4)[0]))
+        count = 5 if self._rows.arm.has_springs or "springs" in names else 4
+        terms, coupling = self._alone(self._terms(full, F, k, W, count)[0]), self._table.coupling
+        terms = coupling.square(terms) if coupling else terms
         found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
         found["joint"] = terms.sum(axis=1)
         if wanted:
@@ -162,9 +162,6 @@ class Chunk:
     ) -> dict[str, Array] | None:
         """Compute K_θ and ``along`` without the terms; None if one row may be singular."""
         K, size = self._terms(at, F, k, W, 1)
-        if self._rows.arm.has_springs:
-            K[:, 0, range(K.shape[2]), range(K.shape[2])] += self._joint_springs()
-            size += self._joint_springs()
         found = {"joint": self._alone(K[:, 0]).copy()} if "joint" in self._names else {}
         if "along" in self._names:
             u = self._rows.directions.copy()  # writable, whatever u is: the kernel compiles once
@@ -178,34 +175,11 @@ class Chunk:
         return found
 
     def _terms(self, at: Pose, F: Array, k: Array, W: Array, count: int) -> tuple[Array, Array]:
-        """Compute the terms (B, 4, nv, nv, W) of K_θ without springs, or 1: their sum."""
+        """Compute the 4 or 5 terms (B, 5, nv, nv, W) of K_θ, or 1: their sum."""
         B, nv, _ = at.gravity.shape
         K, size = self._empty("K", B, count, nv, nv), self._empty("size", B, nv)
-        self._kernels.stiffness(self._table.arm, at, F, k, W, K, size)
+        self._kernels.stiffness(self._table.arm, self._body(), at, F, k, W, K, size)
         return K, size
-
-    def _joint_springs(self) -> Array:
-        """Return the stiffness of springs (n, 1), or (B, n, W) if the rows differ."""
-        k = self._own_springs()
-        return self._table.spring[:, None] if k is None else side_by_side(k, self._width)
-
-    def _own_springs(self) -> Array | None:
-        """Return the springs of each row (N, n), or None if all have those of the arm."""
-        k = self._rows.joint_springs
-        return None if k is None else k[self._part]
-
-    def _with_springs(self, terms: Array) -> Array:
-        """Return the terms (n, 4 or 5, nv, nv) of K_θ, from those of the kernels."""
-        if (coupling := self._table.coupling) is not None:
-            terms = coupling.square(terms)
-        if not self._rows.arm.has_springs and "springs" not in self._names:
-            return terms
-        springs = self._table.springs[None]
-        if (k := self._own_springs()) is not None:
-            springs = k[:, :, None] * np.eye(k.shape[1])
-            springs = springs if coupling is None else coupling.square(springs)
-        springs = np.broadcast_to(springs[:, None], (len(terms), 1, *terms.shape[2:]))
-        return np.concatenate([terms, springs], axis=1)
 
     def _finished(self, name: str, value: Array) -> Array:
         """Put NaN where the quantity does not exist."""

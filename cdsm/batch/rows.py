@@ -25,6 +25,7 @@ class Arm(NamedTuple):
     turn: Array  # A, B, C (nv, 3, 3, 3): a joint turns its frame by A + B cos q + C sin q
     axis: Array  # of joints that turn, in the frame before (nv, 3); else zero
     slide: Array  # of joints that slide, in the frame before (nv, 3); else zero
+    free: Array  # angle of each joint at which its spring has no torque (nv,)
     moves: NDArray[np.bool_]  # whether joint i moves what joint j carries (nv of j, nv of i)
     frame: NDArray[np.intp]  # frame of each site (P,)
     ends: NDArray[np.intp]  # cable, first and second site of each segment (S, 3)
@@ -52,6 +53,7 @@ class Body(NamedTuple):
     tip: Array  # (B, 3, W) [m]
     mass: Array  # (B, nv+1, W) [kg]
     fixed: Array  # length of cables that no joint changes (B, C, W) [m]
+    spring: Array  # stiffness of the spring of each joint (B, nv, W)
 
 
 class Pose(NamedTuple):
@@ -75,9 +77,6 @@ class ArmRows:
 
     Attributes:
         coupling: How the n joints follow from those of q; None: they are those of q.
-        spring: Stiffness of the spring of each joint (n,).
-        free: Angle of each joint at which its spring has no torque (n,).
-        springs: Their part of K_θ (nv, nv).
         arm: What all variants of the arm share.
         shapes: Of the arrays of :class:`Pose`, for one posture.
         dimensions: Those of the arm: a :class:`Body` without axes of blocks and postures.
@@ -87,8 +86,7 @@ class ArmRows:
         tree, routing = arm._body.arrays(), arm._routing
         parent = tree.parent[1:]
         nv = len(parent)
-        self.coupling, springs = arm._body.coupling, arm.springs
-        self.spring, self.free, self.springs = springs.stiffness, springs.angle, springs.matrix
+        self.coupling = arm._body.coupling
         moves = np.eye(nv, dtype=np.bool_)
         for j in range(nv):
             if parent[j]:
@@ -108,6 +106,7 @@ class ArmRows:
             turn=frozen(rotation[:, None] @ np.stack([about, np.eye(3) - about, cross], axis=1)),
             axis=frozen((rotation @ axis[:, :, None])[:, :, 0].copy()),
             slide=frozen((rotation @ slide[:, :, None])[:, :, 0].copy()),
+            free=arm.springs.angle,
             moves=frozen(moves),
             frame=frozen(routing.row.copy()),
             ends=frozen(ends),
@@ -127,6 +126,7 @@ class ArmRows:
             tip=tree.tip_point,
             mass=tree.mass,
             fixed=routing.fixed,
+            spring=arm.springs.stiffness,
         )
         self.body = cache(self._body)
         C, (S, m) = len(arm.cables), path.shape

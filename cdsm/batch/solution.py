@@ -129,7 +129,6 @@ class Rows:
         body: Dimensions of each row, rows first; those of the arm by default.
         springs: Stiffness (n, C) of cables of lengths L (n, C) under F (n, C) in a slice of rows;
             −1 outside a law; those of the arm by default.
-        joint_springs: Stiffness (N, n) of the springs of all joints; those of the arm by default.
         check_limits: Whether rows beyond the joint limits are skipped.
     """
 
@@ -142,7 +141,6 @@ class Rows:
     directions: Array = field(default_factory=partial(np.zeros, (0, 3)))
     body: Body | None = None
     springs: Springs | None = None
-    joint_springs: Array | None = None
     check_limits: bool = True
 
     def solve(self, status: Codes, threads: int = 1) -> dict[str, Array]:

@@ -63,6 +63,7 @@ class Inputs:
         self._nominal = nominal = table.dimensions
         self._points = np.concatenate([x.ravel() for x in nominal[:4]])
         # the crosses of universal joints weigh next to nothing
+        self._sprung = arm.springs.sprung
         self._heavy = np.flatnonzero(nominal.mass > CROSS_MASS)
         of, row = np.repeat(range(len(cables)), [len(c.sites) for c in cables]), arm._routing.row
         self._first = np.flatnonzero((of[1:] == of[:-1]) & (row[1:] == row[:-1]))
@@ -73,7 +74,7 @@ class Inputs:
         self.labels: dict[str, Sequence[str]] = {
             "rigidity": cables.names,
             "spring": [c.name for c in cables if c.series_stiffness < math.inf],
-            "joint_stiffness": [arm.springs.joints[j] for j in arm.springs.sprung],
+            "joint_stiffness": [arm.springs.joints[j] for j in self._sprung],
             "joint_angle": arm.joint_names,
             "tension": cables.names,
             "lead": cables.names,
@@ -103,13 +104,14 @@ class Inputs:
         shift, site, centre, tip = (
             part.reshape(count, *x.shape) for part, x in zip(parts, nominal[:4], strict=True)
         )
-        mass, fixed = (np.tile(x, (count, 1)) for x in (nominal.mass, nominal.fixed))
+        mass, fixed, spring = (np.tile(x, (count, 1)) for x in nominal[4:])
         mass[:, self._heavy] += errors.get("link_mass", 0.0)
         fixed += errors.get("lead", 0.0)
+        spring[:, self._sprung] *= 1.0 + errors.get("joint_stiffness", 0.0)
         a, b = self._first, self._first + 1  # within one body
         longer = np.linalg.norm(site[:, b] - site[:, a], axis=2)
         longer -= np.linalg.norm(nominal.site[b] - nominal.site[a], axis=1)
-        return Body(shift, site, centre, tip, mass, fixed + longer @ self._of_cable)
+        return Body(shift, site, centre, tip, mass, fixed + longer @ self._of_cable, spring)
 
     def groups(self, tolerances: Tolerances) -> tuple[Group, ...]:
         """Find the inputs of each tolerance.

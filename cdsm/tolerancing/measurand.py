@@ -101,7 +101,6 @@ class Measurand(ReadOnlyState):
             directions=u,
             body=self.inputs.bodies(errors, count),
             springs=lambda L, F, part: self._springs(errors, L, F, part),
-            joint_springs=self._joint_springs(errors, count),
             check_limits=False,
         ).solve(status, threads)[self.of]
         if self.of == "tension":
@@ -124,15 +123,6 @@ class Measurand(ReadOnlyState):
             EA[:, of] = law.rigidity(np.clip(F[:, of], law.low, law.high))
         stretched = stretched + np.where(stretched > 0.0, change * EA, 0.0)
         return laws.stiffness_of(L, F, stretched, series)
-
-    def _joint_springs(self, errors: Errors, count: int) -> Array | None:
-        """Return the stiffness (count, n) of the joints' springs, or None without errors."""
-        if "joint_stiffness" not in errors:
-            return None
-        springs = self.stiffness.posture.arm.springs
-        k = np.tile(springs.stiffness, (count, 1))
-        k[:, springs.sprung] *= 1.0 + errors["joint_stiffness"]
-        return k
 
 
 def measurand_of(
