@@ -177,7 +177,7 @@ class MuJoCoState(NamedTuple):
     model: Any  # mujoco.MjModel, never changed
     pose: Posture  # true posture
     true_values: Measurement  # true wire and tension at the motors
-    velocity: Array  # of the joints (nv,) [rad/s], in MuJoCo's order
+    joints: Array  # coordinates of all joints [rad], and their velocities [rad/s] (2, n)
 
 
 @final
@@ -221,7 +221,8 @@ class MuJoCoPlant:
         text = to_mjcf(self.arm, pose, tension, damping_ratio=self.damping_ratio)
         paid_out = self.arm._laws.original_lengths(pose.cable_lengths, tension)
         model = mujoco.MjModel.from_xml_string(text)
-        return MuJoCoState(model, pose, Measurement(paid_out, tension), frozen(np.zeros(q.size)))
+        joints = frozen(np.array([model.qpos0, 0.0 * model.qpos0]))
+        return MuJoCoState(model, pose, Measurement(paid_out, tension), joints)
 
     def step_to(self, state: MuJoCoState, command: Command, wrench: Array) -> MuJoCoState:
         """Return the state one period after ``state``, under a command and a wrench (6,).
@@ -234,9 +235,7 @@ class MuJoCoPlant:
 
         model = copy.copy(state.model)
         data = mujoco.MjData(model)
-        names = self.arm.joint_names
-        address = np.array([model.joint(name).qposadr[0] for name in names])
-        data.qpos[address], data.qvel[:] = state.pose.q, state.velocity
+        data.qpos[:], data.qvel[:] = state.joints
         body = model.body(self.arm.tip_link).id
         steps = max(round(self.period / _TANGENTS / model.opt.timestep), 1)
         for _ in range(_TANGENTS):
@@ -250,10 +249,12 @@ class MuJoCoPlant:
             mujoco.mj_step(model, data, steps)
         if not np.isfinite(data.qpos).all() or data.warning.number.any():
             raise solver_failed("mujoco", "diverges: the arm moves beyond all bounds")
-        pose = self.arm.at(data.qpos[address].copy(), check_limits=False)
+        own = [model.joint(name).qposadr[0] for name in self.arm.joint_names]
+        pose = self.arm.at(data.qpos[own], check_limits=False)
         F = _tensions_of(self.arm, pose.cable_lengths, command.paid_out, command.tension)
         true_values = Measurement(command.paid_out, frozen(F))
-        return MuJoCoState(state.model, pose, true_values, data.qvel.copy())
+        joints = frozen(np.array([data.qpos, data.qvel]))
+        return MuJoCoState(state.model, pose, true_values, joints)
 
     def _set_motors(self, model: Any, lengths: Array, command: Command) -> None:
         """Set each actuator of ``model`` so that it has the force F + k (L' − L) at a length L'.

@@ -183,7 +183,7 @@ def mujoco_model(
     for joint in joints:
         joint.set("damping", repr(of_joints))
     if coupling:
-        couple(root, coupling, arm._body.all_joints)
+        couple(root, coupling, arm._body.all_joints, step)
     controls = _cables(root, arm, K, actuators, of_cables)
     if K is not None:
         frame = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose")

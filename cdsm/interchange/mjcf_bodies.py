@@ -138,12 +138,19 @@ def row(values: ArrayLike) -> str:
     return " ".join(repr(float(x)) for x in np.ravel(values))
 
 
-def couple(root: etree._Element, coupling: Coupling, names: Sequence[str]) -> None:
-    """Add an equation for each joint that follows another one, from the initial positions."""
+def couple(
+    root: etree._Element, coupling: Coupling, names: Sequence[str], time_step: float
+) -> None:
+    """Add an equation for each joint that follows another one, from the initial positions.
+
+    It is as stiff as the time step allows: MuJoCo's own would yield by radians under the cables.
+    """
     equations = etree.SubElement(root, "equality")
+    stiff = {"solref": f"{2.0 * time_step!r} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
     for i, name in enumerate(names):
         if i not in coupling.leaders:
-            (j,) = np.flatnonzero(coupling.matrix[i])
-            leader, factor = names[coupling.leaders[j]], float(coupling.matrix[i, j])
-            line = {"joint1": name, "joint2": leader, "polycoef": f"0 {factor!r} 0 0 0"}
-            etree.SubElement(equations, "joint", line)
+            line = {"joint1": name, "polycoef": "0 0 0 0 0"}  # that of a joint which stays
+            for j in np.flatnonzero(coupling.matrix[i]):
+                line["joint2"] = names[coupling.leaders[j]]
+                line["polycoef"] = f"0 {float(coupling.matrix[i, j])!r} 0 0 0"
+            etree.SubElement(equations, "joint", line | stiff)

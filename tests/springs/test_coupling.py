@@ -148,3 +148,17 @@ def test_joints_follow_in_mujoco_too() -> None:
         equations = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         assert equations.sum() == 2
         np.testing.assert_allclose(data.efc_pos[equations], 0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("follows", [FOLLOWS, {"b": '<mimic joint="a" multiplier="0"/>'}])
+def test_followers_do_not_yield_to_the_cables_in_mujoco(follows: dict[str, str]) -> None:
+    mujoco: Any = pytest.importorskip("mujoco")
+    arm = robot(follows)
+    pose = arm.at(0.3 * np.ones(arm.nv))
+    pull = cdsm.distribute_tension(pose, 10.0)
+    model = mujoco.MjModel.from_xml_string(cdsm.to_mjcf(arm, pose, pull))
+    state = mujoco.MjData(model)
+    for _ in range(200):
+        mujoco.mj_step(model, state)
+    found = [state.qpos[model.joint(name).qposadr[0]] for name in arm._body.all_joints]
+    np.testing.assert_allclose(found, arm._body.coupling.angles(pose.q), atol=1e-6)

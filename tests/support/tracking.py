@@ -32,6 +32,16 @@ def small_path(
 
 
 @cache
+def coupled_path() -> PathPlan:
+    """Four universal joints that bend alike, held by the cables of the last one."""
+    geometry = readme_geometry(hole_radius=0.02, link_mass=0.05, lead=0.1, coupled=True)
+    arm = cdsm.Manipulator(geometry, presets.STRAND_1X19)
+    arm = arm.with_cables([each for each in arm.cables if each.name.startswith("cable4")])
+    angles = np.deg2rad([[6.0, -4.0], [7.0, -3.0], [8.0, -2.0]])
+    return cdsm.plan_path(arm, "z", 3e3, 10.0, 250.0, angles=angles)
+
+
+@cache
 def circle(friction: float, samples: int = 13) -> PathPlan:
     """Five universal joints, whose tip draws a circle of 15 mm at 4 N/mm along z."""
     geometry = readme_geometry(joints=5, hole_radius=0.02, link_mass=0.05, lead=0.1)
