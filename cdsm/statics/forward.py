@@ -138,8 +138,8 @@ def forward_statics(
 
     Raises:
         InvalidInput: Not exactly one of the three is given, an argument has the wrong shape, or a
-            cable does not exist; or motors hold rest lengths, but ``original_length`` of the arm is
-            ``"stretched"``.
+            cable does not exist; or motors hold lengths, but a cable has the control ``"force"``,
+            or ``original_length`` of the arm is ``"stretched"``.
         ElasticityRangeError: Motors hold lengths, and a tension is outside the domain of its law.
         EquilibriumError: No stable equilibrium was found, or nothing holds a joint.
     """
@@ -192,6 +192,10 @@ def _model(
     if name == "tension":
         F, _ = checked_tension(home, value, wrench)
         return lambda share: LockedArm(begin, share * F, share * wrench, tension_held=True)
+    for cable in arm.cables:
+        if cable.control == "force":
+            said = f"{cable.name} has control='force': its motor holds a tension, no length. "
+            raise InvalidInput(name, f"{said}Give tension, or this cable control='position'.")
     if arm.original_length != "unstrained":
         said = "l_0 of this arm changes with the tension; use original_length='unstrained'."
         raise InvalidInput(name, said)

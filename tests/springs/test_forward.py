@@ -1,6 +1,7 @@
 """Where an arm comes to rest from what its motors do, and how stiff it is there."""
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -94,6 +95,10 @@ def test_cables_that_a_dict_does_not_name_are_loose(what: str) -> None:
 def test_what_cannot_be_solved_is_named(given: Any, said: str) -> None:
     with pytest.raises(cdsm.InvalidInput, match=said):
         cdsm.forward_statics(ARM, **given)
+    first, *others = ARM.cables
+    forced = ARM.with_cables([replace(first, control="force"), *others])
+    with pytest.raises(cdsm.InvalidInput, match="pull: cable8_1 has control='force'"):
+        cdsm.forward_statics(forced, pull=[0.0, 0.0, 0.0])
     loose = ARM.with_springs(dict.fromkeys(ARM.joint_names[:-1], 1.0))
     with pytest.raises(cdsm.EquilibriumError, match="nothing holds joint8_2"):
         cdsm.forward_statics(loose, tension=TENSION)

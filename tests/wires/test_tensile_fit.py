@@ -158,6 +158,7 @@ NOISE = np.random.default_rng(0)
         (RAMP, PULL[:-1], {}, "a point needs both"),
         (RAMP, PULL, {"gauge_length": -0.5}, "gauge_length: -0.5 m given"),
         (RAMP, PULL, {"between": (300.0, 200.0)}, "between: "),
+        (RAMP, PULL, {"between": 50.0}, "between: 50.0 given"),
         (RAMP, 100.0 + 50.0 * NOISE.normal(size=100), {}, "does not rise"),
         (NOISE.permutation(RAMP), PULL, {}, "order recorded"),
         (RAMP, -PULL, {}, "compression"),
