@@ -180,8 +180,8 @@ def fit_tensile_test(
     length = checked("gauge_length", gauge_length, "length")
     if u.ndim != 1 or u.shape != F.shape:
         raise InvalidInput("force", f"shapes {u.shape} and {F.shape} given; a point needs both.")
-    ends = np.asarray(between)
-    if ends.shape != (2,) or ends.dtype.kind not in "iuf" or not ends[0] < ends[1]:
+    limits = np.asarray(between)
+    if limits.shape != (2,) or limits.dtype.kind not in "iuf" or not limits[0] < limits[1]:
         raise InvalidInput("between", f"{between!r} given; give (low, high) in N, low below high.")
     points = loading(u / length, F, between)
     strain, pull, notes = points.strain, points.force, points.notes
