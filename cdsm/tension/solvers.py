@@ -80,7 +80,9 @@ def solve(problem: Problem, solver: str) -> Array | str:
 
     one_of("installed solver", solver, qpsolvers.available_solvers)
     A, b, low, high, *_ = problem
-    qp = qpsolvers.Problem(np.eye(low.size), np.zeros(low.size), A=A, b=b, lb=low, ub=high)
+    basis = _independent(A)
+    sides: dict[str, Array] = {"A": basis.T @ A, "b": basis.T @ b, "lb": low, "ub": high}
+    qp = qpsolvers.Problem(np.eye(low.size), np.zeros(low.size), **sides)
     # others warn of dense matrices, and of failures that are reported below; this takes 20 µs
     quiet = nullcontext() if solver == DEFAULT_SOLVER else warnings.catch_warnings(action="ignore")
     try:
@@ -90,7 +92,7 @@ def solve(problem: Problem, solver: str) -> Array | str:
         raise solver_failed(solver, f"failed: {error}. {HINT}") from error
     if not found.found or found.x is None or found.y is None:
         return "found no solution with multipliers"
-    x, y = np.asarray(found.x), np.asarray(found.y)
+    x, y = np.asarray(found.x), basis @ found.y
     if not np.isfinite([x.sum(), y.sum()]).all():
         return "calls numbers optimal that are not finite"
     least = -(y @ A)  # the optimum but for the bounds
@@ -102,6 +104,18 @@ def solve(problem: Problem, solver: str) -> Array | str:
     if missed > OPTIMALITY:
         return f"calls a point optimal that misses it by {missed:.1e} ({OPTIMALITY:g} is allowed)"
     return np.asarray(np.minimum(np.maximum(x, low), high))
+
+
+def _independent(A: Array) -> Array:
+    """Return combinations of the joints (nv, r) with which r balances A x = b are independent.
+
+    With as many joints as cables, or more, solvers fail at those that follow from others.
+    """
+    if A.shape[0] < A.shape[1]:
+        return np.eye(len(A))
+    U, size, _ = np.linalg.svd(A, full_matrices=False)
+    known = size > _ROUNDING * size[0]
+    return np.asarray(U[:, known] / size[known])
 
 
 def violation(problem: Problem, x: Array, y: Array) -> float:

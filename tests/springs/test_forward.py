@@ -68,6 +68,22 @@ def test_motors_that_hold_lengths_are_stiffer_than_those_that_hold_tensions() ->
     assert locked.along("z") > 2.0 * held.along("z")
 
 
+@pytest.mark.parametrize("solver", ["daqp", "osqp"])
+def test_fewer_cables_than_joints_balance_where_the_arm_rests(solver: str) -> None:
+    """16 balances for three tensions, of which three are independent."""
+    random, q = np.random.default_rng(0), []
+    given = random.uniform(1.0, 8.0, (8, 3))
+    for F in given:
+        pose = cdsm.forward_statics(ARM, tension=F, wrench=WRENCH).pose
+        least = cdsm.distribute_tension(pose, wrench=WRENCH, solver=solver)
+        np.testing.assert_allclose(least.values, F, rtol=1e-6)
+        q.append(pose.q)
+    batch = cdsm.distribute_tensions(ARM, q, wrench=WRENCH)
+    np.testing.assert_allclose(batch.values, given, rtol=1e-6)
+    with pytest.raises(cdsm.InfeasibleTension, match="only where they come to rest"):
+        cdsm.distribute_tension(ARM.at(1.1 * q[0]), wrench=WRENCH, solver=solver)
+
+
 @pytest.mark.parametrize("what", ["tension", "rest_lengths", "pull"])
 def test_cables_that_a_dict_does_not_name_are_loose(what: str) -> None:
     rest = cdsm.forward_statics(ARM, tension=[4.0, 0.0, 0.0])
