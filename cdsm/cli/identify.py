@@ -119,8 +119,10 @@ def identify(
         write_picture(figure, planned.plot)
         return answer(as_json, planned.to_dict(), planned)
     bounds = {at: ranges[name] or _usual(name, start[at]) for at, name in labels.items()}
-    inside = all(low <= start[at] <= high for at, (low, high) in bounds.items())
-    found = cdsm.identify(model_of, read, bounds, start=start if inside else None)
+    for at, (low, high) in bounds.items():
+        if not low < start[at] < high:  # of a friction of 0, no derivative shows what it does
+            start[at] = (low + high) / 2.0
+    found = cdsm.identify(model_of, read, bounds, start=start)
     intervals = found.confidence()
     write_picture(figure, found.plot)
     rows = [("95 % by the profile of χ²", "from", "to")]
