@@ -10,7 +10,7 @@ import numpy as np
 
 from cdsm.cable import Cable, Site, require_own_cables, serpentine_cables
 from cdsm.errors import InvalidInput
-from cdsm.geometry import Geometry, Joint, Link
+from cdsm.geometry import Joint, Link
 from cdsm.manipulator import Manipulator
 from cdsm.support.validation import instance, one_of, scalar, text
 from cdsm.wires.elasticity import Elasticity
@@ -61,7 +61,8 @@ class ArmParameters:
 
     ``"hole_radius"`` is that of all joints, ``"hole_radius@2"`` of the second one from the base.
     ``"lead"`` is that of all cables, ``"lead@2"`` of the cables that end at joint 2,
-    ``"lead@cable2_1"`` of one cable. A call passes names with @ in a dict:
+    ``"lead@cable2_1"`` of one cable. An arm from a URDF has only friction, spring, rigidity, slack
+    and gain, of all cables or of one. A call passes names with @ in a dict:
     ``parameters(**{"hole_radius@2": 0.025})``.
 
     Attributes:
@@ -80,7 +81,8 @@ class ArmParameters:
     def __post_init__(self) -> None:
         instance("arm", self.arm, Manipulator)
         object.__setattr__(self, "names", tuple(text("names", name) for name in self.names))
-        require_own_cables(self._geometry, self.arm.cables)
+        if self.arm.is_serpentine:
+            require_own_cables(self.arm.geometry, self.arm.cables)
         taken = set[tuple[str, int]]()
         for name in self.names:
             kind, where = self._place(name)
@@ -96,10 +98,6 @@ class ArmParameters:
             if taken & numbers:
                 raise InvalidInput(name, f"frees {kind} of a joint twice.")
             taken |= numbers
-
-    @property
-    def _geometry(self) -> Geometry:
-        return self.arm.geometry
 
     def unit(self, name: str) -> tuple[str, float]:
         """Return the unit in which the parameter ``name`` is printed, and its size in SI."""
@@ -122,52 +120,65 @@ class ArmParameters:
             InvalidInput: A parameter is not among :attr:`names`. A rigidity is not positive, or a
                 value is not a number. A spring is not positive.
         """
-        geometry = self._geometry
+        places = {one_of("parameter", name, self.names): self._place(name) for name in values}
+        numbers = {name: scalar(name, number) for name, number in values.items()}
+        changes, laws = [dict[str, float]() for _ in self.arm.cables], dict[Any, Elasticity]()
+        for name, (kind, where) in places.items():
+            for i in where if PARAMETERS[kind].part == "cables" else ():
+                changes[i][kind] = numbers[name]
+        if all(PARAMETERS[kind].part == "cables" for kind, _ in places.values()):
+            pairs = zip(self.arm.cables, changes, strict=True)
+            return self.arm.with_cables([_changed(each, own, laws) for each, own in pairs])
+        geometry = self.arm.geometry
         parts: dict[str, list[Any]] = {
             "joints": [*geometry.joints],
             "links": [*geometry.links],
             "routes": [*geometry.cables],
         }
-        common, changes = geometry.hole_radius, [dict[str, float]() for _ in geometry.cables]
-        for name, number in values.items():
-            one_of("parameter", name, self.names)
-            value, (kind, where) = scalar(name, number), self._place(name)
-            own: float | None = value
+        common = geometry.hole_radius
+        for name, (kind, where) in places.items():
+            value: float | None = numbers[name]
             if name == "hole_radius":
-                common, own = value, None  # of all joints: they have none of their own
+                common, value = numbers[name], None  # of all joints: they have none of their own
             _, _, part, attribute, _ = PARAMETERS[kind]
-            for i in where:
-                if part == "cables":
-                    changes[i][kind] = value
-                elif part == "beams":
+            for i in where if part != "cables" else ():
+                if part == "beams":
                     own_part = "joints" if i < len(geometry.joints) else "links"
                     i %= len(geometry.joints)
-                    parts[own_part][i] = _bent(parts[own_part][i], value)
+                    parts[own_part][i] = _bent(parts[own_part][i], numbers[name])
                 elif kind == "phase":
-                    parts[part][i] = replace(parts[part][i], angle=parts[part][i].angle + value)
+                    angle = parts[part][i].angle + numbers[name]
+                    parts[part][i] = replace(parts[part][i], angle=angle)
                 else:
-                    parts[part][i] = replace(parts[part][i], **{attribute: own})
-        if any(PARAMETERS[self._place(name)[0]].part != "cables" for name in values):
-            geometry = geometry.replace(
-                joints=tuple(parts["joints"]),
-                links=tuple(parts["links"]),
-                cables=tuple(parts["routes"]),
-                hole_radius=common,
-            )
-        laws = dict[tuple[Elasticity, float], Elasticity]()
+                    parts[part][i] = replace(parts[part][i], **{attribute: value})
+        geometry = geometry.replace(
+            joints=tuple(parts["joints"]),
+            links=tuple(parts["links"]),
+            cables=tuple(parts["routes"]),
+            hole_radius=common,
+        )
         routed = serpentine_cables(geometry, self.arm.cables[0].elasticity)
-        rows = zip(self.arm.cables, routed, changes, strict=True)
-        cables = [_changed(old, new, own, laws) for old, new, own in rows]
-        if geometry is self._geometry:
-            return self.arm.with_cables(cables)  # keeps the rigid body
+        cables = [
+            _changed(replace(old, sites=holes_like(new, old), lead=new.lead), own, laws)
+            for old, new, own in zip(self.arm.cables, routed, changes, strict=True)
+        ]
         return self.arm._with_geometry(geometry, cables)
 
     def _place(self, name: str) -> tuple[str, list[int]]:
         """Split a name such as ``hole_radius@2`` into its kind, and the indices in its part."""
         kind, at, place = name.partition("@")
         one_of("parameter of an arm", kind, PARAMETERS)
-        geometry, count = self._geometry, len(self._geometry.joints)
         part = PARAMETERS[kind].part
+        if not self.arm.is_serpentine:
+            if part != "cables":
+                free = ", ".join(k for k, each in PARAMETERS.items() if each.part == "cables")
+                said = "is not known of an arm from a URDF"
+                raise InvalidInput(name, f"{said}; its cables have {free}.")
+            names = self.arm.cables.names
+            place = one_of("cable", place, names) if at else ""
+            return kind, [c for c, own in enumerate(names) if place in ("", own)]
+        geometry = self.arm.geometry
+        count = len(geometry.joints)
         of_cable = part in ("routes", "cables")
         joints = [c.joint for c in geometry.cables] if of_cable else [*range(1, count + 1)] * 2
         if of_cable and place.startswith("cable"):
@@ -185,7 +196,7 @@ class ArmParameters:
 
     @property
     def _beams(self) -> tuple[Joint | Link, ...]:
-        return (*self._geometry.joints, *self._geometry.links)
+        return (*self.arm.geometry.joints, *self.arm.geometry.links)
 
     def values(self, name: str) -> list[float]:
         """Return the values in SI that the parameter ``name`` has in the joints or cables."""
@@ -194,12 +205,14 @@ class ArmParameters:
         if not math.isnan(neutral):
             return [neutral]
         if kind == "hole_radius":
-            return [self._geometry.hole_radii[i] for i in where]
+            return [self.arm.geometry.hole_radii[i] for i in where]
         if kind == "friction":
             return [max(site.friction for site in self.arm.cables[i].sites) for i in where]
         owners: Any = self._beams if part == "beams" else self.arm.cables
         if part not in ("cables", "beams"):
-            owners = self._geometry.cables if part == "routes" else getattr(self._geometry, part)
+            owners = (
+                self.arm.geometry.cables if part == "routes" else getattr(self.arm.geometry, part)
+            )
         return [getattr(owners[i], attribute) for i in where]
 
 
@@ -217,27 +230,16 @@ def _bent(beam: Joint | Link, EI: float) -> Joint | Link:
     return replace(beam, bending_stiffness=EI, torsion_stiffness=GJ)
 
 
-def _changed(
-    old: Cable,
-    routed: Cable,
-    changes: dict[str, float],
-    laws: dict[tuple[Elasticity, float], Elasticity],
-) -> Cable:
-    """Return the cable ``old`` on the sites and with the lead of ``routed``, and with ``changes``.
-
-    ``laws`` has the scaled laws so far: cables that share one are computed together.
-    """
-    cable = replace(old, sites=holes_like(routed, old), lead=routed.lead)
+def _changed(cable: Cable, changes: dict[str, float], laws: dict[Any, Elasticity]) -> Cable:
+    """Return the cable with ``changes``; cables that share one of the scaled ``laws`` share it."""
     if "friction" in changes:
         cable = cable.with_friction(changes["friction"])
     names = {name: PARAMETERS[name].attribute for name in ("spring", "slack", "gain")}
     own: dict[str, Any] = {names[key]: x for key, x in changes.items() if key in names}
-    cable = replace(cable, **own)
     if "rigidity" in changes:
-        law, factor = old.elasticity, changes["rigidity"]
-        shared = laws.setdefault((law, factor), law.scaled(factor))
-        cable = replace(cable, elasticity=shared)
-    return cable
+        law, factor = cable.elasticity, changes["rigidity"]
+        own["elasticity"] = laws.setdefault((law, factor), law.scaled(factor))
+    return replace(cable, **own)
 
 
 def holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:

@@ -1,12 +1,14 @@
 """An arm as a function of parameters by name."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import cdsm
 from tests.support.arms import readme_geometry
+from tests.support.foreign import crab
 
 GEOMETRY = readme_geometry(joints=2, hole_radius=[0.025, 0.02])
 ARM = cdsm.Manipulator(GEOMETRY, cdsm.LinearElasticity(48e3), gravity="-y").with_friction(0.1)
@@ -19,6 +21,15 @@ def test_nothing_changed_is_the_same_arm() -> None:
     assert same.geometry.cables == GEOMETRY.cables
     assert same.cables == ARM.cables
     assert same.at([0.1] * 4).gravity_torque == pytest.approx(ARM.at([0.1] * 4).gravity_torque)
+
+
+def test_cables_of_a_robot_have_parameters() -> None:
+    robot, (first, *_) = crab(), crab().cables.names
+    parameters = cdsm.ArmParameters(robot, ("friction", "rigidity", f"spring@{first}"))
+    arm = parameters(friction=0.2, rigidity=0.5, **{f"spring@{first}": 2e4})
+    rough = crab(cdsm.LinearElasticity(1.5e4)).with_friction(0.2)
+    assert arm.cables[1:] == rough.cables[1:]
+    assert arm.cables[0] == replace(rough.cables[0], series_stiffness=2e4)
 
 
 def test_each_parameter_is_where_it_says() -> None:
@@ -128,7 +139,11 @@ def test_files_hold_slack_and_gain(tmp_path: Path) -> None:
         (ROD, ("joint_stiffness",), "free the bending_stiffness"),
         (ROD, ("slack@2",), "no cable that ends there"),
         (SPRUNG.with_springs({"joint1_1": 4.0}), ("joint_stiffness",), "springs of the arm"),
-        (cdsm.Manipulator.from_urdf(ARM.urdf, ARM.cables, tip="tool0"), ("lead",), "geometry"),
+        (
+            cdsm.Manipulator.from_urdf(ARM.urdf, ARM.cables, tip="tool0"),
+            ("lead",),
+            "its cables have friction",
+        ),
     ],
 )
 def test_names_that_free_nothing_or_twice_are_refused(
