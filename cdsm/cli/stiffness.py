@@ -60,8 +60,9 @@ def stiffness(
     axes, lines = {axis: options.direction_of(axis) for axis in ("x", "y", "z")}, list[str]()
     if direction is not None:
         axes[direction] = u = options.direction_of(direction)
-        numbers |= {"direction": u, "along_direction_N_per_m": K.along(u)}
-        lines.append(f"along {direction}: {K.along(u) / 1e3:.4g} N/mm")
+        k = (rest or K).along(u)
+        numbers |= {"direction": u, "along_direction_N_per_m": k}
+        lines.append(f"along {direction}: {k / 1e3:.4g} N/mm")
     sure, uncertainty = _uncertainty(K.distribution, axes)
     if check or out is not None:
         report = (rest or K).report()
@@ -69,7 +70,12 @@ def stiffness(
         write(out, lambda file: write_text(file, report.to_html(about)))
         failed = () if report.passed else ("FAIL: the report says why.",)
         told = numbers | report.to_dict() | uncertainty
-        return answer(as_json, told, head, report, *sure, warnings=failed)
+        return answer(as_json, told, head, report, *lines, *sure, warnings=failed)
+    if rest and rest.at_limit:  # K knows no stops
+        told = numbers | rest.to_dict()
+        with contextlib.suppress(cdsm.SingularStiffness):
+            told["along_N_per_m"] = [rest.along(u) for u in "xyz"]
+        return answer(as_json, told, head, rest, *lines, warnings=rest.warnings)
     stuck, sticking = _sticking(K.distribution, axes)
     parts = [head, rest or K.distribution, K, *lines, *stuck, *sure]
     told = numbers | K.to_dict() | (rest.to_dict() if rest else {}) | sticking | uncertainty

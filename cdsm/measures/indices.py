@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdsm.errors import solver_failed
+from cdsm.errors import InvalidInput, solver_failed
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import instance
@@ -43,11 +43,13 @@ def tension_factor(pose: Posture) -> float:
 def isotropy(stiffness: Stiffness) -> float:
     """Compute the ratio of the least to the largest tip stiffness of all directions, 0 to 1 [-].
 
-    The stiffness along u is 1/(uᵀ C_vv u), Eq. 20; the arm must be stable. The ratio is 0 if the
-    stiffness is infinite in some directions, and 1 if it is infinite in all. Raises
+    The stiffness along u is 1/(uᵀ C_vv u), Eq. 20. The ratio is 0 if the stiffness is infinite in
+    some directions, and 1 if it is infinite in all. Raises InvalidInput if the arm is unstable, and
     SingularStiffness if K_θ is singular.
     """
     K = instance("stiffness", stiffness, Stiffness)
+    if K.margin < 0.0:
+        raise InvalidInput("stiffness", f"has no isotropy: {K.warnings[0]}.")
     return float(principal_stiffness(K.compliance[:3, :3])["isotropy"])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, final
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.errors import InvalidInput
+from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.statics.solve import FLAT
@@ -206,7 +207,13 @@ class Equilibrium(Result):
         return frozen(J @ self.stiffness._inverse_of(self._free) @ J.T)
 
     def report(self) -> Report:
-        """Check the stiffness here, as :meth:`Stiffness.report` does."""
+        """Check the stiffness here, as :meth:`Stiffness.report` does.
+
+        Raises InvalidInput if a joint rests on its stop, which K_θ does not know.
+        """
+        if self.at_limit:
+            said = "does not know of stops, and"
+            raise InvalidInput("report", f"{said} {listed(self.at_limit)} rests on its own.")
         pose = self._held(self.stiffness.cable_stiffness == 0.0)
         return stiffness(pose, self.tension, self.wrench).report()
 
@@ -241,6 +248,10 @@ class Equilibrium(Result):
             f"{self.stop_torque[i]:.4g} {arm.torque_unit(i)}"
             for i in np.flatnonzero(self.stop_torque).tolist()
         ]
+        if self.at_limit:
+            with suppress(SingularStiffness):
+                k = coordinates([self.along(u) / 1e3 for u in "xyz"])
+                lines.append(f"stiffness along x, y, z, that joint fixed: {k} N/mm")
         lines.append(
             "motors hold lengths: the elasticity of the cables counts in the stiffness"
             if self.motors == "locked"

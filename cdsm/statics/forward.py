@@ -130,7 +130,8 @@ def forward_statics(
         rest_lengths: Unstrained lengths l_0 (C,) [m] of the wires that the motors have left.
         pull: How much wire each motor reports to have taken in (C,) [m], from the lengths in which
             the cables are just straight at the angles q_0 of the springs: these lengths become
-            shorter by ``gain`` · pull − ``slack`` of each :class:`~cdsm.Cable`.
+            shorter by ``gain`` · pull − ``slack`` of each :class:`~cdsm.Cable`. A cable is straight
+            at zero strain, where a law that begins above 0 N has its lowest tension.
         wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m].
         start: Angles q (nv,) [rad] at which the search begins, under the whole load. None: load and
             pull grow from nothing, from the angles q_0; :attr:`Equilibrium.branch` says if the arm

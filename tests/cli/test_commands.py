@@ -17,6 +17,7 @@ import cdsm
 from cdsm.cli import app
 from cdsm.support.format import plain
 from tests.interchange.test_caspr import cable, folder, link
+from tests.support.arms import readme_geometry
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -126,6 +127,26 @@ def test_the_posture_follows_from_what_the_motors_do(tmp_path: Path) -> None:
     assert "motors hold lengths" in call(*hung).stdout
     for more in (("--tension", "2,0,1"), ("--angles", 0), ("--minimum", 2)):
         assert "say what the motors do" in call(*hung, *more).stderr
+
+
+def test_an_arm_on_a_stop_is_as_stiff_as_a_small_weight_measures(tmp_path: Path) -> None:
+    """K_θ, which knows no stops, would be unstable there."""
+    geometry = readme_geometry(joints=2, hole_radius=0.02, link_mass=0.1, joint_stiffness=0.5)
+    file = cdsm.Manipulator(geometry, cdsm.LinearElasticity(2e4)).write(tmp_path / "arm.toml")
+    arm, F = cdsm.Manipulator.read(file), [0.0, 80.0, 0.0, 0.0, 0.0, 0.0]
+    rest = cdsm.forward_statics(arm, tension=F)
+    assert not rest.stiffness.is_stable
+    ends = [
+        cdsm.forward_statics(arm, tension=F, wrench=[0, 0, f, 0, 0, 0], start=rest.pose.q)
+        for f in (1e-3, -1e-3)
+    ]
+    measured = 2e-3 / (ends[0].pose.tip[2, 3] - ends[1].pose.tip[2, 3])
+    found = told("stiffness", file, "--tension", "0,80,0,0,0,0")
+    assert found["stable"] is True
+    assert found["along_N_per_m"][2] == pytest.approx(measured, rel=1e-4)
+    assert (
+        "rests on its own" in call("stiffness", file, "--tension", "0,80,0,0,0,0", "--check").stderr
+    )
 
 
 def test_weigh(probe: Path, pose: cdsm.Posture, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cdsm
-from tests.support.arms import prototype, random_arm, random_posture
+from tests.support.arms import prototype, random_arm, random_posture, readme_geometry
 
 
 def one_joint(angles: tuple[float, ...]) -> cdsm.Manipulator:
@@ -50,3 +50,7 @@ def test_isotropy_is_the_ratio_of_extremes() -> None:
     K = cdsm.stiffness(*prototype())
     values = 1.0 / np.linalg.eigvalsh(K.compliance[:3, :3])
     assert cdsm.isotropy(K) == pytest.approx(values.min() / values.max(), rel=1e-10)
+    arm = cdsm.Manipulator(readme_geometry(), cdsm.LinearElasticity(1e3))
+    buckled = cdsm.stiffness(arm.at(np.zeros(arm.nv)), 500.0 * np.ones(len(arm.cables)))
+    with pytest.raises(cdsm.InvalidInput, match="has no isotropy: UNSTABLE"):
+        cdsm.isotropy(buckled)
