@@ -179,7 +179,7 @@ def reproduce(
     numbers = paper.to_dict(results)
     text = json.dumps(numbers, indent=1, allow_nan=False)
     written.append(write_text(out / "reproduction.json", f"{text}\n"))
-    rows = [(f"{row[0]}: {row[1]}", *row[2:5]) for row in paper.to_rows(results)]
-    table = "\n".join(aligned([("quantity", *paper.HEADER[2:5]), *rows]))
+    rows = [(f"{row[0]}: {row[1]}", *row[2:6]) for row in paper.to_rows(results)]
+    table = "\n".join(aligned([("quantity", *paper.HEADER[2:6]), *rows]))
     said = f"all numbers, and what each is: {out / 'reproduction.md'}"
     return answer(as_json, numbers, table, f"{said}\nwritten: {', '.join(map(str, written))}")

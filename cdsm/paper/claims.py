@@ -13,22 +13,26 @@ if TYPE_CHECKING:
     from matplotlib import figure
 
 HEADER = (
-    *("figure", "quantity", "paper", "computed", "difference", "original length", "hung weight"),
-    *("assumption", "searched"),
+    *("figure", "quantity", "paper", "computed", "difference", "verdict", "original length"),
+    *("hung weight", "assumption", "searched"),
 )
 """Columns of :func:`to_rows`."""
 
 EXPLANATION = (
     "Three numbers are x, y, z. computed: K_R as the paper writes it, with the pseudo-inverse of "
-    "the Jacobian, and with the stretched length of the cables in EA/l_0; original length: the "
-    "same with the unstrained length, which locked motors hold; hung weight: with that, the "
-    "stiffness that a small weight at the tip measures. searched: what was chosen to meet the "
+    "the Jacobian, and with the stretched length of the cables in EA/l_0. verdict: all numbers are "
+    "within the printed digits; or hold within a fifth; or have the sign only; misprint: a digit "
+    "of the paper is wrong. original length: computed with the unstrained length, which locked "
+    "motors hold; hung weight: with that, the stiffness that a small weight at the tip measures. "
+    "searched: what was chosen to meet the "
     "paper's number. Section V was measured with weights: there computed is that, on one prototype "
     "whose dimensions were fitted to the same data. All of it is frictionless, links rigid. "
     "Left out: Fig. 9, a photograph, and Fig. 11, measured springs without printed numbers."
 )
 """Meaning of the columns, and the figures that are left out."""
 
+
+_HOLDS = 0.2  # largest difference with which a number of the paper holds, as a part of it
 
 Said: TypeAlias = tuple[str, str, str, tuple[float, ...] | None]
 """What the paper says: the first four fields of a :class:`Claim`."""
@@ -52,6 +56,7 @@ class Claim:
         assumption: Assumptions where the paper is silent.
         searched: Assumptions that were searched to meet the paper's number; empty if none.
         at_most: Whether the paper's number is an upper bound.
+        misprint: Whether the row shows a misprint of the paper.
     """
 
     figure: str
@@ -64,6 +69,25 @@ class Claim:
     assumption: str = field(kw_only=True)
     searched: str = ""
     at_most: bool = False
+    misprint: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """How the paper's numbers stand to the computed ones; "–" where the paper has none.
+
+        ``within printed digits``; ``holds``: all within a fifth of the paper's, or below its bound;
+        ``sign only``; ``differs``; or ``misprint``.
+        """
+        if self.misprint or not self.paper:
+            return "misprint" if self.misprint else "–"
+        if self.at_most:
+            return "holds" if max(self.computed) <= self.paper[0] else "differs"
+        pairs = [*zip(self.computed, self.paper, strict=True)]
+        if all(abs(ours - theirs) <= _half_digit(theirs) for ours, theirs in pairs):
+            return "within printed digits"
+        if all(abs(ours - theirs) <= _HOLDS * abs(theirs) for ours, theirs in pairs):
+            return "holds"
+        return "sign only" if all(ours * theirs > 0.0 for ours, theirs in pairs) else "differs"
 
     @property
     def difference(self) -> tuple[float, ...] | None:
@@ -73,8 +97,8 @@ class Claim:
         return tuple(ours - theirs for ours, theirs in zip(self.computed, self.paper, strict=True))
 
     def to_dict(self) -> dict[str, object]:
-        """Return all fields and the difference, for JSON."""
-        return {**vars(self), "difference": self.difference}
+        """Return all fields, the difference and the verdict, for JSON."""
+        return {**vars(self), "difference": self.difference, "verdict": self.verdict}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,6 +134,7 @@ def to_rows(figures: Sequence[Figure]) -> list[tuple[str, ...]]:
             ("≤ " if claim.at_most else "") + _joined(claim.paper, ".4g"),
             _joined(claim.computed, ".3g"),
             _joined(claim.difference, "+.2g"),
+            claim.verdict,
             _joined(claim.original, ".3g"),
             _joined(claim.along, ".3g"),
             claim.assumption,
@@ -134,6 +159,11 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def to_dict(figures: Sequence[Figure]) -> dict[str, object]:
     """Return all curves (in SI) and claims of ``figures`` by name, ready for JSON."""
     return {figure.name: figure.to_dict() for figure in figures}
+
+
+def _half_digit(number: float) -> float:
+    """Return half a unit of the last digit that is printed of a number."""
+    return 0.5 * 10.0 ** -len(f"{number:.10g}".partition(".")[2])
 
 
 def _joined(values: tuple[float, ...] | None, form: str) -> str:

@@ -150,7 +150,8 @@ def figure_10() -> ExperimentFigure:
     for label, table in ((exchanged, TABLE_II_SWAPPED), ("as printed", TABLE_II)):
         misfit = 100.0 * np.sqrt(np.mean(np.log(computed / table) ** 2, axis=0))
         assumed = f"root mean square of ln(model/paper); {label}"
-        claims.append(_claim(("Table II", "typical misfit in x, y, z", "%", None), misfit, assumed))
+        what = f"typical misfit in x, y, z, {label.partition(' in')[0]}"
+        claims.append(_claim(("Table II", what, "%", None), misfit, assumed))
     return ExperimentFigure(
         name="fig10",
         title="Fig. 10: stiffness over tension, 1×19 strand, fitted prototype. "

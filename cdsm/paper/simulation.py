@@ -184,11 +184,12 @@ def figure_3() -> StiffnessFigure:
     pairs = [_curves(labels[F], laws, [F], part="passive", swept=moduli) for F in labels]
     wire = "solid wire of 1.2 mm, lower bound"
     ratio = "stiffness at 320 GPa over stiffness at 160 GPa (proportional: 2)", "-", (2.0, 2.0, 2.0)
-    gap = "Fig. 3", "largest difference of passive and total stiffness", "%", (1.5,)
     claims = [
         _claim(("Fig. 3", *ratio), pairs[0], lambda total, _: total[-1] / total[0], f"{wire} 50 N")
     ]
     for pair, F in zip(pairs, labels, strict=True):
+        what = f"largest difference of passive and total stiffness, lower bound {F:g} N"
+        gap: Said = "Fig. 3", what, "%", (1.5,)
         claims.append(_claim(gap, pair, _largest_gap, f"{wire} {F:g} N", at_most=True))
     title = "Fig. 3: stiffness over Young's modulus, cable tension constant"
     return _figure(title, pairs, *claims, swept="young_modulus", part="passive")
@@ -199,10 +200,11 @@ def figure_4() -> StiffnessFigure:
     minima = np.linspace(100.0, 800.0, _POINTS)
     strand = "EA = 48 kN (the strand in its elastic stage)", [presets.ELASTIC_STAGE]
     wire = "EA = 226 kN (solid wire, the stated 200 GPa)", [presets.STEEL_WIRE_200GPA]
-    said = "Fig. 4", "change of stiffness with tension", "%", (-1.46, -1.04, -1.43)
     pairs, claims = [_curves(*case, minima) for case in (strand, wire)], []
     for pair, searched in zip(pairs, ("EA, range of tension", "range of tension"), strict=True):
         assumed = f"{pair[0].label}, lower bound 100 to 800 N"
+        what = f"change of stiffness with tension, {pair[0].label.partition(' (')[0]}"
+        said: Said = "Fig. 4", what, "%", (-1.46, -1.04, -1.43)
         claims.append(_claim(said, pair, _percent, assumed, f"{searched}; {_FROM_FIG_6}"))
     title = "Fig. 4: stiffness over cable tension, cable elasticity constant"
     return _figure(title, pairs, *claims)
@@ -262,14 +264,17 @@ def figure_7() -> StiffnessFigure:
 
 def figure_8() -> StiffnessFigure:
     """Compute stiffness as a function of tension, over its whole range, at three postures."""
-    rise = "Fig. 8", "rise of stiffness over the whole range, (last − first)/first", "times", None
-    fall = "Fig. 8", "change at the end of the range (paper: a slight decrease)", "%", None
     pairs, claims = [], []
     for label, q in FIGURE_8_POSTURES.items():
         highest, law = _highest_minimum(q), [presets.STRAND_1X19]
         # more points at low tension, where the curve is steep
         pairs.append(_curves(label, law, np.geomspace(5.0, highest, 2 * _POINTS), q))
         end = _curves(label, law, [LEVEL[0], highest], q)
+        posture = label.partition(":")[0]
+        risen = f"rise of stiffness over the whole range, (last − first)/first, {posture}"
+        fallen = f"change at the end of the range (paper: a slight decrease), {posture}"
+        rise: Said = "Fig. 8", risen, "times", None
+        fall: Said = "Fig. 8", fallen, "%", None
         assumed = f"{label}; Eq. 19 repaired, lower bound 5 to {highest:.0f} N"
         claims.append(_claim(rise, pairs[-1], _increment, assumed))
         assumed = f"{label}; Eq. 19 most level within its digits, lower bound "

@@ -99,7 +99,7 @@ def figure_5() -> StrandFigure:
         secant=frozen(law.secant_rigidity(tension)),
         printed=frozen(eq19_as_printed(tension)),
         claims=tuple(
-            Claim("Fig. 5", what, of, paper, floats(computed), assumption=assumed)
-            for what, of, paper, computed, assumed in claims
+            Claim("Fig. 5", what, of, paper, floats(x), assumption=why, misprint=paper is not None)
+            for what, of, paper, x, why in claims
         ),
     )

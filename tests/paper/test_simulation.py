@@ -96,3 +96,20 @@ def test_report_is_strict_json_and_a_table(results: Results) -> None:
     table = paper.to_markdown(figures).splitlines()
     rows = table[2 : 2 + sum(len(figure.claims) for figure in figures)]
     assert all(line.startswith(("| Fig.", "| Table", "| Section")) for line in rows)
+
+
+@pytest.mark.parametrize(
+    ("paper", "computed", "more", "verdict"),
+    [
+        (None, (1.0,), {}, "–"),
+        ((2.9, 4.57), (2.949, 4.5651), {}, "within printed digits"),
+        ((2.9, 4.57), (2.951, 4.5651), {}, "holds"),
+        ((-1.5, 2.0), (-1.1, 2.0), {}, "sign only"),
+        ((-1.5, 2.0), (-1.5, -0.1), {}, "differs"),
+        ((1.5,), (1.4,), {"at_most": True}, "holds"),
+        ((1.5,), (1.6,), {"at_most": True}, "differs"),
+        ((1.0,), (1.0,), {"misprint": True}, "misprint"),
+    ],
+)
+def test_verdicts(paper: Any, computed: Any, more: Any, verdict: str) -> None:
+    assert cdsm.paper.Claim("", "", "", paper, computed, assumption="", **more).verdict == verdict
