@@ -29,7 +29,12 @@ if TYPE_CHECKING:
 
 Statistic = Literal["median", "min", "max"]
 
-_UNITS: Final = {"N m-1": (N_PER_MM, "N/mm"), "N m rad-1": (1.0, "N m/rad"), "1": (1.0, "-")}
+_UNITS: Final = {
+    "N m-1": (N_PER_MM, "N/mm"),
+    "N m rad-1": (1.0, "N m/rad"),
+    "m": (MM, "mm"),
+    "1": (1.0, "-"),
+}
 """Factor and label of the colour bar for each unit of a Dataset."""
 
 _MOST_PANELS = 9
@@ -41,12 +46,13 @@ _THIN = 0.3  # least ratio of the sides of a map, which leaves room for its labe
 _MARGIN = 0.05  # around the tips, over their largest extent
 _TALLEST = 2.3  # largest height of a map [inch]
 _CHARACTERS = 15.0  # of a label in an inch
+_TICK = 0.6  # least space for the label of a tick [inch]
 _LABELS = 0.75  # space for the labels beside and below a map [inch]
 _BAR, _HEADING = 1.0, 0.6  # width of the colour bar with its label, height of the title [inch]
 _HUGE = 1e300
 _SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
 
-_NONE: Final = {"marker": ".", "c": "0.75", "s": 8.0, "label": "no value"}
+_NONE: Final = {"marker": ".", "c": "0.6", "s": 8.0, "label": "no value"}
 _UNSTABLE: Final = {"marker": "x", "c": style.VERMILLION, "s": 14.0, "lw": 0.7, "label": "unstable"}
 
 
@@ -130,7 +136,7 @@ def plot_map(
     for axes, each, (x, y), shape in zip(grid.ravel(), maps, limits, shapes, strict=False):
         _draw(axes, each, colors, statistic)
         axes.set(xlim=x, ylim=y, aspect="equal")
-        axes.locator_params("x", nbins=max(2, round(5.0 * min(1.0, shape))))
+        axes.locator_params("x", nbins=min(5, max(1, int(size * shape / _TICK))))
         axes.set_title(textwrap.fill(each.title, round(_CHARACTERS * (size * shape + 0.5))))
     name = dataset[quantity].long_name.split(",")[0]
     title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
@@ -225,14 +231,17 @@ def _views(points: Array, section: Any, path: bool) -> Iterator[View]:
         return title.replace(" ", "\xa0"), axis, inside, section is None  # no line break
 
     every, extent = np.full(len(points), True), np.ptp([*points, np.zeros(3)], axis=0)
+    flat = np.ptp(points, axis=0) <= _FLAT * extent.max()
     if section is not None:
         if not isinstance(section, (tuple, list)) or len(section) != 3:
             said = f"{section!r} given; an axis, its place and the half thickness [m] needed."
             raise InvalidInput("section", said)
         axis = "xyz".index(one_of("axis", section[0], tuple("xyz")))
         yield slab(axis, *(MM * scalar("section", each) for each in section[1:]))
-    elif extent.min() <= _FLAT * extent.max():  # the base is at the origin
-        yield "", int(extent.argmin()), every, False
+    elif flat.any():
+        axis = int(np.where(flat, extent, np.inf).argmin())
+        off = extent[axis] > _FLAT * extent.max()  # from the base, which is at the origin
+        yield f"{'xyz'[axis]} = {points[0, axis]:.3g} mm" if off else "", axis, every, False
     else:
         for axis in (1, 2, 0):
             x = points[:, axis]
@@ -250,6 +259,8 @@ def _colors(values: Array) -> tuple[ScalarMappable, str]:
         low = -high
     elif low > 0.0 and high > _WIDE * low:
         scale = LogNorm
+    if high - low <= _FLAT * abs(high):  # differences are rounding
+        low, high = low - 0.05 * abs(low), high + 0.05 * abs(high)
     beyond = bool((finite < low).any()), bool((values > high).any())
     extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond]
     return ScalarMappable(scale(low, high), colormaps[name]), extend
