@@ -91,6 +91,7 @@ class Measurand(ReadOnlyState):
         elif self.of != "tip":  # cables only pull
             status[F.min(axis=1) < 0.0] = Status.OUTSIDE_ELASTICITY
         u = np.zeros((0, 3)) if self.direction is None else self.direction[None]
+        body, joint_springs = self.inputs.arms(errors, count)
         found = Rows(
             arm=arm,
             q=K.posture.q + errors.get("joint_angle", none),
@@ -99,9 +100,9 @@ class Measurand(ReadOnlyState):
             tension=None if self.redistribute else F,
             bounds=bounds,
             directions=u,
-            body=self.inputs.bodies(errors, count),
+            body=body,
             springs=lambda L, F, part: self._springs(errors, L, F, part),
-            joint_springs=self._joint_springs(errors, count),
+            joint_springs=joint_springs,
             check_limits=False,
         ).solve(status, threads)[self.of]
         if self.of == "tension":
@@ -124,15 +125,6 @@ class Measurand(ReadOnlyState):
             EA[:, of] = law.rigidity(np.clip(F[:, of], law.low, law.high))
         stretched = stretched + np.where(stretched > 0.0, change * EA, 0.0)
         return laws.stiffness_of(L, F, stretched, series)
-
-    def _joint_springs(self, errors: Errors, count: int) -> Array | None:
-        """Return the stiffness (count, n) of the joints' springs, or None without errors."""
-        if "joint_stiffness" not in errors:
-            return None
-        springs = self.stiffness.posture.arm.springs
-        k = np.tile(springs.stiffness, (count, 1))
-        k[:, springs.sprung] *= 1.0 + errors["joint_stiffness"]
-        return k
 
 
 def measurand_of(
