@@ -89,9 +89,9 @@ class Tolerances:
         lead: Straight length of each cable before the base disk [m].
         hole_radius: Distance of each hole from the axis of its link [m].
         hole_angle: Angle of each hole about the axis of its link [rad].
-        disk_offset: Distance of each disk from its joint [m].
-        link_length: Length of each link [m].
-        link_mass: Mass of each link [kg].
+        disk_offset: Distance of each disk from its joint [m]; place of a backbone's disk.
+        link_length: Length of each link [m]; of a backbone, of each gap before a disk.
+        link_mass: Mass of each link [kg]; of a backbone, of each disk with the gap before it.
         friction: Coefficient μ of each hole with friction [-].
         site: Each coordinate of each cable site [m]; for an arm from a URDF, instead of its holes.
 

@@ -114,7 +114,7 @@ class _Arm:
         inside = held.reshape(len(self.postures), -1).any(axis=1)
         swept = _SWEPT.get(each.of, each.of)
         if each.of == "mass":
-            return np.array([[sum(link.mass for link in geometry.links)]])
+            return np.array([[sum(body.mass for body in geometry._chain.bodies[1:])]])
         if each.of == "length":
             return np.array([[geometry.length]])
         if each.of == "deflection":

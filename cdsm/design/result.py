@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cdsm
-from cdsm.batch import evaluate
 from cdsm.design.evaluation import Designs
+from cdsm.design.lengths import length_bounds
 from cdsm.design.problem import DesignProblem
 from cdsm.interchange.mjcf import write_mjcf
 from cdsm.manipulator import Manipulator
@@ -36,8 +36,6 @@ _DEFLECTION = (
     "tensions without the load"
 )
 _DIGITS = 4
-_GRID = 41  # angles of each axis: lengths within the limits are found to 1 µm
-_INSIDE = 1e-6  # distance from a joint limit, over the range: there two disks touch, holes may meet
 _PRINTED = 20  # number of designs, evenly spread over a front, that a printed table shows
 
 
@@ -98,9 +96,9 @@ class DesignSearch(ReadOnlyState):
 
         ``holes.csv`` has each hole of each disk. ``cables.csv`` has three lengths of each cable,
         lead included: in the straight arm, and the shortest and the longest (the cut) within the
-        joint limits. The stroke, which the motor winds, is the difference of the last two. All are
-        geometric lengths: the stretch under tension is not subtracted, and the wire needed to fix
-        both ends is not included.
+        joint limits; with coupled joints these two are bounds, which no posture need attain. The
+        stroke, which the motor winds, is their difference. All are geometric lengths: the stretch
+        under tension is not subtracted, and the wire needed to fix both ends is not included.
 
         Args:
             folder: The folder; it is created if it does not exist.
@@ -229,12 +227,12 @@ def cable_table(arm: Manipulator) -> str:
     """Return a CSV with a row for each cable: wire, lead, and lengths in mm.
 
     All lengths include the lead. ``straight`` is the length in the straight arm, ``shortest`` and
-    ``cut`` are the shortest and the longest within the joint limits, and ``stroke``, which the
-    motor winds, is their difference. The lengths are without stretch, and without the wire needed
-    to fix both ends.
+    ``cut`` are the shortest and the longest within the joint limits, or bounds of them if joints
+    are coupled; ``stroke``, which the motor winds, is their difference. The lengths are without
+    stretch, and without the wire needed to fix both ends.
     """
     straight = arm.at(np.clip(0.0, arm.lower, arm.upper)).cable_lengths
-    shortest, longest = _extremes(arm)
+    shortest, longest = length_bounds(arm)
     leads = [cable.lead for cable in arm.cables]
     lengths = np.column_stack([leads, straight, shortest, longest, longest - shortest])
     rows = [
@@ -243,28 +241,6 @@ def cable_table(arm: Manipulator) -> str:
     ]
     head = ["cable", "ends after joint", "wire", "lead [mm]", "straight [mm]", "shortest [mm]"]
     return csv_text([*head, "cut [mm]", "stroke [mm]"], rows)
-
-
-def _extremes(arm: Manipulator) -> tuple[Array, Array]:
-    """Return the shortest and the longest length (C,) [m] of the cables within the joint limits.
-
-    A segment crosses at most one joint, so a length is a sum with a term for each joint, and a
-    grid over one joint after the other finds all of it.
-    """
-    inset = _INSIDE * (arm.upper - arm.lower)
-    low, high = arm.lower + inset, arm.upper - inset
-    straight = np.clip(0.0, low, high)
-    shortest = longest = at_rest = arm.at(straight).cable_lengths
-    first = 0
-    for joint in arm.geometry.joints:
-        own = slice(first, first + len(joint.axes))
-        grid = np.meshgrid(*np.linspace(low[own], high[own], _GRID).T)
-        q = np.tile(straight, (grid[0].size, 1))
-        q[:, own] = np.stack([each.ravel() for each in grid], axis=1)
-        change = evaluate(arm, q, outputs=["cable_lengths"])["cable_lengths"] - at_rest
-        shortest, longest = shortest + change.min(axis=0), longest + change.max(axis=0)
-        first = own.stop
-    return shortest, longest
 
 
 def _mm(value: float) -> str:

@@ -157,6 +157,10 @@ class Variable:
 
     def require(self, arm: Manipulator) -> None:
         """Raise InvalidInput if an arm lacks the joint or the cable of this."""
+        if self.kind == "cables_per_joint" and not all(x.axes for x in arm.geometry.joints):
+            said = f"{arm.name} has a backbone or necks, whose cables no rule spaces; vary "
+            first = arm.geometry.cable_names[0]
+            raise InvalidInput(self.of, f"{said}hole_angle@{first} or end@{first} of its cables.")
         if self.kind == "end":
             one_of("cable", self.at, arm.geometry.cable_names)
             if not self.choices:

@@ -135,21 +135,31 @@ class Chain:
 
 
 def chain_of(
-    base_length: float, joints: Sequence[Joint], links: Sequence[Link], sizes: Sequence[Sizes]
+    base_length: float,
+    joints: Sequence[Joint],
+    links: Sequence[Link],
+    sizes: Sequence[Sizes],
+    offsets: Sequence[Sequence[float]] = (),
 ) -> Chain:
-    """Return the chain of an arm; ``sizes`` are those of the disks of each joint."""
+    """Return the chain of an arm; ``sizes`` are those of the disks of each joint.
+
+    ``offsets`` are the distances [m] of each joint from the disk before and the one after it; both
+    are ``disk_offset`` if they are not given.
+    """
     chain, rigid = Chain(), (STEEPEST, False)
+    offsets = offsets or [[joint.disk_offset] * 2 for joint in joints]
     for k in range(len(joints) + 1):
         after = joints[k] if k < len(joints) else None
         link = links[k - 1] if k else Link(length=max(base_length, _LEAST), mass=0.0)
         length = link.length if k else base_length
-        start = _start(chain, k, joints[k - 1], link, sizes[k - 1]) if k else 0.0
-        h = after.disk_offset if after else 0.0
+        own = offsets[k - 1] if k else [0.0, 0.0]
+        start = _start(chain, k, joints[k - 1], link, sizes[k - 1], own) if k else 0.0
+        h = offsets[k][0] if after else 0.0
         if link.bending_stiffness is None:
             chain.mass += link.mass
             chain.x = length - h - start
         else:
-            gap = length - h - joints[k - 1].disk_offset
+            gap = length - h - own[1]
             chain.run(f"link{k}b", gap, link, link.mass * gap / length, f"link{k}_end", *rigid)
         if after:
             chain.disk(k + 1, *sizes[k][:2])
@@ -161,15 +171,17 @@ def chain_of(
     return chain
 
 
-def _start(chain: Chain, k: int, joint: Joint, link: Link, sizes: Sizes) -> float:
+def _start(
+    chain: Chain, k: int, joint: Joint, link: Link, sizes: Sizes, offsets: Sequence[float]
+) -> float:
     """Add joint k with the disk after it; return where x = 0 of its link is behind the joint."""
-    h, (radius, outer, limit), stops = joint.disk_offset, sizes, joint.limit is None
+    (before, h), (radius, outer, limit), stops = offsets, sizes, joint.limit is None
     chain.at = k
     bends = link.bending_stiffness is not None
     if not joint.axes:
         backbone = min(abs(link.length - h), abs(link.length - 2.0 * h)) < _NEAR
         stem, name = (f"gap{k}", f"disk{k}") if backbone else (f"joint{k}", f"link{k}")
-        chain.run(stem, 2.0 * h, joint, joint.mass, name, limit, stops)
+        chain.run(stem, before + h, joint, joint.mass, name, limit, stops)
         chain.disk(k, radius, outer)
         return h - chain.x
     name, child = f"joint{k}", f"link{k}_start" if bends else f"link{k}"

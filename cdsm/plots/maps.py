@@ -136,7 +136,7 @@ def plot_map(
     for axes, each, (x, y), shape in zip(grid.ravel(), maps, limits, shapes, strict=False):
         _draw(axes, each, colors, statistic)
         axes.set(xlim=x, ylim=y, aspect="equal")
-        axes.locator_params("x", nbins=min(5, max(1, int(size * shape / _TICK))))
+        axes.locator_params("x", nbins=min(5, max(1, int(size * shape / _TICK))), min_n_ticks=1)
         axes.set_title(textwrap.fill(each.title, round(_CHARACTERS * (size * shape + 0.5))))
     name = dataset[quantity].long_name.split(",")[0]
     title = f"{dataset.attrs['title']}, {dataset.attrs['poses']}"
@@ -241,7 +241,8 @@ def _views(points: Array, section: Any, path: bool) -> Iterator[View]:
     elif flat.any():
         axis = int(np.where(flat, extent, np.inf).argmin())
         off = extent[axis] > _FLAT * extent.max()  # from the base, which is at the origin
-        yield f"{'xyz'[axis]} = {points[0, axis]:.3g} mm" if off else "", axis, every, False
+        title = f"{'xyz'[axis]} = {points[0, axis]:.3g} mm".replace(" ", "\xa0")
+        yield title if off else "", axis, every, False
     else:
         for axis in (1, 2, 0):
             x = points[:, axis]

@@ -20,6 +20,7 @@ from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array
 from cdsm.tolerances import EVERY, Tolerance, Tolerances
+from cdsm.tolerancing.dimensions import Change, changes_of_chain, changes_of_holes
 from cdsm.urdf import CROSS_MASS
 
 Errors = Mapping[str, Array]
@@ -30,7 +31,6 @@ _POSITIVE = (
     "spring",
     "joint_stiffness",
 )  # sources with relative errors of positive numbers
-_NEAR = 1e-9  # a site this near to a disk [m] is on the disk
 _LENGTHS = ("lead", "hole_radius", "disk_offset", "link_length", "site")
 _LARGEST = 0.1  # largest standard uncertainty of a length, divided by the length of the arm
 
@@ -51,8 +51,8 @@ class Group(NamedTuple):
 class Inputs:
     """Inputs of an arm.
 
-    Its points (joint origins, sites, centres of mass, tip) depend linearly on them: a sparse matrix
-    for each source turns errors into displacements.
+    Its dimensions (points, masses, lengths of leads) and 1/k of its beams are linear in them, or
+    nearly so: a sparse matrix for each source turns errors into changes.
 
     Attributes:
         labels: Names of the inputs of each source, such as ``cable2_1 on link1, site 3``.
@@ -60,58 +60,51 @@ class Inputs:
 
     def __init__(self, arm: Manipulator) -> None:
         cables, table, self._arm = arm.cables, rows_of(arm), (arm.name, _LARGEST * arm.length)
-        self._nominal = nominal = table.dimensions
-        self._points = np.concatenate([x.ravel() for x in nominal[:4]])
-        # the crosses of universal joints weigh next to nothing
-        self._sprung = arm.springs.sprung
-        self._heavy = np.flatnonzero(nominal.mass > CROSS_MASS)
+        self._nominal, self._sprung = table.dimensions, arm.springs.sprung
+        k = self._nominal.spring
+        softness = np.divide(1.0, k, out=np.full(k.shape, np.inf), where=k > 0.0)
+        every = *self._nominal[:-1], softness
+        self._parts = np.cumsum([x.size for x in every[:-1]])
+        self._numbers = np.concatenate([x.ravel() for x in every])
         of, row = np.repeat(range(len(cables)), [len(c.sites) for c in cables]), arm._routing.row
         self._first = np.flatnonzero((of[1:] == of[:-1]) & (row[1:] == row[:-1]))
         self._of_cable = np.eye(len(cables))[of[self._first]]
         each = [(c.name, i, site) for c in cables for i, site in enumerate(c.sites, 1)]
         sites = [f"{name} on {site.link}, site {i}" for name, i, site in each]
-        moved = ("base", *arm.springs.joints)
         self.labels: dict[str, Sequence[str]] = {
             "rigidity": cables.names,
             "spring": [c.name for c in cables if c.series_stiffness < math.inf],
             "joint_stiffness": [arm.springs.joints[j] for j in self._sprung],
             "joint_angle": arm.joint_names,
             "tension": cables.names,
-            "lead": cables.names,
             "friction": [name for name, e in zip(sites, each, strict=True) if e[2].friction],
-            "link_mass": [f"link moved by {moved[i]}" for i in self._heavy],
         }
-        names: dict[str, dict[str, int]] = {}
-        entries: dict[str, list[tuple[int, int, float]]] = {}
-        for source, name, point, motion in _motions(arm, sites):
-            of_source = names.setdefault(source, {})
-            column = of_source.setdefault(name, len(of_source))
-            entries.setdefault(source, []).extend((point + x, column, motion[x]) for x in range(3))
+        found: dict[str, list[Change]] = {}
+        for change in _changes(arm, sites):
+            found.setdefault(change[0], []).append(change)
         self._maps = {}
-        for source, of_source in names.items():
-            i, j, values = np.array(entries[source]).T
-            self.labels[source] = [*of_source]
-            self._maps[source] = csr_matrix((values, (i, j)), (self._points.size, len(of_source)))
+        for source, changes in found.items():
+            _, self.labels[source], rows, values = zip(*changes, strict=True)
+            columns = np.repeat(range(len(rows)), [len(each) for each in rows])
+            entries = np.concatenate(values), (np.concatenate(rows), columns)
+            self._maps[source] = csr_matrix(entries, (self._numbers.size, len(rows)))
 
     def bodies(self, errors: Errors, count: int) -> Body:
         """Return the dimensions of ``count`` arms with ``errors``."""
-        nominal, points = self._nominal, self._points[:, None]
+        numbers = self._numbers[:, None]
         for source, each in self._maps.items():
             if source in errors:
-                points = points + each @ errors[source].T
-        points = np.broadcast_to(points, (len(points), count)).T
-        parts = np.split(points, np.cumsum([x.size for x in nominal[:3]]), axis=1)
-        shift, site, centre, tip = (
-            part.reshape(count, *x.shape) for part, x in zip(parts, nominal[:4], strict=True)
-        )
-        mass, fixed, spring = (np.tile(x, (count, 1)) for x in nominal[4:])
-        mass[:, self._heavy] += errors.get("link_mass", 0.0)
-        fixed += errors.get("lead", 0.0)
-        spring[:, self._sprung] *= 1.0 + errors.get("joint_stiffness", 0.0)
+                numbers = numbers + each @ errors[source].T
+        numbers = np.broadcast_to(numbers, (len(numbers), count)).T
+        *parts, softness = np.split(numbers, self._parts, axis=1)
+        springs = 1.0 / softness
+        springs[:, self._sprung] *= 1.0 + errors.get("joint_stiffness", 0.0)
+        shapes = zip((*parts, springs), self._nominal, strict=True)
+        body = Body(*(part.reshape(count, *x.shape) for part, x in shapes))
         a, b = self._first, self._first + 1  # within one body
-        longer = np.linalg.norm(site[:, b] - site[:, a], axis=2)
-        longer -= np.linalg.norm(nominal.site[b] - nominal.site[a], axis=1)
-        return Body(shift, site, centre, tip, mass, fixed + longer @ self._of_cable, spring)
+        longer = np.linalg.norm(body.site[:, b] - body.site[:, a], axis=2)
+        longer -= np.linalg.norm(self._nominal.site[b] - self._nominal.site[a], axis=1)
+        return body._replace(fixed=body.fixed + longer @ self._of_cable)
 
     def groups(self, tolerances: Tolerances) -> tuple[Group, ...]:
         """Find the inputs of each tolerance.
@@ -179,39 +172,21 @@ _LACKS = {
 }
 
 
-def _motions(arm: Manipulator, names: Sequence[str]) -> Iterator[tuple[str, str, int, Array]]:
-    """Yield how inputs move points: source, input, first coordinate and motion (3,) of a point.
-
-    ``names`` are those of all sites.
-    """
-    table = rows_of(arm)
-    shift, site, centre = np.cumsum([x.size for x in table.dimensions[:3]]).tolist()
-    for p, name in enumerate(names):
-        for axis, unit in zip("xyz", np.eye(3), strict=True):
-            yield "site", f"{name}, {axis}", shift + 3 * p, unit
-    if not arm.is_serpentine:
+def _changes(arm: Manipulator, sites: Sequence[str]) -> Iterator[Change]:
+    """Yield what each input changes of the numbers of :class:`Inputs`; ``sites`` are named."""
+    dimensions = rows_of(arm).dimensions
+    sizes = np.cumsum([0, *(x.size for x in dimensions)]).tolist()
+    starts = dict(zip((*Body._fields[:-1], "softness"), sizes, strict=False))
+    one = np.ones(1)
+    for p, name in enumerate(sites):
+        for i, axis in enumerate("xyz"):
+            yield "site", f"{name}, {axis}", np.array([starts["site"] + 3 * p + i]), one
+    for c, cable in enumerate(arm.cables):
+        yield "lead", cable.name, np.array([starts["fixed"] + c]), one
+    if arm.is_serpentine:
+        yield from changes_of_holes(arm, sites, starts["site"])
+        yield from changes_of_chain(arm, starts)
         return
-    disks = arm.geometry.disks
-    places = {name: [disk.x for disk in disks if disk.link == name] for name, *_ in disks}
-    base, *links = places
-    for p, own in enumerate(own for cable in arm.cables for own in cable.sites):
-        if own.link not in places:
-            continue
-        rotation, at = arm._body.locate(own.link)[1], shift + 3 * p
-        x, y, z = own.position
-        if radius := math.hypot(y, z):
-            yield "hole_radius", names[p], at, rotation @ [0.0, y / radius, z / radius]
-            yield "hole_angle", names[p], at, rotation @ [0.0, -z, y]
-        for d, place in enumerate(places[own.link]):
-            if abs(x - place) <= _NEAR:
-                before_joint = d > 0 or own.link == base
-                along = rotation @ [-1.0 if before_joint else 1.0, 0.0, 0.0]
-                yield "disk_offset", f"disk {d + 1} of {own.link}", at, along
-                if d > 0:
-                    yield "link_length", own.link, at, -along
-    for link in links:
-        row, rotation, _ = arm._body.locate(link)
-        along = rotation @ [1.0, 0.0, 0.0]
-        yield "link_length", link, site + 3 * row, along / 2.0
-        following = np.flatnonzero(table.arm.parent == row).tolist()
-        yield "link_length", link, 3 * following[0] if following else centre, along
+    moved = ("base", *arm.springs.joints)
+    for i in np.flatnonzero(dimensions.mass > CROSS_MASS).tolist():
+        yield "link_mass", f"link moved by {moved[i]}", np.array([starts["mass"] + i]), one

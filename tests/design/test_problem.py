@@ -271,6 +271,14 @@ START = 1.5e4
         ({"variables": (cdsm.Variable("end@cable2_1", 1, 4),)}, "end@cable2_1.high: 4"),
         ({"variables": (cdsm.Variable("hole_radius@9", 0.01, 0.02),)}, "joints 1 to 3"),
         ({"variables": (cdsm.Variable("lead", 0.0, 0.1),) * 2}, "lead of a joint twice"),
+        (
+            {
+                "arm": cdsm.presets.nitinol_segment(),
+                "variables": (cdsm.Variable("cables_per_joint", 3, 4),),
+                "postures": np.zeros((1, 50)),
+            },
+            "vary hole_angle@cable10_1 or end@cable10_1",
+        ),
         ({"loads": np.zeros((1, 5))}, "loads: shape"),
         ({"objectives": (cdsm.Objective("force_radius"),), "maximum": np.inf}, "a finite one"),
         (
