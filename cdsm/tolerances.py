@@ -84,7 +84,8 @@ class Tolerances:
         rigidity: EA of the law of each cable; relative [-].
         spring: k_series in series with each cable, such as its anchor or drive; relative [-].
         joint_stiffness: k of the spring of each joint, those of beams included; relative [-].
-        joint_angle: Each joint angle [rad]; [m] for prismatic joints.
+        joint_angle: Angle of each joint that turns [rad].
+        joint_position: Coordinate of each joint that slides [m].
         tension: Each measured cable tension [N].
         lead: Straight length of each cable before the base disk [m].
         hole_radius: Distance of each hole from the axis of its link [m].
@@ -102,6 +103,7 @@ class Tolerances:
     spring: OneOrMore = 0.0
     joint_stiffness: OneOrMore = 0.0
     joint_angle: OneOrMore = 0.0
+    joint_position: OneOrMore = 0.0
     tension: OneOrMore = 0.0
     lead: OneOrMore = 0.0
     hole_radius: OneOrMore = 0.0

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import lru_cache
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -71,11 +72,13 @@ class Inputs:
         self._of_cable = np.eye(len(cables))[of[self._first]]
         each = [(c.name, i, site) for c in cables for i, site in enumerate(c.sites, 1)]
         sites = [f"{name} on {site.link}, site {i}" for name, i, site in each]
+        slides = list(compress(arm.joint_names, arm.slides))
         self.labels: dict[str, Sequence[str]] = {
             "rigidity": cables.names,
             "spring": [c.name for c in cables if c.series_stiffness < math.inf],
             "joint_stiffness": [arm.springs.joints[j] for j in self._sprung],
-            "joint_angle": arm.joint_names,
+            "joint_angle": [name for name in arm.joint_names if name not in slides],
+            "joint_position": slides,
             "tension": cables.names,
             "friction": [name for name, e in zip(sites, each, strict=True) if e[2].friction],
         }
@@ -166,6 +169,8 @@ _NO_HOLES = (
     "coordinate of its cable sites."
 )
 _LACKS = {
+    "joint_angle": "has no joints that turn; give joint_position [m].",
+    "joint_position": "has no joints that slide; give joint_angle [rad].",
     "friction": "has no friction in its holes; see Manipulator.with_friction.",
     "spring": "has no springs in series; see series_stiffness of a Cable.",
     "joint_stiffness": "has no springs at its joints; see joint_stiffness and Geometry.backbone.",

@@ -91,9 +91,12 @@ class Measurand(ReadOnlyState):
         elif self.of != "tip":  # cables only pull
             status[F.min(axis=1) < 0.0] = Status.OUTSIDE_ELASTICITY
         u = np.zeros((0, 3)) if self.direction is None else self.direction[None]
+        q = np.tile(K.posture.q, (count, 1))
+        q[:, ~arm.slides] += errors.get("joint_angle", none)
+        q[:, arm.slides] += errors.get("joint_position", none)
         found = Rows(
             arm=arm,
-            q=K.posture.q + errors.get("joint_angle", none),
+            q=q,
             wrench=K.wrench[None],
             names=(self.of,),
             tension=None if self.redistribute else F,

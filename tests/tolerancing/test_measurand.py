@@ -12,6 +12,7 @@ from cdsm.support.status import Status
 from cdsm.tolerancing.budget import Uncertainty
 from cdsm.tolerancing.measurand import MeasurandName, measurand_of
 from tests.support import arms
+from tests.support.foreign import POSTURE, TENSION, crab
 
 U = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
 Q = np.deg2rad([10, 5, -8, 12, 3, -6])
@@ -133,3 +134,20 @@ def test_errors_of_sites_and_rigidities_are_those_of_other_cables(
         assert found[n, 0] == pytest.approx(
             cdsm.stiffness(built, tension, wrench).along(U), rel=1e-10
         )
+
+
+def test_joints_that_slide_have_their_own_tolerance() -> None:
+    """√Σ (u ∂K/∂q)² over the joints that turn, and over those that slide."""
+    arm = crab()
+    assert 0 < arm.slides.sum() < arm.nv
+    given = cdsm.Tolerances(joint_angle=1e-3, joint_position=2e-4)
+    found = cdsm.uncertainty(arm.at(POSTURE), TENSION, given, direction=U).contributions
+    slopes = []
+    for step in 1e-5 * np.eye(arm.nv):
+        ends = [cdsm.stiffness(arm.at(POSTURE + s * step), TENSION).along(U) for s in (1, -1)]
+        slopes.append((ends[0] - ends[1]) / 2e-5)
+    of = np.array(slopes)
+    assert found["joint_angle"] == pytest.approx(1e-3 * np.linalg.norm(of[~arm.slides]), rel=1e-4)
+    assert found["joint_position"] == pytest.approx(2e-4 * np.linalg.norm(of[arm.slides]), rel=1e-4)
+    with pytest.raises(cdsm.InvalidInput, match="has no joints that slide"):
+        cdsm.uncertainty(posture(), F, cdsm.Tolerances(joint_position=1e-4), direction=U)
