@@ -114,10 +114,12 @@ class Uncertainty(Result):
     def __str__(self) -> str:
         (unit, size), relative = self.measurand.unit, 100.0 * self.relative
         low, high = (end / size for end in self.interval())
+        own = "its own least tensions" if self.measurand.redistribute else "the tensions given"
+        with_them = "" if self.measurand.of == "tip" else f", each with {own}"
         lines = [
             *self._unstable,
             f"{self.name}: {self.shown} {unit} (one standard uncertainty, {relative:.2g} %)",
-            f"95 % of such arms: {low:.4g} to {high:.4g} {unit}",
+            f"95 % of such arms: {low:.4g} to {high:.4g} {unit}{with_them}",
             f"{'source':<16}{'tolerance':>16}{f'contribution [{unit}]':>24}{'of variance':>14}",
         ]
         for source, u in self.contributions.items():
