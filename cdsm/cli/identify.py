@@ -89,6 +89,9 @@ def identify(
     tests: Annotated[
         int | None, opt("Plan the best N tests of LOOPS.csv instead.", "N", min=1)
     ] = None,
+    profile: Annotated[
+        bool, opt("Intervals by the profile of χ² too, which takes longer.", None, "--profile")
+    ] = False,
     figure: options.Figure = None,
     as_json: options.AsJson = False,
 ) -> int:
@@ -123,13 +126,15 @@ def identify(
         if not low < start[at] < high:  # of a friction of 0, no derivative shows what it does
             start[at] = (low + high) / 2.0
     found = cdsm.identify(model_of, read, bounds, start=start)
-    intervals = found.confidence()
+    told, shown = found.to_dict(), list[str]()
+    if profile:
+        told["interval_95"] = intervals = found.confidence()
+        rows = [("95 % by the profile of χ²", "from", "to")]
+        rows += [(name, f"{low:.4g}", f"{high:.4g}") for name, (low, high) in intervals.items()]
+        shown = ["\n".join(aligned(rows))]
     write_picture(figure, found.plot)
-    rows = [("95 % by the profile of χ²", "from", "to")]
-    rows += [(name, f"{low:.4g}", f"{high:.4g}") for name, (low, high) in intervals.items()]
-    told = {**found.to_dict(), "interval_95": intervals}
     warnings = [f"warning: {sentence}" for sentence in found.warnings]
-    return answer(as_json, told, found, "\n".join(aligned(rows)), warnings=warnings)
+    return answer(as_json, told, found, *shown, warnings=warnings)
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:
