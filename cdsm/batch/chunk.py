@@ -16,7 +16,7 @@ from cdsm.batch.quantities import (
     Codes,
     read,
 )
-from cdsm.batch.rows import Body, Pose, one_by_one, rows_of, side_by_side
+from cdsm.batch.rows import Body, Indices, Pose, one_by_one, rows_of, side_by_side
 from cdsm.errors import CdsmError
 from cdsm.manipulator import LIMIT_SLACK
 from cdsm.routing import SHORTEST_SEGMENT
@@ -138,47 +138,63 @@ class Chunk:
     def _of_stiffness(self, full: Pose, at: Pose, F: Array, k: Array, W: Array) -> dict[str, Array]:
         """Compute K_θ, its terms if they are needed, and what is read off it."""
         names, status, u = self._names, self._status, self._rows.directions
-        wanted, fine = names & set(READINGS), status == Status.OK
-        if self._kernels.COMPILED and self._table.coupling is None:
-            simple = names.isdisjoint(TERMS) and wanted <= {"along"}
-            if simple and (found := self._along(at, F, k, W, fine)) is not None:
-                return found
-        count = 5 if self._rows.arm.has_springs or "springs" in names else 4
-        terms, coupling = self._alone(self._terms(full, F, k, W, count)[0]), self._table.coupling
-        terms = coupling.square(terms) if coupling else terms
-        found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
-        found["joint"] = terms.sum(axis=1)
-        if wanted:
-            K, parts = found["joint"][fine], abs(terms[fine]).sum(axis=1)
-            read_off, codes = read(wanted, K, parts, self._jacobian(at)[fine], u)
+        wanted, rows = names & set(READINGS), np.flatnonzero(status == Status.OK)
+        found: dict[str, Array] = {}
+        if (
+            self._kernels.COMPILED
+            and self._table.coupling is None
+            and names.isdisjoint(TERMS)
+            and wanted <= {"along"}
+        ):
+            found, pivot = self._along(at, F, k, W)
+            rows = rows[~(pivot[rows] > _PIVOT)] if wanted else rows[:0]
+            terms = self._terms(full, F, k, W, rows) if rows.size else np.zeros(0)
+        else:
+            terms = self._terms(full, F, k, W, None)
+            found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
+            found["joint"], terms = terms.sum(axis=1), terms[rows]
+        if wanted and rows.size:
+            K, parts = terms.sum(axis=1), abs(terms).sum(axis=1)
+            read_off, status[rows] = read(wanted, K, parts, self._jacobian(at)[rows], u)
             for name, value in read_off.items():
-                found[name] = np.full((len(status), *value.shape[1:]), np.nan)
-                found[name][fine] = value
-            status[fine] = codes
+                if name not in found:
+                    found[name] = np.full((len(status), *value.shape[1:]), np.nan)
+                found[name][rows] = value
         return found
 
-    def _along(
-        self, at: Pose, F: Array, k: Array, W: Array, fine: NDArray[np.bool_]
-    ) -> dict[str, Array] | None:
-        """Compute K_θ and ``along`` without the terms; None if one row may be singular."""
-        K, size = self._terms(at, F, k, W, 1)
+    def _along(self, at: Pose, F: Array, k: Array, W: Array) -> tuple[dict[str, Array], Array]:
+        """Compute K_θ and ``along`` without the terms, and pivots (n,): where small, not exact."""
+        K, size = self._stiffness(at, self._body(), F, k, W, 1)
         found = {"joint": self._alone(K[:, 0]).copy()} if "joint" in self._names else {}
+        pivot = np.empty((len(F), self._width))
         if "along" in self._names:
             u = self._rows.directions.copy()  # writable, whatever u is: the kernel compiles once
-            shape, moment = (len(F), len(u), self._width), bool(W[:, 3:].any())
-            along, pivot = np.empty(shape), np.empty(shape[::2])
-            kernel = self._kernels.along
-            kernel(K, size, at.tip_jacobian, u, moment, along, pivot)
-            if not (self._alone(pivot)[fine] > _PIVOT).all():
-                return None
+            along, moment = np.empty((len(F), len(u), self._width)), bool(W[:, 3:].any())
+            self._kernels.along(K, size, at.tip_jacobian, u, moment, along, pivot)
             found["along"] = self._alone(along)
-        return found
+        return found, self._alone(pivot)
 
-    def _terms(self, at: Pose, F: Array, k: Array, W: Array, count: int) -> tuple[Array, Array]:
+    def _terms(self, at: Pose, F: Array, k: Array, W: Array, rows: Indices | None) -> Array:
+        """Return the 4 or 5 terms (n, 5, nv, nv) of K_θ of some rows, or of all."""
+        body, number, coupling = self._body(), len(self._q), self._table.coupling
+
+        def some(x: Array) -> Array:
+            return side_by_side(self._alone(x)[rows], self._width)
+
+        if rows is not None:
+            at, F, k, W, number = Pose(*map(some, at)), some(F), some(k), some(W), rows.size
+            body = body if self._rows.body is None else Body(*map(some, body))
+        count = 5 if self._rows.arm.has_springs or "springs" in self._names else 4
+        terms = one_by_one(self._stiffness(at, body, F, k, W, count)[0], number)
+        return coupling.square(terms) if coupling else terms
+
+    def _stiffness(
+        self, at: Pose, body: Body, F: Array, k: Array, W: Array, count: int
+    ) -> tuple[Array, Array]:
         """Compute the 4 or 5 terms (B, 5, nv, nv, W) of K_θ, or 1: their sum."""
         B, nv, _ = at.gravity.shape
-        K, size = self._empty("K", B, count, nv, nv), self._empty("size", B, nv)
-        self._kernels.stiffness(self._table.arm, self._body(), at, F, k, W, K, size)
+        K, size = self._empty(f"K{count}", B, count, nv, nv), self._empty("size", B, nv)
+        self._kernels.stiffness(self._table.arm, body, at, F, k, W, K, size)
         return K, size
 
     def _finished(self, name: str, value: Array) -> Array:
