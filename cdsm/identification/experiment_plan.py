@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination
 from cdsm.identification.measurement import WeightLoop
@@ -27,17 +26,14 @@ from cdsm.support.validation import (
     unit_directions,
     whole_number,
 )
-from cdsm.support.values import Array, frozen
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cdsm.support.values import Array, Plotted, frozen
 
 _MOST = 5000  # largest number of candidates and of tests
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class ExperimentPlan(Result):
+class ExperimentPlan(Result, Plotted):
     """Weight tests that determine parameters of an arm best; made by :func:`plan_experiment`.
 
     There are n candidates and P parameters. All arrays are read-only.
@@ -56,6 +52,7 @@ class ExperimentPlan(Result):
     """
 
     _rows = "parameter"
+    _figure = "plot_experiment_plan"
 
     names: tuple[str, ...] = field(metadata=unit("1", "parameter"))
     values: Array = field(metadata=unit("own unit", "parameter"))
@@ -92,10 +89,6 @@ class ExperimentPlan(Result):
     def undetermined(self) -> tuple[str, ...]:
         """Names of the parameters that the planned tests do not determine."""
         return tuple(n for n, std in zip(self.names, self.std, strict=True) if math.isinf(std))
-
-    def plot(self) -> Figure:
-        """Plot the expected 95 % intervals, and how often each candidate is tested."""
-        return cdsm.plots.plot_experiment_plan(self)
 
     def __str__(self) -> str:
         times = ((label, f"{count}×") for label, count in self.repetitions.items())

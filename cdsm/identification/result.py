@@ -6,13 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtr, chdtrc, ndtri
 
-import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination, interval
 from cdsm.identification.measurement import Measurement, WeightLoop, name_of
@@ -24,10 +23,7 @@ from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import scalar
-from cdsm.support.values import Array, frozen
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cdsm.support.values import Array, Plotted, frozen
 
 _CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
 _UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
@@ -47,7 +43,7 @@ def independent_readings(measurements: Sequence[Test]) -> int:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Identification(Result):
+class Identification(Result, Plotted):
     """Parameters of an arm that explain its measurements best; made by :func:`identify`.
 
     There are P parameters and n measured numbers: one for each stiffness, all readings of each
@@ -68,6 +64,7 @@ class Identification(Result):
     """
 
     _headline, _rows = "chi_square", "parameter"
+    _figure = "plot_identification"
 
     names: tuple[str, ...] = field(metadata=unit("1", "parameter"))
     values: Array = field(metadata=unit(_OWN, "parameter"))
@@ -202,10 +199,6 @@ class Identification(Result):
                 limits = interval(problem, best, jacobian, i, rise) if known else None
                 found[self.names[i]] = limits or (-math.inf, math.inf)
         return found
-
-    def plot(self) -> Figure:
-        """Plot predicted and measured stiffnesses [N/mm] and loops [mm], and residuals in σ."""
-        return cdsm.plots.plot_identification(self)
 
     def __str__(self) -> str:
         half = float(ndtri(0.975)) * self.std

@@ -61,9 +61,8 @@ def quantity(of: str, *dims: str) -> Callable[[Callable[[Any], _T]], cached_prop
 class Result(ReadOnlyState):
     """A frozen result that exports itself: what a field is, stands in its metadata.
 
-    Fields and properties without metadata are not exported. Subclasses write ``__str__`` and
-    ``plot`` by hand, nothing else. ``_posture`` is the posture whose joint coordinates come first
-    in the JSON; its arm, or the attribute ``arm``, names joints and cables.
+    Fields and properties without metadata are not exported. Subclasses write ``__str__`` by
+    hand, nothing else; those with a figure are also :class:`~cdsm.support.values.Plotted`.
     """
 
     _headline: ClassVar[str] = ""
@@ -72,9 +71,18 @@ class Result(ReadOnlyState):
     _rows: ClassVar[str] = ""
     """Dimension whose entries are the rows of the table; a table of one row if it is empty."""
 
+    _posture_from: ClassVar[str] = "posture"
+    """Attribute with the posture, whose joint coordinates come first in the JSON.
+
+    Its arm, or the attribute ``arm``, names joints and cables.
+    """
+
     @property
     def _posture(self) -> Any:
-        return getattr(self, "posture", None)
+        found: Any = self
+        for name in self._posture_from.split("."):
+            found = getattr(found, name, None)
+        return found
 
     @property
     def _arm(self) -> Any:

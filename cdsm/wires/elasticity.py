@@ -8,26 +8,22 @@ import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.polynomial.polynomial import polyint, polyval
 from numpy.typing import ArrayLike, NDArray
 
-import cdsm
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.support.format import rounded
 from cdsm.support.validation import number_array, scalar
-from cdsm.support.values import Array
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cdsm.support.values import Array, Plotted
 
 _SHORTEST: Final = 0.5  # length of a slack wire over that at the low end of its law
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Elasticity:
+class Elasticity(Plotted):
     """Axial elasticity of a wire: its law EA(F), with the strain ε(F) = ∫ dF/EA.
 
     A wire of original length l_0 has the stiffness dF/dL = EA(F)/l_0: EA is the *tangent* rigidity.
@@ -41,6 +37,8 @@ class Elasticity:
         high: Largest tension [N]; inf if there is none.
         rest: Tension [N] at which the strain is zero: ``low``, but see :meth:`slack_below`.
     """
+
+    _figure = "plot_elasticity"
 
     low: float
     high: float
@@ -91,10 +89,6 @@ class Elasticity:
         from cdsm.wires.catalogue import write_law
 
         return write_law(self, path)
-
-    def plot(self) -> Figure:
-        """Plot tangent and secant rigidity [kN] against the tension [N]."""
-        return cdsm.plots.plot_elasticity(self)
 
     def scaled(self, factor: float) -> Elasticity:
         """Return the law of ``factor`` · EA(F), e.g. for a wire of another spool.
