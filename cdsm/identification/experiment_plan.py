@@ -28,8 +28,6 @@ from cdsm.support.validation import (
 )
 from cdsm.support.values import Array, Plotted, frozen
 
-_MOST = 5000  # largest number of candidates and of tests
-
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -156,8 +154,6 @@ def plan_experiment(
         raise InvalidInput("weights", f"{weights!r} given; positive forces (n,) [N] are needed.")
     bound, count = number_array("minimum", minimum), whole_number("steps", steps, 1, 100)
     axes = np.atleast_2d(unit_directions("directions", directions)).tolist()
-    if len(forces) * len(angles) * len(axes) > _MOST:
-        raise InvalidInput("postures", f"more than {_MOST} candidates; give fewer.")
     names = {axis: name for name, axis in AXES.items()}
     way = (*range(count + 1), *range(count - 1, -1, -1))  # up and down
     candidates = [
@@ -193,7 +189,7 @@ def plan_tests(
         said = "give {name: expected value} for at least one."
         raise InvalidInput("parameters", f"{parameters!r} given; {said}")
     values = np.array([scalar(f"parameters[{name!r}]", x) for name, x in parameters.items()])
-    names, most = tuple(parameters), whole_number("tests", tests, 1, _MOST)
+    names, most = tuple(parameters), whole_number("tests", tests, 1)
     if not values.all():
         said = "0 given; intervals are judged relative to the expected value. Give a small one "
         said += "(commands: in ARM.toml or by --set)."

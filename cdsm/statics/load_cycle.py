@@ -23,7 +23,6 @@ from cdsm.support.validation import WRENCH, instance, number_array, whole_number
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
 
-_MOST_LOADS = 100_000  # of a history
 _SHOWN = 24  # largest number of loads that are printed; of more, the first and the last ones
 
 
@@ -201,11 +200,10 @@ def load_cycle(
         F, W = checked_tension(pose, tension, None)
     pose.arm._laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
     loads = number_array("wrenches", wrenches, "wrench")
-    if loads.ndim != 2 or loads.shape[1] != 6 or not 0 < len(loads) <= _MOST_LOADS:
+    if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
         raise InvalidInput(
             "wrenches",
-            f"shape {loads.shape} given, (n, 6) with n from 1 to {_MOST_LOADS} needed: one wrench "
-            f"per load ({WRENCH}).",
+            f"shape {loads.shape} given, (n, 6) needed, n > 0: one wrench per load ({WRENCH}).",
         )
     substeps = whole_number("substeps", substeps, 1, 1000)
     arm = QuasiStaticArm(pose, F)

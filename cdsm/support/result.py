@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
@@ -238,12 +237,4 @@ def write_labelled(
         return write_file(path, table().to_csv)
     need("sweep", "netCDF4")
     data = labelled()
-
-    def fill(aside: Path) -> None:
-        try:
-            data.to_netcdf(aside, engine="netcdf4")
-        except (RuntimeError, PermissionError) as error:  # HDF5 does not report a full disk
-            free = shutil.disk_usage(aside.parent).free
-            raise OSError(f"{error} ({free} bytes are free there)") from None
-
-    return write_file(path, fill)
+    return write_file(path, lambda aside: data.to_netcdf(aside, engine="netcdf4"))
