@@ -29,10 +29,8 @@ AT_END: Final = 1e-3
 
 _ASCENTS, _DESCENTS = 16, 5  # largest number of searches for each end
 _AGREED, _SAME = 5, 1e-5  # number of ascents whose ends differ by this part at most, and suffice
-_STEEP, _TANGENT = (
-    10.0,
-    0.1,
-)  # factor of ln(along/start), and along/start below which it is straight
+_STEEP = 10.0  # factor of ln(along/start)
+_TANGENT = 0.1  # along/start below which the logarithm is straight
 _SETTINGS: Any = {"precision": 1e-10, "iterations": 50}
 _GAIN = 1e-6  # a smaller relative gain is no reason to search on
 

@@ -21,9 +21,7 @@ from cdsm.support.validation import instance
 from cdsm.support.values import Array, Plotted, frozen
 from cdsm.urdf import CROSS_INERTIA
 
-_LIGHT = (
-    50.0  # a link with less than so many times the placeholders of its cross counts as massless
-)
+_LIGHT = 50.0  # a link below so many times the placeholders of its cross counts as massless
 
 
 @final

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import math
 import os
@@ -12,7 +11,7 @@ from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
-from cdsm.errors import FileError, listed
+from cdsm.errors import FileError, did_you_mean, listed
 from cdsm.support.files import read_text
 from cdsm.support.values import Array
 
@@ -115,12 +114,12 @@ def named_columns(
     found: dict[str, tuple[int, str]] = {}
     for at, (name, unit) in enumerate(map(name_and_unit, table.header)):
         as_long = [each for each in known if abs(len(each) - len(name)) < 2]
-        near = difflib.get_close_matches(name, as_long, 1, 0.8)
+        hint = did_you_mean(name, as_long, least=0.8)
         if name in found:
             refuse(f"has two columns called {name}; give each once")
-        if name not in known and (near or unit in ANGLE):
-            there = f"did you mean {near[0]}? There are" if near else "there are"
-            refuse(f"has a column {name}, which is not known; {there} {listed(known)}")
+        if name not in known and (hint or unit in ANGLE):
+            hint = f"{hint} There" if hint else "; there"
+            refuse(f"has a column {name}, which is not known{hint} are {listed(known)}")
         found[name] = at, unit
     return found
 

@@ -239,15 +239,30 @@ class Elasticity(Plotted):
             problem = f"no tension of the domain {self._span} gives {given}"
             raise ElasticityRangeError(problem, indices=np.flatnonzero(outside).tolist())
         after = np.searchsorted(reached, wanted).clip(1, len(knots) - 1)
-        low, high, F = knots[after - 1], knots[after], np.interp(wanted, reached, knots)
-        for _ in range(50):  # Newton's method in a shrinking bracket
+
+        def error(F: Array) -> tuple[Array, Array]:
             strain, EA = self._evaluate(F)
-            error = length * strain + series * (F - self.rest) - wanted
-            low, high = np.where(error < 0.0, F, low), np.where(error > 0.0, F, high)
-            F, before = np.clip(F - error / (length / EA + series), low, high), F
-            if (abs(F - before) <= 1e-13 * np.maximum(F, 1.0)).all():
-                break
-        return np.asarray(F)
+            return length * strain + series * (F - self.rest) - wanted, length / EA + series
+
+        start = np.interp(wanted, reached, knots)
+        return newton_in_bracket(error, start, knots[after - 1], knots[after])[0]
+
+
+def newton_in_bracket(
+    of: Callable[[Array], tuple[Array, Array]], x: Array, low: Array, high: Array
+) -> tuple[Array, Array]:
+    """Find the roots of rising functions between ``low`` and ``high``, from x; any shape.
+
+    ``of`` returns values and slopes at x. Returns the roots, to 1e-13, and the slopes there.
+    """
+    for _ in range(200):
+        value, slope = of(x)
+        newton = x - value / slope
+        if (abs(newton - x) <= 1e-13 * np.maximum(abs(x), 1.0)).all():
+            break
+        low, high = np.where(value < 0.0, x, low), np.where(value > 0.0, x, high)
+        x = np.where((low <= newton) & (newton <= high), newton, (low + high) / 2.0)
+    return x, slope
 
 
 def checked_law(law: object) -> Elasticity:

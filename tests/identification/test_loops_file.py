@@ -71,7 +71,7 @@ def test_three_axes_measured_tensions_and_tests_without_readings(tmp_path: Path)
         ("side,-10,z,150,5", "side,-10,z,150,0", "test side.*two sizes"),
         ("displacement [mm]", "displacement [m]", "test up.*0.249 m, more than the arm is"),
         ("remark", "cable1_1 [N]", "minimum and cable1_1"),
-        ("remark", "joint9 [deg]", "column joint9.*did you mean joint"),
+        ("remark", "joint9 [deg]", "column joint9.*did you mean 'joint"),
     ],
 )
 def test_faults_name_line_and_column(tmp_path: Path, old: str, new: str, said: str) -> None:
