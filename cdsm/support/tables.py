@@ -86,9 +86,9 @@ class Columns:
     """Columns of a CSV file: a header of names with units, such as ``force [N]``, then rows.
 
     ``units`` has the units of each known column with their factors to SI; of a text, none. Other
-    columns are ignored, unless they are almost called as a known one or hold angles. Spreadsheets
-    also write empty columns at the end, and empty rows: they do not count. ``holds`` says what the
-    rows are. FileError names each fault, with its line and column.
+    columns are ignored, unless they are almost called as a known one or hold angles of unknown
+    joints. Spreadsheets also write empty columns at the end, and empty rows: they do not count.
+    ``holds`` says what the rows are. FileError names each fault, with its line and column.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class Columns:
             hint = did_you_mean(name, as_long, least=0.8)
             if name in units:
                 self._at[name], self.unit[name] = at, unit
-            elif hint or unit in ANGLE:
+            elif hint or (unit in ANGLE and name.rpartition(" ")[2] not in units):
                 hint = f"{hint} There" if hint else "; there"
                 self.refuse(f"has a column {name}, which is not known{hint} are {listed([*units])}")
 
