@@ -19,6 +19,7 @@ from cdsm.support.validation import (
     number_array,
     one_of,
     quantity,
+    scalar,
     sequence_of,
     text,
     vector,
@@ -191,10 +192,10 @@ class Cables(tuple[Cable, ...]):
 
 
 def _length(value: float) -> float:
-    length = number_array("free_length", value)
-    if length.ndim or length <= 0.0:
-        raise InvalidInput("free_length", f"{value!r} m given; one positive number is needed.")
-    return float(length)
+    length = scalar("free_length", value)
+    if length <= 0.0:
+        raise InvalidInput("free_length", f"{length:g} m given; a positive number is needed.")
+    return length
 
 
 def serpentine_cables(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
@@ -13,6 +14,14 @@ from cdsm.support.values import Array, frozen
 from cdsm.wires.elasticity import Elasticity
 
 OriginalLength = Literal["unstrained", "stretched"]
+
+
+def group_by_law(cables: Iterable[tuple[int, Cable]]) -> dict[Elasticity, list[int]]:
+    """Return the indices of numbered cables by their law, in their order."""
+    found: dict[Elasticity, list[int]] = {}
+    for c, cable in cables:
+        found.setdefault(cable.elasticity, []).append(c)
+    return found
 
 
 class CableLaws:
@@ -39,14 +48,11 @@ class CableLaws:
     def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
         self._cables = cables
         self._unstrained = original_length == "unstrained"
-        by_law: dict[Elasticity, list[int]] = {}
-        for c, cable in enumerate(cables):
-            if cable.control == "position":
-                by_law.setdefault(cable.elasticity, []).append(c)
+        locked = [(c, each) for c, each in enumerate(cables) if each.control == "position"]
         # usually all cables have one law, and a slice is faster than indices
         self.held = [
             (law, slice(None) if len(of) == len(cables) else np.array(of))
-            for law, of in by_law.items()
+            for law, of in group_by_law(locked).items()
         ]
         self._least = frozen(np.array([cable.minimum for cable in cables]))
         self._most = frozen(np.array([cable.maximum for cable in cables]))

@@ -65,11 +65,19 @@ class InvalidInput(CdsmError, ValueError):
         self.name = name
 
 
+def did_you_mean(name: str, known: Iterable[str], most: int = 1, least: float = 0.6) -> str:
+    """Return ``; did you mean 'a' or 'b'?`` with up to ``most`` known names similar to ``name``.
+
+    The text is empty if no similarity, from 0 to 1, reaches ``least``.
+    """
+    near = difflib.get_close_matches(name, [each for each in known if each != name], most, least)
+    return f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+
+
 def unknown(kind: str, name: object, known: Iterable[str], remedy: str = "") -> InvalidInput:
     """Return the error for a ``kind``, e.g. a link, called ``name`` that is not among ``known``."""
     known = tuple(known)
-    near = difflib.get_close_matches(str(name), known)
-    hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else "."
+    hint = did_you_mean(str(name), known, 3) or "."
     error = InvalidInput(kind, "unknown")
     said = f"no {kind} is called {name!r}{hint} Known: {listed(known, 12)}. {remedy}"
     error.args = (said.rstrip(),)

@@ -17,11 +17,7 @@ from cdsm.support.validation import one_of, scalar, sequence_of, text
 Distribution = Literal["normal", "uniform"]
 
 EVERY: Final = "*"  # pattern of the names of all inputs
-_COMMON = (
-    "rigidity",
-    "joint_stiffness",
-    "friction",
-)  # one error for all by default: one spool, one material
+_COMMON = "rigidity", "joint_stiffness", "friction"  # one error for all: one spool, one material
 _LARGEST = {
     **dict.fromkeys(("rigidity", "spring", "joint_stiffness", "friction"), 0.5),
     **dict.fromkeys(("joint_angle", "hole_angle"), 0.3),

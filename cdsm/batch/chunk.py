@@ -153,7 +153,7 @@ class Chunk:
             terms = self._terms(full, F, k, W, None)
             found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
             found["joint"], terms = terms.sum(axis=1), terms[rows]
-        if wanted and rows.size:
+        if wanted and (rows.size or not wanted <= found.keys()):
             K, parts = terms.sum(axis=1), abs(terms).sum(axis=1)
             read_off, status[rows] = read(wanted, K, parts, self._jacobian(at)[rows], u)
             for name, value in read_off.items():

@@ -89,9 +89,6 @@ def identify(
     tests: Annotated[
         int | None, opt("Plan the best N tests of LOOPS.csv instead.", "N", min=1)
     ] = None,
-    profile: Annotated[
-        bool, opt("Intervals by the profile of χ² too, which takes longer.", None, "--profile")
-    ] = False,
     figure: options.Figure = None,
     as_json: options.AsJson = False,
 ) -> int:
@@ -102,7 +99,6 @@ def identify(
     """
     from cdsm.identification.experiment_plan import plan_tests
     from cdsm.parameters import ArmParameters
-    from cdsm.support.format import aligned
 
     described = options.read(arm, changes)
     ranges = _ranges(free)
@@ -126,15 +122,9 @@ def identify(
         if not low < start[at] < high:  # of a friction of 0, no derivative shows what it does
             start[at] = (low + high) / 2.0
     found = cdsm.identify(model_of, read, bounds, start=start)
-    told, shown = found.to_dict(), list[str]()
-    if profile:
-        told["interval_95"] = intervals = found.confidence()
-        rows = [("95 % by the profile of χ²", "from", "to")]
-        rows += [(name, f"{low:.4g}", f"{high:.4g}") for name, (low, high) in intervals.items()]
-        shown = ["\n".join(aligned(rows))]
     write_picture(figure, found.plot)
     warnings = [f"warning: {sentence}" for sentence in found.warnings]
-    return answer(as_json, told, found, *shown, warnings=warnings)
+    return answer(as_json, found.to_dict(), found, warnings=warnings)
 
 
 def _ranges(free: list[str]) -> dict[str, Range | None]:

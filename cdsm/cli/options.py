@@ -6,7 +6,7 @@ import json
 import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -188,32 +188,27 @@ def read_path(path: Path, arm: cdsm.Manipulator) -> Motion:
     """
     import numpy as np
 
-    from cdsm.support.tables import ANGLE, column_in, named_columns, read_table
+    from cdsm.support.tables import ANGLE, Columns
 
-    def refuse(problem: str) -> NoReturn:
-        raise cdsm.FileError(path, f"{problem}.")
-
-    def column(name: str) -> Array:
-        at, size = column_in(units[name], name, found, refuse)
-        return size * table.column(at, refuse)
-
-    table, length = read_table(path), {"mm": 1e-3, "m": 1.0}
-    if len(table.rows) < 2:
-        refuse("holds no path; a header and one line per sample are needed")
+    length = {"mm": 1e-3, "m": 1.0}
     pairs = zip(arm.joint_names, arm.slides, strict=True)
     units = {name: length if slides else ANGLE for name, slides in pairs}
     units |= dict.fromkeys("xyz", length) | {"target": {"N/mm": 1e3, "N/m": 1.0}}
-    found = named_columns(table, [*units], refuse)
-    has_tips = not found.keys().isdisjoint("xyz")
-    if has_tips != found.keys().isdisjoint(arm.joint_names):
+    table = Columns(path, units, "samples")
+
+    def column(name: str) -> Array:
+        return np.array([table.number(row, name) for row in table.rows])
+
+    has_tips = any(axis in table for axis in "xyz")
+    if has_tips == any(name in table for name in arm.joint_names):
         first = f"{arm.joint_names[0]} [{'mm' if arm.slides[0] else 'deg'}]"
-        refuse(
+        table.refuse(
             f"has columns for {'both' if has_tips else 'neither'} of joint angles ({first}, …) and "
             "tip positions (x [mm], y [mm], z [mm]); give one of them"
         )
-    target = column("target") if "target" in found else None
+    target = column("target") if "target" in table else None
     if has_tips:
         return Motion(tips=np.transpose([column(name) for name in "xyz"]), target=target)
-    rest = np.zeros(len(table.rows) - 1)
-    joints = [column(name) if name in found else rest for name in arm.joint_names]
+    rest = np.zeros(len(table.rows))
+    joints = [column(name) if name in table else rest for name in arm.joint_names]
     return Motion(angles=np.transpose(joints), target=target)

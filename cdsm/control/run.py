@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING, Any, Final, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-import cdsm
 from cdsm.errors import listed
 from cdsm.manipulator import Manipulator
 from cdsm.planning.path_plan import PathPlan
 from cdsm.support.format import aligned, plural
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 
 if TYPE_CHECKING:
     import pandas
-    from matplotlib.figure import Figure
 
     from cdsm.control.plants import Plant, PlantState
 
@@ -36,7 +34,7 @@ _ROUNDING = 1e-9  # distance beyond a band [m] that counts as rounding
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class TrackingRun(Result):
+class TrackingRun(Result, Plotted):
     """Result of :func:`track`: a closed loop along a path, step by step.
 
     There are n steps, C cables and D wanted directions. With friction, the true stiffness of a
@@ -89,6 +87,7 @@ class TrackingRun(Result):
     """
 
     _rows = "time"
+    _figure = "plot_tracking_run"
 
     plan: PathPlan
     law: str = field(metadata=unit("1"))
@@ -191,13 +190,6 @@ class TrackingRun(Result):
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table over time, which ``cdsm view`` plays; needs pandas (CdsmError)."""
         return super().to_pandas().rename(columns=lambda name: name.removeprefix("angles "))
-
-    def plot(self) -> Figure:
-        """Plot tip error, stiffness, tensions and the first-order band over time.
-
-        :func:`cdsm.plots.plot_path` draws the postures of :attr:`states`, and writes a film.
-        """
-        return cdsm.plots.plot_tracking_run(self)
 
     def __repr__(self) -> str:
         return f"<TrackingRun of {self.arm.name}, law {self.law}, {self.outcome}>"

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import NDArray
 
-import cdsm
 from cdsm.design.evaluation import Designs
 from cdsm.design.lengths import length_bounds
 from cdsm.design.problem import DesignProblem
@@ -23,13 +22,12 @@ from cdsm.support.format import aligned, plain, plural
 from cdsm.support.result import data_frame
 from cdsm.support.tables import csv_text
 from cdsm.support.validation import whole_number
-from cdsm.support.values import Array, ReadOnlyState
+from cdsm.support.values import Array, Plotted, ReadOnlyState
 from cdsm.urdf import write_urdf
 from cdsm.wires.catalogue import label
 
 if TYPE_CHECKING:
     import pandas
-    from matplotlib.figure import Figure
 
 _DEFLECTION = (
     "deflection: by the load on locked motors, to first order, with the stiffness of the least "
@@ -41,7 +39,7 @@ _PRINTED = 20  # number of designs, evenly spread over a front, that a printed t
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class DesignSearch(ReadOnlyState):
+class DesignSearch(ReadOnlyState, Plotted):
     """Best designs of a problem; made by :func:`search_designs` and :func:`refine_design`.
 
     Attributes:
@@ -52,6 +50,8 @@ class DesignSearch(ReadOnlyState):
             other is at least as good in all objectives and better in one; the best in the first
             objective comes first.
     """
+
+    _figure = "plot_designs"
 
     problem: DesignProblem
     seed: int
@@ -139,13 +139,6 @@ class DesignSearch(ReadOnlyState):
             "front": self.best.columns(),
         }
         return plain(numbers)
-
-    def plot(self) -> Figure:
-        """Plot two or three objectives of feasible designs, with the front and :attr:`compromise`.
-
-        If there is one objective, its best value is plotted against the number of designs.
-        """
-        return cdsm.plots.plot_designs(self)
 
     def __repr__(self) -> str:
         return f"<DesignSearch: {plural(len(self.front), 'design')} on the front>"

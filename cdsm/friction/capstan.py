@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.cable import Cable
+from cdsm.cable_laws import group_by_law
 from cdsm.posture import Posture
 from cdsm.routing import Indices
 from cdsm.segments import STRAIGHT
@@ -65,10 +66,7 @@ class ChainProblem:
         self._unloaded[first] = [cable.elasticity.rest for cable in cables]
         self._base, self._softness = np.ones(size), np.zeros(size)
         self._curved: list[tuple[Elasticity, Indices]] = []
-        by_law: dict[Elasticity, list[int]] = {}
-        for c, cable in enumerate(cables):
-            by_law.setdefault(cable.elasticity, []).append(c)
-        self.laws = list(by_law.items())
+        self.laws = list(group_by_law(enumerate(cables)).items())
         for law, of in self.laws:
             segments = np.flatnonzero(np.isin(self._cable, of))
             if law._constant is None:

@@ -45,6 +45,7 @@ class Breakaway(Result):
     """
 
     _headline = "load"
+    _posture_from = "stiffness.posture"
 
     stiffness: Stiffness
     direction: Array = field(metadata=unit("1", "axis"))
@@ -53,10 +54,6 @@ class Breakaway(Result):
     cable: str = field(metadata=unit("1"))
     site: int = field(metadata=unit("1"))
     link: str = field(metadata=unit("1"))
-
-    @property
-    def _posture(self) -> Posture:
-        return self.stiffness.posture
 
     def __str__(self) -> str:
         said = f"breakaway along {coordinates(self.direction)}: {self.load:.4g} N"
@@ -186,6 +183,7 @@ class RestBand(Result):
     """
 
     _headline = "half_width"
+    _posture_from = "stiffness.posture"
 
     stiffness: Stiffness
     direction: Array = field(metadata=unit("1", "axis"))
@@ -201,10 +199,6 @@ class RestBand(Result):
     def high(self) -> float:
         """Largest displacement of the tip from the reference along u [m]: half_width."""
         return self.half_width
-
-    @property
-    def _posture(self) -> Posture:
-        return self.stiffness.posture
 
     @property
     def warnings(self) -> tuple[str, ...]:

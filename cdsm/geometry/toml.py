@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
-from cdsm.errors import GeometryError
+from cdsm.errors import GeometryError, did_you_mean
 from cdsm.geometry.geometry import Geometry
 from cdsm.geometry.uniform import Turn
-from cdsm.support.records import Name, did_you_mean, parse, record
+from cdsm.support.records import Name, parse, record
 
 # keys of an ARM.toml that do not belong to the geometry; cables may belong to it
 _ARM_KEYS = (

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination
 from cdsm.identification.measurement import WeightLoop
@@ -27,17 +26,12 @@ from cdsm.support.validation import (
     unit_directions,
     whole_number,
 )
-from cdsm.support.values import Array, frozen
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_MOST = 5000  # largest number of candidates and of tests
+from cdsm.support.values import Array, Plotted, frozen
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class ExperimentPlan(Result):
+class ExperimentPlan(Result, Plotted):
     """Weight tests that determine parameters of an arm best; made by :func:`plan_experiment`.
 
     There are n candidates and P parameters. All arrays are read-only.
@@ -56,6 +50,7 @@ class ExperimentPlan(Result):
     """
 
     _rows = "parameter"
+    _figure = "plot_experiment_plan"
 
     names: tuple[str, ...] = field(metadata=unit("1", "parameter"))
     values: Array = field(metadata=unit("own unit", "parameter"))
@@ -92,10 +87,6 @@ class ExperimentPlan(Result):
     def undetermined(self) -> tuple[str, ...]:
         """Names of the parameters that the planned tests do not determine."""
         return tuple(n for n, std in zip(self.names, self.std, strict=True) if math.isinf(std))
-
-    def plot(self) -> Figure:
-        """Plot the expected 95 % intervals, and how often each candidate is tested."""
-        return cdsm.plots.plot_experiment_plan(self)
 
     def __str__(self) -> str:
         times = ((label, f"{count}×") for label, count in self.repetitions.items())
@@ -163,8 +154,6 @@ def plan_experiment(
         raise InvalidInput("weights", f"{weights!r} given; positive forces (n,) [N] are needed.")
     bound, count = number_array("minimum", minimum), whole_number("steps", steps, 1, 100)
     axes = np.atleast_2d(unit_directions("directions", directions)).tolist()
-    if len(forces) * len(angles) * len(axes) > _MOST:
-        raise InvalidInput("postures", f"more than {_MOST} candidates; give fewer.")
     names = {axis: name for name, axis in AXES.items()}
     way = (*range(count + 1), *range(count - 1, -1, -1))  # up and down
     candidates = [
@@ -200,7 +189,7 @@ def plan_tests(
         said = "give {name: expected value} for at least one."
         raise InvalidInput("parameters", f"{parameters!r} given; {said}")
     values = np.array([scalar(f"parameters[{name!r}]", x) for name, x in parameters.items()])
-    names, most = tuple(parameters), whole_number("tests", tests, 1, _MOST)
+    names, most = tuple(parameters), whole_number("tests", tests, 1)
     if not values.all():
         said = "0 given; intervals are judged relative to the expected value. Give a small one "
         said += "(commands: in ARM.toml or by --set)."

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
 from itertools import groupby
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,14 +13,12 @@ from cdsm.errors import FileError, InvalidInput
 from cdsm.identification.measurement import WeightLoop
 from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
-from cdsm.support.tables import ANGLE, column_in, named_columns, read_table
+from cdsm.support.tables import ANGLE, Columns, Row
 from cdsm.support.validation import AXES, instance
 
 _LENGTH: Final = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _FORCE: Final = {"N": 1.0}
-_NAMES: Final = ("test", "direction", "force", "displacement", *"xyz", "minimum")
-
-_Row = tuple[int, list[str]]  # line number and cells
+_TEXT: Final[dict[str, float]] = {}
 
 
 def read_loops(
@@ -61,47 +58,35 @@ def read_loops(
             wrong; the line and the column are named.
         InvalidInput: ``displacement_std`` or ``minimum`` is invalid.
     """
-    instance("arm", arm, Manipulator)
+    joints, cables = instance("arm", arm, Manipulator).joint_names, arm.cables.names
+    units = {"test": _TEXT, "direction": _TEXT, "force": _FORCE, "minimum": _FORCE}
+    units |= dict.fromkeys(("displacement", *"xyz"), _LENGTH) | dict.fromkeys(cables, _FORCE)
+    units |= zip(joints, (_LENGTH if each else ANGLE for each in arm.slides), strict=True)
+    table = Columns(path, units, "loops")
+    refuse, text, number = table.refuse, table.text, table.number
 
-    def refuse(problem: str) -> NoReturn:
-        raise FileError(path, f"{problem}.")
-
-    def cell(row: _Row, name: str) -> str:
-        return "".join(row[1][header[name][0] : header[name][0] + 1])
-
-    def number(row: _Row, name: str, text: str | None = None) -> float:
-        text = cell(row, name) if text is None else text
-        value = table.number(text)
-        if not math.isfinite(value):
-            refuse(f"line {row[0]}, column {name}: {text!r} is not a finite number")
-        return value * column_in(units[name], name, header, refuse)[1]
-
-    def fixed(rows: list[_Row], name: str) -> str:
-        """Return the cell of a column in the first row of a test; later ones repeat it."""
-        first = cell(rows[0], name)
+    def fixed(rows: list[Row], name: str) -> Row:
+        """Return the first row of a test, whose cell of a column later rows repeat."""
+        first = text(rows[0], name)
         for row in rows[1:]:
-            if (found := cell(row, name)) not in (first, ""):
+            if (found := text(row, name)) not in (first, ""):
                 said = f"{found!r} given, but {first!r} at the beginning of the test, which fixes"
                 refuse(f"line {row[0]}, column {name}: {said} it; begin another test")
-        return first
+        return rows[0]
 
-    def loop(label: str, rows: list[_Row]) -> WeightLoop:
-        direction, first = fixed(rows, "direction"), rows[0]
+    def loop(label: str, rows: list[Row]) -> WeightLoop:
+        direction = text(fixed(rows, "direction"), "direction")
         if direction not in AXES:
             said = f"{direction!r} is no axis; give one of {', '.join(AXES)}"
-            refuse(f"line {first[0]}, column direction: {said}")
-        before = [number(first, name, fixed(rows, name)) for name in tensions]
+            refuse(f"line {rows[0][0]}, column direction: {said}")
+        before = [number(fixed(rows, name), name) for name in tensions]
         read = np.array([[number(row, name) for name in readings] for row in rows])
         if readings and (moved := float(np.ptp(read, axis=0).max())) > arm.length:
             said = f"its readings span {moved:.4g} m, more than the arm is long, {arm.length:.4g} m"
             refuse(f"test {label}: {said}; give the unit in which they were read")
-        angles = [
-            number(first, name, fixed(rows, name)) if name in header else 0.0
-            for name in arm.joint_names
-        ]
         return WeightLoop(
             direction=AXES[direction],
-            angles=tuple(angles),
+            angles=tuple(number(fixed(rows, q), q) if q in table else 0.0 for q in joints),
             forces=tuple(number(row, "force") for row in rows),
             displacements=(read[:, 0] if len(readings) == 1 else read) if readings else None,  # type: ignore[arg-type]
             tension=tuple(before) if tensions and tensions != ["minimum"] else None,
@@ -110,25 +95,17 @@ def read_loops(
             label=label,
         )
 
-    table = read_table(path)
-    if len(table.rows) < 2:
-        refuse("holds no loops; a header and one line per reading are needed")
-    joints, cables = arm.joint_names, arm.cables.names
-    header = named_columns(table, (*_NAMES, *joints, *cables), refuse)
-    units = dict(zip(joints, (_LENGTH if each else ANGLE for each in arm.slides), strict=True))
-    units |= dict.fromkeys(("displacement", *"xyz"), _LENGTH)
-    units |= dict.fromkeys(("force", "minimum", *cables), _FORCE)
-    axes = [] if not {*"xyz"} & header.keys() else [*"xyz"]
-    readings = ["displacement"] if "displacement" in header else axes
-    given = [name for name in cables if name in header]
-    tensions = ["minimum"] if "minimum" in header else [*cables] if given else []
+    axes = [*"xyz"] if any(axis in table for axis in "xyz") else []
+    readings = ["displacement"] if "displacement" in table else axes
+    given = [name for name in cables if name in table]
+    tensions = ["minimum"] if "minimum" in table else [*cables] if given else []
     if given and tensions == ["minimum"]:
         refuse(f"has columns minimum and {given[0]}; give one of them")
     for name in ("test", "direction"):
-        if name not in header:
+        if name not in table:
             refuse(f"has no column {name}")
-    for name in ("force", *readings, *tensions, *(each for each in joints if each in header)):
-        column_in(units[name], name, header, refuse)
+    for name in ("force", *readings, *tensions, *(each for each in joints if each in table)):
+        table.factor(name)
     if tensions and minimum is not None:
         refuse("has tensions; leave out minimum")
     if not tensions and minimum is None:
@@ -136,7 +113,7 @@ def read_loops(
         refuse(f"has no tensions; {said}, or give minimum")
     bound = None if minimum is None else np.asarray(minimum).tolist()
     loops = list[WeightLoop]()
-    for label, group in groupby(table.rows[1:], lambda row: cell(row, "test")):
+    for label, group in groupby(table.rows, lambda row: text(row, "test")):
         rows = [*group]
         if not label:
             refuse(f"line {rows[0][0]}: the test has no name")
@@ -177,33 +154,23 @@ def read_tip_positions(
         InvalidInput: ``std`` is invalid.
     """
     names = instance("arm", arm, Manipulator).cables.names
-
-    def refuse(problem: str) -> NoReturn:
-        raise FileError(path, f"{problem}.")
-
-    table = read_table(path)
-    if len(table.rows) < 2:
-        refuse("holds no positions; a header and one line per reading are needed")
-    header = named_columns(table, ("label", *"xyz", *names), refuse)
-    axes, cables = ([name for name in group if name in header] for group in ("xyz", names))
+    units = {"label": _TEXT} | dict.fromkeys("xyz", _LENGTH) | dict.fromkeys(names, _LENGTH)
+    table = Columns(path, units, "positions")
+    axes, cables = ([name for name in group if name in table] for group in ("xyz", names))
     if not axes or not cables:
-        refuse(f"needs a column x, y or z [mm], and one of a cable, such as {names[0]} [mm]")
-    motors = "tension" if header[cables[0]][1] in _FORCE else "pull"
-    units = dict.fromkeys(axes, _LENGTH)
-    units |= dict.fromkeys(cables, _FORCE if motors == "tension" else _LENGTH)
-    columns = {name: column_in(units[name], name, header, refuse) for name in (*axes, *cables)}
+        table.refuse(f"needs a column x, y or z [mm], and one of a cable, such as {names[0]} [mm]")
+    motors = "tension" if table.unit[cables[0]] in _FORCE else "pull"
+    if motors == "tension":
+        table.units |= dict.fromkeys(cables, _FORCE)
+    for name in (*axes, *cables):
+        table.factor(name)
     found = []
-    for line, cells in table.rows[1:]:
-        read = dict[str, float]()
-        for name, (at, size) in columns.items():
-            if text := "".join(cells[at : at + 1]):
-                read[name] = size * table.number(text)
-                if not math.isfinite(read[name]):
-                    refuse(f"line {line}, column {name}: {text!r} is not a finite number")
+    for row in table.rows:
+        filled = [name for name in (*axes, *cables) if table.text(row, name)]
+        read = {name: table.number(row, name) for name in filled}
         if not read.keys() & {*axes}:
-            refuse(f"line {line}: no coordinate was measured")
+            table.refuse(f"line {row[0]}: no coordinate was measured")
         fields: dict[str, Any] = {axis: read[axis] for axis in axes if axis in read}
         fields[motors] = {name: value for name, value in read.items() if name in names}
-        at = header.get("label", (len(cells), ""))[0]
-        found.append(TipPosition(**fields, std=std, label="".join(cells[at : at + 1])))
+        found.append(TipPosition(**fields, std=std, label=table.text(row, "label")))
     return tuple(found)

@@ -69,6 +69,8 @@ class Measurement:
     label: str = ""
     force: float = 0.0
 
+    _suffixes = ("",)  # after the label, for the name of each reading
+
     def __post_init__(self) -> None:
         value, std = positive("value", self.value, "N/m"), positive("std", self.std, "N/m")
         force = scalar("force", self.force)
@@ -99,6 +101,10 @@ class Measurement:
     def _errors(self, predicted: Array) -> tuple[Array, float]:
         """Return predicted minus measured numbers, and their standard deviation."""
         return predicted - self.value, self.std
+
+    def _shown(self, measured: Array, predicted: Array) -> list[str]:
+        """Return measured and predicted numbers as text."""
+        return [f"{K[0] / 1e3:.4g} N/mm" for K in (measured, predicted)]
 
 
 @final
@@ -172,6 +178,10 @@ class WeightLoop:
         return unit_direction("direction", self.direction)
 
     @property
+    def _suffixes(self) -> list[str]:
+        return [f" force {k + 1}" for k in range(len(self.forces)) for _ in self.axes]
+
+    @property
     def _readings(self) -> Array:
         if self.displacements is None:
             return np.zeros(len(self.forces))  # of a planned test, any
@@ -218,6 +228,10 @@ class WeightLoop:
         """
         off = (predicted - self._readings).reshape(len(self.forces), -1)
         return (off - off.mean(axis=0)).ravel(), self.displacement_std
+
+    def _shown(self, measured: Array, predicted: Array) -> list[str]:
+        rms = 1e6 * np.sqrt(np.mean((predicted - measured) ** 2))
+        return [f"{measured.size} readings", f"off by {rms:.3g} µm rms"]
 
 
 def tension_before(test: Measurement | WeightLoop, pose: Posture) -> Tension | ArrayLike:

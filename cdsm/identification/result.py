@@ -6,28 +6,23 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtr, chdtrc, ndtri
 
-import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.identification.determination import Determination, interval
-from cdsm.identification.measurement import Measurement, WeightLoop, name_of
+from cdsm.identification.measurement import WeightLoop, name_of
 from cdsm.identification.problem import Problem, Test
-from cdsm.identification.tip_position import TipPosition
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix.prints import frictionless_model
-from cdsm.support.format import aligned, coordinates, without_rounding
+from cdsm.support.format import aligned
 from cdsm.support.progress import progress_allowed, track
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import scalar
-from cdsm.support.values import Array, frozen
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cdsm.support.values import Array, Plotted, frozen
 
 _CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
 _UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
@@ -47,7 +42,7 @@ def independent_readings(measurements: Sequence[Test]) -> int:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Identification(Result):
+class Identification(Result, Plotted):
     """Parameters of an arm that explain its measurements best; made by :func:`identify`.
 
     There are P parameters and n measured numbers: one for each stiffness, all readings of each
@@ -68,6 +63,7 @@ class Identification(Result):
     """
 
     _headline, _rows = "chi_square", "parameter"
+    _figure = "plot_identification"
 
     names: tuple[str, ...] = field(metadata=unit("1", "parameter"))
     values: Array = field(metadata=unit(_OWN, "parameter"))
@@ -203,10 +199,6 @@ class Identification(Result):
                 found[self.names[i]] = limits or (-math.inf, math.inf)
         return found
 
-    def plot(self) -> Figure:
-        """Plot predicted and measured stiffnesses [N/mm] and loops [mm], and residuals in σ."""
-        return cdsm.plots.plot_identification(self)
-
     def __str__(self) -> str:
         half = float(ndtri(0.975)) * self.std
         numbers = np.column_stack([self.values, self.std, self.values - half, self.values + half])
@@ -219,18 +211,8 @@ class Identification(Result):
         tests: list[Sequence[str]] = [("measurement", "measured", "predicted", "worst residual")]
         for i, each in enumerate(self.measurements):
             own = self.measurement_of == i
-            off, worst = self.residuals[own], f"{max(self.residuals[own], key=abs):.2f} σ"
-            if isinstance(each, Measurement):
-                said = [f"{K[own][0] / 1e3:.4g} N/mm" for K in (self.measured, self.predicted)]
-            elif isinstance(each, TipPosition):
-                names = ", ".join(each.axes)
-                said = [
-                    f"{names} {coordinates(1e3 * without_rounding(p[own]))} mm"
-                    for p in (self.measured, self.predicted)
-                ]
-            else:
-                rms = 1e6 * each.displacement_std * math.sqrt(np.mean(off**2))
-                said = [f"{off.size} readings", f"off by {rms:.3g} µm rms"]
+            said = each._shown(self.measured[own], self.predicted[own])
+            worst = f"{max(self.residuals[own], key=abs):.2f} σ"
             tests.append((name_of(i, each.label), *said, worst))
         note = "(95 % from the std of the linear model; confidence() profiles χ²)"
         model = f"({frictionless_model(self.arm)}; secant where a force is given; "
@@ -241,16 +223,8 @@ class Identification(Result):
     @property
     def reading_names(self) -> list[str]:
         """Name of each of the n measured numbers: the label, and the force's number or the axis."""
-        names = []
-        for i, each in enumerate(self.measurements):
-            own, numbers = name_of(i, each.label), each._readings.size
-            if isinstance(each, WeightLoop):
-                names += [f"{own} force {k // len(each.axes) + 1}" for k in range(numbers)]
-            elif isinstance(each, TipPosition):
-                names += [f"{own} {axis}" for axis in each.axes]
-            else:
-                names.append(own)
-        return names
+        pairs = enumerate(self.measurements)
+        return [f"{name_of(i, each.label)}{of}" for i, each in pairs for of in each._suffixes]
 
     @property
     def _verdict(self) -> str:

@@ -13,12 +13,8 @@ from cdsm.identification.measurement import positive
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics.forward import forward_statics
-from cdsm.support.validation import (
-    NO_WRENCH,
-    number_array,
-    scalar,
-    wrench_vector,
-)
+from cdsm.support.format import coordinates, without_rounding
+from cdsm.support.validation import NO_WRENCH, number_array, scalar, wrench_vector
 from cdsm.support.values import Array
 
 OfCables = tuple[float, ...] | Mapping[str, float]
@@ -122,6 +118,14 @@ class TipPosition:
     def _errors(self, predicted: Array) -> tuple[Array, float]:
         """Return predicted minus measured coordinates, and their standard deviation."""
         return predicted - self._readings, self.std
+
+    @property
+    def _suffixes(self) -> list[str]:
+        return [f" {axis}" for axis in self.axes]
+
+    def _shown(self, measured: Array, predicted: Array) -> list[str]:
+        both = [coordinates(1e3 * without_rounding(p)) for p in (measured, predicted)]
+        return [f"{', '.join(self.axes)} {each} mm" for each in both]
 
     def _require_near(self, arm: Manipulator, name: str) -> None:
         """Raise InvalidInput if the tip of an arm of this length cannot be there."""

@@ -44,9 +44,7 @@ DAMPING_RATIO = 0.05
 _CABLE = 5e-4  # radius [m] of a drawn cable
 _MOST = RANGES["tension"].high  # tension of a motor [N]; MuJoCo's ranges have two ends
 _SHARE = 0.5  # least share of ω² from the cables, for modes that count for the damping
-_STEPS = [
-    float(f"{digit}e-{n}") for n in range(3, 12) for digit in (2, 1, 0.5)
-]  # [s]; MuJoCo: 2 ms
+_STEPS = [float(f"{digit}e-{n}") for n in range(3, 12) for digit in (2, 1, 0.5)]  # [s]
 _PHASE = 0.2  # largest ω·dt [rad]: frequencies are right within 0.2 %; explicit springs bear 2
 
 _CONTROLS = {

@@ -10,22 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import cdsm
 from cdsm.errors import CdsmError, InvalidInput, solver_failed
 from cdsm.posture import Posture
 from cdsm.support.format import coordinates
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, instance, wrench_vector
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import bounds_at, distribute_tension, solvers
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _NO_MOTION = 1e-9
 """Smaller singular values of J_v, divided by the arm length, count as zero: no tip motion there."""
@@ -35,7 +31,7 @@ _OUTSIDE = 1e-8  # smaller distances from a hull, relative to its size, count as
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class ForcePolytope(Result):
+class ForcePolytope(Result, Plotted):
     """All forces at the tip that an arm can balance; made by :func:`force_polytope`.
 
     The forces f (3,) [N] in base axes act at the tip besides ``wrench``. The polytope is the set of
@@ -56,6 +52,7 @@ class ForcePolytope(Result):
     """
 
     _headline = "radius"
+    _figure = "plot_force_polytope"
 
     posture: Posture
     wrench: Array = field(metadata=unit("N and N m", "component"))
@@ -88,10 +85,6 @@ class ForcePolytope(Result):
             return math.inf
         corners = self.vertices[self.faces] - self.vertices.mean(axis=0)
         return float(abs(np.linalg.det(corners)).sum()) / 6.0
-
-    def plot(self) -> Figure:
-        """Plot the polytope [N]; InvalidInput if it has no volume."""
-        return cdsm.plots.plot_force_polytope(self)
 
     def __str__(self) -> str:
         return (

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias, final
+from typing import TypeAlias, final
 
-import cdsm
 from cdsm.support.result import Result, unit
-
-if TYPE_CHECKING:
-    from matplotlib import figure
+from cdsm.support.values import Plotted
 
 HEADER = (
     *("figure", "quantity", "paper", "computed", "difference", "verdict", "original length"),
@@ -102,7 +99,7 @@ class Claim:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Figure(Result):
+class Figure(Result, Plotted):
     """One recomputed figure of the paper. Each subclass adds its curves.
 
     Attributes:
@@ -111,13 +108,11 @@ class Figure(Result):
         claims: Numbers of the paper, each with the computed numbers.
     """
 
+    _figure = "plot_paper"
+
     name: str
     title: str = field(metadata=unit("1"))
     claims: tuple[Claim, ...] = field(metadata=unit("1"))
-
-    def plot(self) -> figure.Figure:
-        """Plot the curves, with the numbers that the paper prints."""
-        return cdsm.plots.plot_paper(self)
 
 
 def floats(values: Iterable[float]) -> tuple[float, ...]:

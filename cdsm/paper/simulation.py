@@ -168,12 +168,12 @@ def _claim(
 
 
 def _figure(
-    title: str, pairs: Sequence[tuple[Curve, Curve]], *claims: Claim, **options: Any
+    number: int, about: str, pairs: Sequence[tuple[Curve, Curve]], *claims: Claim, **options: Any
 ) -> StiffnessFigure:
     curves, original = zip(*pairs, strict=True)
     postures = tuple(presets.virtual_prototype().at(curve.q) for curve in curves)
-    given = {"curves": curves, "original": original, "postures": postures} | options
-    return StiffnessFigure(name=f"fig{title[5]}", title=title, claims=claims, **given)
+    own: Any = {"name": f"fig{number}", "title": f"Fig. {number}: {about}", "claims": claims}
+    return StiffnessFigure(**own, curves=curves, original=original, postures=postures, **options)
 
 
 def figure_3() -> StiffnessFigure:
@@ -191,8 +191,8 @@ def figure_3() -> StiffnessFigure:
         what = f"largest difference of passive and total stiffness, lower bound {F:g} N"
         gap: Said = "Fig. 3", what, "%", (1.5,)
         claims.append(_claim(gap, pair, _largest_gap, f"{wire} {F:g} N", at_most=True))
-    title = "Fig. 3: stiffness over Young's modulus, cable tension constant"
-    return _figure(title, pairs, *claims, swept="young_modulus", part="passive")
+    about = "stiffness over Young's modulus, cable tension constant"
+    return _figure(3, about, pairs, *claims, swept="young_modulus", part="passive")
 
 
 def figure_4() -> StiffnessFigure:
@@ -206,8 +206,8 @@ def figure_4() -> StiffnessFigure:
         what = f"change of stiffness with tension, {pair[0].label.partition(' (')[0]}"
         said: Said = "Fig. 4", what, "%", (-1.46, -1.04, -1.43)
         claims.append(_claim(said, pair, _percent, assumed, f"{searched}; {_FROM_FIG_6}"))
-    title = "Fig. 4: stiffness over cable tension, cable elasticity constant"
-    return _figure(title, pairs, *claims)
+    about = "stiffness over cable tension, cable elasticity constant"
+    return _figure(4, about, pairs, *claims)
 
 
 def figure_lead() -> LeadFigure:
@@ -245,8 +245,8 @@ def figure_6() -> StiffnessFigure:
     searched = (
         "cables, link, mass, gravity, hole phase, lower bound and reading of K_R, for this row"
     )
-    title = "Fig. 6: stiffness over cable tension in the pre-tensioning stage, Eq. 19"
-    return _figure(title, [pair], _claim(said, pair, _increment, assumed, searched))
+    about = "stiffness over cable tension in the pre-tensioning stage, Eq. 19"
+    return _figure(6, about, [pair], _claim(said, pair, _increment, assumed, searched))
 
 
 def figure_7() -> StiffnessFigure:
@@ -258,8 +258,8 @@ def figure_7() -> StiffnessFigure:
         f"EA = 48 kN, tensions from 120 N to {STRAND_END:g} N (lower bound to {highest:.0f} N)"
     )
     claim = _claim(said, pair, _percent, assumed, f"EA, for Fig. 4; {_FROM_FIG_6}")
-    title = "Fig. 7: stiffness over cable tension in the elastic stage, EA constant"
-    return _figure(title, [pair], claim)
+    about = "stiffness over cable tension in the elastic stage, EA constant"
+    return _figure(7, about, [pair], claim)
 
 
 def figure_8() -> StiffnessFigure:
@@ -280,8 +280,8 @@ def figure_8() -> StiffnessFigure:
         assumed = f"{label}; Eq. 19 most level within its digits, lower bound "
         assumed += f"{LEVEL[0]:g} to {highest:.0f} N"
         claims.append(_claim(fall, end, _percent, assumed))
-    title = "Fig. 8: stiffness over the whole range of tension, Eq. 19, three postures"
-    return _figure(title, pairs, *claims)
+    about = "stiffness over the whole range of tension, Eq. 19, three postures"
+    return _figure(8, about, pairs, *claims)
 
 
 def _highest_minimum(q: Array) -> float:

@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 
-import cdsm
 from cdsm.cable_laws import CableLaws
 from cdsm.errors import CdsmError, listed
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import plain, plural
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 
 if TYPE_CHECKING:
     import pandas
-    from matplotlib.figure import Figure
 
 Status = Literal["posture", "balance", "elasticity", "singular", "stiffness", "rate"]
 
@@ -46,7 +44,7 @@ class InfeasibleSample:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class PathPlan(Result):
+class PathPlan(Result, Plotted):
     """Tensions along a path, with the arguments of the plan; made by :func:`plan_path`.
 
     P of the S samples are planned. Arrays of results have one row per planned sample; the table and
@@ -66,6 +64,7 @@ class PathPlan(Result):
     """
 
     _headline, _rows = "tensions", "planned"
+    _figure = "plot_path_plan"
 
     arm: Manipulator
     direction: Array = field(metadata=unit("1", "direction", "axis"))
@@ -110,13 +109,6 @@ class PathPlan(Result):
     def tips(self) -> Array:
         """Tip positions (P, 3) [m]."""
         return frozen(np.array([K.posture.tip[:3, 3] for K in self.stiffness]).reshape(-1, 3))
-
-    def plot(self) -> Figure:
-        """Plot wanted and reached stiffness [N/mm] and the tensions [N] against the samples.
-
-        :func:`cdsm.plots.plot_path` draws the arm on its path, and writes a film.
-        """
-        return cdsm.plots.plot_path_plan(self)
 
     def to_dict(self) -> dict[str, object]:
         """Return the plan in SI for JSON, with units in the keys; a row per planned sample."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, final
+from typing import Any, Final, NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.posture import Posture
@@ -19,11 +18,8 @@ from cdsm.support.format import coordinates, span
 from cdsm.support.progress import progress_bar
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, Direction, unit_direction, whole_number
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 STARTS: Final = 24
 """Default number of random directions in which corners are sought."""
@@ -33,17 +29,15 @@ AT_END: Final = 1e-3
 
 _ASCENTS, _DESCENTS = 16, 5  # largest number of searches for each end
 _AGREED, _SAME = 5, 1e-5  # number of ascents whose ends differ by this part at most, and suffice
-_STEEP, _TANGENT = (
-    10.0,
-    0.1,
-)  # factor of ln(along/start), and along/start below which it is straight
+_STEEP = 10.0  # factor of ln(along/start)
+_TANGENT = 0.1  # along/start below which the logarithm is straight
 _SETTINGS: Any = {"precision": 1e-10, "iterations": 50}
 _GAIN = 1e-6  # a smaller relative gain is no reason to search on
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class StiffnessRange(Result):
+class StiffnessRange(Result, Plotted):
     """Range of the stiffness of an arm along a direction; made by :func:`stiffness_range`.
 
     Attributes:
@@ -56,6 +50,7 @@ class StiffnessRange(Result):
     """
 
     _headline, _rows = "ends", "cable"
+    _figure = "plot_stiffness_range"
 
     direction: Array = field(metadata=unit("1", "axis"))
     low: float = field(metadata=unit("N/m"))
@@ -85,10 +80,6 @@ class StiffnessRange(Result):
             for F in (self.low_tension, self.high_tension)
         )
         return low, high
-
-    def plot(self) -> Figure:
-        """Plot the tensions [N] of the softest and the stiffest arm."""
-        return cdsm.plots.plot_stiffness_range(self)
 
     def __contains__(self, target: float) -> bool:
         return self.low <= target <= self.high

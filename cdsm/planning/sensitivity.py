@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Literal, final
+from typing import Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput
 from cdsm.planning.tension_space import FAR, form_by_tension, unstable
 from cdsm.posture import Posture
@@ -19,11 +18,8 @@ from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import NO_WRENCH, Direction, bound, instance, scalar, unit_direction
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension, distribute_tension
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 End = Literal["buckling", "balance", "elasticity", "maximum", "none"]
 
@@ -46,13 +42,10 @@ class StiffnessGradient(Result):
     """
 
     _headline, _rows = "cable_stiffness", "cable"
+    _posture_from = "stiffness.posture"
 
     stiffness: Stiffness
     cable_stiffness: Array = field(metadata=unit("1/m", "cable"))
-
-    @property
-    def _posture(self) -> Posture:
-        return self.stiffness.posture
 
     @cached_property
     def joint(self) -> Array:
@@ -128,7 +121,7 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Saturation(Result):
+class Saturation(Result, Plotted):
     """Stiffness as a function of the lower bound of the tensions; made by :func:`saturation`.
 
     Attributes:
@@ -149,6 +142,7 @@ class Saturation(Result):
     """
 
     _headline, _rows = "bound", "minimum"
+    _figure = "plot_saturation"
 
     direction: Array = field(metadata=unit("1", "axis"))
     fraction: float = field(metadata=unit("1"))
@@ -164,10 +158,6 @@ class Saturation(Result):
     def posture(self) -> Posture:
         """The posture."""
         return self.tension.posture
-
-    def plot(self) -> Figure:
-        """Plot the stiffness [N/mm] against the lower bound of tension [N]."""
-        return cdsm.plots.plot_saturation(self)
 
     def __str__(self) -> str:
         end, along = self.minimum[-1], f"the stiffness along {coordinates(self.direction)}"

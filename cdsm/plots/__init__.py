@@ -1,8 +1,8 @@
 """Plot arms, maps, paths and attainable stiffness, and save figures. Axes show mm and N/mm.
 
 Every function returns a new :class:`matplotlib.figure.Figure`, as wide as one or two columns of a
-journal. Show it in a notebook, or write it with :func:`save_figure`. Results have a method ``plot``
-of their own, which calls the functions of this package that are not listed in ``__all__``.
+journal. Show it in a notebook, or write it with :func:`save_figure`. The method ``plot`` of results
+calls the functions of this package that are not listed in ``__all__``.
 """
 
 from cdsm.plots.arm import plot_arm, plot_path

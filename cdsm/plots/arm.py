@@ -145,7 +145,7 @@ def plot_path(
 
 @style.styled
 def plot_modes(modes: Modes) -> Figure:
-    """Plot an arm and its deflections by up to three modes: growing modes, then the lowest."""
+    """Plot an arm in mm, deflected by up to three modes: growing modes first, then the lowest."""
     pose = modes.stiffness.posture
     figure, axes = picture()
     draw_bones(axes, pose, color="0.6", linewidth=2.0)

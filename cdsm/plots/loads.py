@@ -26,7 +26,7 @@ _HALF = 0.5  # the stiffness axis begins at zero if values are below this part o
 
 @style.styled
 def plot_weight_test(test: WeightTest) -> Figure:
-    """Plot load against tip displacement, nonlinear and linear, and tensions against load."""
+    """Plot load [N] against tip displacement [mm], nonlinear and linear, and tensions [N]."""
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
     loads = np.concatenate([[0.0], test.loads])
     moved = MM * np.vstack([np.zeros(3), test.displacements])
@@ -48,7 +48,10 @@ def plot_weight_test(test: WeightTest) -> Figure:
 
 @style.styled
 def plot_critical_tension(critical: CriticalTension) -> Figure:
-    """Plot the stability margin against the lower bound of all tensions; shade unstable ranges."""
+    """Plot the smallest eigenvalue of K_θ [N m/rad] against the lower bound of all tensions [N].
+
+    Unstable ranges are shaded.
+    """
     low, high = critical.examined
     shown = high if math.isinf(critical.minimum) or not critical.stable else 2.0 * critical.minimum
     inside = critical.bounds <= shown
@@ -70,7 +73,7 @@ def plot_critical_tension(critical: CriticalTension) -> Figure:
 
 @style.styled
 def plot_critical_load(critical: CriticalLoad) -> Figure:
-    """Plot the stability margin against the factor of the load, up to the critical factor."""
+    """Plot the smallest eigenvalue of K_θ [N m/rad] against the factor of the load."""
     figure, axes = _margins(critical, critical.factors, critical.margins)
     if math.isfinite(critical.factor):
         words = {"buckling": "buckles", "infeasible": "no balance", "elasticity": "end of a law"}
@@ -83,7 +86,11 @@ def plot_critical_load(critical: CriticalLoad) -> Figure:
 
 @style.styled
 def plot_load_history(history: LoadHistory) -> Figure:
-    """Plot the force along the largest force, and the tensions of the most uneven cable."""
+    """Plot force [N] against tip displacement [mm], and the tensions [N] along one cable.
+
+    Force and displacement are components along the largest force. The cable is the one whose
+    segments differ most in tension.
+    """
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
     forces = np.vstack([history.reference_wrench, history.wrenches])[:, :3]
     moved = MM * np.vstack([np.zeros(3), history.displacement])
@@ -113,7 +120,11 @@ def plot_load_history(history: LoadHistory) -> Figure:
 
 @style.styled
 def plot_tracking_run(run: TrackingRun) -> Figure:
-    """Plot a closed loop over time: tip error, stiffness, displacement of the tip, tensions."""
+    """Plot tip error [mm], stiffness [N/mm], displacement [mm] and tensions [N] over time [s].
+
+    The displacement of the tip from the frictionless equilibrium is drawn with its first-order
+    band. :func:`plot_path` draws the postures of ``run.states``, and writes a film.
+    """
     figure, axes = style.panels(style.TWO_COLUMNS, 6.4, rows=4, sharex=True)
     error, stiffness, band, tension = axes[:, 0]
     t, target, found = run.time, N_PER_MM * run.target, N_PER_MM * run.stiffness

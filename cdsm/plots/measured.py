@@ -36,7 +36,7 @@ _ENDLESS = 1000.0  # tension [N] up to which a law without a highest tension is 
 
 @style.styled
 def plot_tensile_fit(fit: TensileFit) -> Figure:
-    """Plot force against strain, measured and fitted, and EA with its band against tension."""
+    """Plot force [N] against strain [%] with the fit; EA [kN] with its 95 % band and stages."""
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
     tension, band, length = fit.tension, fit.band, fit.test.gauge_length
     fitted = 100.0 * (fit.start / length + fit.elasticity.strain(tension))
@@ -75,7 +75,7 @@ def shade_stages(axes: Any, stages: Sequence[tuple[str, float, float]], along: s
 
 @style.styled
 def plot_identification(fit: Identification) -> Figure:
-    """Plot predicted and measured values, and residuals in σ."""
+    """Plot predicted and measured stiffnesses [N/mm], tips and loops [mm], and residuals in σ."""
     rows = [fit.measurements[i] for i in fit.measurement_of]
     loops = [(i, one) for i, one in enumerate(fit.measurements) if hasattr(one, "forces")]
     stiff = [k for k, one in enumerate(rows) if hasattr(one, "value")]
@@ -128,7 +128,7 @@ def _plot_loops(axes: Any, fit: Identification, loops: Sequence[tuple[int, Any]]
 
 @style.styled
 def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
-    """Plot the expected 95 % interval of each parameter, and how often each candidate is tested."""
+    """Plot the expected 95 % intervals [%], and how often each candidate is tested."""
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.2, 2)
     half = 196.0 * plan.std / abs(plan.values)
     left.barh(np.arange(half.size), np.where(np.isfinite(half), half, 0.0))
@@ -146,7 +146,7 @@ def plot_experiment_plan(plan: ExperimentPlan) -> Figure:
 
 @style.styled
 def plot_uncertainty(budget: Uncertainty) -> Figure:
-    """Plot the contribution of each source to the standard uncertainty, and the whole of it."""
+    """Plot the standard uncertainty, and the contribution of each source to it, one bar each."""
     unit, size = budget.measurand.unit
     named = {source.replace("_", " "): u / size for source, u in budget.contributions.items() if u}
     bars = named | {"all together": budget.standard_uncertainty / size}
@@ -163,7 +163,7 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
 
 @style.styled
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
-    """Plot a histogram of a Monte Carlo run beside the normal distribution of its budget."""
+    """Plot the histogram of the values, and the normal distribution of ``run.budget``."""
     (unit, size), first = run.budget.measurand.unit, run.budget
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.8)
     values, u = run.values / size, first.standard_uncertainty / size
@@ -186,7 +186,10 @@ def plot_monte_carlo(run: MonteCarlo) -> Figure:
 
 @style.styled
 def plot_designs(found: DesignSearch) -> Figure:
-    """Plot the objectives of feasible designs with their front, or the best value of one goal."""
+    """Plot two or three objectives of feasible designs, with the front and its compromise.
+
+    If there is one objective, its best value is plotted against the number of designs.
+    """
     objectives = found.problem.objectives
     scales = [each.unit[1] for each in objectives]
     names = [textwrap.fill(label, _WIDEST) for label in found._labels]
@@ -220,7 +223,7 @@ def plot_designs(found: DesignSearch) -> Figure:
 
 @style.styled
 def plot_force_polytope(polytope: ForcePolytope) -> Figure:
-    """Plot the tip forces that the cables can balance; InvalidInput if they have no volume."""
+    """Plot the tip forces [N] that the cables can balance; InvalidInput if they have no volume."""
     if not len(polytope.faces):
         raise InvalidInput(
             "polytope", "has no surface in three dimensions to draw; bend the arm, or add cables."
@@ -239,7 +242,7 @@ def plot_force_polytope(polytope: ForcePolytope) -> Figure:
 
 @style.styled
 def plot_elasticity(law: Elasticity) -> Figure:
-    """Plot tangent and secant rigidity EA against the tension, at most up to 1000 N if endless."""
+    """Plot tangent and secant rigidity [kN] against the tension [N]: up to 1000 N if endless."""
     tension = np.linspace(law.low, law.high if math.isfinite(law.high) else _ENDLESS, 400)
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.3)
     axes.plot(tension, KN * law.rigidity(tension), label="tangent, dF/dε")

@@ -47,7 +47,7 @@ _STAGES: Final = (
 
 @style.styled
 def plot_paper(result: paper.Figure) -> Figure:
-    """Plot one recomputed figure of the paper, with the numbers that the paper prints."""
+    """Plot the curves of one recomputed figure, with the numbers that the paper prints."""
     figure = _DRAWN[result.name](result)
     return style.titled(figure, result.title)
 

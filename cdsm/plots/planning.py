@@ -81,7 +81,7 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
 
 @style.styled
 def plot_saturation(found: Saturation) -> Figure:
-    """Plot the stiffness against the lower bound of all tensions."""
+    """Plot the stiffness [N/mm] against the lower bound of all tensions [N]."""
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.6)
     axes.plot(found.minimum, N_PER_MM * found.along, label="least tensions")
     direction = style.direction_name(found.direction)
@@ -99,7 +99,10 @@ def plot_saturation(found: Saturation) -> Figure:
 
 @style.styled
 def plot_path_plan(plan: PathPlan) -> Figure:
-    """Plot wanted and planned stiffness, and tensions, along a path; shade infeasible samples."""
+    """Plot wanted and reached stiffness [N/mm] and the tensions [N] against the samples.
+
+    Infeasible samples are shaded. :func:`plot_path` draws the arm on its path, and writes a film.
+    """
     figure, ((above,), (below,)) = style.panels(style.TWO_COLUMNS, 4.6, rows=2, sharex=True)
     x, rows = np.arange(float(len(plan.target))), list(plan.planned)
     wanted = N_PER_MM * plan.target.reshape(len(x), -1)
@@ -129,7 +132,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
 
 @style.styled
 def plot_shares(shares: Shares) -> Figure:
-    """Plot the contribution of each cable, gravity, load and springs to a stiffness as bars."""
+    """Plot the contribution [N/mm] of each cable, gravity, load and springs as bars."""
     arm, rest = shares.stiffness.posture.arm, [*shares.others.values()]
     none = np.zeros(len(rest))
     passive, active = (N_PER_MM * np.append(each, none) for each in (shares.passive, shares.active))
@@ -150,7 +153,7 @@ def plot_shares(shares: Shares) -> Figure:
 
 @style.styled
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
-    """Plot the planned tension of each cable, beside those of the softest and the stiffest arm."""
+    """Plot the planned tension [N] of each cable, beside those of the softest and stiffest arm."""
     F, misses = plan.tension, "" if plan.reached else f", missed by {100.0 * plan.misfit:.2g} %"
     if attainable is None:
         return _plot_tensions([(F, f"planned{misses}", "o")], f"{F.posture.arm.name}: plan")
@@ -164,7 +167,7 @@ def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None =
 
 @style.styled
 def plot_stiffness_range(attainable: StiffnessRange, planned: Sequence[_Case] = ()) -> Figure:
-    """Plot the tension of each cable for the softest and for the stiffest arm, and as planned."""
+    """Plot the tension [N] of each cable for the softest and the stiffest arm, and as planned."""
     softest = f"softest: {N_PER_MM * attainable.low:.4g} N/mm"
     stiffest = f"stiffest: {N_PER_MM * attainable.high:.4g} N/mm"
     ends = (attainable.low_tension, softest, "v"), (attainable.high_tension, stiffest, "^")

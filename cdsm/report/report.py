@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from io import StringIO
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
@@ -45,6 +45,8 @@ class Report(Result):
             balance, μ ≥ 0 and ν ≥ 0 of the bounds; None if the tensions need not be the least.
     """
 
+    _posture_from = "stiffness.posture"
+
     stiffness: Stiffness
     comparisons: tuple[Comparison, ...]
     residual: float = field(metadata=unit("N m"))
@@ -52,10 +54,6 @@ class Report(Result):
     imbalance: float = field(metadata=unit("1"))
     bound_violation: float | None = field(metadata=unit("1"))
     kkt_residual: float | None = field(metadata=unit("1"))
-
-    @property
-    def _posture(self) -> Any:
-        return self.stiffness.posture
 
     @quantity("1")
     def condition(self) -> float:

@@ -51,6 +51,7 @@ class Equilibrium(Result):
     """
 
     _headline, _rows = "moved", "cable"
+    _posture_from = "pose"
 
     reference: Posture
     reference_tension: Array = field(metadata=unit("N", "cable"))
@@ -64,10 +65,6 @@ class Equilibrium(Result):
     def pose(self) -> Posture:
         """Posture at the equilibrium."""
         return self.stiffness.posture
-
-    @property
-    def _posture(self) -> Posture:
-        return self.pose
 
     @quantity("N", "cable")
     def tension(self) -> Array:

@@ -9,12 +9,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.batch.evaluation import evaluate
 from cdsm.errors import CdsmError, ElasticityRangeError, InvalidInput, warn
 from cdsm.geometry.beams import buckling_doubt
@@ -23,11 +22,8 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import NO_WRENCH, bound, instance, wrench_vector
 from cdsm.support.validation import quantity as checked
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import distribute_tension
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SAMPLES = 200  # bounds or load factors of a scan: a stable range narrower than a step is not seen
 _PRECISION = 1e-12  # relative precision of a critical bound or load factor
@@ -38,7 +34,7 @@ Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class _Critical(Result):
+class _Critical(Result, Plotted):
     """Posture and load of a result, and K_θ where the arm buckles."""
 
     posture: Posture
@@ -81,6 +77,7 @@ class CriticalTension(_Critical):
     """
 
     _headline, _rows = "minimum", "bounds"
+    _figure = "plot_critical_tension"
 
     minimum: float = field(metadata=unit("N"))
     stable: tuple[tuple[float, float], ...] = field(metadata=unit("N", "range", "end"))
@@ -93,10 +90,6 @@ class CriticalTension(_Critical):
         """One sentence if the arm is UNSTABLE at every lower bound; otherwise empty."""
         said = "UNSTABLE at every lower bound from {:.4g} N to {:.4g} N"
         return () if self.stable else (said.format(*self.examined),)
-
-    def plot(self) -> Figure:
-        """Plot the smallest eigenvalue of K_θ [N m/rad] against the lower bound of tension [N]."""
-        return cdsm.plots.plot_critical_tension(self)
 
     def __str__(self) -> str:
         verdict = f"buckles at a lower bound of {self.minimum:.4g} N"
@@ -124,6 +117,7 @@ class CriticalLoad(_Critical):
     """
 
     _headline, _rows = "factor", "factors"
+    _figure = "plot_critical_load"
 
     load: Array = field(metadata=unit("N and N m", "component"))
     factor: float = field(metadata=unit("1"))
@@ -135,10 +129,6 @@ class CriticalLoad(_Critical):
     def warnings(self) -> tuple[str, ...]:
         """One sentence if the arm is UNSTABLE even without the load; otherwise empty."""
         return () if self.factor else (f"UNSTABLE without the load: {str(self).splitlines()[0]}",)
-
-    def plot(self) -> Figure:
-        """Plot the smallest eigenvalue of K_θ [N m/rad] against the factor of the load."""
-        return cdsm.plots.plot_critical_load(self)
 
     def __str__(self) -> str:
         none = self.factor == 0.0

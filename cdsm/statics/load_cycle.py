@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.friction.capstan import assemble_segments
 from cdsm.posture import Posture
@@ -21,19 +20,15 @@ from cdsm.support.format import without_rounding
 from cdsm.support.progress import track
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import WRENCH, instance, number_array, whole_number
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_MOST_LOADS = 100_000  # of a history
 _SHOWN = 24  # largest number of loads that are printed; of more, the first and the last ones
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class LoadHistory(Result):
+class LoadHistory(Result, Plotted):
     """States of an arm with friction, load by load; made by :func:`~cdsm.load_cycle`.
 
     There are n loads. The S segments and P holes are in the order of :attr:`Posture.segments`. The
@@ -61,6 +56,8 @@ class LoadHistory(Result):
     """
 
     _headline, _rows = "dissipated", "load"
+    _posture_from = "reference"
+    _figure = "plot_load_history"
 
     reference: Posture
     reference_tension: Array = field(metadata=unit("N", "cable"))
@@ -76,10 +73,6 @@ class LoadHistory(Result):
     stop_torque: Array = field(metadata=unit("torque", "load", "joint"))
     dissipated: Array = field(metadata=unit("J", "load"))
     snaps: NDArray[np.bool_] = field(metadata=unit("1", "load"))
-
-    @property
-    def _posture(self) -> Posture:
-        return self.reference
 
     @quantity("m", "load", "axis")
     def displacement(self) -> Array:
@@ -124,14 +117,6 @@ class LoadHistory(Result):
         T, W = self.segment_tensions[k].copy(), frozen(self.wrenches[k].copy())
         friction: Friction = "sliding" if sliding.any() else "stuck"
         return assemble_segments(self.pose(k), T, sliding, W, friction)
-
-    def plot(self) -> Figure:
-        """Plot force against tip displacement, and the tensions of the segments of one cable.
-
-        Force and displacement are components along the largest force. The cable is
-        the one whose segments differ most in tension.
-        """
-        return cdsm.plots.plot_load_history(self)
 
     def __str__(self) -> str:
         rows = [
@@ -215,11 +200,10 @@ def load_cycle(
         F, W = checked_tension(pose, tension, None)
     pose.arm._laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
     loads = number_array("wrenches", wrenches, "wrench")
-    if loads.ndim != 2 or loads.shape[1] != 6 or not 0 < len(loads) <= _MOST_LOADS:
+    if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
         raise InvalidInput(
             "wrenches",
-            f"shape {loads.shape} given, (n, 6) with n from 1 to {_MOST_LOADS} needed: one wrench "
-            f"per load ({WRENCH}).",
+            f"shape {loads.shape} given, (n, 6) needed, n > 0: one wrench per load ({WRENCH}).",
         )
     substeps = whole_number("substeps", substeps, 1, 1000)
     arm = QuasiStaticArm(pose, F)

@@ -14,7 +14,7 @@ from cdsm.posture import Posture
 from cdsm.statics.solve import ArmState
 from cdsm.stiffness_matrix import Stiffness, assemble
 from cdsm.support.values import Array, frozen
-from cdsm.wires.elasticity import Elasticity
+from cdsm.wires.elasticity import Elasticity, newton_in_bracket
 
 _ROUNDING = 1e-9  # a tension outside the domain of a law by at most this part is rounding
 _HUGE = 1e12  # no tension [N] is beyond
@@ -121,17 +121,14 @@ class _LockedLaw(NamedTuple):
         return wire + (inside - self.start) * self.series + (F - inside) * slope, slope
 
     def tension(self, lengths: Array) -> tuple[Array, Array]:
-        """Compute F [N] and dF/dL [N/m] at lengths L [m]: Newton's method in a bracket."""
-        wanted, F = lengths - self.length, self.start
-        low, high = np.full((2, F.size), [[-_HUGE], [_HUGE]])
-        for _ in range(200):
+        """Compute F [N] and dF/dL [N/m] at lengths L [m]."""
+        wanted, ends = lengths - self.length, np.full((2, lengths.size), [[-_HUGE], [_HUGE]])
+
+        def error(F: Array) -> tuple[Array, Array]:
             reached, slope = self.elongation(F)
-            error = reached - wanted
-            newton = F - error / slope
-            if (abs(newton - F) <= 1e-13 * np.maximum(abs(F), 1.0)).all():
-                break
-            low, high = np.where(error < 0.0, F, low), np.where(error > 0.0, F, high)
-            F = np.where((low <= newton) & (newton <= high), newton, (low + high) / 2.0)
+            return reached - wanted, slope
+
+        F, slope = newton_in_bracket(error, self.start, *ends)
         return np.maximum(F, 0.0), np.where(F < 0.0, 0.0, 1.0 / slope)
 
 

@@ -8,31 +8,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 
-import cdsm
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.format import aligned
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import instance
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.urdf import CROSS_INERTIA
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_LIGHT = (
-    50.0  # a link with less than so many times the placeholders of its cross counts as massless
-)
+_LIGHT = 50.0  # a link below so many times the placeholders of its cross counts as massless
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Modes(Result):
+class Modes(Result, Plotted):
     """Natural modes of an arm and the stiffness from which they follow; made by :func:`modes`.
 
     S of the nv modes vibrate. The other modes grow; a stable arm has none of them. Shapes are
@@ -50,6 +44,8 @@ class Modes(Result):
     """
 
     _headline = "frequencies"
+    _posture_from = "stiffness.posture"
+    _figure = "plot_modes"
 
     stiffness: Stiffness
     mass: Array = field(metadata=unit("kg m²", "joint", "joint_column"))
@@ -59,17 +55,9 @@ class Modes(Result):
     growth_shapes: Array = field(metadata=unit("1", "joint", "growth"))
 
     @property
-    def _posture(self) -> Posture:
-        return self.stiffness.posture
-
-    @property
     def is_stable(self) -> bool:
         """Whether all modes vibrate."""
         return not self.growth_rates.size
-
-    def plot(self) -> Figure:
-        """Plot the arm in mm, deflected by a few modes: growing modes first, then the lowest."""
-        return cdsm.plots.plot_modes(self)
 
     def __str__(self) -> str:
         names = np.array(self.stiffness.posture.arm.joint_names)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
@@ -21,11 +20,8 @@ from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import coordinates, plural, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import unit_direction, vector, whole_number
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SLIDING = 1.25  # an arm slides if its tangent is at most so many times the frictionless one
 
@@ -35,7 +31,7 @@ _DISPLACED = 1e-9  # least displacement, over the arm's length, above the roundi
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class WeightTest(Result):
+class WeightTest(Result, Plotted):
     """States of an arm while a weight at its tip is increased in n equal steps.
 
     If the arm has friction in its holes, tips, displacements, tensions and stiffness are computed
@@ -51,6 +47,7 @@ class WeightTest(Result):
     """
 
     _headline, _rows = "stiffness", "loads"
+    _figure = "plot_weight_test"
 
     force: Array = field(metadata=unit("N", "axis"))
     unloaded: Equilibrium
@@ -162,10 +159,6 @@ class WeightTest(Result):
         if not self.unloaded.stable:
             said.append("NEUTRAL: before the weight, not every joint is brought back")
         return (*said, *(history.warnings if history else ()))
-
-    def plot(self) -> Figure:
-        """Plot load [N] against tip displacement [mm], and the tension of each cable [N]."""
-        return cdsm.plots.plot_weight_test(self)
 
     def __str__(self) -> str:
         rows = [f"{'load [N]':>10}{'x [mm]':>12}{'y [mm]':>12}{'z [mm]':>12}"]

@@ -7,23 +7,19 @@ from typing import TYPE_CHECKING, Self, final
 
 import numpy as np
 
-import cdsm
-from cdsm.posture import Posture
 from cdsm.stiffness_matrix.prints import model_of, verdict
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import one_of
-from cdsm.support.values import Array, Named, frozen
+from cdsm.support.values import Array, Named, Plotted, frozen
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cdsm.stiffness_matrix import Stiffness
 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Shares(Result, Named):
+class Shares(Result, Named, Plotted):
     """Contributions to the stiffness in one direction; they add up to :attr:`total`.
 
     Attributes:
@@ -37,6 +33,8 @@ class Shares(Result, Named):
     """
 
     _headline, _rows = "total", "cable"
+    _posture_from = "stiffness.posture"
+    _figure = "plot_shares"
 
     stiffness: Stiffness
     direction: Array = field(metadata=unit("1", "axis"))
@@ -72,17 +70,13 @@ class Shares(Result, Named):
             springs=springs,
         )
 
-    @property
-    def _posture(self) -> Posture:
-        return self.stiffness.posture
-
     def __getitem__(self, cable: str) -> float:
         """Return passive + active contribution of a cable [N/m], or raise InvalidInput."""
         return float(self.cables[self.keys().index(one_of("cable", cable, self.keys()))])
 
     def keys(self) -> tuple[str, ...]:
         """Return the names of the cables."""
-        return self._posture.arm.cables.names
+        return self.stiffness.posture.arm.cables.names
 
     @property
     def cables(self) -> Array:
@@ -104,10 +98,6 @@ class Shares(Result, Named):
     def is_stable(self) -> bool:
         """Whether the arm is stable; if not, the contributions mean nothing."""
         return self.stiffness.is_stable
-
-    def plot(self) -> Figure:
-        """Plot the contribution of each cable, of gravity and of the load as bars [N/mm]."""
-        return cdsm.plots.plot_shares(self)
 
     def __str__(self) -> str:
         K, others = self.stiffness, self.others

@@ -37,25 +37,25 @@ def track(items: Collection[_Item], what: str, *, wanted: bool = True) -> Iterat
 
 @contextmanager
 def progress_bar(
-    what: str, total: int | None = None, done: int = 0, *, wanted: bool = True
+    what: str, total: int | None = None, *, wanted: bool = True
 ) -> Iterator[Callable[[int], None]]:
     """Show a bar called ``what``, and yield a function that advances it by a number of items.
 
-    ``done`` of the ``total`` items (None: unknown) are finished already. A bar that is opened while
-    another one is open is never shown, even if the outer one is not ``wanted``.
+    ``total`` is the number of items, None if it is unknown. A bar that is opened while another one
+    is open is never shown, even if the outer one is not ``wanted``.
     """
     terminal = sys.stderr.isatty()
     shown = wanted and _allowed.get() and (terminal or _lines_wanted.get())
     with progress_allowed(False):
         if shown and terminal:
-            with _bar(what, total, done) as advance:
+            with _bar(what, total) as advance:
                 yield advance
         else:
-            yield _lines(what, total, done) if shown else lambda count: None
+            yield _lines(what, total) if shown else lambda count: None
 
 
 @contextmanager
-def _bar(what: str, total: int | None, done: int) -> Iterator[Callable[[int], None]]:
+def _bar(what: str, total: int | None) -> Iterator[Callable[[int], None]]:
     from rich import progress  # slow to import
     from rich.console import Console
 
@@ -63,7 +63,7 @@ def _bar(what: str, total: int | None, done: int) -> Iterator[Callable[[int], No
     console = Console(stderr=True)
     left = progress.TimeRemainingColumn()
     bar = progress.Progress(*columns, left, console=console, transient=True)
-    task, begun = bar.add_task(what, total=total, completed=done), monotonic()
+    task, begun = bar.add_task(what, total=total), monotonic()
 
     def advance(count: int) -> None:
         if monotonic() - begun >= DELAY:
@@ -76,16 +76,16 @@ def _bar(what: str, total: int | None, done: int) -> Iterator[Callable[[int], No
         bar.stop()
 
 
-def _lines(what: str, total: int | None, done: int) -> Callable[[int], None]:
+def _lines(what: str, total: int | None) -> Callable[[int], None]:
     """Return a function that counts items, and prints a line if the last one is long ago."""
-    begun, printed, first = monotonic(), monotonic() - _PAUSE + DELAY, done
+    begun, printed, done = monotonic(), monotonic() - _PAUSE + DELAY, 0
 
     def advance(count: int) -> None:
         nonlocal done, printed
         done, now = done + count, monotonic()
         if now - printed < _PAUSE or done == total:
             return
-        printed, speed = now, (done - first) / (now - begun)
+        printed, speed = now, done / (now - begun)
         left = f", {(total - done) / speed:.0f} s left" if total and speed else ""
         print(f"{what}: {done}{f' of {total}' if total else ''}{left}", file=sys.stderr, flush=True)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 import tomllib
@@ -32,7 +31,7 @@ from pydantic import (
 )
 from pydantic.dataclasses import dataclass, is_pydantic_dataclass
 
-from cdsm.errors import GeometryError, listed
+from cdsm.errors import GeometryError, did_you_mean, listed
 from cdsm.support.validation import LARGEST, RANGES, within
 
 _Record = TypeVar("_Record")
@@ -155,15 +154,6 @@ def parse(kind: type[_Record], data: object) -> _Record:
     # only from JSON does pydantic's strict mode accept a table as a record and an array as a tuple;
     # JSON has no dates, so they become strings, which only names accept
     return _reporting(TypeAdapter(kind).validate_json, kind)(json.dumps(data, default=str))
-
-
-def did_you_mean(key: str, known: Iterable[str], least: float = 0.6) -> str:
-    """Return ``; did you mean …?`` with the known key that is most similar to ``key``.
-
-    The text is empty if no similarity, from 0 to 1, reaches ``least``.
-    """
-    near = difflib.get_close_matches(key, [each for each in known if each != key], 1, least)
-    return f"; did you mean {near[0]}?" if near else ""
 
 
 def faults_at(where: str, error: ValueError) -> list[str]:

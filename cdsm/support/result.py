@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
@@ -61,9 +60,8 @@ def quantity(of: str, *dims: str) -> Callable[[Callable[[Any], _T]], cached_prop
 class Result(ReadOnlyState):
     """A frozen result that exports itself: what a field is, stands in its metadata.
 
-    Fields and properties without metadata are not exported. Subclasses write ``__str__`` and
-    ``plot`` by hand, nothing else. ``_posture`` is the posture whose joint coordinates come first
-    in the JSON; its arm, or the attribute ``arm``, names joints and cables.
+    Fields and properties without metadata are not exported. Subclasses write ``__str__`` by
+    hand, nothing else; those with a figure are also :class:`~cdsm.support.values.Plotted`.
     """
 
     _headline: ClassVar[str] = ""
@@ -72,9 +70,18 @@ class Result(ReadOnlyState):
     _rows: ClassVar[str] = ""
     """Dimension whose entries are the rows of the table; a table of one row if it is empty."""
 
+    _posture_from: ClassVar[str] = "posture"
+    """Attribute with the posture, whose joint coordinates come first in the JSON.
+
+    Its arm, or the attribute ``arm``, names joints and cables.
+    """
+
     @property
     def _posture(self) -> Any:
-        return getattr(self, "posture", None)
+        found: Any = self
+        for name in self._posture_from.split("."):
+            found = getattr(found, name, None)
+        return found
 
     @property
     def _arm(self) -> Any:
@@ -230,12 +237,4 @@ def write_labelled(
         return write_file(path, table().to_csv)
     need("sweep", "netCDF4")
     data = labelled()
-
-    def fill(aside: Path) -> None:
-        try:
-            data.to_netcdf(aside, engine="netcdf4")
-        except (RuntimeError, PermissionError) as error:  # HDF5 does not report a full disk
-            free = shutil.disk_usage(aside.parent).free
-            raise OSError(f"{error} ({free} bytes are free there)") from None
-
-    return write_file(path, fill)
+    return write_file(path, lambda aside: data.to_netcdf(aside, engine="netcdf4"))

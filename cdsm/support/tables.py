@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple, NoReturn
 
-import numpy as np
-
-from cdsm.errors import FileError, listed
+from cdsm.errors import FileError, did_you_mean, listed
 from cdsm.support.files import read_text
-from cdsm.support.values import Array
 
 ANGLE: Final = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
 """Units of angles in a header, in SI."""
@@ -27,10 +23,13 @@ def csv_text(head: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
     return out.getvalue()
 
 
+Row = tuple[int, list[str]]  # line number and cells
+
+
 class Table(NamedTuple):
     """A table that was read from a text file. Its cells have no white space around them."""
 
-    rows: list[tuple[int, list[str]]]  # line number and cells; the first row is the header
+    rows: list[Row]  # the first row is the header
     comments: list[str]  # lines that begin with #
     delimiter: str  # between cells
 
@@ -38,19 +37,6 @@ class Table(NamedTuple):
     def header(self) -> list[str]:
         """Return the cells of the first row."""
         return self.rows[0][1]
-
-    def column(self, at: int, refuse: Callable[[str], NoReturn], first: int = 1) -> Array:
-        """Return the numbers of the column with index ``at``, from the row ``first`` on.
-
-        If a cell is not a finite number, ``refuse`` is called, which raises an error.
-        """
-        numbers = []
-        for line, cells in self.rows[first:]:
-            cell = cells[at] if at < len(cells) else ""
-            numbers.append(self.number(cell))
-            if not math.isfinite(numbers[-1]):
-                refuse(f"line {line}: {cell!r} is not a finite number")
-        return np.array(numbers)
 
     def number(self, cell: str) -> float:
         """Return the number in a cell, or NaN; commas are decimal marks if none is a delimiter."""
@@ -96,49 +82,65 @@ def name_and_unit(cell: str) -> tuple[str, str]:
     return name.strip(), unit.strip().removesuffix("]")
 
 
-def named_columns(
-    table: Table, known: Sequence[str], refuse: Callable[[str], NoReturn]
-) -> dict[str, tuple[int, str]]:
-    """Return index and unit of each column of a table, by the name of the column.
+class Columns:
+    """Columns of a CSV file: a header of names with units, such as ``force [N]``, then rows.
 
-    Columns with other names than the ``known`` ones are allowed, unless they are almost a known
-    name or hold angles. ``refuse`` is called, which raises an error, for those, for a name that is
-    given twice, for semicolons between the columns, and for a row with more cells than the header.
+    ``units`` has the units of each known column with their factors to SI; of a text, none. Other
+    columns are ignored, unless they are almost called as a known one or hold angles of unknown
+    joints. Spreadsheets also write empty columns at the end, and empty rows: they do not count.
+    ``holds`` says what the rows are. FileError names each fault, with its line and column.
     """
-    width = len(table.header)
-    if width == 1 and ";" in table.header[0]:
-        refuse("has its columns separated by semicolons; separate them by commas")
-    for line, cells in table.rows[1:]:
-        if any(cells[width:]):
-            more = f"{len(cells)} cells, but the header {width}; write decimals with a point"
-            refuse(f"line {line}: has {more}")
-    found: dict[str, tuple[int, str]] = {}
-    for at, (name, unit) in enumerate(map(name_and_unit, table.header)):
-        as_long = [each for each in known if abs(len(each) - len(name)) < 2]
-        near = difflib.get_close_matches(name, as_long, 1, 0.8)
-        if name in found:
-            refuse(f"has two columns called {name}; give each once")
-        if name not in known and (near or unit in ANGLE):
-            there = f"did you mean {near[0]}? There are" if near else "there are"
-            refuse(f"has a column {name}, which is not known; {there} {listed(known)}")
-        found[name] = at, unit
-    return found
 
+    def __init__(
+        self, path: str | os.PathLike[str], units: Mapping[str, Mapping[str, float]], holds: str
+    ) -> None:
+        table = read_table(path)
+        self.path, self.units, self._number = path, dict(units), table.number
+        self.rows = [row for row in table.rows[1:] if any(row[1])]
+        self._at, self.unit = dict[str, int](), dict[str, str]()  # by name
+        if not self.rows:
+            self.refuse(f"holds no {holds}; a header and a line for each are needed")
+        width = max((k for k, cell in enumerate(table.header, 1) if cell), default=0)
+        if width == 1 and ";" in table.header[0]:
+            self.refuse("has its columns separated by semicolons; separate them by commas")
+        for line, cells in self.rows:
+            if any(cells[width:]):
+                more = f"{len(cells)} cells, but the header {width}; write decimals with a point"
+                self.refuse(f"line {line}: has {more}")
+        for at, (name, unit) in enumerate(map(name_and_unit, table.header)):
+            if name in self:
+                self.refuse(f"has two columns called {name}; give each once")
+            as_long = [each for each in units if abs(len(each) - len(name)) < 2]
+            hint = did_you_mean(name, as_long, least=0.8)
+            if name in units:
+                self._at[name], self.unit[name] = at, unit
+            elif hint or (unit in ANGLE and name.rpartition(" ")[2] not in units):
+                hint = f"{hint} There" if hint else "; there"
+                self.refuse(f"has a column {name}, which is not known{hint} are {listed([*units])}")
 
-def column_in(
-    known: dict[str, float],
-    name: str,
-    found: dict[str, tuple[int, str]],
-    refuse: Callable[[str], NoReturn],
-) -> tuple[int, float]:
-    """Return the index of the column ``name``, and the factor that converts its unit to SI.
+    def __contains__(self, name: str) -> bool:
+        return name in self._at
 
-    ``known`` has this factor for each allowed unit. ``found`` is a result of :func:`named_columns`.
-    If the column is missing or has another unit, ``refuse`` is called, which raises an error.
-    """
-    at, unit = found.get(name, (-1, ""))
-    if unit not in known:
-        fault = f"the column {name} has no unit that is known"
-        names = " or ".join(f"{name} [{unit}]" for unit in known)
-        refuse(f"{fault if at >= 0 else f'has no column {name}'}; call it {names}")
-    return at, known[unit]
+    def refuse(self, problem: str) -> NoReturn:
+        """Raise FileError."""
+        raise FileError(self.path, f"{problem}.")
+
+    def factor(self, name: str) -> float:
+        """Return the factor to SI of a column; refuse it if it is missing or has no known unit."""
+        if (unit := self.unit.get(name, "")) not in self.units[name]:
+            fault = f"the column {name} has no unit that is known"
+            names = " or ".join(f"{name} [{each}]" for each in self.units[name])
+            self.refuse(f"{fault if name in self else f'has no column {name}'}; call it {names}")
+        return self.units[name][unit]
+
+    def text(self, row: Row, name: str) -> str:
+        """Return the cell of a row in a column; empty if there is none."""
+        at = self._at.get(name, len(row[1]))
+        return "".join(row[1][at : at + 1])
+
+    def number(self, row: Row, name: str) -> float:
+        """Return the number of a row in a column, in SI."""
+        value = self._number(cell := self.text(row, name))
+        if not math.isfinite(value):
+            self.refuse(f"line {row[0]}, column {name}: {cell!r} is not a finite number")
+        return value * self.factor(name)

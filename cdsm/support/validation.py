@@ -187,12 +187,9 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
 
 
 def text(name: str, value: object) -> str:
-    """Return ``value`` if it is a printable, not blank text; else raise :class:`InvalidInput`."""
+    """Return ``value`` if it is a text that is not blank; else raise :class:`InvalidInput`."""
     if not isinstance(value, str) or not value.strip():
         raise InvalidInput(name, f"{value!r} given; a name is needed, a text that is not blank.")
-    for at, letter in enumerate(value, start=1):
-        if not letter.isprintable():
-            raise InvalidInput(name, f"{value!r} given; character {at} cannot be printed.")
     return value
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator
 from dataclasses import fields
-from typing import Any, Protocol, TypeVar
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -36,6 +40,22 @@ class Printed:
 
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(str(self))}</pre>"
+
+
+class Plotted:
+    """Base class of values with a figure."""
+
+    _figure: ClassVar[str]
+    """Name of the function of :mod:`cdsm.plots` that draws it."""
+
+    def plot(self) -> Figure:
+        """Plot this value as a new figure.
+
+        What it shows, stands at the function of :mod:`cdsm.plots` for its class, such as
+        :func:`~cdsm.plots.plot_stiffness_range`.
+        """
+        figure: Figure = getattr(import_module("cdsm.plots"), self._figure)(self)
+        return figure
 
 
 class Named:

@@ -50,7 +50,7 @@ class Labelled(Cases):
         coordinates = self._coordinates() if by_joint else {**self._coordinates("joint"), "q": q}
         taken = {*names, *coordinates, *CASES}
         for name in map(str, q.coords.keys() - {"joint"}):
-            if name in taken or "/" in name or not name.isprintable():
+            if name in taken or "/" in name:
                 problem = "is another variable of the Dataset, or no name that files accept"
                 remedy = "Rename it in the URDF, or sweep over a path or random postures"
                 raise InvalidInput("angles", f"joint {name!r} of the grid {problem}. {remedy}.")

@@ -193,11 +193,9 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
     try:
         if path.is_dir():
             found = xarray.open_dataset(path, engine="zarr", consolidated=False)
-        elif path.is_file():  # opening a pipe without a writer would wait forever
+        else:
             with xarray.open_dataset(path, engine="netcdf4") as dataset:
                 found = dataset.load()
-        else:
-            raise FileError(path, "is not a regular file; give the path of a file.")
         check_sweep(found)
     except CdsmError as error:
         raise FileError(path, f"is not a sweep of cdsm: {error}") from None

@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
@@ -21,14 +20,11 @@ from cdsm.support.format import span, with_uncertainty
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.status import Status
 from cdsm.support.validation import Direction, fraction, instance
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
 from cdsm.tolerances import Tolerances
 from cdsm.tolerancing.inputs import Errors, Group
 from cdsm.tolerancing.measurand import Measurand, MeasurandName, measurand_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _LINEAR = 0.05  # largest nonlinearity with which first order is taken as sufficient
 _DRAWN = 100  # random arms that show how far from linear a measurand is
@@ -43,7 +39,7 @@ _UNITS |= {"tension": (1.0, " N"), "link_mass": (1e-3, " g"), "friction": (1.0, 
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Uncertainty(Result):
+class Uncertainty(Result, Plotted):
     """Standard uncertainty of a measurand and its contributions; made by :func:`uncertainty`.
 
     Attributes:
@@ -58,6 +54,7 @@ class Uncertainty(Result):
     """
 
     _headline, _rows = "standard_uncertainty", "source"
+    _figure = "plot_uncertainty"
 
     measurand: Measurand
     tolerances: Tolerances
@@ -106,10 +103,6 @@ class Uncertainty(Result):
         k = float(ndtri(0.5 + fraction("probability", probability) / 2.0))
         low, high = (self.value + s * k * self.standard_uncertainty for s in (-1.0, 1.0))
         return low, high
-
-    def plot(self) -> Figure:
-        """Plot the contributions to the standard uncertainty, one bar per source."""
-        return cdsm.plots.plot_uncertainty(self)
 
     def __str__(self) -> str:
         (unit, size), relative = self.measurand.unit, 100.0 * self.relative

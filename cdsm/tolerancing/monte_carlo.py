@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.batch.distribution import checked_threads
 from cdsm.batch.quantities import Codes
 from cdsm.errors import InvalidInput
@@ -19,14 +18,11 @@ from cdsm.support.progress import progress_bar
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.status import Status
 from cdsm.support.validation import Direction, flag, fraction, whole_number
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.tension import Tension
 from cdsm.tolerances import Tolerances
 from cdsm.tolerancing.budget import Uncertainty, budget_of
 from cdsm.tolerancing.measurand import MeasurandName, measurand_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _AGREES = 0.1  # largest difference of the ends of intervals that agree, in uncertainties
 _BLOCK = 1000  # number of draws in a block; each block has its own random numbers
@@ -34,7 +30,7 @@ _BLOCK = 1000  # number of draws in a block; each block has its own random numbe
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class MonteCarlo(Result):
+class MonteCarlo(Result, Plotted):
     """Values of a measurand for many arms with random errors; made by :func:`monte_carlo`.
 
     Attributes:
@@ -45,6 +41,7 @@ class MonteCarlo(Result):
     """
 
     _headline, _rows = "standard_uncertainty", "draw"
+    _figure = "plot_monte_carlo"
 
     budget: Uncertainty
     values: Array = field(metadata=unit("measurand", "draw"))
@@ -94,10 +91,6 @@ class MonteCarlo(Result):
         """
         both = zip(self.interval(), self.budget.interval(), strict=True)
         return all(abs(a - b) <= _AGREES * self.standard_uncertainty for a, b in both)
-
-    def plot(self) -> Figure:
-        """Plot the histogram of the values and the normal distribution of :attr:`budget`."""
-        return cdsm.plots.plot_monte_carlo(self)
 
     def __str__(self) -> str:
         unit, size = self.budget.measurand.unit

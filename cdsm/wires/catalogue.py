@@ -10,9 +10,9 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeGuard
 
-from cdsm.errors import FileError, GeometryError, InvalidInput, listed
+from cdsm.errors import FileError, GeometryError, InvalidInput, did_you_mean, listed
 from cdsm.support.files import read_text, write_text
-from cdsm.support.records import did_you_mean, read_toml, toml_text
+from cdsm.support.records import read_toml, toml_text
 from cdsm.support.validation import flag, one_of
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import LinearElasticity, StrandElasticity, TabulatedElasticity

@@ -8,26 +8,22 @@ import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.polynomial.polynomial import polyint, polyval
 from numpy.typing import ArrayLike, NDArray
 
-import cdsm
 from cdsm.errors import ElasticityRangeError, InvalidInput
 from cdsm.support.format import rounded
 from cdsm.support.validation import number_array, scalar
-from cdsm.support.values import Array
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cdsm.support.values import Array, Plotted
 
 _SHORTEST: Final = 0.5  # length of a slack wire over that at the low end of its law
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Elasticity:
+class Elasticity(Plotted):
     """Axial elasticity of a wire: its law EA(F), with the strain ε(F) = ∫ dF/EA.
 
     A wire of original length l_0 has the stiffness dF/dL = EA(F)/l_0: EA is the *tangent* rigidity.
@@ -41,6 +37,8 @@ class Elasticity:
         high: Largest tension [N]; inf if there is none.
         rest: Tension [N] at which the strain is zero: ``low``, but see :meth:`slack_below`.
     """
+
+    _figure = "plot_elasticity"
 
     low: float
     high: float
@@ -91,10 +89,6 @@ class Elasticity:
         from cdsm.wires.catalogue import write_law
 
         return write_law(self, path)
-
-    def plot(self) -> Figure:
-        """Plot tangent and secant rigidity [kN] against the tension [N]."""
-        return cdsm.plots.plot_elasticity(self)
 
     def scaled(self, factor: float) -> Elasticity:
         """Return the law of ``factor`` · EA(F), e.g. for a wire of another spool.
@@ -245,15 +239,30 @@ class Elasticity:
             problem = f"no tension of the domain {self._span} gives {given}"
             raise ElasticityRangeError(problem, indices=np.flatnonzero(outside).tolist())
         after = np.searchsorted(reached, wanted).clip(1, len(knots) - 1)
-        low, high, F = knots[after - 1], knots[after], np.interp(wanted, reached, knots)
-        for _ in range(50):  # Newton's method in a shrinking bracket
+
+        def error(F: Array) -> tuple[Array, Array]:
             strain, EA = self._evaluate(F)
-            error = length * strain + series * (F - self.rest) - wanted
-            low, high = np.where(error < 0.0, F, low), np.where(error > 0.0, F, high)
-            F, before = np.clip(F - error / (length / EA + series), low, high), F
-            if (abs(F - before) <= 1e-13 * np.maximum(F, 1.0)).all():
-                break
-        return np.asarray(F)
+            return length * strain + series * (F - self.rest) - wanted, length / EA + series
+
+        start = np.interp(wanted, reached, knots)
+        return newton_in_bracket(error, start, knots[after - 1], knots[after])[0]
+
+
+def newton_in_bracket(
+    of: Callable[[Array], tuple[Array, Array]], x: Array, low: Array, high: Array
+) -> tuple[Array, Array]:
+    """Find the roots of rising functions between ``low`` and ``high``, from x; any shape.
+
+    ``of`` returns values and slopes at x. Returns the roots, to 1e-13, and the slopes there.
+    """
+    for _ in range(200):
+        value, slope = of(x)
+        newton = x - value / slope
+        if (abs(newton - x) <= 1e-13 * np.maximum(abs(x), 1.0)).all():
+            break
+        low, high = np.where(value < 0.0, x, low), np.where(value > 0.0, x, high)
+        x = np.where((low <= newton) & (newton <= high), newton, (low + high) / 2.0)
+    return x, slope
 
 
 def checked_law(law: object) -> Elasticity:

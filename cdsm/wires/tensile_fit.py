@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, NamedTuple, final
+from typing import Final, NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import number_array, scalar
 from cdsm.support.validation import quantity as checked
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, Plotted, frozen
 from cdsm.wires.elasticity import Elasticity
 from cdsm.wires.laws import TabulatedElasticity
 from cdsm.wires.tensile_curve import FEWEST, Curve, fit_curve, loading, refuse
 from cdsm.wires.tensile_test import TensileTest
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _NORMAL: Final = 1.959963984540054  # quantile of the normal distribution for 95 %
 _EXACT: Final = 1e-4  # error of ln EA without noise: from the grid, and from the fitted table
@@ -59,7 +55,7 @@ class Band(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TensileFit(Result):
+class TensileFit(Result, Plotted):
     """Elasticity fitted to a tensile test, with the test and the quality of the fit.
 
     Attributes:
@@ -82,6 +78,7 @@ class TensileFit(Result):
 
     _headline = "rigidity"
     _rows = "tension"
+    _figure = "plot_tensile_fit"
 
     @quantity("N", "tension")
     def tension(self) -> Array:
@@ -137,10 +134,6 @@ class TensileFit(Result):
         half = np.log(self.band.high / self.band.low) / 2.0
         half = np.interp(np.linspace(a, b, 200), self.tension, half)
         return float(np.sqrt(np.mean(half**2)) / _NORMAL)
-
-    def plot(self) -> Figure:
-        """Plot force [N] against strain [%] with the fit; EA [kN] with band and stages."""
-        return cdsm.plots.plot_tensile_fit(self)
 
 
 def fit_tensile_test(

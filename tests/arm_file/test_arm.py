@@ -139,7 +139,7 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        ("gravity = [", "gravty = [", "did you mean gravity?"),
+        ("gravity = [", "gravty = [", "did you mean 'gravity'?"),
         ("-9.81", "-9.81e9", "gravity"),
         ("[0.0, -9.81, 0.0]", "9.81", "gravity in base axes [m/s²], or an axis such as -z"),
         ("minimum = 5.0", "minimum = -5.0", "minimum: -5 N given; cables only pull"),
@@ -150,7 +150,7 @@ def test_arm_without_a_wire_asks_for_one(tmp_path: Path) -> None:
         ("[cables.cable2_3]", "[cables.cable2_4]", "no cable is called 'cable2_4'; did you mean"),
         ("control =", "contrl =", "cables.cable2_3.contrl: is not a key that is known here; did"),
         ("joints = 2", "joints = 0", "joints"),
-        ("joints = 2", "jonits = 2", "jonits: is not a key that is known here; did you mean joi"),
+        ("joints = 2", "jonits = 2", "jonits: is not a key that is known here; did you mean 'joi"),
         ("[universal]", "[universal", "is not TOML"),
     ],
 )

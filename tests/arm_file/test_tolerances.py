@@ -41,7 +41,7 @@ def test_every_kind_comes_back_to_the_last_bit(tmp_path: Path) -> None:
         ("rigidty = 0.05", "rigidty: .*did you mean 'rigidity'"),
         ("lead = -1.0", "lead: .*-1 given; a tolerance is not negative"),
         ("lead = {within = 1.0, standard = 2.0}", "one of standard and within"),
-        ("lead = {width = 1.0}", "lead.width: is not a key .*; did you mean within"),
+        ("lead = {width = 1.0}", "lead.width: is not a key .*; did you mean 'within'"),
         ("lead = {standard = 1e-3, distribution = 'gauss'}", "'gauss'"),
         ("lead = {within = 1e-3, distribution = 'normal'}", "within is uniform"),
     ],

@@ -141,5 +141,5 @@ def test_file_that_cannot_be_read_is_a_file_error(
     with pytest.raises(cdsm.FileError, match=said) as caught:
         cdsm.Geometry.read(path)
     assert caught.value.path == str(path)
-    with pytest.raises(cdsm.FileError, match="regular file"):
+    with pytest.raises(cdsm.FileError, match="directory"):
         cdsm.Geometry.read(tmp_path)

@@ -71,12 +71,20 @@ def test_three_axes_measured_tensions_and_tests_without_readings(tmp_path: Path)
         ("side,-10,z,150,5", "side,-10,z,150,0", "test side.*two sizes"),
         ("displacement [mm]", "displacement [m]", "test up.*0.249 m, more than the arm is"),
         ("remark", "cable1_1 [N]", "minimum and cable1_1"),
-        ("remark", "joint9 [deg]", "column joint9.*did you mean joint"),
+        ("remark", "joint9 [deg]", "column joint9.*did you mean 'joint"),
     ],
 )
 def test_faults_name_line_and_column(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(cdsm.FileError, match=f"(?s)loops.csv.*{said}"):
         read(tmp_path, GOOD.replace(old, new, 1))
+
+
+def test_empty_columns_and_rows_of_a_spreadsheet_do_not_count(tmp_path: Path) -> None:
+    head, *lines = GOOD.split("\n", 2)[1:]
+    text = "\n".join([f"{head},,", *(f"{line},," for line in lines[0].splitlines())])
+    assert read(tmp_path, f"{text}\n{',' * 8}\n") == read(tmp_path, GOOD)
+    with pytest.raises(cdsm.FileError, match="line 2: has 9 cells, but the header 7"):
+        read(tmp_path, text.replace("first,,", "first,0,", 1))
 
 
 HEAD = "label,x [mm],z [mm],cable3_1 [mm],cable3_2 [mm]\n"

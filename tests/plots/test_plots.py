@@ -1,5 +1,8 @@
 """Figures draw what they are given, with units; how they look was looked at."""
 
+import importlib
+import inspect
+import pkgutil
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +18,7 @@ from PIL import Image
 import cdsm
 from cdsm import paper, plots, track
 from cdsm.planning.path_plan import PathPlan
+from cdsm.support.values import Plotted
 from tests.identification import test_search as identified
 from tests.support.arms import mixed_arm, random_posture
 from tests.support.tracking import small_path
@@ -106,6 +110,20 @@ def test_every_picture_is_drawn_with_units(result: Callable[[], Any]) -> None:
     before = dict(matplotlib.rcParams)
     _drawn(result().plot())
     assert dict(matplotlib.rcParams) == before
+
+
+def test_each_class_names_the_function_that_draws_it() -> None:
+    for module in pkgutil.walk_packages(cdsm.__path__, "cdsm."):
+        importlib.import_module(module.name)
+    todo, found = Plotted.__subclasses__(), 0
+    for kind in todo:
+        todo += kind.__subclasses__()
+        if "_figure" in vars(kind):
+            found += 1
+            first, *_ = inspect.signature(getattr(plots, kind._figure)).parameters.values()
+            assert first.annotation.split(".")[-1] == kind.__name__
+    assert found > 15
+    assert not hasattr(cdsm.stiffness_gradient(K), "plot")
 
 
 def test_ranges_are_drawn_and_a_path_is_filmed(tmp_path: Path) -> None:

@@ -105,7 +105,6 @@ CASES: dict[str, tuple[Callable[[], object], str]] = {
         ("lost link", routed(BASE, LOST), "'lnk1'.*did you mean 'link1'.*Known: base_link"),
         ("one place", routed(BASE, BASE, END), "cable 'a'.*sites 1 and 2 coincide"),
         ("site", lambda: cdsm.Site("link1", (0.0, NAN, 0.0)), r"position: entry \[1\] is nan"),
-        ("site unprintable", lambda: cdsm.Site("a\n", (0.0,) * 3), "character 2 cannot be pri"),
         ("cable's name", cable(name=""), "name: .*a name is needed"),
         ("one site", cable(BASE), "cable 'a'.*sites: 1 given.*two or more"),
         ("control", cable(control="frce"), "cable 'a'.*'frce'.*did you mean 'force'?"),
