@@ -78,31 +78,31 @@ def _rows_of_numbers(table: Table) -> int:
 
 def name_and_unit(cell: str) -> tuple[str, str]:
     """Split a header cell such as ``joint1 [deg]``; without brackets the unit is empty."""
-    name, _, unit = cell.partition("[")
-    return name.strip(), unit.strip().removesuffix("]")
+    name, _, unit = cell.replace("(", "[").partition("[")
+    return name.strip(), unit.rstrip(" )]").strip()
 
 
 class Columns:
     """Columns of a CSV file: a header of names with units, such as ``force [N]``, then rows.
 
-    ``units`` has the units of each known column with their factors to SI; of a text, none. Other
-    columns are ignored, unless they are almost called as a known one or hold angles of unknown
-    joints. Spreadsheets also write empty columns at the end, and empty rows: they do not count.
+    Commas, semicolons or tabs separate them; commas are decimal marks if they do not. ``units`` has
+    the units of each known column with their factors to SI; of a text, none. Other columns are
+    ignored, unless they are almost called as a known one or hold angles of unknown joints.
+    Spreadsheets also write empty columns at the end, and empty rows: they do not count.
     ``holds`` says what the rows are. FileError names each fault, with its line and column.
     """
 
     def __init__(
         self, path: str | os.PathLike[str], units: Mapping[str, Mapping[str, float]], holds: str
     ) -> None:
-        table = read_table(path)
+        read = [read_table(path, each) for each in ",;\t"]
+        table = max(read, key=lambda table: len(table.rows[0][1]) if table.rows else 0)
         self.path, self.units, self._number = path, dict(units), table.number
         self.rows = [row for row in table.rows[1:] if any(row[1])]
         self._at, self.unit = dict[str, int](), dict[str, str]()  # by name
         if not self.rows:
             self.refuse(f"holds no {holds}; a header and a line for each are needed")
         width = max((k for k, cell in enumerate(table.header, 1) if cell), default=0)
-        if width == 1 and ";" in table.header[0]:
-            self.refuse("has its columns separated by semicolons; separate them by commas")
         for line, cells in self.rows:
             if any(cells[width:]):
                 more = f"{len(cells)} cells, but the header {width}; write decimals with a point"

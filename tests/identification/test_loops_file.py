@@ -98,6 +98,13 @@ def test_positions_come_out_in_si(tmp_path: Path) -> None:
     assert pulled == TipPosition(x=0.09, tension={"cable3_3": 2.0}, std=1e-3)
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_columns_are_separated_as_spreadsheets_do(separator: str, tmp_path: Path) -> None:
+    text = f"{HEAD}a,90.5,5,3,\nb,,6,0,2\n"
+    other = text.replace(",", separator).replace(".", ",").replace("[", "(").replace("]", ")")
+    assert tips(tmp_path, other) == tips(tmp_path, text)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
