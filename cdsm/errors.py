@@ -254,5 +254,5 @@ def need(extra: str, *packages: str) -> None:
         try:
             importlib.import_module(package)
         except ImportError:
-            said = f"{package} is missing; run pip install -e '.[{extra}]' in cdsm's clone."
-            raise CdsmError(said) from None
+            install = f"{sys.executable} -m pip install -e '.[{extra}]'"
+            raise CdsmError(f"{package} is missing; run {install} in cdsm's clone.") from None
