@@ -133,10 +133,12 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
                 raise
             typer.echo("interrupted: no file is half-written; what was saved stays", err=True)
             code = INTERRUPTED
-        except (cdsm.CdsmError, OSError) as error:  # OSError: of the terminal or pipe
+        except (cdsm.CdsmError, OSError, MemoryError) as error:  # OSError: of terminal or pipe
             if debug_wanted.get():
                 raise
             kind, message = type(error).__name__, str(error)
+            if isinstance(error, MemoryError):
+                message = f"out of memory: compute less at once; a sweep can --store. {error}"
             if given["as_json"]:
                 print_json({"error": kind, "message": message, "data": vars(error)})
             else:

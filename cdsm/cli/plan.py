@@ -127,7 +127,7 @@ def sweep(
         raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
     from cdsm.support.status import status_names
     from cdsm.sweeps.cases import DEFAULT
-    from cdsm.sweeps.sweep import write_sweep
+    from cdsm.sweeps.sweep import read_into_memory, write_sweep
 
     robot = options.read(arm, changes)
     low = options.numbers("--minimum", minimum)
@@ -143,6 +143,8 @@ def sweep(
         outputs=names,
         store=store,
     )
+    if store is not None and (out or figure):
+        read_into_memory(dataset, store)
     head, numbers = header(robot, low)
     written = [] if out is None else [str(write_sweep(dataset, out))]
     status = dataset["status"].values
@@ -191,8 +193,8 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
             rest[name] = units[name] * given[0]
             continue
         low, high, count = given
-        if not (count >= 2.0 and count.is_integer() and low != high):
-            raise misuse("--grid", f"{name}={value}: give LOW:HIGH:N with 2 or more angles.")
+        if not (2.0 <= count <= 1e6 and count.is_integer() and low != high):
+            raise misuse("--grid", f"{name}={value}: give LOW:HIGH:N with 2 to 10^6 angles.")
         angles[name] = units[name] * np.linspace(low, high, int(count))
     if not angles:
         raise misuse("--grid", "has no joint with several angles, JOINT=LOW:HIGH:N.")
@@ -225,7 +227,6 @@ def design(
     from cdsm.design.problem_file import read_problem
     from cdsm.design.search import require_smooth
     from cdsm.support.files import make_folder, write_text
-    from cdsm.support.validation import whole_number
 
     task, search = read_problem(problem)
     if (out / "arm.toml").exists() and not (out / "front.csv").exists():
@@ -240,14 +241,16 @@ def design(
         seed=search.seed,
         jobs=checked_threads(None),
     )
-    number = found.compromise
-    if choose is not None:
-        number = whole_number("--choose", choose, 0, len(found.front) - 1)
-    every = found.evaluated.to_csv()
+    number = found.compromise if choose is None else choose
+    every = write_text(folder / "designs.csv", found.evaluated.to_csv())
+    front = write_text(folder / "front.csv", found.best.to_csv())
+    if number >= (count := len(found.front)):
+        said = f"{number} given, but the front has the designs 0 to {count - 1}. See {front}, and"
+        raise misuse("--choose", f"{said} repeat the command with one of them.")
     if refine:
         found, number = cdsm.refine_design(task, found.design(number)), 0
     paths = [
-        write_text(folder / "designs.csv", every),
+        every,
         write_text(folder / "front.csv", found.best.to_csv()),
         cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
         cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),

@@ -180,7 +180,8 @@ def workers(
             return
         # a forked process would inherit threads of BLAS
         with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-            yield lambda rows: counted(pool.map(compute, rows, chunksize=4))
+            # one by one: when a run is stopped, it waits for all designs that were handed out
+            yield lambda rows: counted(pool.map(compute, rows))
 
 
 class InfeasibleDesign(CdsmError):

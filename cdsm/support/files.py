@@ -83,16 +83,21 @@ def write_file(path: str | os.PathLike[str], fill: Callable[[Path], object]) -> 
 
 
 def require_writable(path: Path) -> None:
-    """Raise a FileError if the folder of ``path`` is missing, or ``path`` is no regular file."""
+    """Raise a FileError if ``path`` is no regular file, or the user must not write it."""
     if path.exists() and not path.is_file():
         raise FileError(path, "is not a regular file; give the path of a file.")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise FileError(path, "is write-protected; give another file, or change its permissions.")
     require_folder(path)
 
 
 def require_folder(path: Path) -> None:
-    """Raise a FileError if the parent folder of ``path`` does not exist."""
-    if not path.resolve().parent.is_dir():
+    """Raise a FileError if the parent folder of ``path`` is missing, or must not be written."""
+    folder = path.resolve().parent
+    if not folder.is_dir():
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise FileError(path, f"you may not write in the folder {folder}; give another one.")
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
@@ -100,7 +105,8 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     path = as_path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
+        require_folder(path / "file")
+    except OSError as error:  # also that of require_folder
         raise _failure(path, "created as a folder", error) from None
     return path
 

@@ -8,11 +8,13 @@ is written last.
 from __future__ import annotations
 
 import logging
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,8 +46,11 @@ from cdsm.tension import checked_bounds
 if TYPE_CHECKING:
     import xarray
 
+_Data = TypeVar("_Data", "xarray.Dataset", "xarray.DataArray")
+
 _CHUNK = 2  # a chunk of a store has so many times the postures that are computed together
 _AT_ONCE = 8  # chunks that dask computes before they are written
+_IN_MEMORY = 2**25  # entries of a sweep without a store, of about 200 bytes each
 
 _log = logging.getLogger("cdsm")
 
@@ -136,6 +141,10 @@ def sweep(
     given = getattr(q, "chunks", None) is not None
     shown = flag("progress", progress)
     if store is None:
+        each = q._of(arm).sizes.values() if isinstance(q, PoseSet) else ()
+        if (entries := cases.count * math.prod(each)) > _IN_MEMORY:
+            said = f"is needed: {entries} entries are too many for the memory, which may hold "
+            raise InvalidInput("store", f"{said}{_IN_MEMORY}. Or give fewer postures.")
         return cases.dataset(angles_of(arm, q), shown)
     angles = angles_of(arm, q, _CHUNK * cases.together)
     return _stored(as_path(store), cases, angles, given, shown)
@@ -228,7 +237,7 @@ def _stored(
         q = q.chunk({dim: sizes.get(dim, -1) for dim in dims})
         if not is_new:
             _require_same(path, kept.chunk(sizes), cases.dataset(q))  # chunk by chunk
-        status, names = kept["status"].load(), [*kept.coords]
+        status, names = read_into_memory(kept["status"], path), [*kept.coords]
         slices = lazy.array.core.slices_from_chunks(tuple(q.chunksizes[dim] for dim in dims))
         regions = [dict(zip(dims, part, strict=True)) for part in slices]
         todo = [each for each in regions if (status.isel(each) == Status.PENDING).any()]
@@ -253,15 +262,30 @@ def _stored(
     return read_sweep(path)
 
 
+def read_into_memory(data: _Data, store: Path) -> _Data:
+    """Load data of a store; raise FileError if a chunk of it is damaged."""
+    try:
+        return data.load()
+    except RuntimeError as error:  # of the decoder
+        said = f"is damaged ({error}); delete this folder, and repeat the sweep."
+        raise FileError(store, said) from None
+
+
 def _make(path: Path, template: xarray.Dataset) -> None:
     """Make a store with the coordinates of a lazy sweep, in which every entry is pending."""
     require_folder(path)  # zarr would create it
     encoding = {"status": {"fill_value": np.int8(Status.PENDING)}}
-    with TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as aside:
-        made = Path(aside) / "store"
+
+    def fill(made: Path) -> Path:
         template.to_zarr(made, compute=False, consolidated=False, encoding=encoding)
         template.coords.to_dataset().to_zarr(made, mode="r+", consolidated=False)
-        made.rename(path)
+        return made
+
+    with (
+        TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as aside,
+        ThreadPoolExecutor(1) as writer,  # Ctrl-C waits for it, not for the threads of zarr
+    ):
+        writer.submit(fill, Path(aside) / "store").result().rename(path)
 
 
 def _require_same(path: Path, kept: xarray.Dataset, wanted: xarray.Dataset) -> None:

@@ -352,6 +352,11 @@ def test_design(tmp_path: Path) -> None:
     assert found["designs"] == 16
     assert found["chosen"] == found["compromise"]
     assert max(found["front"]["deflection [m]"]) <= 0.001
+    result = call("design", problem, "--out", tmp_path / "again", "--choose", 99)
+    assert result.exit_code == 2
+    assert "repeat the command with one of them" in " ".join(result.stderr.split())
+    table = (tmp_path / "again" / "front.csv").read_text(encoding="utf-8")
+    assert table == (out / "front.csv").read_text(encoding="utf-8")
 
 
 def test_reproduce_writes_figures_table_and_numbers(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
         ("plan PROBE --direction z --target 3 --max-change-per-sample 1", 2, "needs --path"),
         ("sweep PROBE --random 5", 2, "where the answer goes"),
         ("sweep PROBE --out s.csv", 2, "give one of them"),
-        ("sweep PROBE --grid joint1_1=-9:9:1 --out s.csv", 2, "2 or more angles"),
+        ("sweep PROBE --grid joint1_1=-9:9:1 --out s.csv", 2, "2 to 10^6 angles"),
         ("sweep PROBE --random 5 --out s.csv", 3, "no posture could be evaluated"),
         ("new arm.toml --from PROBE", 2, "is no robot"),
         ("view PROBE --port 70000", 1, "port: 70000"),
@@ -96,6 +97,40 @@ def test_set_is_what_stands_in_the_file(tmp_path: Path) -> None:
     sets = [word for each in words.split() for word in ("--set", each)]
     changed = told("stiffness", path, *sets, "--angles", 5)
     assert changed == told("stiffness", file, "--angles", 5)
+
+
+def test_a_folder_that_must_not_be_written_is_refused_first(
+    probe: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.access", lambda path, mode: not mode & os.W_OK)
+    monkeypatch.setattr(cdsm, "distribute_tension", None)  # nothing is computed
+    page, folder = probe.with_name("page.html"), probe.with_name("new")
+    for words in (
+        ("stiffness", probe, "--check", "--out", page),
+        ("reproduce", "--out", folder),
+        ("sweep", probe, "--random", 5, "--minimum", 9, "--store", folder / "s.zarr"),
+    ):
+        result = call(*words)
+        assert result.exit_code in (1, 2)
+        assert "you may not write in the folder" in " ".join(result.stderr.split())
+
+
+def test_too_little_memory_is_told(probe: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(cdsm, "stiffness", full)
+    assert "out of memory" in told("stiffness", probe, "--minimum", 9, code=1)["message"]
+
+
+def test_a_damaged_store_is_named(probe: Path) -> None:
+    store = probe.with_name("s.zarr")
+    words = ("sweep", probe, "--random", 5, "--minimum", 9, "--store", store)
+    assert call(*words).exit_code == 0
+    for damaged in ("margin", "status"):
+        (store / damaged / "c" / "0").write_bytes(b"no chunk")
+        result = call(*words, "--out", probe.with_name("s.csv"))
+        assert (result.exit_code, "s.zarr: is damaged" in result.stderr) == (1, True)
 
 
 def test_commands_and_their_options_are_few() -> None:

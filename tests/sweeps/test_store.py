@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,36 @@ def test_a_store_holds_what_a_sweep_in_memory_does(tmp_path: Path, whole: xr.Dat
     assert same(swept(store=tmp_path / "s.zarr"), whole)
     assert same(cdsm.read_sweep(tmp_path / "s.zarr"), whole)
     assert [path.name for path in tmp_path.iterdir()] == ["s.zarr"]  # nothing is left beside it
+
+
+def test_ctrl_c_while_a_store_is_made_waits_for_the_threads_that_write_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = xr.Dataset.to_zarr
+
+    def slowly(*args: Any, **options: Any) -> None:
+        def late() -> None:
+            time.sleep(0.3)
+            write(*args, **options)
+
+        thread = threading.Thread(target=late)  # as those of zarr
+        thread.start()
+        time.sleep(0.1)
+        if "compute" in options:  # once
+            os.kill(os.getpid(), signal.SIGINT)
+        thread.join()
+
+    monkeypatch.setattr(xr.Dataset, "to_zarr", slowly)
+    with pytest.raises(KeyboardInterrupt):
+        swept(store=tmp_path / "s.zarr")
+    time.sleep(0.5)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_sweep_that_memory_cannot_hold_needs_a_store() -> None:
+    for poses in (cdsm.RandomPoses(2**26), cdsm.GridPoses({"joint1_1": np.arange(2**14)})):
+        with pytest.raises(cdsm.InvalidInput, match=r"store: is needed: .* Or give fewer"):
+            swept(poses, minimum=np.arange(10.0, 2**12 + 10.0))
 
 
 def test_only_what_is_missing_is_computed(
