@@ -154,8 +154,8 @@ class InfeasibleTension(CdsmError):
             advice = f"Beside the fixed tensions no bounds help: change or free {', '.join(fixed)}."
         elif relaxation == math.inf:
             advice = f"No bounds would help: the cables cannot exert this torque at all. {hint}"
-            advice += "Change the posture, the load, or the routing (in Python, "
-            advice += "print(pose.moment_arms))."
+            advice += "Change the posture, the load, or the routing, or, in Python, look at "
+            advice += "pose.moment_arms."
         else:
             step = 10.0 ** (math.floor(math.log10(relaxation or 1.0)) - 3)
             wider, at = math.ceil(relaxation / step) * step, ", ".join(binding) or "none"

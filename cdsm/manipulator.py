@@ -231,7 +231,12 @@ class Manipulator(Printed):
         """
         from cdsm.arm_file.arm import read_arm  # pydantic: slow to import
 
-        return cls.__new__(cls)._define(**read_arm(path, wire, changes))
+        defined = read_arm(path, wire, changes)
+        try:
+            return cls.__new__(cls)._define(**defined)
+        except InvalidInput as error:
+            error.args = (f"{path}: {error}",)
+            raise
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write an ARM.toml from which :meth:`read` builds an equal arm; return its path.

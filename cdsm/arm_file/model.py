@@ -201,7 +201,7 @@ def _built(given: Any, check: Callable[[Any], Any], info: Info) -> Cables:
     known = info.data
     if known.get("geometry", ...) is None and not isinstance(given, list):
         raise ValueError("give tables [[cables]], one for each cable")
-    tables, faults = check(given or {}), list[str]()
+    tables, faults = check({} if given is None else given), list[str]()
     routes: dict[str, Any]
     if isinstance(tables, tuple):
         routes = {f"[{i}]": each for i, each in enumerate(tables, start=1)}
@@ -280,7 +280,8 @@ def read_model(
     except GeometryError as error:
         faults = listed(error.faults, 20, LINES)
     if faults:  # not inside except: its context could not be pickled
-        raise FileError(path, f"cannot be read as {'an arm' if robot else 'cables'}:{faults}")
+        what = ("an arm" if robot else "cables") + " with these changes" * bool(changes)
+        raise FileError(path, f"cannot be read as {what}:{faults}")
     cables = cast(Cables, file.cables)  # see _built
     if forced is not None:
         return file, Cables(replace(cable, elasticity=forced) for cable in cables)
@@ -288,6 +289,9 @@ def read_model(
     if without:
         whose = f"the cables {listed(without)}" if len(without) < len(cables) else "its cables"
         remedy = 'write at its top: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
-        said = f"has no wire for {whose}. Give wire= (commands: --set wire=48e3), or {remedy}"
+        gives = (
+            "read (commands: --set wire=48e3)" if robot else "read_cables (cdsm new: --wire 48e3)"
+        )
+        said = f"has no wire for {whose}. Give a wire to {gives}, or {remedy}"
         raise FileError(path, said)
     return file, cables

@@ -56,7 +56,8 @@ def new(
         made = _of_robot(source, cables, tip, wire, not no_check_inertia)
         made.write(arm)
     else:
-        for option, value in (("--cables", cables), ("--tip", tip)):
+        only = {"--cables": cables, "--tip": tip, "--no-check-inertia": no_check_inertia or None}
+        for option, value in only.items():
             if value is not None:
                 raise misuse(option, "goes with --from only.")
         counts = _counts("4" if joints is None else joints)
@@ -105,6 +106,8 @@ def _of_robot(
     """Read the arm of a URDF, or of the folder of a CASPR model."""
     law = None if wire is None else _law(wire)
     if source.is_dir():
+        if cables is not None or tip is not None:
+            raise misuse("--cables, --tip", "are those of the CASPR model; leave them out.")
         usual = cdsm.presets.ELASTIC_STAGE
         found = cdsm.read_caspr(source, elasticity=law or usual, check_inertia=check_inertia)
         if law is None:  # after reading: the folder may hold no model
@@ -145,7 +148,7 @@ def export(
         file_opt("URDF, or MuJoCo model under tension.", "OUT.urdf|xml", declare=typer.Argument),
     ],
     changes: options.Changes = None,
-    angles: options.Angles = "0",
+    angles: options.Angles = None,
     minimum: options.Minimum = 0.0,
     actuators: Annotated[
         Literal["length", "tension", "none"], opt("What motors of a MuJoCo model control.")
@@ -161,6 +164,8 @@ def export(
     from cdsm.support.files import write_text
 
     if out.suffix.lower() == ".urdf":  # it has no cables: any wire does
+        if (angles, minimum, actuators) != (None, 0.0, "length"):
+            raise misuse("--angles, --minimum, --actuators", "are those of a MuJoCo model (.xml).")
         found = cdsm.Manipulator.read(arm, 1e5, changes=options.changes_of(changes))
         if found.is_serpentine:
             cdsm.write_urdf(found.geometry, out)
@@ -188,7 +193,7 @@ def export(
 def view(
     arm: options.Arm,
     changes: options.Changes = None,
-    angles: options.Angles = "",
+    angles: options.Angles = None,
     path: options.PathFile = None,
     minimum: options.Minimum = 0.0,
     load: options.Load = None,
@@ -198,7 +203,7 @@ def view(
     """Show an arm in the browser, with sliders, and its stiffness."""
     with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the view, also while it starts
         robot = options.read(arm, changes)
-        start = options.coordinates(angles, robot) if angles else None
+        start = None if angles is None else options.coordinates(angles, robot)
         force = options.load_at_tip(robot, load)
         if force[3:].any():
             raise misuse("--load", "has a moment, but the view has forces only: FX,FY,FZ.")

@@ -53,7 +53,7 @@ _PATH += "x, y, z of the tip [mm]; for plans also target [N/mm]."
 
 Arm = Annotated[Path, typer.Argument(metavar="ARM.toml", help="The arm; `cdsm new` writes one.")]
 Changes = Annotated[list[str] | None, opt(_SET, "KEY=VALUE", "--set")]
-Angles = Annotated[str, opt(_ANGLES, "DEG,...")]
+Angles = Annotated[str | None, opt(_ANGLES, "DEG,...")]
 PathFile = Annotated[Path | None, opt(_PATH, "PATH.csv", "--path")]
 _PULL = "Wire [mm] that each motor takes in, from straight cables at the rest of the springs."
 Held = Annotated[
@@ -77,6 +77,8 @@ def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
     changes: dict[str, Any] = {}
     for text in texts or ():
         key, _, value = text.partition("=")
+        if not value.strip():
+            raise misuse("--set", f"{text!r} has no value; give KEY=VALUE, such as minimum=5.")
         for form in (str, lambda given: str(float(given)), json.dumps):
             try:
                 changes = laid_over(changes, tomllib.loads(f"{key} = {form(value.strip())}"))
@@ -93,7 +95,7 @@ def read(arm: Path, changes: Iterable[str] | None) -> cdsm.Manipulator:
     return cdsm.Manipulator.read(arm, changes=changes_of(changes))
 
 
-def posture(arm: Path, changes: Iterable[str] | None, angles: str) -> cdsm.Posture:
+def posture(arm: Path, changes: Iterable[str] | None, angles: str | None) -> cdsm.Posture:
     """Read an arm and return its posture at --angles."""
     found = read(arm, changes)
     return found.at(coordinates(angles, found))
@@ -124,11 +126,13 @@ def joint_scales(arm: cdsm.Manipulator) -> Array:
     return np.array([scale for _, scale in JointUnits(arm.slides).shown])
 
 
-def coordinates(text: str, arm: cdsm.Manipulator) -> Array:
-    """Return the joint coordinates of --angles (nv,) in SI."""
-    from cdsm.support.validation import number_array
+def coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
+    """Return the joint coordinates of --angles (nv,) in SI; 0 without this option."""
+    from cdsm.support.validation import scalar
 
     names, form = arm.joint_names, "an angle"
+    if text is None:
+        text = "0"
     if "=" in text:
         named = by_joint("--angles", text, arm, "JOINT=DEG,...")
         each = {name: numbers("--angles", value, (1,), form)[0] for name, value in named.items()}
@@ -136,7 +140,8 @@ def coordinates(text: str, arm: cdsm.Manipulator) -> Array:
     else:
         form = f"one angle, one for each of {', '.join(names)}, or some by name: {names[-1]}=10"
         given = numbers("--angles", text, (1, arm.nv), form)
-    return joint_scales(arm) * number_array("--angles", given)
+    pairs = zip(names, given * arm.nv if len(given) == 1 else given, strict=True)
+    return joint_scales(arm) * [scalar(f"--angles of {name}", each) for name, each in pairs]
 
 
 def by_joint(option: str, text: str, arm: cdsm.Manipulator, form: str) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
@@ -23,8 +24,8 @@ Json = dict[str, object]
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether the running command shows tracebacks."""
 
-FAILED, UNMET, INTERRUPTED = 1, 3, 130
-"""Exit codes: an error; the arm does not do what was asked; Ctrl-C. A wrong option has 2.
+FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
+"""Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
 
 UNMET is the exit code of every answer with a warning, such as that of an unstable arm, and of
 errors that say what the arm cannot do.
@@ -33,6 +34,8 @@ errors that say what the arm cannot do.
 _CANNOT: Final = (
     *("InfeasibleDesign", "InfeasibleTension", "EquilibriumError", "UnreachableStiffness"),
 )
+
+_OF_PYTHON: Final = re.compile(r", or, in Python, .*?(?=\.(\s|$))")  # no remedy of a command
 
 
 def misuse(option: str, problem: str) -> typer.BadParameter:
@@ -133,17 +136,21 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
                 raise
             typer.echo("interrupted: no file is half-written; what was saved stays", err=True)
             code = INTERRUPTED
-        except (cdsm.CdsmError, OSError, MemoryError) as error:  # OSError: of terminal or pipe
-            if debug_wanted.get():
+        except (cdsm.CdsmError, OSError, MemoryError, typer.BadParameter) as error:
+            misused = isinstance(error, typer.BadParameter)  # OSError: of the terminal or pipe
+            if debug_wanted.get() or (misused and not given["as_json"]):
                 raise
-            kind, message = type(error).__name__, str(error)
+            kind, message = type(error).__name__, _OF_PYTHON.sub("", str(error))
+            data = vars(error)
+            if isinstance(error, typer.BadParameter):
+                message, data = error.format_message(), {"option": error.param_hint}
             if isinstance(error, MemoryError):
                 message = f"out of memory: compute less at once; a sweep can --store. {error}"
             if given["as_json"]:
-                print_json({"error": kind, "message": message, "data": vars(error)})
+                print_json({"error": kind, "message": message, "data": data})
             else:
                 typer.secho(f"error: {message}", fg="red", err=True)
-            code = UNMET if kind in _CANNOT else FAILED
+            code = MISUSED if misused else UNMET if kind in _CANNOT else FAILED
         raise typer.Exit(code)
 
     return command

@@ -23,7 +23,7 @@ def plan(
     direction: Annotated[str, opt("Direction of the stiffness, such as -y.", "AXIS|X,Y,Z")],
     changes: options.Changes = None,
     target: Annotated[float | None, opt("Wanted stiffness.", "N/mm", min=0.0)] = None,
-    angles: options.Angles = "",
+    angles: options.Angles = None,
     path: options.PathFile = None,
     max_change_per_sample: Annotated[float, opt("Of a tension, along --path.", "N")] = math.inf,
     minimum: options.Minimum = 0.0,
@@ -48,7 +48,7 @@ def plan(
             raise misuse("--target", "give it, or --path.")
         if max_change_per_sample < math.inf:
             raise misuse("--max-change-per-sample", "needs --path.")
-        pose = options.posture(arm, changes, angles or "0")
+        pose = options.posture(arm, changes, angles)
         bounds = minimum, maximum, options.load_at_tip(pose.arm, load, mass)
         attainable = cdsm.stiffness_range(pose, u, *bounds)
         best = cdsm.plan_stiffness(pose, u, wanted, *bounds)
@@ -60,7 +60,7 @@ def plan(
         )
     from cdsm.support.format import plural
 
-    if angles:
+    if angles is not None:
         raise misuse("--angles", "is of one posture; --path has its own.")
     robot = options.read(arm, changes)
     file = options.read_path(path, robot)
@@ -125,9 +125,12 @@ def sweep(
     """
     if out is None and figure is None and store is None:
         raise misuse("--out", "give --out, --figure or --store: where the answer goes.")
+    if figure is None and quantity != "softest":
+        raise misuse("--quantity", "is of --figure; give both.")
     from cdsm.support.status import status_names
     from cdsm.sweeps.cases import DEFAULT
-    from cdsm.sweeps.sweep import read_into_memory, write_sweep
+    from cdsm.sweeps.dataset import read_into_memory
+    from cdsm.sweeps.sweep import write_sweep
 
     robot = options.read(arm, changes)
     low = options.numbers("--minimum", minimum)

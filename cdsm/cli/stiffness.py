@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def stiffness(
     arm: options.Arm,
     changes: options.Changes = None,
-    angles: options.Angles = "",
+    angles: options.Angles = None,
     minimum: options.Minimum = 0.0,
     maximum: options.Maximum = math.inf,
     tension: options.Held = None,
@@ -86,7 +86,7 @@ def stiffness(
 def _balanced(
     arm: cdsm.Manipulator,
     wrench: ArrayLike,
-    angles: str,
+    angles: str | None,
     minimum: float,
     maximum: float,
     tension: str | None,
@@ -94,9 +94,9 @@ def _balanced(
 ) -> tuple[cdsm.Stiffness, Equilibrium | None]:
     """Return K at --angles, or K and the equilibrium where --tension or --pull let the arm rest."""
     if tension is None and pull is None:
-        pose = arm.at(options.coordinates(angles or "0", arm))
+        pose = arm.at(options.coordinates(angles, arm))
         return cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum, maximum, wrench)), None
-    if None not in (tension, pull) or (angles, minimum, maximum) != ("", 0.0, math.inf):
+    if None not in (tension, pull) or (angles, minimum, maximum) != (None, 0.0, math.inf):
         said = "say what the motors do, and the posture follows: give one of them, without "
         raise misuse("--tension, --pull", f"{said}--angles, --minimum and --maximum.")
     option, text = ("--tension", tension) if pull is None else ("--pull", pull)
@@ -172,7 +172,7 @@ def _uncertainty(
 def weigh(
     arm: options.Arm,
     changes: options.Changes = None,
-    angles: options.Angles = "",
+    angles: options.Angles = None,
     minimum: options.Minimum = 0.0,
     maximum: options.Maximum = math.inf,
     tension: options.Held = None,
@@ -259,7 +259,7 @@ def _cycles(
 def buckle(
     arm: options.Arm,
     changes: options.Changes = None,
-    angles: options.Angles = "0",
+    angles: options.Angles = None,
     minimum: options.Minimum = 0.0,
     maximum: options.Maximum = math.inf,
     load: options.Load = None,

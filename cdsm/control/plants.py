@@ -22,7 +22,7 @@ from cdsm.posture import Posture
 from cdsm.statics import quasi_static
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
 from cdsm.stiffness_matrix import Stiffness
-from cdsm.support.validation import instance, quantity, whole_number
+from cdsm.support.validation import instance, quantity, scalar, whole_number
 from cdsm.support.values import Array, frozen
 
 _TANGENTS: Final = 10  # number of updates of the motors' tangents and of the load per step
@@ -206,6 +206,8 @@ class MuJoCoPlant:
         need("mujoco", "mujoco")
         require_unstrained("arm", self.arm)
         quantity("period", self.period, "time")
+        if scalar("damping_ratio", self.damping_ratio) < 0.0:
+            raise InvalidInput("damping_ratio", f"{self.damping_ratio:g} given; 0 or more needed.")
         if self.arm.has_friction:
             raise InvalidInput(
                 "arm", "has friction, which MuJoCo's cables have not; give arm.with_friction(0.0)."

@@ -214,7 +214,7 @@ class Identification(Result, Plotted):
             said = each._shown(self.measured[own], self.predicted[own])
             worst = f"{max(self.residuals[own], key=abs):.2f} σ"
             tests.append((name_of(i, each.label), *said, worst))
-        note = "(95 % from the std of the linear model; confidence() profiles χ²)"
+        note = "(95 % from the std of the linear model; in Python, confidence() profiles χ²)"
         model = f"({frictionless_model(self.arm)}; secant where a force is given; "
         model += "loops with friction; tips at rest)"
         shown = [*aligned(lines), note, "", *aligned(tests), model, "", self._verdict]

@@ -136,9 +136,10 @@ class CriticalLoad(_Critical):
             "buckling": "it buckles without the load already" if none else "there it buckles",
             "infeasible": "beyond, no tensions balance it",
             "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
-            "none": "nothing happens that far",
+            "none": "more was not tried",
         }[self.limit]
         part = "no part of it" if none else f"the load up to a factor of {self.factor:.4g}"
+        part = part if self.factor < math.inf else "half a million times the load"
         return f"holds {part}; {reason}\n{self._softest()}"
 
 

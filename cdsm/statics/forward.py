@@ -228,6 +228,8 @@ def _require_held(arm: LockedArm, home: Posture) -> None:
         return
     worst = int(abs(vectors[:, 0]).argmax())
     name = home.arm.joint_names[worst]
-    said = f"nothing holds {name} where the cables do not pull. Give it a spring: "
-    said += f'with_springs({{"{name}": k}}); or start= where the load acts already'
-    raise EquilibriumError(said, state.residual, 0.0, name)
+    said = f"nothing holds {name} where the cables do not pull"
+    remedy = f"Give such joints springs: springs.{name} = 5 in ARM.toml or by --set, or all of a "
+    remedy += "geometry by its joint_stiffness, or, in Python, arm.with_springs() or start= where "
+    remedy += "the load acts already."
+    raise EquilibriumError(said, state.residual, 0.0, name, remedy)

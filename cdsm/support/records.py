@@ -172,7 +172,11 @@ def _keys(kind: Any) -> set[str]:
 
 def _faults(error: ValidationError, kind: Any) -> list[str]:
     listed: list[str] = []
-    for fault in error.errors():
+    errors = error.errors()
+    for fault in errors:
+        inner = [each for each in errors if each["loc"][: len(fault["loc"])] == fault["loc"]]
+        if fault["type"] == "too_short" and len(inner) > 1:
+            continue  # pydantic does not count faulty entries
         # joints[2].limit counts from 1 like the names of joints and cables
         parts = (each for each in fault["loc"] if each not in (ONE, EACH, "[key]"))
         shown = (f"[{each + 1}]" if isinstance(each, int) else f".{each}" for each in parts)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdsm.errors import InvalidInput
+from cdsm.errors import FileError, InvalidInput
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import JointUnits
 from cdsm.support.progress import progress_bar
@@ -137,6 +138,15 @@ class Labelled(Cases):
         if self.worst_friction:
             about["worst_friction"] = "all segments stay within the bounds, whatever came before"
         return about
+
+
+def read_into_memory(data: Any, store: Path) -> Any:
+    """Load data of a store; raise FileError if a chunk of it is damaged."""
+    try:
+        return data.load()
+    except RuntimeError as error:  # of the decoder
+        said = f"is damaged ({error}); delete this folder, and repeat the sweep."
+        raise FileError(store, said) from None
 
 
 def _dims(name: str) -> list[str]:

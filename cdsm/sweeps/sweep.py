@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,14 +39,12 @@ from cdsm.support.validation import (
     unit_directions,
 )
 from cdsm.sweeps.cases import DEFAULT, QUANTITIES, require
-from cdsm.sweeps.dataset import Labelled
-from cdsm.sweeps.poses import PoseSet, angles_of, distinct
+from cdsm.sweeps.dataset import Labelled, read_into_memory
+from cdsm.sweeps.poses import MAXIMUM_POSES, PoseSet, angles_of, distinct
 from cdsm.tension import checked_bounds
 
 if TYPE_CHECKING:
     import xarray
-
-_Data = TypeVar("_Data", "xarray.Dataset", "xarray.DataArray")
 
 _CHUNK = 2  # a chunk of a store has so many times the postures that are computed together
 _AT_ONCE = 8  # chunks that dask computes before they are written
@@ -141,10 +139,10 @@ def sweep(
     given = getattr(q, "chunks", None) is not None
     shown = flag("progress", progress)
     if store is None:
-        each = q._of(arm).sizes.values() if isinstance(q, PoseSet) else ()
-        if (entries := cases.count * math.prod(each)) > _IN_MEMORY:
-            said = f"is needed: {entries} entries are too many for the memory, which may hold "
-            raise InvalidInput("store", f"{said}{_IN_MEMORY}. Or give fewer postures.")
+        count = math.prod(q._of(arm).sizes.values()) if isinstance(q, PoseSet) else 0
+        if count <= MAXIMUM_POSES and count * cases.count > _IN_MEMORY:
+            said = f"is needed for {count * cases.count} entries; memory takes {_IN_MEMORY}. "
+            raise InvalidInput("store", f"{said}Or give fewer postures.")
         return cases.dataset(angles_of(arm, q), shown)
     angles = angles_of(arm, q, _CHUNK * cases.together)
     return _stored(as_path(store), cases, angles, given, shown)
@@ -230,7 +228,7 @@ def _stored(
 
     lazy: Any = dask  # untyped
     try:
-        if is_new := not path.exists():
+        if is_new := not path.exists() or not any(path.glob("*")):  # an empty folder is replaced
             _make(path, cases.dataset(q))
         kept = read_sweep(path)
         sizes, dims = kept["status"].encoding["preferred_chunks"], q.dims[:-1]
@@ -260,15 +258,6 @@ def _stored(
     except OSError as error:
         raise FileError(path, f"cannot be written: {error}.") from error
     return read_sweep(path)
-
-
-def read_into_memory(data: _Data, store: Path) -> _Data:
-    """Load data of a store; raise FileError if a chunk of it is damaged."""
-    try:
-        return data.load()
-    except RuntimeError as error:  # of the decoder
-        said = f"is damaged ({error}); delete this folder, and repeat the sweep."
-        raise FileError(store, said) from None
 
 
 def _make(path: Path, template: xarray.Dataset) -> None:
@@ -301,4 +290,6 @@ def _require_same(path: Path, kept: xarray.Dataset, wanted: xarray.Dataset) -> N
     except AssertionError as difference:
         said = f"{difference}".replace("Left", "Store (L)").replace("right", "wanted sweep (R)")
         remedy = "Repeat that one, or give another path to store"
-        raise FileError(path, f"contains another sweep. {remedy}.\n{said}") from None
+        lines = zip(*(str(each.attrs["arm"]).splitlines() for each in both), strict=False)
+        arms = "".join(f"\nIts arm has {a!r}, not {b!r}." for a, b in lines if a != b)
+        raise FileError(path, f"contains another sweep. {remedy}.\n{said}{arms:.600}") from None

@@ -87,7 +87,7 @@ def too_few_cables(arm: Manipulator) -> str:
         said = (
             f"{plural(count, 'cable')} and springs hold {plural(joints, 'joint')} only where they"
         )
-        finds = "forward_statics(arm, tension=...) finds it (commands: --tension)"
+        finds = "forward_statics(arm, tension=...) finds it (command: cdsm stiffness --tension)"
         return f"{said} come to rest: {finds}. "
     needed = f"cables only pull, so at least {joints + 1} are needed"
     return f"{plural(count, 'cable')} alone cannot hold {plural(joints, 'joint')}: {needed}. "

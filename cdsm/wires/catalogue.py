@@ -10,7 +10,7 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeGuard
 
-from cdsm.errors import FileError, GeometryError, InvalidInput, did_you_mean, listed
+from cdsm.errors import LINES, FileError, GeometryError, InvalidInput, did_you_mean, listed
 from cdsm.support.files import read_text, write_text
 from cdsm.support.records import read_toml, toml_text
 from cdsm.support.validation import flag, one_of
@@ -70,7 +70,7 @@ def read_law(path: str | os.PathLike[str]) -> Elasticity:
         return from_table(read_toml(read_text(path)))
     except GeometryError as error:
         faults = error.faults
-    raise FileError(path, f"is not an elasticity, {len(faults)} found:{listed(faults)}")
+    raise FileError(path, f"is not an elasticity:{listed(faults, 20, LINES)}")
 
 
 def write_law(law: Elasticity, path: str | os.PathLike[str]) -> Path:

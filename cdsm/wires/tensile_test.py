@@ -12,7 +12,7 @@ import numpy as np
 
 from cdsm.errors import FileError, InvalidInput
 from cdsm.support.tables import read_table
-from cdsm.support.validation import sequence_of
+from cdsm.support.validation import quantity, sequence_of
 from cdsm.support.values import Array, frozen
 
 _LENGTHS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "in": 0.0254}
@@ -35,6 +35,7 @@ _GAUGE: Final = re.compile(
     r"gau?ge[ _-]?length[^\w-]*(mm|cm|m|in)?\b[^\w-]*(-?[\d.,]*\d)\W*(mm|cm|m|in)?\b", re.I
 )
 _KNOWN: Final = {unit for units in _UNITS.values() for unit in units}
+_MARK: Final = " Write decimals alike, with a point, or, in Python, say decimal=."
 _HEADERS: Final = 50  # first lines, among which the header is
 
 
@@ -87,6 +88,8 @@ def read_tensile_csv(
     for name, pair in (("columns", columns), ("units", units)):
         if pair is not None and len(sequence_of(name, pair, str)) != 2:
             raise InvalidInput(name, f"{pair!r} given; give two, of displacement and force.")
+    if gauge_length is not None:
+        quantity("gauge_length", gauge_length, "length")
     if decimal not in (None, ".", ","):
         raise InvalidInput("decimal", f"{decimal!r} given; it is '.' or ','.")
     table = read_table(path, ";\t,", any_encoding=True)
@@ -111,43 +114,44 @@ def read_tensile_csv(
     if not found:
         refuse(
             f"has no header that names {' and '.join(columns or ('displacement', 'force'))} in "
-            f"its first {_HEADERS} lines; there are {', '.join(names) or 'no names'}. Choose two "
-            "by columns."
+            f"its first {_HEADERS} lines; there are {', '.join(names) or 'no names'}. Give two "
+            "of them as columns."
         )
     at, chosen = -at, []
     for kind, places, given in zip(_UNITS, fit, units or (None, None), strict=True):
         if len(places) > 1:
             several = " and ".join(names[k] for k in places)
-            refuse(f"{several} may both be the {kind}; choose by columns.")
+            refuse(f"{several} may both be the {kind}; give one as columns.")
         known, place = _UNITS[kind], places[0]
         written = [_name_and_unit(names[place])[1], *below[place : place + 1]]
         unit = next((each for each in (*written, given) if each in known), None)
         if unit is None or given not in (None, unit):
             refuse(
                 f"has the {kind} {names[place]!r} in {' '.join(written).strip() or 'no unit'}, and "
-                f"units says {given or 'nothing'}; give one of {', '.join(known)}."
+                f"{given or 'none'} is given as units; give one of {', '.join(known)}."
             )
         chosen.append((place, unit, known[unit]))
     (x, x_unit, to_m), (y, _, to_N) = chosen
     ends = [k for k, row in enumerate(rows) if len(row) > max(x, y) and re.search(r"\d", row[y])]
     kept = range(first, max(ends, default=0) + 1)  # text below has no number
     for k in kept:
-        both = values[k][x : x + 1] + values[k][y : y + 1]
-        if len(both) < 2 or not np.isfinite(both).all() or any(rows[k][len(names) :]):
-            refuse(
-                f"line {table.rows[k][0]}: {table.delimiter.join(rows[k])!r} needs a number in "
-                "both columns and no more cells than the header; decimal= tells the decimal mark."
-            )
+        line, row = table.rows[k]
+        for place in (x, y):
+            cell = row[place] if place < len(row) else ""
+            if not math.isfinite(_number(cell, table.delimiter, decimal)):
+                refuse(f"line {line}: {cell!r} under {names[place]!r} is no number.{_MARK}")
+        if any(row[len(names) :]):
+            refuse(f"line {line}: {table.delimiter.join(row)!r} has too many cells.{_MARK}")
     text = "".join(rows[k][place] for k in kept for place in (x, y))
     if not decimal and table.delimiter != "," and {",", "."} <= set(text):
-        refuse("has numbers with commas and with points; decimal= tells the decimal mark.")
+        refuse(f"has numbers with commas and with points.{_MARK}")
     for said in _GAUGE.finditer("\n".join([*table.comments, *map(" ".join, rows[:at])])):
         if gauge_length is None and (unit := said[1] or said[3]):
             gauge_length = _number(said[2], ";", decimal) * _LENGTHS[unit.lower()]
     source = f"{names[x]!r} and {names[y]!r} of line {table.rows[at][0]}"
     if gauge_length is None:
         if x_unit not in _STRAINS:
-            refuse("has no gauge length; give gauge_length, or a line # gauge_length = 500 mm.")
+            refuse("has no gauge length; give one, or add a line # gauge_length = 500 mm.")
         gauge_length = 1.0
         source += "; no gauge length: displacements are those of 1 m of wire"
     to_m *= gauge_length if x_unit in _STRAINS else 1.0

@@ -62,6 +62,7 @@ def test_what_is_left_out_is_nothing_and_friction_of_a_cable_is_that_of_its_hole
         ("48e3", "-1.0", "wires.rope.rigidity"),
         ('kind = "linear"', 'kind = "rubber"', "wires.rope.kind: must be one of linear"),
         ("[0, 0.01, 0.0]", "[0, nan, 0.0]", "sites[1].xyz[2]"),
+        ("[0, 0.01, 0.0]", "[0, 0.01]", "sites[1].xyz[3]: is missing"),
         ('name = "left"', 'name = "left"\nminimum = 5.0\nmaximum = 2.0', "maximum: 2 N given"),
         ('name = "left"', 'name = "left"\nfriction = 2.5', "cables[1].friction: 2.5 given"),
         ("{link", "{friction = 0.1, link", "site 1 has friction or wrap"),
@@ -72,3 +73,6 @@ def test_faults_are_named(before: str, after: str, said: str, tmp_path: Path) ->
     (tmp_path / "cables.toml").write_text(ONE.replace(before, after, 1), encoding="utf-8")
     with pytest.raises(cdsm.FileError, match=f"cables.toml(?s:.*){re.escape(said)}"):
         cdsm.read_cables(tmp_path / "cables.toml")
+    with pytest.raises(cdsm.FileError) as error:
+        cdsm.read_cables(tmp_path / "cables.toml")
+    assert "at least 2 items" not in str(error.value)

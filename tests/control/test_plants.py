@@ -36,6 +36,9 @@ def test_arms_that_a_plant_does_not_simulate_are_refused() -> None:
         cdsm.QuasiStaticPlant(stretched)
     with pytest.raises(cdsm.InvalidInput, match="friction"):
         cdsm.MuJoCoPlant(small_path(0.1).arm)
+    for ratio in (np.nan, -0.1, "0.5"):
+        with pytest.raises(cdsm.InvalidInput, match="damping_ratio"):
+            cdsm.MuJoCoPlant(arm, damping_ratio=ratio)  # type: ignore[arg-type]
 
 
 pytest.importorskip("mujoco")

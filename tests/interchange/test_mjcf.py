@@ -286,6 +286,7 @@ FINGER_POSE, FINGER_PULL = finger()
         ((FINGER_POSE, FINGER_PULL), {"damping_ratio": -0.1}, "damping_ratio: -0.1 given"),
         ((FINGER_POSE, FINGER_PULL), {"damping": 0.1, "damping_ratio": 0.1}, "not both"),
         ((), {"actuators": "length"}, "give pose and tension"),
+        ((), {"actuators": ""}, "no kind of actuators"),
         ((random_posture(mixed_arm(), 1), FINGER_PULL), {}, "another arm"),
     ],
 )

@@ -116,7 +116,7 @@ def test_what_cannot_be_solved_is_named(given: Any, said: str) -> None:
     with pytest.raises(cdsm.InvalidInput, match="pull: cable8_1 has control='force'"):
         cdsm.forward_statics(forced, pull=[0.0, 0.0, 0.0])
     loose = ARM.with_springs(dict.fromkeys(ARM.joint_names[:-1], 1.0))
-    with pytest.raises(cdsm.EquilibriumError, match="nothing holds joint8_2"):
+    with pytest.raises(cdsm.EquilibriumError, match=r"nothing holds joint8_2.*with_springs\(\)"):
         cdsm.forward_statics(loose, tension=TENSION)
 
 

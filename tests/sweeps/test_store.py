@@ -93,8 +93,14 @@ def test_ctrl_c_while_a_store_is_made_waits_for_the_threads_that_write_it(
 
 def test_a_sweep_that_memory_cannot_hold_needs_a_store() -> None:
     for poses in (cdsm.RandomPoses(2**26), cdsm.GridPoses({"joint1_1": np.arange(2**14)})):
-        with pytest.raises(cdsm.InvalidInput, match=r"store: is needed: .* Or give fewer"):
+        with pytest.raises(cdsm.InvalidInput, match=r"store: is needed for .* Or give fewer"):
             swept(poses, minimum=np.arange(10.0, 2**12 + 10.0))
+
+
+def test_an_empty_folder_becomes_a_store(tmp_path: Path) -> None:
+    (tmp_path / "s.zarr").mkdir()
+    poses = cdsm.RandomPoses(3)
+    xr.testing.assert_equal(swept(poses, store=tmp_path / "s.zarr"), swept(poses))
 
 
 def test_only_what_is_missing_is_computed(
@@ -148,7 +154,10 @@ def test_a_killed_run_goes_on_to_the_same_numbers(tmp_path: Path) -> None:
         ({"minimum": [1.0, 20.0, 61.0]}, r"minimum(?s:.*)60\.0(?s:.*)61\.0"),
         ({"maximum": 99.0}, r"maximum(?s:.*)inf(?s:.*)99\.0"),
         ({"outputs": "margin"}, "outputs"),
-        ({"arm": short_arm(spring=1e6)}, "Differing attributes(?s:.*)arm"),
+        (
+            {"arm": short_arm(spring=1e6)},
+            "Differing attributes(?s:.*)arm(?s:.*)Its arm has .*1000000",
+        ),
         ({"q": cdsm.GridPoses({"joint1_1": [0.1]})}, "joint3_2"),
         ({"q": np.full((1, 6), 0.1)}, "pose"),
     ],
@@ -163,6 +172,7 @@ def test_a_store_of_another_sweep_is_refused_with_the_difference(
         swept(**changes, store=path)
     folder = path.with_name("folder.zarr")
     folder.mkdir(exist_ok=True)
+    (folder / "notes.txt").touch()
     with pytest.raises(cdsm.FileError, match="folder"):
         swept(store=folder)
 
