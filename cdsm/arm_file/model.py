@@ -289,9 +289,7 @@ def read_model(
     if without:
         whose = f"the cables {listed(without)}" if len(without) < len(cables) else "its cables"
         remedy = 'write at its top: wire = "1x19-1.2mm", or wire = 48e3 for a constant EA in N.'
-        gives = (
-            "read (commands: --set wire=48e3)" if robot else "read_cables (cdsm new: --wire 48e3)"
-        )
+        gives = "read (commands: --set wire=48e3)" if robot else "read_cables (cdsm new: --wire)"
         said = f"has no wire for {whose}. Give a wire to {gives}, or {remedy}"
         raise FileError(path, said)
     return file, cables

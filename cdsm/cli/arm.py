@@ -167,10 +167,7 @@ def export(
         if (angles, minimum, actuators) != (None, 0.0, "length"):
             raise misuse("--angles, --minimum, --actuators", "are those of a MuJoCo model (.xml).")
         found = cdsm.Manipulator.read(arm, 1e5, changes=options.changes_of(changes))
-        if found.is_serpentine:
-            cdsm.write_urdf(found.geometry, out)
-        else:
-            write_text(out, found.urdf)
+        write_text(out, found.urdf)
         return answer(as_json, _facts(found, out), found, f"written: {out}")
     from cdsm.interchange.mjcf import mujoco_model
     from cdsm.support.format import JointUnits, key

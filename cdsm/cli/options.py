@@ -71,15 +71,13 @@ AsJson = Annotated[bool, opt("Print answer (SI) and errors as JSON.", None, "--j
 
 
 def changes_of(texts: Iterable[str] | None) -> dict[str, Any]:
-    """Parse the texts of --set; a value that is no TOML is a number such as .5, or a string."""
+    """Parse the texts of --set; what is no TOML is a number such as .5, or a string."""
     from cdsm.support.records import laid_over
 
     changes: dict[str, Any] = {}
     for text in texts or ():
         key, _, value = text.partition("=")
-        if not value.strip():
-            raise misuse("--set", f"{text!r} has no value; give KEY=VALUE, such as minimum=5.")
-        for form in (str, lambda given: str(float(given)), json.dumps):
+        for form in (str, lambda x: str(float(x)), lambda x: json.dumps(x or None)):
             try:
                 changes = laid_over(changes, tomllib.loads(f"{key} = {form(value.strip())}"))
                 break
@@ -131,15 +129,13 @@ def coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
     from cdsm.support.validation import scalar
 
     names, form = arm.joint_names, "an angle"
-    if text is None:
-        text = "0"
-    if "=" in text:
+    if text is not None and "=" in text:
         named = by_joint("--angles", text, arm, "JOINT=DEG,...")
         each = {name: numbers("--angles", value, (1,), form)[0] for name, value in named.items()}
         given = [each.get(name, 0.0) for name in names]
     else:
         form = f"one angle, one for each of {', '.join(names)}, or some by name: {names[-1]}=10"
-        given = numbers("--angles", text, (1, arm.nv), form)
+        given = numbers("--angles", "0" if text is None else text, (1, arm.nv), form)
     pairs = zip(names, given * arm.nv if len(given) == 1 else given, strict=True)
     return joint_scales(arm) * [scalar(f"--angles of {name}", each) for name, each in pairs]
 

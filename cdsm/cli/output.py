@@ -24,8 +24,8 @@ Json = dict[str, object]
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether the running command shows tracebacks."""
 
-FAILED, MISUSED, UNMET, INTERRUPTED = 1, 2, 3, 130
-"""Exit codes: an error; a wrong option; the arm does not do what was asked; Ctrl-C.
+FAILED, UNMET, INTERRUPTED = 1, 3, 130
+"""Exit codes: an error; the arm does not do what was asked; Ctrl-C. A wrong option has 2.
 
 UNMET is the exit code of every answer with a warning, such as that of an unstable arm, and of
 errors that say what the arm cannot do.
@@ -34,7 +34,6 @@ errors that say what the arm cannot do.
 _CANNOT: Final = (
     *("InfeasibleDesign", "InfeasibleTension", "EquilibriumError", "UnreachableStiffness"),
 )
-
 _OF_PYTHON: Final = re.compile(r", or, in Python, .*?(?=\.(\s|$))")  # no remedy of a command
 
 
@@ -136,21 +135,22 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
                 raise
             typer.echo("interrupted: no file is half-written; what was saved stays", err=True)
             code = INTERRUPTED
-        except (cdsm.CdsmError, OSError, MemoryError, typer.BadParameter) as error:
-            misused = isinstance(error, typer.BadParameter)  # OSError: of the terminal or pipe
-            if debug_wanted.get() or (misused and not given["as_json"]):
+        except typer.BadParameter as error:
+            if not given["as_json"]:
+                raise
+            print_json({"error": "BadParameter", "message": error.format_message(), "data": {}})
+            code = error.exit_code
+        except (cdsm.CdsmError, OSError, MemoryError) as error:  # OSError: of terminal or pipe
+            if debug_wanted.get():
                 raise
             kind, message = type(error).__name__, _OF_PYTHON.sub("", str(error))
-            data = vars(error)
-            if isinstance(error, typer.BadParameter):
-                message, data = error.format_message(), {"option": error.param_hint}
             if isinstance(error, MemoryError):
                 message = f"out of memory: compute less at once; a sweep can --store. {error}"
             if given["as_json"]:
-                print_json({"error": kind, "message": message, "data": data})
+                print_json({"error": kind, "message": message, "data": vars(error)})
             else:
                 typer.secho(f"error: {message}", fg="red", err=True)
-            code = MISUSED if misused else UNMET if kind in _CANNOT else FAILED
+            code = UNMET if kind in _CANNOT else FAILED
         raise typer.Exit(code)
 
     return command

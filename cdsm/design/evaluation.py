@@ -180,8 +180,7 @@ def workers(
             return
         # a forked process would inherit threads of BLAS
         with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-            # one by one: when a run is stopped, it waits for all designs that were handed out
-            yield lambda rows: counted(pool.map(compute, rows))
+            yield lambda rows: counted(pool.map(compute, rows))  # Ctrl-C waits for each chunk
 
 
 class InfeasibleDesign(CdsmError):

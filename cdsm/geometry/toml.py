@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from inspect import signature
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
@@ -20,8 +19,6 @@ _ARM_KEYS = (
     *("slack", "gain", "tolerances"),
 )
 
-_FORMS = ("sections", "universal", "hinged", "backbone", "geometry")
-
 
 def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Split the parsed TOML of an arm into the keys of its geometry and all others.
@@ -37,7 +34,8 @@ def split_geometry(data: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
 
 def build(data: Mapping[str, Any]) -> Geometry:
     """Build a geometry from parsed TOML as :meth:`Geometry.read`; GeometryError lists faults."""
-    kind = next((key for key in _FORMS if key in data), "")
+    forms = ("sections", "universal", "hinged", "backbone", "geometry")
+    kind = next((key for key in forms if key in data), "")
     if not kind and not data.keys() & {"joints", "links"}:
         found = ", ".join(data) or "nothing"
         forms_known = "[universal], [hinged], [backbone], [[sections]] or joints"
@@ -45,21 +43,17 @@ def build(data: Mapping[str, Any]) -> Geometry:
     if kind == "sections":
         return Geometry.sections(**vars(parse(_Sections, data)))
     if kind and len(data) > 1:
-        raise GeometryError([_outside(key, kind) for key in data if key != kind])
+        inside = f"stands outside [{kind}]; if it belongs there, write it below [{kind}]"
+        said = dict.fromkeys(data, inside)
+        for key in data:
+            if hint := did_you_mean(key, _ARM_KEYS, least=0.8):
+                said[key] = f"is not a key that is known here{hint}"
+        said |= dict.fromkeys(forms, f"stands beside [{kind}]; an arm has one of them")
+        raise GeometryError([f"{key}: {said[key]}" for key in data if key != kind])
     table = data[kind] if kind else data
     if not isinstance(table, dict):
         raise GeometryError([f"{kind}: is {table!r}; give a table [{kind}]"])
     return parse(Geometry, table) if kind in ("", "geometry") else getattr(Geometry, kind)(**table)
-
-
-def _outside(key: str, kind: str) -> str:
-    """Return the fault of a key beside the table of a geometry."""
-    if key in _FORMS:
-        return f"{key}: stands beside [{kind}]; an arm has one of them"
-    hint = did_you_mean(key, _ARM_KEYS)
-    if hint and key not in signature(getattr(Geometry, kind, build)).parameters:
-        return f"{key}: is not a key that is known here{hint}"
-    return f"{key}: stands outside [{kind}]; if it belongs there, write it below [{kind}]"
 
 
 @record

@@ -154,8 +154,7 @@ def mujoco_model(
     if pose is not None and instance("pose", pose, Posture).arm != arm:
         raise InvalidInput("pose", "is of another arm; take arm.at(q).")
     K = None if pose is None or tension is None else stiffness(pose, tension)
-    if actuators is None:
-        actuators = "none" if K is None else "length"
+    actuators = ("none" if K is None else "length") if actuators is None else actuators
     one_of("kind of actuators", actuators, _CONTROLS)
     if K is None and (actuators == "length" or damping_ratio is not None):
         name = "actuators" if damping_ratio is None else "damping_ratio"

@@ -136,10 +136,9 @@ class CriticalLoad(_Critical):
             "buckling": "it buckles without the load already" if none else "there it buckles",
             "infeasible": "beyond, no tensions balance it",
             "elasticity": "beyond, a tension leaves the domain of its cable's elasticity",
-            "none": "more was not tried",
+            "none": "half a million times it was tried",
         }[self.limit]
         part = "no part of it" if none else f"the load up to a factor of {self.factor:.4g}"
-        part = part if self.factor < math.inf else "half a million times the load"
         return f"holds {part}; {reason}\n{self._softest()}"
 
 

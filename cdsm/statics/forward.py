@@ -228,8 +228,7 @@ def _require_held(arm: LockedArm, home: Posture) -> None:
         return
     worst = int(abs(vectors[:, 0]).argmax())
     name = home.arm.joint_names[worst]
+    remedy = f"Give such joints springs in ARM.toml or by --set (springs.{name} = 5, or joint_"
+    remedy += "stiffness of the geometry), or, in Python, by with_springs(); or start= under load."
     said = f"nothing holds {name} where the cables do not pull"
-    remedy = f"Give such joints springs: springs.{name} = 5 in ARM.toml or by --set, or all of a "
-    remedy += "geometry by its joint_stiffness, or, in Python, arm.with_springs() or start= where "
-    remedy += "the load acts already."
     raise EquilibriumError(said, state.residual, 0.0, name, remedy)

@@ -86,18 +86,17 @@ def require_writable(path: Path) -> None:
     """Raise a FileError if ``path`` is no regular file, or the user must not write it."""
     if path.exists() and not path.is_file():
         raise FileError(path, "is not a regular file; give the path of a file.")
-    if path.exists() and not os.access(path, os.W_OK):
-        raise FileError(path, "is write-protected; give another file, or change its permissions.")
     require_folder(path)
 
 
 def require_folder(path: Path) -> None:
-    """Raise a FileError if the parent folder of ``path`` is missing, or must not be written."""
+    """Raise a FileError if the folder of ``path`` is missing, or one of both is protected."""
     folder = path.resolve().parent
     if not folder.is_dir():
         raise FileError(path, f"the folder {path.parent} does not exist; create it.")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise FileError(path, f"you may not write in the folder {folder}; give another one.")
+    for each, mode in ((folder, os.W_OK | os.X_OK), (path, os.W_OK)):
+        if each.exists() and not os.access(each, mode):
+            raise FileError(path, f"you may not write to {each}; give another place.")
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

@@ -172,11 +172,7 @@ def _keys(kind: Any) -> set[str]:
 
 def _faults(error: ValidationError, kind: Any) -> list[str]:
     listed: list[str] = []
-    errors = error.errors()
-    for fault in errors:
-        inner = [each for each in errors if each["loc"][: len(fault["loc"])] == fault["loc"]]
-        if fault["type"] == "too_short" and len(inner) > 1:
-            continue  # pydantic does not count faulty entries
+    for fault in error.errors():
         # joints[2].limit counts from 1 like the names of joints and cables
         parts = (each for each in fault["loc"] if each not in (ONE, EACH, "[key]"))
         shown = (f"[{each + 1}]" if isinstance(each, int) else f".{each}" for each in parts)
@@ -184,6 +180,8 @@ def _faults(error: ValidationError, kind: Any) -> list[str]:
         cause = fault.get("ctx", {}).get("error")
         if isinstance(cause, ValueError):
             listed += faults_at(where, cause)
+        elif fault["type"] == "too_short" and any(each.startswith(where) for each in listed):
+            continue  # pydantic does not count faulty entries
         elif fault["type"].startswith("missing"):
             listed.append(f"{where}: is missing")
         elif fault["type"] == "unexpected_keyword_argument":

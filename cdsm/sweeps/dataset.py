@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -140,13 +139,12 @@ class Labelled(Cases):
         return about
 
 
-def read_into_memory(data: Any, store: Path) -> Any:
+def read_into_memory(data: Any, store: object) -> Any:
     """Load data of a store; raise FileError if a chunk of it is damaged."""
     try:
         return data.load()
     except RuntimeError as error:  # of the decoder
-        said = f"is damaged ({error}); delete this folder, and repeat the sweep."
-        raise FileError(store, said) from None
+        raise FileError(store, f"is damaged ({error}); delete it, and repeat the sweep.") from None
 
 
 def _dims(name: str) -> list[str]:

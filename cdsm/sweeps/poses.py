@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 MAXIMUM_POSES = 2**30
 """Maximum number of postures of a sweep; scipy's Sobol sequence has 30 bits."""
 
+_IN_MEMORY = 2**25  # postures without a store; each takes some 200 bytes in each case
 _ALL = slice(None)
 
 
@@ -51,7 +52,7 @@ class PoseSet(ABC):
 
         Raises:
             InvalidInput: The arm has no such joint. The set does not fit the arm, or has more than
-                2³⁰ postures.
+                2³⁰ postures, 2²⁵ without ``chunk``.
             CdsmError: xarray, or dask for chunks, is not installed.
         """
         return angles_of(arm, self, None if chunk is None else whole_number("chunk", chunk, 1))
@@ -214,9 +215,9 @@ def angles_of(
     if isinstance(q, xarray.DataArray):
         return _checked(arm, q, chunk)
     sizes, angles, description, coordinates = _postures_of(arm, q)
-    if math.prod(sizes.values()) > MAXIMUM_POSES:
+    if math.prod(sizes.values()) > (_IN_MEMORY if chunk is None else MAXIMUM_POSES):
         size = " x ".join(map(str, sizes.values()))
-        raise InvalidInput("q", f"has {size} postures; 2^30 are taken at most.")
+        raise InvalidInput("q", f"has {size} postures; 2^30 are taken at most, 2^25 in memory.")
     if chunk is None:
         values: Any = angles(*[_ALL] * len(sizes))
     else:

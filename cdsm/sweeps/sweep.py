@@ -8,7 +8,6 @@ is written last.
 from __future__ import annotations
 
 import logging
-import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -40,7 +39,7 @@ from cdsm.support.validation import (
 )
 from cdsm.sweeps.cases import DEFAULT, QUANTITIES, require
 from cdsm.sweeps.dataset import Labelled, read_into_memory
-from cdsm.sweeps.poses import MAXIMUM_POSES, PoseSet, angles_of, distinct
+from cdsm.sweeps.poses import PoseSet, angles_of, distinct
 from cdsm.tension import checked_bounds
 
 if TYPE_CHECKING:
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
 
 _CHUNK = 2  # a chunk of a store has so many times the postures that are computed together
 _AT_ONCE = 8  # chunks that dask computes before they are written
-_IN_MEMORY = 2**25  # entries of a sweep without a store, of about 200 bytes each
 
 _log = logging.getLogger("cdsm")
 
@@ -139,10 +137,6 @@ def sweep(
     given = getattr(q, "chunks", None) is not None
     shown = flag("progress", progress)
     if store is None:
-        count = math.prod(q._of(arm).sizes.values()) if isinstance(q, PoseSet) else 0
-        if count <= MAXIMUM_POSES and count * cases.count > _IN_MEMORY:
-            said = f"is needed for {count * cases.count} entries; memory takes {_IN_MEMORY}. "
-            raise InvalidInput("store", f"{said}Or give fewer postures.")
         return cases.dataset(angles_of(arm, q), shown)
     angles = angles_of(arm, q, _CHUNK * cases.together)
     return _stored(as_path(store), cases, angles, given, shown)
@@ -228,7 +222,7 @@ def _stored(
 
     lazy: Any = dask  # untyped
     try:
-        if is_new := not path.exists() or not any(path.glob("*")):  # an empty folder is replaced
+        if is_new := not path.exists() or (path.is_dir() and not [*path.iterdir()]):
             _make(path, cases.dataset(q))
         kept = read_sweep(path)
         sizes, dims = kept["status"].encoding["preferred_chunks"], q.dims[:-1]

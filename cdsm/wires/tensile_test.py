@@ -114,8 +114,7 @@ def read_tensile_csv(
     if not found:
         refuse(
             f"has no header that names {' and '.join(columns or ('displacement', 'force'))} in "
-            f"its first {_HEADERS} lines; there are {', '.join(names) or 'no names'}. Give two "
-            "of them as columns."
+            f"its first {_HEADERS} lines; there are {', '.join(names) or 'none'}; which columns?"
         )
     at, chosen = -at, []
     for kind, places, given in zip(_UNITS, fit, units or (None, None), strict=True):
@@ -139,7 +138,8 @@ def read_tensile_csv(
         for place in (x, y):
             cell = row[place] if place < len(row) else ""
             if not math.isfinite(_number(cell, table.delimiter, decimal)):
-                refuse(f"line {line}: {cell!r} under {names[place]!r} is no number.{_MARK}")
+                mark = _MARK * ("," in cell)
+                refuse(f"line {line}: {cell!r} under {names[place]!r} is no number.{mark}")
         if any(row[len(names) :]):
             refuse(f"line {line}: {table.delimiter.join(row)!r} has too many cells.{_MARK}")
     text = "".join(rows[k][place] for k in kept for place in (x, y))

@@ -91,7 +91,7 @@ def test_of_two_gauges_none_is_chosen_silently() -> None:
     ("text", "given", "said"),
     [
         ("", {}, "no header that names displacement and force in its first 50 lines"),
-        ("weight [N],force [N]\n0,0\n", {}, "there are weight [N], force [N]. Give two of"),
+        ("weight [N],force [N]\n0,0\n", {}, "there are weight [N], force [N]; which"),
         ("s,F\n0,0\n", {"columns": ("Weg", "F")}, "names Weg and F"),
         ("force [N],load [N],stroke [mm]\n0,0,0\n", {}, "force [N] and load [N] may both"),
         ("displacement,force [N]\n0,0\n", {}, "the displacement 'displacement' in no unit"),
