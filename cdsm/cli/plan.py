@@ -104,7 +104,7 @@ def sweep(
     out: Annotated[Path | None, file_opt("Table to write, SI.", "FILE.nc|csv", "--out")] = None,
     changes: options.Changes = None,
     grid: Annotated[str | None, opt(_GRID, "JOINT=LOW:HIGH:N,...")] = None,
-    path: options.PathFile = None,
+    path: Annotated[Path | None, opt(options.OF_JOINTS, "PATH.csv")] = None,
     random: Annotated[int | None, opt("Sobol points within the joint limits.", "N", min=1)] = None,
     minimum: Annotated[str, opt("Lower bounds of all tensions [N], a case each.", "N,...")] = "0",
     maximum: options.Maximum = math.inf,
@@ -176,8 +176,8 @@ def _postures(
         return _grid(grid, arm)
     if path is not None:
         file = options.read_path(path, arm)
-        if file.angles is None or file.target is not None:
-            raise cdsm.FileError(path, "has tips or targets; a sweep needs joint angles.")
+        if file.angles is None:
+            raise cdsm.FileError(path, "has tips; a sweep needs joint angles.")
         return cdsm.PathPoses(file.angles)
     return cdsm.RandomPoses(random or 0)
 

@@ -207,7 +207,9 @@ def weigh(
         result, more, note = _cycles(pose, start, weight, cycles, steps or 12)
         write(out, result.write)
     elif weight[3:].any():
-        raise misuse("--load", "has a moment, but a weight is a force: FX,FY,FZ.")
+        raise misuse(
+            "--load", "has a moment, but a weight is a force: FX,FY,FZ. --cycles takes moments."
+        )
     else:
         more, result = {}, cdsm.weight_test(pose, start, weight[:3], steps=steps or 5)
         without = " without friction" if pose.arm.has_friction else ""

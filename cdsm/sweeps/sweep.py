@@ -7,10 +7,12 @@ is written last.
 
 from __future__ import annotations
 
+import fcntl
 import logging
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -224,34 +226,50 @@ def _stored(
     try:
         if is_new := not path.exists() or (path.is_dir() and not [*path.iterdir()]):
             _make(path, cases.dataset(q))
-        kept = read_sweep(path)
-        sizes, dims = kept["status"].encoding["preferred_chunks"], q.dims[:-1]
-        q = q.chunk({dim: sizes.get(dim, -1) for dim in dims})
-        if not is_new:
-            _require_same(path, kept.chunk(sizes), cases.dataset(q))  # chunk by chunk
-        status, names = read_into_memory(kept["status"], path), [*kept.coords]
-        slices = lazy.array.core.slices_from_chunks(tuple(q.chunksizes[dim] for dim in dims))
-        regions = [dict(zip(dims, part, strict=True)) for part in slices]
-        todo = [each for each in regions if (status.isel(each) == Status.PENDING).any()]
-        if len(todo) < len(regions):
-            shown = cases.arm.name, len(regions) - len(todo), len(regions)
-            _log.warning("sweep of %s resumes: %d of %d chunks are kept", *shown)
-        many = _AT_ONCE if by_dask else 1
-        with progress_bar("sweep", len(todo), wanted=progress) as advance:
-            for some in (todo[i : i + many] for i in range(0, len(todo), many)):
-                angles = [q.isel(region) for region in some]
-                if not by_dask:  # a Dataset of numbers is computed at once, by all threads
-                    angles = lazy.compute(*angles, scheduler="synchronous")
-                parts = lazy.compute(*(cases.dataset(each).drop_vars(names) for each in angles))
-                for region, part in zip(some, parts, strict=True):
-                    for each in (part.drop_vars("status"), part[["status"]]):  # status last
-                        each.to_zarr(path, region=region, consolidated=False)
-                    advance(1)
+        with _only_writer(path):
+            kept = read_sweep(path)
+            sizes, dims = kept["status"].encoding["preferred_chunks"], q.dims[:-1]
+            q = q.chunk({dim: sizes.get(dim, -1) for dim in dims})
+            if not is_new:
+                _require_same(path, kept.chunk(sizes), cases.dataset(q))  # chunk by chunk
+            status, names = read_into_memory(kept["status"], path), [*kept.coords]
+            slices = lazy.array.core.slices_from_chunks(tuple(q.chunksizes[dim] for dim in dims))
+            regions = [dict(zip(dims, part, strict=True)) for part in slices]
+            todo = [each for each in regions if (status.isel(each) == Status.PENDING).any()]
+            if len(todo) < len(regions):
+                shown = cases.arm.name, len(regions) - len(todo), len(regions)
+                _log.warning("sweep of %s resumes: %d of %d chunks are kept", *shown)
+            many = _AT_ONCE if by_dask else 1
+            with progress_bar("sweep", len(todo), wanted=progress) as advance:
+                for some in (todo[i : i + many] for i in range(0, len(todo), many)):
+                    angles = [q.isel(region) for region in some]
+                    if not by_dask:  # a Dataset of numbers is computed at once, by all threads
+                        angles = lazy.compute(*angles, scheduler="synchronous")
+                    parts = lazy.compute(*(cases.dataset(each).drop_vars(names) for each in angles))
+                    for region, part in zip(some, parts, strict=True):
+                        for each in (part.drop_vars("status"), part[["status"]]):  # status last
+                            each.to_zarr(path, region=region, consolidated=False)
+                        advance(1)
     except FileError:
         raise
     except OSError as error:
         raise FileError(path, f"cannot be written: {error}.") from error
     return read_sweep(path)
+
+
+@contextmanager
+def _only_writer(path: Path) -> Iterator[None]:
+    """Lock a store; FileError if another sweep writes to it. The lock ends with its process."""
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            said = "another sweep writes to it; wait for that one, or give another path to store."
+            raise FileError(path, said) from None
+        yield
+    finally:
+        os.close(folder)
 
 
 def _make(path: Path, template: xarray.Dataset) -> None:

@@ -178,6 +178,22 @@ def test_a_store_of_another_sweep_is_refused_with_the_difference(
         swept(store=folder)
 
 
+def test_a_second_writer_is_refused(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    cdsm.sweep(short_arm(), GRID, store=store, **CASES)
+    writer = "import sys; from pathlib import Path; from cdsm.sweeps.sweep import _only_writer\n"
+    writer += f"with _only_writer(Path({str(store)!r})): print('locked', flush=True); input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", writer], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"locked\n"
+        with pytest.raises(cdsm.FileError, match="another sweep writes to it"):
+            cdsm.sweep(short_arm(), GRID, store=store, **CASES)
+        other.communicate(b"\n")
+    cdsm.sweep(short_arm(), GRID, store=store, **CASES)
+
+
 def test_netcdf_gives_the_same_sweep_back(tmp_path: Path, whole: xr.Dataset) -> None:
     path = write_sweep(whole, tmp_path / "s.nc")
     xr.testing.assert_identical(cdsm.read_sweep(path), whole)
