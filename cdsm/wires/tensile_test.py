@@ -93,6 +93,8 @@ def read_tensile_csv(
     if decimal not in (None, ".", ","):
         raise InvalidInput("decimal", f"{decimal!r} given; it is '.' or ','.")
     table = read_table(path, ";\t,", any_encoding=True)
+    micro = [(line, [cell.replace("μ", "µ") for cell in row]) for line, row in table.rows]
+    table = table._replace(rows=micro)  # not the Greek letter
 
     def refuse(problem: str) -> NoReturn:
         raise FileError(path, problem)

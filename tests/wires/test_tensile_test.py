@@ -57,6 +57,7 @@ def test_encodings(encoding: str, tmp_path: Path) -> None:
         ("Gage Length (in): 19.68504\nPosition in mm,force_cN\n0,0\n1.5,1e4\n", {}),
         ("# gauge_length=500mm\nTime,Extension,Load\n(s),(mm),(N)\n0,0,0\n1,1.5,100\n", {}),
         ("displacement µm,load/lbf\n0,0\n1500,22.48089431\n", HALF),
+        ("displacement [μm],load [N]\n0,0\n1500,100\n", HALF),  # the Greek letter
         ("displacement,force\n0,0\n1.5,0.1\n", {"units": ("mm", "kN"), **HALF}),
         ("strain [%],force [N]\n0,0\n0.3,100\n", HALF),
         ("Strain,force [N]\n0,0\n0.003,100\n", {"units": ("strain", "N"), **HALF}),
