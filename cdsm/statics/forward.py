@@ -228,7 +228,10 @@ def _require_held(arm: LockedArm, home: Posture) -> None:
         return
     worst = int(abs(vectors[:, 0]).argmax())
     name = home.arm.joint_names[worst]
-    remedy = f"Give such joints springs in ARM.toml or by --set (springs.{name} = 5, or joint_"
-    remedy += "stiffness of the geometry), or, in Python, by with_springs(); or start= under load."
-    said = f"nothing holds {name} where the cables do not pull"
+    k = home.arm.springs.matrix[worst, worst]
+    weak = f"the spring of {name}, {k:.4g} N m/rad, is too weak for its weight"
+    said = f"{weak if k else f'nothing holds {name}'} where the cables do not pull"
+    remedy = "Give all such joints springs at once, which replace those they have: springs.JOINT = "
+    remedy += "5 in ARM.toml or by --set, or joint_stiffness of the geometry, or, in Python, by "
+    remedy += "with_springs(); or start= under load."
     raise EquilibriumError(said, state.residual, 0.0, name, remedy)
