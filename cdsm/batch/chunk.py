@@ -22,7 +22,7 @@ from cdsm.manipulator import LIMIT_SLACK
 from cdsm.routing import SHORTEST_SEGMENT
 from cdsm.support.status import Status
 from cdsm.support.values import Array, frozen
-from cdsm.tension.infeasibility import is_infeasible
+from cdsm.tension.infeasibility import is_infeasible, is_proved_infeasible
 from cdsm.tension.solvers import DEFAULT_SOLVER, Problem, nondimensional, solve
 
 if TYPE_CHECKING:
@@ -239,6 +239,8 @@ class Chunk:
 def _least(problem: Problem) -> tuple[Array, Status]:
     """Return the least tensions F (C,) [N] and OK, or the reason why there are none."""
     try:
+        if is_proved_infeasible(problem):  # most rows for which the kernel has no guess
+            return problem.low * problem.force, Status.INFEASIBLE
         x = solve(problem, DEFAULT_SOLVER)
         if not isinstance(x, str):
             return x * problem.force, Status.OK

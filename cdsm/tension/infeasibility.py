@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from typing import Final, NoReturn
 
 import numpy as np
@@ -94,27 +93,32 @@ def too_few_cables(arm: Manipulator) -> str:
 
 
 def is_infeasible(problem: Problem) -> bool:
-    """Whether no tensions within the bounds balance the arm.
+    """Whether no tensions within the bounds balance the arm; what has no proof, HiGHS decides."""
+    return is_proved_infeasible(problem) or _nearest(problem)[1] > OPTIMALITY
+
+
+def is_proved_infeasible(problem: Problem) -> bool:
+    """Whether there is a quick proof that no tensions within the bounds balance the arm.
 
     With x = F − low ≥ 0, the residual r of min ‖A x − b‖ is a proof by Farkas: rᵀA ≤ 0 < rᵀb.
-    Bounds above become equations x + s = high − low with slacks s ≥ 0. The rare rest is decided by
-    linear programming, which is slower.
+    Bounds above become equations x + s = high − low with slacks s ≥ 0.
     """
     from scipy.optimize import nnls  # slow to import
 
     A, b, low, high, *_ = problem
-    upper = np.flatnonzero(high < np.inf)
-    bounded, none = np.eye(low.size)[upper], np.zeros((b.size, upper.size))
-    A = np.block([[A, none], [bounded, np.eye(upper.size)]])
-    b = np.concatenate([b - problem.A @ low, (high - low)[upper]])
-    with suppress(RuntimeError):  # too many iterations
+    b, upper = b - A @ low, np.flatnonzero(high < np.inf)
+    if upper.size:
+        bounded, none = np.eye(low.size)[upper], np.zeros((b.size, upper.size))
+        A = np.block([[A, none], [bounded, np.eye(upper.size)]])
+        b = np.concatenate([b, (high - low)[upper]])
+    try:
         x, missing = nnls(A, b)
-        r = b - A @ x
-        work, most = r @ b, abs(A).max(axis=0) * abs(r).max()
-        proof = missing > _PROOF and work > _PROOF * (abs(r) @ abs(b))
-        if proof and ((r @ A) <= _ROUNDING * most).all():
-            return True
-    return _nearest(problem)[1] > OPTIMALITY
+    except RuntimeError:  # too many iterations
+        return False
+    r = b - A @ x
+    work, most = r @ b, abs(A).max(axis=0) * abs(r).max()
+    proof = missing > _PROOF and work > _PROOF * (abs(r) @ abs(b))
+    return bool(proof and ((r @ A) <= _ROUNDING * most).all())
 
 
 def _nearest(problem: Problem) -> tuple[Array, float]:
