@@ -116,10 +116,7 @@ class Chunk:
         return found
 
     def _tensions(self, at: Pose) -> Array:
-        """Return F (B, C, W): given, distributed, or 0 if nothing that is asked for depends on it.
-
-        Rows without tensions get some number, which is not used.
-        """
+        """Return F (B, C, W): given, distributed, or any number where none exists or is needed."""
         rows, status, shape = self._rows, self._status, at.length.shape
         if rows.tension is not None:
             return np.nan_to_num(self._lanes(rows.tension))

@@ -208,10 +208,7 @@ def _checked_outputs(outputs: Sequence[str]) -> tuple[str, ...]:
 def _checked_load(
     arm: Manipulator, q: Array, tension: Tensions | ArrayLike | None, wrench: ArrayLike | None
 ) -> tuple[Array | None, Array, Codes]:
-    """Check tensions and wrench; return both, and the status (B,) of the postures so far.
-
-    The tensions are None if not given. The status is that of given :class:`Tensions`, else OK.
-    """
+    """Return checked tensions (None if not given) and wrench, and the status (B,) so far."""
     if not isinstance(tension, Tensions):
         given = None if tension is None else given_tension(arm, tension, len(q))
         return given, given_wrench(wrench, len(q)), np.zeros(len(q), dtype=np.uint8)

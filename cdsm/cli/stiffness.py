@@ -112,10 +112,7 @@ def _balanced(
 def _sticking(
     tension: cdsm.Tension | None, axes: dict[str, Sequence[float]]
 ) -> tuple[list[str], Json]:
-    """Return the stiffness while all cables stick, and where sliding begins, as text and for JSON.
-
-    Both are empty without distributed tensions, without friction, or if no load has this limit.
-    """
+    """Return the stuck stiffness and the load of the first slip, as text and for JSON, if any."""
     lines, numbers = list[str](), Json()
     if tension is None or not tension.posture.arm.has_friction:
         return [], {}
@@ -135,11 +132,7 @@ def _sticking(
 def _uncertainty(
     tension: cdsm.Tension | None, axes: dict[str, Sequence[float]]
 ) -> tuple[list[str], Json]:
-    """Return the uncertainty of the stiffness along each axis, as a table and for JSON.
-
-    Both are empty without distributed tensions or tolerances. A direction in which the tip cannot
-    move is left out.
-    """
+    """Return the uncertainty along each axis in which the tip can move, as a table and for JSON."""
     from cdsm.support.format import aligned
 
     found: dict[str, Uncertainty] = {}

@@ -146,11 +146,7 @@ def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
 
 
 def _tensions_of(arm: Manipulator, lengths: Array, paid_out: Array, tension: Array) -> Array:
-    """Compute F (C,) [N] from lengths and wire of the cables (C,) [m], without friction.
-
-    A force-controlled cable has its ``tension`` (C,). Raises ElasticityRangeError, which names the
-    cable, where a law is not defined; a law that begins at 0 N or below is slack there.
-    """
+    """Compute F (C,) [N] from ``lengths`` and wire ``paid_out`` (C,) [m], without friction."""
     F = np.array(tension)
     for c, (cable, wire) in enumerate(zip(arm.cables, paid_out.tolist(), strict=True)):
         if cable.control == "position":
@@ -259,11 +255,7 @@ class MuJoCoPlant:
         return MuJoCoState(state.model, pose, true_values, joints)
 
     def _set_motors(self, model: Any, lengths: Array, command: Command) -> None:
-        """Set each actuator of ``model`` so that it has the force F + k (L' − L) at a length L'.
-
-        L (C,) is ``lengths`` [m], without the leads. F is the tension at L with the commanded wire,
-        and k is the tangent stiffness of the cable.
-        """
+        """Let actuators pull F + k (L′ − L) at L′; L (C,) [m] are ``lengths``, without leads."""
         cables = self.arm.cables
         L = lengths + [cable.lead for cable in cables]
         F = _tensions_of(self.arm, L, command.paid_out, command.tension)

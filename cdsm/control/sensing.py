@@ -161,10 +161,7 @@ class Observer:
         )
 
     def _after_sliding(self, before: Estimate, pose: Posture, F: Array) -> Estimate:
-        """Return the estimate at a new posture, after wire has slid through the holes.
-
-        ``F`` (C,) [N] are the tensions at the motors.
-        """
+        """Return the estimate after wire has slid through holes; ``F`` (C,) [N] at the motors."""
         segments = pose.segments
         chains = segments.chains
         motor = F[chains.cable]
@@ -181,10 +178,9 @@ class Observer:
     def _tip_force(self, pose: Posture, tension: Array) -> Array:
         """Compute the force f (3,) [N] at the tip that best balances the tensions T (S,) [N].
 
-        T are the tensions of all segments. f solves J_vᵀ f = Σ_j T_j g_j + g by weighted least
-        squares, with the translational rows J_v of the tip Jacobian, the gravity torque g and the
-        gradient g_j of the length of segment j. What is out of balance counts as an error of the
-        tensions at the motors, relative to the errors of load cells and friction.
+        f solves J_vᵀ f = Σ_j T_j g_j + g by weighted least squares, with the gradient g_j of the
+        length of segment j. What is out of balance counts as an error of the tensions at the
+        motors, relative to the errors of load cells and friction.
         """
         segments = pose.segments
         F = tension[segments.chains.start[:-1]]
@@ -195,10 +191,7 @@ class Observer:
         return np.asarray(found[0])
 
     def _mean_strain(self, pose: Posture, shares: Array, F: Array) -> Array:
-        """Compute the mean strain ε̄ (C,) [-] of each cable by its law.
-
-        ``F`` (C,) [N] are the tensions at the motors, ``shares`` ρ (S,).
-        """
+        """Compute the mean strains ε̄ (C,) [-] from F (C,) [N] at the motors and shares ρ (S,)."""
         segments = pose.segments
         chains = segments.chains
         T, strain = shares * F[chains.cable], np.zeros(segments.lengths.size)

@@ -150,10 +150,7 @@ def _follow(
     bounds: tuple[Array, Array],
     rows: list[dict[str, Any]],
 ) -> tuple[Outcome, str]:
-    """Control step by step; return how it ends, and why.
-
-    The values of each field of TrackingRun at each step are added to ``rows``.
-    """
+    """Control step by step, with a row per step added to ``rows``; return how it ends, and why."""
     last, load = schedule[0].reference, plan.stiffness[0].wrench
     state = plant.initial(last.angles, last.tension, load)
     random, true_values = np.random.default_rng(sensors.seed), [state.true_values]
@@ -215,10 +212,9 @@ class _Wanted(NamedTuple):
 
 
 def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
-    """Divide a plan into ``steps`` equal steps from each sample to the next.
+    """Divide a plan into ``steps`` equal steps from each sample to the next, each in balance.
 
-    Angles, loads and targets are interpolated linearly. So are the tensions, which then get the
-    least change that balances the arm. The weight ``hung`` (3,) [N] acts on the second half.
+    The weight ``hung`` (3,) [N] acts on the second half.
     """
     arm, size = plan.arm, len(plan.planned)
     at = np.linspace(0.0, size - 1.0, (size - 1) * steps + 1)
@@ -252,10 +248,7 @@ def _tension_controlled(pose: Posture) -> NDArray[np.bool_]:
 
 
 def _assessed(state: PlantState, wrench: Array, directions: Array) -> dict[str, Any]:
-    """Return the true stiffness, margin and band of a state, and how far its tip is off the band.
-
-    Values that do not exist are NaN.
-    """
+    """Return true stiffness, margin and band, and how far the tip is off its centre; or NaN."""
     found: dict[str, Any] = dict.fromkeys(("margin", "band", "displacement"), math.nan)
     found["stiffness"] = np.full(len(directions), math.nan)
     with suppress(CdsmError):
