@@ -106,10 +106,7 @@ class _Arm:
         return self.arm.at(self.postures[posture]), self.problem.loads[load]
 
     def cases_of(self, each: Measure) -> Array:
-        """Return a quantity in SI (n, k) for each held posture and load; k = 1.
-
-        For ``motor_force``, k counts the cables. What depends on neither is one case.
-        """
+        """Return a quantity in SI (n, k): n held cases, or 1 for all; k = 1, or the cables."""
         held, geometry = self.held, self.arm.geometry
         inside = held.reshape(len(self.postures), -1).any(axis=1)
         swept = _SWEPT.get(each.of, each.of)
@@ -162,10 +159,10 @@ class _Arm:
         return float(found[case, cable] + extra)
 
     def _margin(self, each: Measure, case: int) -> Array:
-        """Compute the margin for tolerances (k,) of a quantity in one case, ± coverage · u.
+        """Compute the margin ± coverage · u (k,) of a quantity in one case, with the worse sign.
 
-        The sign is that for which adding the margin makes the quantity worse. The arm is not built
-        yet: its tensions are the least ones of its dimensions, within bounds that do not change.
+        The arm is not built yet: its tensions are the least ones of its dimensions, within bounds
+        that do not change.
         """
         if (each.key, case) not in self.margins:
             (pose, load), of = self._pair(case), _MEASURANDS[each.of]

@@ -167,10 +167,7 @@ class DesignSearch(ReadOnlyState, Plotted):
         return "\n".join([head, *aligned(self._table(shown)), *asked, *notes])
 
     def _spread(self, most: int, *also: int) -> list[int]:
-        """Return the numbers of up to ``most`` designs spread over the front.
-
-        The compromise and the designs ``also`` are always among them.
-        """
+        """Return up to ``most`` designs spread over the front, the compromise, and ``also``."""
         count = len(self.front)
         even = np.linspace(0, count - 1, min(count, most)).round().astype(int)
         return sorted({*even.tolist(), self.compromise, *also})
@@ -196,10 +193,7 @@ class DesignSearch(ReadOnlyState, Plotted):
 
 
 def _hole_table(arm: Manipulator) -> str:
-    """Return a CSV with a row for each hole of each disk of an arm, in mm and degrees.
-
-    Angles are about the x axis of the link, from y towards z. A cable is fixed at its last disk.
-    """
+    """Return a CSV with a row per hole of each disk, in mm, and in degrees from y towards z."""
     geometry = arm.geometry
     rows = []
     for number, disk in enumerate(geometry.disks, start=1):
@@ -217,13 +211,7 @@ def _hole_table(arm: Manipulator) -> str:
 
 
 def cable_table(arm: Manipulator) -> str:
-    """Return a CSV with a row for each cable: wire, lead, and lengths in mm.
-
-    All lengths include the lead. ``straight`` is the length in the straight arm, ``shortest`` and
-    ``cut`` are the shortest and the longest within the joint limits, or bounds of them if joints
-    are coupled; ``stroke``, which the motor winds, is their difference. The lengths are without
-    stretch, and without the wire needed to fix both ends.
-    """
+    """Return the text of the file ``cables.csv`` of :meth:`DesignSearch.write`."""
     straight = arm.at(np.clip(0.0, arm.lower, arm.upper)).cable_lengths
     shortest, longest = length_bounds(arm)
     leads = [cable.lead for cable in arm.cables]

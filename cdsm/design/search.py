@@ -237,11 +237,7 @@ def _best_of(evaluated: Designs, seed: int) -> DesignSearch:
 
 
 def _pareto(designs: Designs) -> NDArray[np.intp]:
-    """Return the indices (m,) of the feasible designs that no other feasible design dominates.
-
-    They are sorted by the first objective, the best first. Of designs with equal objectives, only
-    the first is returned.
-    """
+    """Return the Pareto-optimal designs (m,), one of equal ones, sorted by the first objective."""
     goals = designs.goals
     usable = np.flatnonzero(designs.feasible & np.isfinite(goals).all(axis=1))
     _, first = np.unique(goals[usable], axis=0, return_index=True)  # sorted by the columns

@@ -84,10 +84,7 @@ def _surplus(wire: Wire, j: int, T: float) -> tuple[float, float]:
 def _slope(
     wire: Wire, best: Array, j: int, last: int, tension: float
 ) -> tuple[float, float, float]:
-    """Compute V_j′ [m] at ``tension``, ∂V_j′/∂T [m/N], and the sum of its rest lengths [m].
-
-    ``best`` (S,) has exp(y*_i) [N] of the segments i after j; ``last`` is the last of the cable.
-    """
+    """Compute V_j′ [m], ∂V_j′/∂T [m/N], Σ|l_0| [m] at ``tension``; ``best`` (S,): exp(y*_i) [N]."""
     total, rise = _surplus(wire, j, tension)
     T, size = tension, abs(wire.rest_length[j])
     for i in range(j + 1, last + 1):

@@ -134,10 +134,7 @@ def breakaway(
 
 
 def _first_slip(K: Stiffness, u: Array, load: float, motion: Array) -> tuple[float, int]:
-    """Return the load [N] along u (3,) at which a stuck arm first slides, and the hole.
-
-    ``load`` and ``motion`` (nv,) [rad/N] are those of first order.
-    """
+    """Return load [N] and hole of first slip along u; ``load``, ``motion`` [rad/N]: first order."""
     pose, arm = K.posture, K.posture.arm
     segments, forced = pose.segments, ~arm.cables.position_controlled
     chains, T = segments.chains, K.tension[segments.chains.cable]

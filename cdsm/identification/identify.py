@@ -173,10 +173,7 @@ def _optimum(problem: Problem, start: Array) -> Array:
 
 
 def _unfinished(problem: Problem, best: Array, jacobian: Array) -> str:
-    """Return a warning if a search ended before a minimum of χ², else an empty text.
-
-    The search can end early because the model does not exist beyond ``best`` (P,).
-    """
+    """Return a warning if a search ended before a minimum of χ², else an empty text."""
     r = problem.residuals(best)
     gradient = r @ jacobian
     free = ~(((best == 0.0) & (gradient >= 0.0)) | ((best == 1.0) & (gradient <= 0.0)))

@@ -103,7 +103,6 @@ class Measurement:
         return predicted - self.value, self.std
 
     def _shown(self, measured: Array, predicted: Array) -> list[str]:
-        """Return measured and predicted numbers as text."""
         return [f"{K[0] / 1e3:.4g} N/mm" for K in (measured, predicted)]
 
 
@@ -222,10 +221,7 @@ class WeightLoop:
         return np.asarray(moved @ self.axes.T).ravel()
 
     def _errors(self, predicted: Array) -> tuple[Array, float]:
-        """Return predicted minus measured numbers less their mean along each axis, and σ.
-
-        The zero of each axis is unknown; this estimate of it has the least χ².
-        """
+        """Return errors less their mean along each axis (the unknown zero of least χ²), and σ."""
         off = (predicted - self._readings).reshape(len(self.forces), -1)
         return (off - off.mean(axis=0)).ravel(), self.displacement_std
 

@@ -116,7 +116,6 @@ class TipPosition:
         return pose.tip[["xyz".index(axis) for axis in self.axes], 3]
 
     def _errors(self, predicted: Array) -> tuple[Array, float]:
-        """Return predicted minus measured coordinates, and their standard deviation."""
         return predicted - self._readings, self.std
 
     @property
