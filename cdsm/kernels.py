@@ -371,10 +371,7 @@ def along(K: Array, size: Array, JX: Array, u: Array, skew: bool, out: Array, pi
 
 @lane
 def _paired(J: Array, p: int, q: int, i: int, j: int, least: float, out: Array) -> None:
-    """Copy the moment arms of cables p and q about axes i and j, or of p alone if i = j.
-
-    Those below ``least`` are rounding: the cable crosses the axis.
-    """
+    """Copy moment arms of cables p, q about axes i, j (p if i = j); below ``least`` is rounding."""
     for n in range(2):
         c = q if n else p
         for m in range(2):

@@ -392,11 +392,7 @@ class Manipulator(Printed):
         springs: Mapping[str, Spring] | None = None,
         like: Manipulator | None = None,
     ) -> Self:
-        """Check what defines an arm, and set all attributes; ``urdf`` has been checked before.
-
-        Without ``springs``, they are those of the geometry.
-        ``like`` is an arm whose doubts the user has seen.
-        """
+        """Set all attributes; ``urdf`` is checked, the user has seen the doubts about ``like``."""
         one_of("original_length", original_length, get_args(OriginalLength))
         gravity = gravity_vector("gravity", gravity)
         if joint_names is not None:

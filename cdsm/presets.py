@@ -31,7 +31,6 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """List the public names."""
     return __all__
 
 
@@ -152,11 +151,11 @@ def fitted_prototype(hybrid_stiffness: float | None = None) -> Manipulator:
     """Build :func:`experimental_prototype` with dimensions fitted to the numbers of Section V.
 
     The paper prints 20 numbers of its prototype, and no dimension. These dimensions, and the
-    conditions of the tests (Section V), are the least-squares fit to the 20
-    numbers within plausible bounds, with x and y exchanged in rows 2 to 4 of Table II. Hole radius
-    and mass of a link ended at their largest allowed values, as did the tool and the stiffness of
-    the drives; the links at their shortest. Table II is still missed by 21 %, 15 % and 33 % (root
-    mean square in x, y and z). So this arm is one possible guess, not the paper's prototype.
+    conditions of the tests (Section V), are the least-squares fit to the 20 numbers within
+    plausible bounds, with x and y exchanged in rows 2 to 4 of Table II. Hole radius and mass of a
+    link ended at their largest allowed values, as did the tool and the stiffness of the drives; the
+    links at their shortest. Table II is still missed by 21 %, 15 % and 33 % (root mean square in x,
+    y and z). So this arm is one possible guess, not the paper's prototype.
 
     ``hybrid_stiffness`` is that of every cable [N/m], where a spring replaces the elasticity of the
     strand (Figs. 12 and 13). None: the strand, with a drive of 10 kN/mm behind it. Raises

@@ -235,10 +235,7 @@ class RigidBody:
 
 
 def _bounded(robot: etree._Element) -> str:
-    """Return the text of a URDF with continuous joints as revolute ones.
-
-    To Pinocchio, a continuous joint has two coordinates; and it refuses infinite limits.
-    """
+    """Return a URDF without continuous joints, which have two coordinates in Pinocchio."""
     copy = deepcopy(robot)
     for joint in copy.iterfind("joint[@type='continuous']"):
         joint.set("type", "revolute")

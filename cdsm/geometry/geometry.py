@@ -48,10 +48,9 @@ class Geometry(Printed):
     """A serpentine arm, joint by joint; frozen, checked, all in SI units.
 
     :meth:`universal` and :meth:`hinged` build arms of similar joints, :meth:`backbone` one on a
-    flexible rod or tube; :meth:`sections` joins arms.
-    Joint 1 is at x = ``base_length``, joint k+1 at the end of link k, and the tip at the end of the
-    last link. Every joint has two disks, at the distance ``disk_offset`` before and after it; both
-    have the ``hole_radius`` of the joint.
+    flexible rod or tube; :meth:`sections` joins arms. Joint 1 is at x = ``base_length``, joint k+1
+    at the end of link k, and the tip at the end of the last link. Every joint has two disks, at the
+    distance ``disk_offset`` before and after it; both have the ``hole_radius`` of the joint.
 
     Attributes:
         name: Name of the robot: letters, digits and underscores.

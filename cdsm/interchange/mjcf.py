@@ -205,10 +205,7 @@ def mujoco_model(
 def _motion(
     arm: Manipulator, K: Stiffness | None, ratio: float | None, damping: float | None
 ) -> tuple[float, Array, list[str]]:
-    """Choose the time step [s] and the damping of each cable (C,) [N s/m]; say both in lines.
-
-    Joint dampers with the same effect would slow down the slow motions of a long arm tenfold.
-    """
+    """Choose time step [s] and cable damping [N s/m]: joint dampers slow long arms down tenfold."""
     step, of, wires = _STEPS[0], "MuJoCo's own", np.zeros(len(arm.cables))
     unit = JointUnits(arm.slides).joined("N m s/rad", "N s/m")
     damped = f"{damping or 0.0:.4g} {unit} at every joint"

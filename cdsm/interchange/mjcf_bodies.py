@@ -81,10 +81,7 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
 
 
 def _add_inertia(body: etree._Element, link: etree._Element) -> None:
-    """Write the mass and inertia of a link to its body; change moments that MuJoCo refuses.
-
-    A body without mass gets a least one, without weight.
-    """
+    """Write the inertia of a link, or one that MuJoCo accepts; without mass it has no weight."""
     inertial = link.find("inertial")
     mass = 0.0 if inertial is None else float(inertial.find("mass").get("value"))
     if mass <= _SMALLEST:
