@@ -168,11 +168,7 @@ def _ways_to_the_rim(away: Array, axis: Array, radius: Array) -> Array:
 
 
 class _Bodies:
-    """Bodies in base axes: n shapes of coal with z along their axes, rounded by a radius.
-
-    Centres, axes and extents (halves of the boxes around the shapes) are (n, 3); lengths and
-    radii are (n,) [m].
-    """
+    """Bodies in base axes: n coal shapes along z, rounded by radii (n,) [m]; half boxes (n, 3)."""
 
     def __init__(
         self, names: list[str], shapes: list[Any], centre: Array, axis: Array, extent: Array
@@ -202,11 +198,7 @@ class _Bodies:
 
 
 def _nearest(one: _Bodies, other: _Bodies, pairs: NDArray[np.bool_]) -> Named:
-    """Return the smallest distance of the ``pairs`` (n, m) of bodies, the likeliest ones first.
-
-    The spheres and the boxes around two bodies bound their distance from below, the centres from
-    above.
-    """
+    """Return the smallest distance of the ``pairs`` (n, m), the likeliest by their boxes first."""
     best = Named(math.inf)
     if not pairs.any():
         return best

@@ -144,10 +144,7 @@ def _angles(arm: Manipulator, tip: Array, near: ArrayLike | None) -> Array:
 
 
 def _plan(goal: Goal, before: Array | None, change: Array, steps: int) -> Array:
-    """Plan one sample: the least tensions (C,) [N] that meet the goal, near those ``before``.
-
-    ``change`` (C,) [N] is the largest change in the ``steps`` samples since then.
-    """
+    """Plan the least F (C,) [N] for a goal, at most ``change`` from ``before``, ``steps`` ago."""
     near = None if before is None else goal.space.within(before, change)
     if before is not None and (found := goal.search(before, near)) is not None:
         return found

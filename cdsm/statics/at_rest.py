@@ -143,10 +143,7 @@ class Equilibrium(Result):
         return tuple(self.pose.arm.joint_names[i] for i in np.flatnonzero(self.stop_torque))
 
     def _resumed(self, pose: Posture, wrench: object) -> Equilibrium:
-        """Return it with itself as the reference, its motors as they are.
-
-        Raises InvalidInput if ``pose`` is not its posture, or a wrench is given.
-        """
+        """Return it as its own reference, its motors as they are, if ``pose`` is its own."""
         if wrench is not None:
             raise InvalidInput("wrench", "comes with the Equilibrium; leave it out here.")
         if not instance("pose", pose, Posture)._equals(self.pose):

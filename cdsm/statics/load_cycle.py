@@ -240,10 +240,7 @@ def load_cycle(
 
 
 def _commands(motors: ArrayLike, pose: Posture, shape: tuple[int, ...], wire: Array) -> Array:
-    """Check the commands ``motors`` of :func:`load_cycle`, and return them as an array (n, C).
-
-    ``shape`` is (n, C), ``wire`` the rest length (C,) [m] of each cable.
-    """
+    """Return ``motors`` checked, as an array (n, C); ``wire`` (C,) [m] are the rest lengths."""
     commands, cables = number_array("motors", motors), pose.arm.cables
     if commands.shape != shape:
         raise InvalidInput(

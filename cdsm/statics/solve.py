@@ -217,10 +217,7 @@ def _solved(K: Array, torque: Array) -> Array:
 
 
 def _not_found(reference: Posture, point: Point, reached: float, load: str) -> EquilibriumError:
-    """Return the error of a search that ended at ``point``.
-
-    It names the joint with the largest residual torque, and a cable of which two sites meet there.
-    """
+    """Return the error of a search that ended at ``point``; say if two sites of a cable meet."""
     pose, residual = point.state.pose, frozen(np.where(point.out, 0.0, point.state.residual))
     worst, remedy = int(abs(residual).argmax()), ""
     arm = pose.arm

@@ -215,11 +215,7 @@ class Cases:
         return found
 
     def _bounds(self, q: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return bounds (R, C) [N] of the tensions at the motors, and whether they exist (R,).
-
-        With the worst friction they are narrower, so that each segment stays within the given ones;
-        where none are left, the given bounds are returned.
-        """
+        """Return bounds (R, C) [N] at the motors, narrowed by worst friction if any remain (R,)."""
         pairs = [checked_bounds(self.arm, each, self.maximum) for each in self.minimum.tolist()]
         low, high = (
             np.tile(each, (len(q) * len(self.wrench), 1)) for each in zip(*pairs, strict=True)

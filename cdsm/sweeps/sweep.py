@@ -216,10 +216,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
 def _stored(
     path: Path, cases: Labelled, q: xarray.DataArray, by_dask: bool, progress: bool
 ) -> xarray.Dataset:
-    """Compute what a store lacks, chunk by chunk; return the sweep that it then has.
-
-    ``q`` is chunked. If ``by_dask``, the chunks are computed by dask, else in this process.
-    """
+    """Compute what a store lacks of chunked ``q``, by dask or in this process; return it whole."""
     import dask.array
 
     lazy: Any = dask  # untyped
