@@ -107,10 +107,7 @@ def solve(problem: Problem, solver: str) -> Array | str:
 
 
 def _independent(A: Array) -> Array:
-    """Return combinations of the joints (nv, r) with which r balances A x = b are independent.
-
-    With as many joints as cables, or more, solvers fail at those that follow from others.
-    """
+    """Return independent combinations of joints (nv, r): solvers fail at redundant ones."""
     if A.shape[0] < A.shape[1]:
         return np.eye(len(A))
     U, size, _ = np.linalg.svd(A, full_matrices=False)

@@ -259,10 +259,9 @@ def propagate(
 def _differences(
     measurand: Measurand, groups: Sequence[Group], drawn: Errors
 ) -> tuple[Array, Array, Codes]:
-    """Differentiate a measurand by the common error of each group (m, k); evaluate D drawn arms.
+    """Differentiate by the common error of each group (m, k), and evaluate D drawn arms (D, k).
 
-    These have values (D, k) and a status (D,). A difference is one-sided where the measurand
-    exists only for one sign of the error.
+    A difference is one-sided where the measurand exists only for one sign of the error.
     """
     m, value, labels = len(groups), measurand.value(), measurand.inputs.labels
     step = _STEP * np.array([group.tolerance.standard for group in groups])

@@ -95,11 +95,7 @@ def changes_of_chain(arm: Manipulator, starts: Mapping[str, int]) -> Iterator[Ch
 def _numbers(
     arm: Manipulator, starts: Mapping[str, int]
 ) -> tuple[NDArray[np.intp], Callable[[Chain], Array]]:
-    """Return which numbers of an arm depend on its chain, and the function that reads them there.
-
-    They are x of joints, sites on disks, centres of mass and the tip; masses; and 1/k of springs,
-    unless the user has given others.
-    """
+    """Return which numbers of an arm depend on its chain, and the function that reads them."""
     chain, places = arm.geometry._chain, dict[str, list[tuple[int, float]]]()
     for d, disk in enumerate(chain.disks):
         places.setdefault(disk.link, []).append((d, disk.x))

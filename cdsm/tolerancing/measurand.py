@@ -113,10 +113,7 @@ class Measurand(ReadOnlyState):
         return found, status
 
     def _springs(self, errors: Errors, L: Array, F: Array, part: slice) -> Array:
-        """Return the stiffness of cables whose rigidities EA and springs have errors.
-
-        The strain ε falls as EA rises, so EA (1 + ε) rises by the error of EA alone.
-        """
+        """Return stiffness with errors of springs and EA; as EA rises, ε falls: EA ε stays."""
         laws = self.stiffness.posture.arm._laws
         change = errors["rigidity"][part] if "rigidity" in errors else 0.0
         stretched, EA, series = laws.rigidities(F), np.zeros_like(F), laws.series + 0.0 * F

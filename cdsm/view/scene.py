@@ -141,7 +141,6 @@ class Scene:
         self._label.position = tip + 0.1 * self._arm.length * np.eye(3)[2]
 
     def _draw_surroundings(self) -> None:
-        """Add light, the base axes, and a grid below the base."""
         scene, length = self._scene, self._arm.length
         # an environment map and shadows take seconds without a GPU
         scene.configure_environment_map(hdri=None)

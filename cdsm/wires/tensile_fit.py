@@ -232,10 +232,7 @@ def _as_law(curve: Curve, strain: Array) -> tuple[Array, TabulatedElasticity]:
 
 
 def _yield_onset(curve: Curve) -> float | None:
-    """Return the tension [N] from which EA surely stays below 0.8 of its plateau, if there is one.
-
-    The plateau is a quantile: a narrow peak, as of a slip, is none.
-    """
+    """Return F [N] from which EA surely stays below 0.8 of its plateau, which no slip raises."""
     F, level = curve.tension, curve.level
     even = np.linspace(F[0], F[-1], 200)
     sure = np.interp(even, F, level - _CERTAIN * curve.deviation)
@@ -245,10 +242,7 @@ def _yield_onset(curve: Curve) -> float | None:
 
 
 def _pretension_end(curve: Curve) -> float | None:
-    """Return the tension [N] beyond which EA grows slower than √F, midway from EA ∝ F to constant.
-
-    None if EA nowhere grows faster, beyond its uncertainty.
-    """
+    """Return F [N] beyond which EA grows slower than √F, midway from EA ∝ F to constant, if any."""
     F = curve.tension[(curve.tension > _STEP * curve.tension[0])]
     F = F[curve.tension[-1] > F * _STEP]
     sides = [np.interp(F * s, curve.tension, curve.level) for s in (_STEP, 1.0 / _STEP)]
