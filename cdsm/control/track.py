@@ -75,7 +75,8 @@ def track(
     The plan's arm, with its friction, is the model of the controller. The loop starts at rest at
     the first sample with the planned tensions. Between two samples the joint angles change evenly,
     and the tensions balance the arm. If plant and plan are the same arm and the sensors are exact,
-    every law holds the plan at the samples. An unstable loop, an arm that buckles and a target that
+    every law holds the plan at the samples; ``"stiffness"``, which takes all loads for forces at
+    the tip, only if the plan has no moment. An unstable loop, an arm that buckles and a target that
     cannot be planned or reached raise no error: ``outcome``, ``reason`` and ``warnings`` of the
     result report them.
 
@@ -90,7 +91,7 @@ def track(
         payload: Mass [kg] that the controller does not know of; it hangs at the tip on the second
             half of the path.
         steps: Steps of control from one sample of the path to the next.
-        period: Time between two steps [s].
+        period: Time between two steps [s]; that of a plant which has one.
         max_change_per_step: Largest change of a tension per step that the outer loop plans [N], for
             all cables or (C,). ``steps_needed`` of the result says how many steps that takes.
 
@@ -106,10 +107,10 @@ def track(
     require_unstrained("plan", arm)
     low, high = checked_bounds(arm, minimum, maximum)
     name = law if isinstance(law, str) else getattr(law, "__name__", "custom")
-    command_of = LAWS[one_of("law", law, LAWS)] if isinstance(law, str) else law
+    command_of = law if callable(law) else LAWS[one_of("law", law, LAWS)]
     sensors = Sensors() if sensors is None else instance("sensors", sensors, Sensors)
     plant = QuasiStaticPlant(arm) if plant is None else plant
-    if not hasattr(plant, "step_to"):  # an arm by itself, for example
+    if isinstance(plant, type) or not hasattr(plant, "step_to"):  # an arm by itself, for example
         said = f"{plant!r} given; a plant is needed, such as QuasiStaticPlant(arm)."
         raise InvalidInput("plant", said)
     own, its = ((*each.joint_names, *each.cables.names) for each in (arm, plant.arm))
@@ -118,6 +119,9 @@ def track(
         raise InvalidInput(
             "plant", f"its arm and that of the plan differ in joints or cables: {other}."
         )
+    if (its_own := getattr(plant, "period", period)) != period:
+        said = f"{period!r} s given, but a step of the plant takes {its_own!r} s; give it here too."
+        raise InvalidInput("period", said)
     count = whole_number("steps", steps, 1, _MOST_STEPS)
     change = checked_change("max_change_per_step", arm, max_change_per_step)
     outer = StiffnessLoop(plan, low, high, change) if name == "stiffness" else None

@@ -23,6 +23,7 @@ from cdsm.support.validation import number_array
 from cdsm.support.values import Array, frozen
 
 if TYPE_CHECKING:
+    from cdsm.control.plants import PlantState
     from cdsm.planning.path_plan import PathPlan
     from cdsm.posture import Posture
     from cdsm.statics.modes import Modes
@@ -103,7 +104,7 @@ def plot_arm(
 
 @style.styled
 def plot_path(
-    path: PathPlan | Sequence[Posture],
+    path: PathPlan | Sequence[Posture | PlantState],
     *,
     animate: str | os.PathLike[str] | None = None,
     tensions: ArrayLike | None = None,
@@ -111,7 +112,8 @@ def plot_path(
     """Plot some postures of a path over each other, from pale to dark, with the path of the tip.
 
     Args:
-        path: Postures of one arm, in order; or a plan, of which the feasible samples are drawn.
+        path: Postures of one arm, in order, or states with a ``pose``, as of a tracking run; or a
+            plan, of which the feasible samples are drawn.
         animate: A ``.gif`` to write too: the arm follows the path, with cables coloured by tension.
         tensions: Tensions (P, C) [N] for the colours at P postures; default: those of a plan.
 
@@ -119,7 +121,9 @@ def plot_path(
         InvalidInput: ``path`` has no postures of one arm, or ``animate`` does not end in ``.gif``.
         FileError: The animation cannot be written.
     """
-    poses: Sequence[Any] = path if isinstance(path, Sequence) else [path]
+    poses: Sequence[Any] = [path]
+    if isinstance(path, Sequence):
+        poses = [getattr(each, "pose", each) for each in path]
     for pose in poses:
         style.expect("path", pose, "Posture" if isinstance(path, Sequence) else "PathPlan")
     if not isinstance(path, Sequence):

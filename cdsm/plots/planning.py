@@ -86,7 +86,7 @@ def plot_saturation(found: Saturation) -> Figure:
     axes.plot(found.minimum, N_PER_MM * found.along, label="least tensions")
     direction = style.direction_name(found.direction)
     axes.set(xlabel="lower bound of tension [N]", ylabel=f"stiffness along {direction} [N/mm]")
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])  # also a curve that hardly changes is seen
     if np.isfinite(found.bound):
         label = f"saturates at {found.bound:.4g} N"
         axes.axvline(found.bound, color=style.VERMILLION, linestyle="--", label=label)

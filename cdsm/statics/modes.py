@@ -97,11 +97,12 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
     if arm.is_serpentine:
         least = int(M.diagonal().argmin())  # crosses and massless links have placeholders
         crossed = any(len(joint.axes) == 2 for joint in arm.geometry.joints)
-        light = crossed and M[least, least] < _LIGHT * CROSS_INERTIA
-        if light or arm.geometry.links[-1].mass == 0.0:
+        held = crossed or arm.geometry.links[-1].mass == 0.0
+        if held and M[least, least] < _LIGHT * CROSS_INERTIA:
             raise SingularStiffness(
                 f"{arm.joint_names[least]} moves links of no mass, or of hardly any: its frequency "
-                "would be that of placeholders. Give the links their link_mass.",
+                "would be that of placeholders. Give the links their link_mass, or a backbone its "
+                "mass_per_length or disk_mass.",
                 frozen(np.eye(arm.nv)[least]),
             )
     squares, shapes = vibrations(stiffness, M)

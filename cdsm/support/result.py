@@ -122,7 +122,10 @@ class Result(ReadOnlyState):
                 for place in np.ndindex(array.shape[1:]):
                     pairs = zip(dims[1:], place, strict=True)
                     parts = [str(labels[d][i] if d in labels else i + 1) for d, i in pairs]
-                    columns[" ".join([name, *parts]) + suffix] = array[(slice(None), *place)]
+                    own = suffix
+                    if of == "rad or m":  # each joint has one of them
+                        own = f" [{'m' if self._arm.slides[place[-1]] else 'rad'}]"
+                    columns[" ".join([name, *parts]) + own] = array[(slice(None), *place)]
         numbers = np.arange(len(next(iter(columns.values()), ())))  # of rows without names
         return data_frame(columns, self._rows or "result", labels.get(self._rows, numbers))
 

@@ -112,6 +112,17 @@ def test_wrong_arguments_are_refused() -> None:
             cdsm.track(given, law, **options)
 
 
+def test_time_of_a_plant_and_its_class_are_not_mistaken() -> None:
+    plan: Any = small_path()
+    for bad, said in (
+        ({"plant": cdsm.QuasiStaticPlant}, "a plant is needed"),
+        ({"law": 3}, "law"),
+        ({"plant": cdsm.MuJoCoPlant(plan.arm, period=0.1)}, "a step of the plant takes 0.1 s"),
+    ):
+        with pytest.raises(cdsm.InvalidInput, match=said):
+            cdsm.track(plan, **{"law": "mixed", **bad}, **BOUNDS)
+
+
 def test_unstable_loop_is_an_answer_with_its_time() -> None:
     """All motors hold tensions that are read late: nothing holds the posture, and it is lost."""
     plan = circle(0.0)

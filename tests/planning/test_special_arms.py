@@ -76,3 +76,13 @@ def test_at_least_as_stiff_costs_no_more_than_exactly_as_stiff() -> None:
             np.testing.assert_allclose(plan.tension, least.tension, rtol=1e-6)
     with pytest.raises(cdsm.UnreachableStiffness):
         cdsm.plan_stiffness(pose, DOWN, 1.01 * found.high, 40.0, 300.0, at_least=True)
+
+
+def test_the_table_of_a_path_has_the_unit_of_each_joint() -> None:
+    arm = finger().arm
+    q = np.array([[0.05, 0.002], [0.06, 0.002]])
+    ends = [cdsm.stiffness_range(arm.at(each), "z", 5.0, 60.0) for each in q]
+    targets = [(each.low + each.high) / 2.0 for each in ends]
+    plan = cdsm.plan_path(arm, "z", targets, 5.0, 60.0, angles=q)
+    turns, slides = arm.joint_names
+    assert {f"{turns} [rad]", f"{slides} [m]"} <= {*plan.to_pandas().columns}
