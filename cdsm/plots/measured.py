@@ -155,7 +155,7 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
     drawn = axes.barh(list(bars), list(bars.values()), color=colors, height=0.65)
     axes.bar_label(drawn, fmt="%.3g", padding=3)
     axes.invert_yaxis()
-    axes.margins(x=0.18)
+    axes.margins(x=0.3)  # for the numbers at the bars
     axes.grid(visible=False, axis="y")
     axes.set(xlabel=f"standard uncertainty [{unit}]")
     return style.titled(figure, f"{budget.name}: {budget.value / size:.4g} {unit}")
