@@ -68,8 +68,12 @@ def new(
         first = max(cable.elasticity.low for cable in made.cables)  # where the law begins
         least = max(10.0, float(f"{1.05 * first:.4g}"))
         write_text(arm, template(arm.name, _number(law), least, parts))
-    bent = min([10.0, *(math.degrees(x) / 2.0 for x in made.upper[~made.slides].tolist())])
-    tried = f"written: {arm}; try cdsm stiffness {arm} --angles {bent:.3g} --check"
+    units = options.joint_scales(made)
+    low, high = made.lower / units, made.upper / units
+    bent = min([10.0, *(high[~made.slides] / 2.0).tolist()])
+    inside = [bent if a <= bent <= b else (a + b) / 2.0 for a, b in zip(low, high, strict=True)]
+    asked = ",".join(f"{each:.3g}" for each in (inside[:1] if {*inside} == {bent} else inside))
+    tried = f"written: {arm}; try cdsm stiffness {arm} --angles {asked} --check"
     return answer(as_json, _facts(made, arm), made, tried)
 
 

@@ -74,7 +74,7 @@ Range = tuple[float, float]
 _LOOPS = "A line per reading. Columns: test; joints [deg]; direction (such as -z); force [N]; "
 _LOOPS += "displacement [mm] along it (or x, y, z); minimum [N], or a tension per cable [N]."
 _FREE = "Parameter to find; repeat it: friction; rigidity (factor on EA); spring [N/mm] in series; "
-_FREE += "lead, slack, hole_radius, disk_offset, link_length [mm]; link_mass [g]; joint_stiffness, "
+_FREE += "lead, hole_radius, disk_offset, link_length [mm]; link_mass [g]; joint_stiffness, "
 _FREE += "bending_stiffness [N m/rad, N m²]. Default bounds: half to "
 _FREE += "twice the arm's own value; friction 0 to 1."
 
@@ -102,6 +102,10 @@ def identify(
 
     described = options.read(arm, changes)
     ranges = _ranges(free)
+    for name in ranges:
+        if name.partition("@")[0] in ("slack", "gain"):
+            said = "changes no weight test: positions of the tip show it (in Python, TipPosition)."
+            raise misuse("--free", f"{name} {said}")
     parameters = ArmParameters(described, tuple(ranges))
     units = {name: parameters.unit(name) for name in ranges}
     labels = {f"{name} [{unit}]" if unit else name: name for name, (unit, _) in units.items()}
@@ -117,6 +121,8 @@ def identify(
         planned = plan_tests(model_of, start, read, tests=tests)
         write_picture(figure, planned.plot)
         return answer(as_json, planned.to_dict(), planned)
+    if any(loop.displacements is None for loop in read):
+        raise cdsm.FileError(loops, "has no readings: no column displacement [mm], or x, y, z.")
     bounds = {at: ranges[name] or _usual(name, start[at]) for at, name in labels.items()}
     for at, (low, high) in bounds.items():
         if not low < start[at] < high:  # of a friction of 0, no derivative shows what it does

@@ -181,6 +181,10 @@ def _unfinished(problem: Problem, best: Array, jacobian: Array) -> str:
     fall = float(np.sum((jacobian[:, free] @ step) ** 2))
     if fall < (1e-2 if problem.has_rests else 1e-3):  # of χ²; a standard deviation is 1
         return ""
-    edge = f"The model ended last at {problem.edge}" if problem.edge else "Give another start."
+    edge = (
+        f"The model ended last at {problem.edge}"
+        if problem.edge
+        else "Give other bounds, or another start."
+    )
     said = f"no optimum within the bounds: χ² would still fall by about {fall:.3g} on the way from "
     return f"{said}{problem.describe(best)}. {edge}"

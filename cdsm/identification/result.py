@@ -160,8 +160,8 @@ class Identification(Result, Plotted):
             said.append(
                 f"the model does not explain the measurements within their σ: {self._verdict}, "
                 f"worst at {self.reading_names[k]} with {self.residuals[k]:+.3g} σ. Standard "
-                "deviations and intervals are valid for a right model only; another start may "
-                "find a better optimum."
+                "deviations and intervals are valid for a right model only; from other values of "
+                "the arm the search may find a better optimum."
             )
         return (*said, *([self.unfinished] if self.unfinished else []))
 

@@ -337,6 +337,7 @@ def test_identify(tmp_path: Path) -> None:
         assert value == pytest.approx(true[name], rel=0.05)
     assert sum(told(*asked, "--tests", 1)["counts"]) == 1
     assert "give bounds, spring=LOW:HIGH" in call(*asked, "--free", "spring").stderr
+    assert "slack changes no weight test" in call(*asked, "--free", "slack=0:1").stderr
 
 
 def test_design(tmp_path: Path) -> None:
