@@ -29,6 +29,7 @@ SAMPLES = 200  # bounds or load factors of a scan: a stable range narrower than 
 _PRECISION = 1e-12  # relative precision of a critical bound or load factor
 _ABOVE = 1.0 + 1e-9  # just above the low end of a law: rounding may put a tension below its bound
 _LOWEST, _LARGEST = 1e-3, 1e6  # lowest bound of a scan from zero [N]; end of doubled load factors
+_ROUNDING = 1e-7  # a smaller factor is that of the balance, which solvers accept to 1e-9
 _SHOWN = 10.0  # largest load factor of the curve if the critical one is infinite
 Limit = Literal["buckling", "infeasible", "elasticity", "none"]
 
@@ -249,6 +250,7 @@ def critical_load(
     if limit == "none" and end < _LARGEST:  # the doubling may have stepped over the first failure
         n = int(np.append(margins[:-1] > 0.0, False).argmin())
         factor, beyond = _bisect(lambda x: _failure(at, x) == "none", *factors[n - 1 : n + 1])
+        factor *= factor > _ROUNDING
         limit = _failure(at, beyond)
         factors, margins = np.append(factors[:n], factor), np.append(margins[:n], at(factor).margin)
     return CriticalLoad(
