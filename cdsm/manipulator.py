@@ -366,9 +366,9 @@ class Manipulator(Printed):
         """Return the unit of torque of a joint or, if None, of all: "N m", "N" or "N m or N"."""
         return JointUnits(self.slides).joined("N m", "N", joint)
 
-    def stiffness_unit(self) -> str:
-        """Return the unit of eigenvalues of K_θ: "N m/rad", "N/m" or "N m/rad or N/m"."""
-        return JointUnits(self.slides).joined("N m/rad", "N/m")
+    def stiffness_unit(self, joint: int | None = None) -> str:
+        """Return the unit of stiffness of a joint or, if None, of all: "N m/rad or N/m"."""
+        return JointUnits(self.slides).joined("N m/rad", "N/m", joint)
 
     def __repr__(self) -> str:
         return f"<Manipulator {self}>"

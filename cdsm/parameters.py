@@ -210,9 +210,7 @@ class ArmParameters:
             return [max(site.friction for site in self.arm.cables[i].sites) for i in where]
         owners: Any = self._beams if part == "beams" else self.arm.cables
         if part not in ("cables", "beams"):
-            owners = (
-                self.arm.geometry.cables if part == "routes" else getattr(self.arm.geometry, part)
-            )
+            owners = getattr(self.arm.geometry, "cables" if part == "routes" else part)
         return [getattr(owners[i], attribute) for i in where]
 
 

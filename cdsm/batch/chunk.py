@@ -144,26 +144,31 @@ class Chunk:
             and wanted <= {"along"}
         ):
             found, pivot = self._along(at, F, k, W)
-            rows = rows[~(pivot[rows] > _PIVOT)] if wanted else rows[:0]
-            terms = self._terms(full, F, k, W, rows) if rows.size else np.zeros(0)
+            rows = rows[~(pivot[rows] > _PIVOT)]
+            if not (wanted and rows.size):
+                return found
+            terms = self._terms(full, F, k, W, rows)
+            K = terms.sum(axis=1)
         else:
             terms = self._terms(full, F, k, W, None)
             found = dict(zip(TERMS, terms.swapaxes(0, 1), strict=False))
-            found["joint"], terms = terms.sum(axis=1), terms[rows]
-        if wanted and (rows.size or not wanted <= found.keys()):
-            K, parts = terms.sum(axis=1), abs(terms).sum(axis=1)
-            read_off, status[rows] = read(wanted, K, parts, self._jacobian(at)[rows], u)
-            for name, value in read_off.items():
-                if name not in found:
-                    found[name] = np.full((len(status), *value.shape[1:]), np.nan)
-                found[name][rows] = value
+            found["joint"] = terms.sum(axis=1)
+            if not wanted:
+                return found
+            K, terms = found["joint"][rows], terms[rows]
+        parts = abs(terms).sum(axis=1)
+        read_off, status[rows] = read(wanted, K, parts, self._jacobian(at)[rows], u)
+        for name, value in read_off.items():
+            if name not in found:
+                found[name] = np.full((len(status), *value.shape[1:]), np.nan)
+            found[name][rows] = value
         return found
 
     def _along(self, at: Pose, F: Array, k: Array, W: Array) -> tuple[dict[str, Array], Array]:
         """Compute K_θ and ``along`` without the terms, and pivots (n,): where small, not exact."""
         K, size = self._stiffness(at, self._body(), F, k, W, 1)
         found = {"joint": self._alone(K[:, 0]).copy()} if "joint" in self._names else {}
-        pivot = np.empty((len(F), self._width))
+        pivot = np.zeros((len(F), self._width))
         if "along" in self._names:
             u = self._rows.directions.copy()  # writable, whatever u is: the kernel compiles once
             along, moment = np.empty((len(F), len(u), self._width)), bool(W[:, 3:].any())

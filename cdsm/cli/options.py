@@ -48,13 +48,10 @@ _SET = "Change a key of ARM.toml for this run: minimum=50, wire=48e3, friction=0
 _SET += "universal.link_mass=0.06, cables.cable1_1.maximum=90. Repeat it."
 _ANGLES = "Joint angles [deg, or mm where a joint slides]: one for all, one each, or by name "
 _ANGLES += "(joint2_1=10,…; others 0). Default: 0."
-OF_JOINTS = (
-    "Path, a line per sample. Columns such as joint1_1 [deg]; mm where they slide; others 0."
-)
-_PATH = (
-    "Path, a line per sample. Columns such as joint1_1 [deg] (mm where they slide; others 0), or "
-)
-_PATH += "x [mm], y [mm], z [mm] of the tip; for plans also target [N/mm]."
+OF_JOINTS = "Path, a line per sample. Columns such as joint1_1 [deg]; mm where they slide; "
+OF_JOINTS += "others 0."
+_PATH = "Path, a line per sample. Columns such as joint1_1 [deg] (mm where they slide; others 0), "
+_PATH += "or x [mm], y [mm], z [mm] of the tip; for plans also target [N/mm]."
 
 Arm = Annotated[Path, typer.Argument(metavar="ARM.toml", help="The arm; `cdsm new` writes one.")]
 Changes = Annotated[list[str] | None, opt(_SET, "KEY=VALUE", "--set")]

@@ -252,9 +252,10 @@ def design(
         raise misuse("--choose", f"{said} repeat the command with one of them.")
     if refine:
         found, number = cdsm.refine_design(task, found.design(number)), 0
+        front = write_text(front, found.best.to_csv())
     paths = [
         every,
-        write_text(folder / "front.csv", found.best.to_csv()),
+        front,
         cdsm.plots.save_figure(found.plot(), folder / "front.pdf"),
         cdsm.plots.save_figure(found.arm(number).plot(), folder / "arm.pdf"),
         *found.write_arm(folder, number),

@@ -228,8 +228,8 @@ def _require_held(arm: LockedArm, home: Posture) -> None:
         return
     worst = int(abs(vectors[:, 0]).argmax())
     name = home.arm.joint_names[worst]
-    k = home.arm.springs.matrix[worst, worst]
-    weak = f"the spring of {name}, {k:.4g} N m/rad, is too weak for its weight"
+    k, unit = home.arm.springs.matrix[worst, worst], home.arm.stiffness_unit(worst)
+    weak = f"the spring of {name}, {k:.4g} {unit}, is too weak for its weight"
     said = f"{weak if k else f'nothing holds {name}'} where the cables do not pull"
     remedy = "Give all such joints springs at once, which replace those they have: springs.JOINT = "
     remedy += "5 in ARM.toml or by --set, or joint_stiffness of the geometry, or, in Python, by "

@@ -124,7 +124,7 @@ class Result(ReadOnlyState):
                     parts = [str(labels[d][i] if d in labels else i + 1) for d, i in pairs]
                     own = suffix
                     if of == "rad or m":  # each joint has one of them
-                        own = f" [{'m' if self._arm.slides[place[-1]] else 'rad'}]"
+                        own = f" [{JointUnits(self._arm.slides).joined('rad', 'm', place[-1])}]"
                     columns[" ".join([name, *parts]) + own] = array[(slice(None), *place)]
         numbers = np.arange(len(next(iter(columns.values()), ())))  # of rows without names
         return data_frame(columns, self._rows or "result", labels.get(self._rows, numbers))

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final, NamedTuple, NoReturn
 
 from cdsm.errors import FileError, did_you_mean, listed
@@ -46,14 +46,27 @@ class Table(NamedTuple):
             return math.nan
 
 
+def _rows_of_numbers(table: Table) -> int:
+    rows = (cells for _, cells in table.rows)
+    return sum(sum(not math.isnan(table.number(cell)) for cell in row) > 1 for row in rows)
+
+
+def _cells_of_header(table: Table) -> int:
+    return len(table.header) if table.rows else 0
+
+
 def read_table(
-    path: str | os.PathLike[str], delimiters: str = ",", *, any_encoding: bool = False
+    path: str | os.PathLike[str],
+    delimiters: str,
+    *,
+    rank: Callable[[Table], int] = _rows_of_numbers,
+    any_encoding: bool = False,
 ) -> Table:
     """Read a table from a text file.
 
-    The delimiter of the cells is the first of ``delimiters`` that splits most lines into two or
-    more numbers. ``any_encoding`` is an argument of :func:`read_text`. FileError names a line that
-    cannot be split into cells.
+    The delimiter of the cells is the first of ``delimiters`` whose table has the highest ``rank``:
+    by default, most lines with two or more numbers. ``any_encoding`` is an argument of
+    :func:`read_text`. FileError names a line that cannot be split into cells.
     """
     lines = enumerate(read_text(path, any_encoding=any_encoding).splitlines(), start=1)
     filled = [(number, line) for number, line in lines if line.strip()]
@@ -68,12 +81,7 @@ def read_table(
             at, why = kept[split.line_num - 1][0], f"{error}" or "a quote is not closed before it"
             raise FileError(path, f"line {at} is no line of a table: {why}.") from None
         tables.append(Table(rows, comments, delimiter))
-    return max(tables, key=_rows_of_numbers)
-
-
-def _rows_of_numbers(table: Table) -> int:
-    rows = (cells for _, cells in table.rows)
-    return sum(sum(not math.isnan(table.number(cell)) for cell in row) > 1 for row in rows)
+    return max(tables, key=rank)
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:
@@ -95,8 +103,7 @@ class Columns:
     def __init__(
         self, path: str | os.PathLike[str], units: Mapping[str, Mapping[str, float]], holds: str
     ) -> None:
-        read = [read_table(path, each) for each in ",;\t"]
-        table = max(read, key=lambda table: len(table.rows[0][1]) if table.rows else 0)
+        table = read_table(path, ",;\t", rank=_cells_of_header)
         self.path, self.units, self._number = path, dict(units), table.number
         self.rows = [row for row in table.rows[1:] if any(row[1])]
         self._at, self.unit = dict[str, int](), dict[str, str]()  # by name

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import fcntl
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -145,6 +149,21 @@ def read_into_memory(data: Any, store: object) -> Any:
         return data.load()
     except RuntimeError as error:  # of the decoder
         raise FileError(store, f"is damaged ({error}); delete it, and repeat the sweep.") from None
+
+
+@contextmanager
+def only_writer(path: Path) -> Iterator[None]:
+    """Lock a store; FileError if another sweep writes to it. The lock ends with its process."""
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            said = "another sweep writes to it; wait for that one, or give another path to store."
+            raise FileError(path, said) from None
+        yield
+    finally:
+        os.close(folder)
 
 
 def _dims(name: str) -> list[str]:

@@ -7,12 +7,10 @@ is written last.
 
 from __future__ import annotations
 
-import fcntl
 import logging
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -40,7 +38,7 @@ from cdsm.support.validation import (
     unit_directions,
 )
 from cdsm.sweeps.cases import DEFAULT, QUANTITIES, require
-from cdsm.sweeps.dataset import Labelled, read_into_memory
+from cdsm.sweeps.dataset import Labelled, only_writer, read_into_memory
 from cdsm.sweeps.poses import PoseSet, angles_of, distinct
 from cdsm.tension import checked_bounds
 
@@ -223,7 +221,7 @@ def _stored(
     try:
         if is_new := not path.exists() or (path.is_dir() and not [*path.iterdir()]):
             _make(path, cases.dataset(q))
-        with _only_writer(path):
+        with only_writer(path):
             kept = read_sweep(path)
             sizes, dims = kept["status"].encoding["preferred_chunks"], q.dims[:-1]
             q = q.chunk({dim: sizes.get(dim, -1) for dim in dims})
@@ -252,21 +250,6 @@ def _stored(
     except OSError as error:
         raise FileError(path, f"cannot be written: {error}.") from error
     return read_sweep(path)
-
-
-@contextmanager
-def _only_writer(path: Path) -> Iterator[None]:
-    """Lock a store; FileError if another sweep writes to it. The lock ends with its process."""
-    folder = os.open(path, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            said = "another sweep writes to it; wait for that one, or give another path to store."
-            raise FileError(path, said) from None
-        yield
-    finally:
-        os.close(folder)
 
 
 def _make(path: Path, template: xarray.Dataset) -> None:

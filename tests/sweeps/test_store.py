@@ -181,8 +181,8 @@ def test_a_store_of_another_sweep_is_refused_with_the_difference(
 def test_a_second_writer_is_refused(tmp_path: Path) -> None:
     store = tmp_path / "store"
     cdsm.sweep(short_arm(), GRID, store=store, **CASES)
-    writer = "import sys; from pathlib import Path; from cdsm.sweeps.sweep import _only_writer\n"
-    writer += f"with _only_writer(Path({str(store)!r})): print('locked', flush=True); input()"
+    writer = "import sys; from pathlib import Path; from cdsm.sweeps.dataset import only_writer\n"
+    writer += f"with only_writer(Path({str(store)!r})): print('locked', flush=True); input()"
     with subprocess.Popen(
         [sys.executable, "-c", writer], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as other:
