@@ -136,7 +136,8 @@ class Cable:
 
     def with_friction(self, friction: float) -> Cable:
         """Return the same cable with μ = ``friction`` (0 to 2) in all holes that it passes."""
-        sites, holes = self.sites, self._holes
+        sites = self.sites
+        holes = self._holes
         rough = [replace(sites[i], friction=friction) for i in holes]
         return replace(self, sites=(*sites[: holes.start], *rough, *sites[holes.stop :]))
 
@@ -159,7 +160,8 @@ class Cable:
 
     def tension(self, elongation: ArrayLike, free_length: float) -> Array:
         """Compute F [N] at elongations Δl [m], any shape: the inverse of :meth:`elongation`."""
-        wanted, l_0 = number_array("elongation", elongation), _length(free_length)
+        wanted = number_array("elongation", elongation)
+        l_0 = _length(free_length)
         return self.elasticity._tension_of(wanted, "elongation", l_0, 1.0 / self.series_stiffness)
 
 
@@ -221,7 +223,8 @@ def serpentine_cables(
     Raises:
         InvalidInput: ``elasticity`` is not a law, or not one for each cable.
     """
-    names, n = instance("geometry", geometry, Geometry).cable_names, len(geometry.cables)
+    names = instance("geometry", geometry, Geometry).cable_names
+    n = len(geometry.cables)
     laws: Sequence[Elasticity]
     laws = elasticity if isinstance(elasticity, (list, tuple)) else [checked_law(elasticity)] * n
     if len(laws) != n:
@@ -229,7 +232,8 @@ def serpentine_cables(
     new = partial(Cable, series_stiffness=series_stiffness, control=control)
     cables = []
     for name, route, law in zip(names, geometry.cables, laws, strict=True):
-        mu, passed = route.friction, geometry.disks_of(route)
+        mu = route.friction
+        passed = geometry.disks_of(route)
         friction = [mu if route.lead else 0.0, *[mu] * (len(passed) - 2), 0.0]
         holes = zip(passed, friction, strict=True)
         sites = tuple(Site(disk.link, disk.hole(route), mu) for disk, mu in holes)
@@ -243,7 +247,8 @@ def require_own_cables(geometry: Geometry, cables: Sequence[Cable]) -> None:
     What is built from values of the geometry would replace them. Raises InvalidInput.
     """
     routed = serpentine_cables(geometry, cables[0].elasticity)
-    own, given = {cable.name: _path(cable) for cable in routed}, {c.name: _path(c) for c in cables}
+    own = {cable.name: _path(cable) for cable in routed}
+    given = {c.name: _path(c) for c in cables}
     if list(own.items()) != list(given.items()):
         other = listed([name for name in own | given if own.get(name) != given.get(name)])
         raise InvalidInput(

@@ -58,12 +58,15 @@ class CableLaws:
         self._most = frozen(np.array([cable.maximum for cable in cables]))
         self.series = frozen(1.0 / np.array([cable.series_stiffness for cable in cables]))
         self.rest = frozen(np.array([cable.elasticity.rest for cable in cables]))
-        self.nonlinear = [(law, of) for law, of in self.held if law._constant is None]
-        constant, linear = np.zeros(len(cables)), np.zeros(len(cables))
+        self.nonlinear = [(law, of) for law, of in self.held if law.constant_rigidity is None]
+        constant = np.zeros(len(cables))
+        linear = np.zeros(len(cables))
         for law, of in self.held:
-            if law._constant is not None:
-                constant[of], linear[of] = law._constant, float(self._unstrained)
-        self.constant, self.linear = frozen(constant), frozen(linear)
+            if law.constant_rigidity is not None:
+                constant[of] = law.constant_rigidity
+                linear[of] = float(self._unstrained)
+        self.constant = frozen(constant)
+        self.linear = frozen(linear)
 
     def narrowed(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return the tension bounds ``low``, ``high`` (…, C) [N], narrowed to the cables' own."""
@@ -123,7 +126,7 @@ class CableLaws:
         for law, of in self.held:
             stretch, EA = self._evaluate(law, of, tension[of])
             share = stiffness[of] * self.series[of]
-            rise = law._slope(tension[of], EA) * stretch + float(self._unstrained)
+            rise = law.slope_at(tension[of], EA) * stretch + float(self._unstrained)
             slope[of] = stiffness[of] * (share + (1.0 - share) * rise) / (EA * stretch)
         return frozen(slope)
 
@@ -132,7 +135,7 @@ class CableLaws:
     ) -> tuple[Array, Array]:
         """Compute 1 + ε and EA [N] of the cables ``of``."""
         try:
-            strain, EA = law._evaluate(law._inside(tension))
+            strain, EA = law.evaluate(law.require_inside(tension))
         except ElasticityRangeError as error:
             raise self.naming(error, of) from None
         return 1.0 + strain * self._unstrained, EA

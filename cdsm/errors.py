@@ -99,7 +99,8 @@ class GeometryError(CdsmError, ValueError):
     """
 
     def __init__(self, faults: Texts | str, source: str | None = None) -> None:
-        self.faults, self.source = (faults,) if isinstance(faults, str) else tuple(faults), source
+        self.faults = (faults,) if isinstance(faults, str) else tuple(faults)
+        self.source = source
         said = f"invalid geometry:{listed(self.faults, 20, LINES)}"
         said = faults if isinstance(faults, str) else said
         super().__init__(f"{source}: {said}" if source else said)
@@ -117,8 +118,10 @@ class ElasticityRangeError(CdsmError, ValueError):
     def __init__(
         self, problem: str, tension: Numbers = (), indices: Sequence[int] = (), cables: Texts = ()
     ) -> None:
-        self.problem, self.cables = problem, tuple(cables)
-        self.tension, self.indices = tuple(map(float, tension)), tuple(map(int, indices))
+        self.problem = problem
+        self.cables = tuple(cables)
+        self.tension = tuple(map(float, tension))
+        self.indices = tuple(map(int, indices))
         where = f"cable {listed(self.cables)}" if cables else ""
         if self.tension:
             values = f"tension {listed([f'{text} N' for text in _distinct(self.tension)])}"
@@ -148,8 +151,11 @@ class InfeasibleTension(CdsmError):
         fixed: Texts = (),
         hint: str = "",
     ) -> None:
-        self.missing, self.joint, self.relaxation = missing, joint, relaxation
-        self.binding, self.fixed = tuple(binding), tuple(fixed)
+        self.missing = missing
+        self.joint = joint
+        self.relaxation = relaxation
+        self.binding = tuple(binding)
+        self.fixed = tuple(fixed)
         if fixed:
             advice = f"Beside the fixed tensions no bounds help: change or free {', '.join(fixed)}."
         elif relaxation == math.inf:
@@ -158,7 +164,8 @@ class InfeasibleTension(CdsmError):
             advice += "pose.moment_arms."
         else:
             step = 10.0 ** (math.floor(math.log10(relaxation or 1.0)) - 3)
-            wider, at = math.ceil(relaxation / step) * step, ", ".join(binding) or "none"
+            wider = math.ceil(relaxation / step) * step
+            at = ", ".join(binding) or "none"
             advice = f"Widening every bound by {wider:.4g} N would be enough (cables at a bound: "
             advice += f"{at}). Reduce the load{hint and f', or {hint}'}."
         most = f"largest at {joint} ({abs(missing).max():.4g} {units[1]})"
@@ -193,7 +200,9 @@ class EquilibriumError(CdsmError, ArithmeticError):
     ) -> None:
         usual = "Reduce the load, raise the tensions, or take stiffer cables or springs."
         super().__init__(f"{problem}. {remedy or usual}")
-        self.residual, self.load_factor, self.joint = residual, load_factor, joint
+        self.residual = residual
+        self.load_factor = load_factor
+        self.joint = joint
 
 
 class UnreachableStiffness(CdsmError):
@@ -213,7 +222,10 @@ class UnreachableStiffness(CdsmError):
         nearest: Numbers,
         hint: str = "",
     ) -> None:
-        self.direction, self.target, self.low, self.high = direction, target, low, high
+        self.direction = direction
+        self.target = target
+        self.low = low
+        self.high = high
         self.nearest = tuple(map(float, nearest))
         wanted, least, most, *near = _distinct([x / 1e3 for x in (target, low, high, *nearest)])
         if low <= target <= high:
@@ -242,9 +254,11 @@ _OURS = {"cdsm", "pydantic", "dataclasses", "contextlib"}
 
 def warn(message: str) -> None:
     """Issue a :class:`CdsmWarning` that names the line of the first caller outside cdsm."""
-    level, frame = 1, sys._getframe(1)
+    level = 1
+    frame = sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in _OURS:
-        level, frame = level + 1, frame.f_back
+        level = level + 1
+        frame = frame.f_back
     warnings.warn(message, CdsmWarning, stacklevel=level + 1)
 
 

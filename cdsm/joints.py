@@ -50,7 +50,8 @@ def mimics_of(robot: etree._Element) -> dict[str, Mimic]:
     found = {}
     for joint in robot.iterfind("joint"):
         if (mimic := joint.find("mimic")) is not None:
-            factor, offset = mimic.get("multiplier") or 1.0, mimic.get("offset") or 0.0
+            factor = mimic.get("multiplier") or 1.0
+            offset = mimic.get("offset") or 0.0
             said = Mimic(str(mimic.get("joint")), float(factor), float(offset))
             found[str(joint.get("name"))] = said
     return found
@@ -65,9 +66,11 @@ def coupling_of(
     """
     if names == leaders:
         return None
-    S, offset = np.zeros((len(names), len(leaders))), np.zeros(len(names))
+    S = np.zeros((len(names), len(leaders)))
+    offset = np.zeros(len(names))
     for i, name in enumerate(names):
-        factor, way = 1.0, [name]
+        factor = 1.0
+        way = [name]
         while (mimic := mimics.get(way[-1])) is not None:
             offset[i] += factor * mimic.offset
             factor *= mimic.multiplier
@@ -83,11 +86,13 @@ def coupling_of(
 
 def limits_of(coupling: Coupling, lower: Array, upper: Array) -> tuple[Array, Array]:
     """Return the limits of φ (nv,) that keep all joints within theirs (n,)."""
-    low, high = np.full(len(coupling.leaders), -np.inf), np.full(len(coupling.leaders), np.inf)
+    low = np.full(len(coupling.leaders), -np.inf)
+    high = np.full(len(coupling.leaders), np.inf)
     for i, j in zip(*np.nonzero(coupling.matrix), strict=True):
         factor = coupling.matrix[i, j]
         ends = sorted((end - coupling.offset[i]) / factor for end in (lower[i], upper[i]))
-        low[j], high[j] = max(low[j], ends[0]), min(high[j], ends[1])
+        low[j] = max(low[j], ends[0])
+        high[j] = min(high[j], ends[1])
     return frozen(low), frozen(high)
 
 
@@ -139,7 +144,8 @@ class Springs:
         """Joint angles q (nv,) [rad] where the springs rest; 0 where there are none."""
         if self._coupling is None:
             return self.angle
-        S, root = self._coupling.matrix, np.sqrt(self.stiffness)
+        S = self._coupling.matrix
+        root = np.sqrt(self.stiffness)
         free = root * (self.angle - self._coupling.offset)
         found = np.linalg.lstsq(S * root[:, None], free, rcond=None)[0]
         return frozen(np.asarray(found, dtype=np.float64))
@@ -153,7 +159,8 @@ def springs_of(given: object, joints: tuple[str, ...], coupling: Coupling | None
     if not isinstance(given, Mapping):
         said = f"{given!r} given; give a dict of joint names and stiffnesses [N m/rad]."
         raise InvalidInput("springs", said)
-    k, angle = np.zeros(len(joints)), np.zeros(len(joints))
+    k = np.zeros(len(joints))
+    angle = np.zeros(len(joints))
     for name, spring in given.items():
         j = joints.index(one_of("joint", name, joints))
         pair = list(spring) if isinstance(spring, Sequence) else [spring, 0.0]

@@ -155,7 +155,9 @@ def _enlarge(a: Array, out: Array) -> None:
 @lane
 def _straight(a: Array, b: Array, out: Array, length: Array, shortest: Array) -> None:
     for w in each(length):
-        x, y, z = b[0, w] - a[0, w], b[1, w] - a[1, w], b[2, w] - a[2, w]
+        x = b[0, w] - a[0, w]
+        y = b[1, w] - a[1, w]
+        z = b[2, w] - a[2, w]
         distance = np.sqrt(x * x + y * y + z * z)
         length[w] += distance
         shortest[w] = np.minimum(shortest[w], distance)
@@ -177,7 +179,8 @@ def _moving(u: Array, v: Array, z: Array, b: Array, g: float, d: Array, J: Array
 def _bent(u: Array, d: Array, z: Array, F: Array, sign: float, out: Array) -> None:
     for w in each(F):
         rate = u[0, w] * d[0, w] + u[1, w] * d[1, w] + u[2, w] * d[2, w]
-        h, g = F[w] * u[3, w], F[w] * sign
+        h = F[w] * u[3, w]
+        g = F[w] * sign
         out[0, w] = h * (d[0, w] - rate * u[0, w]) + g * (u[1, w] * z[2, w] - u[2, w] * z[1, w])
         out[1, w] = h * (d[1, w] - rate * u[1, w]) + g * (u[2, w] * z[0, w] - u[0, w] * z[2, w])
         out[2, w] = h * (d[2, w] - rate * u[2, w]) + g * (u[0, w] * z[1, w] - u[1, w] * z[0, w])
@@ -186,14 +189,24 @@ def _bent(u: Array, d: Array, z: Array, F: Array, sign: float, out: Array) -> No
 @kernel
 def pose(arm: Arm, body: Body, q: Array, wrench: Array, at: Pose) -> None:
     """Fill ``at`` for joint angles q (B, nv, W) and wrenches (B, 6, W)."""
-    nv, P, W = len(arm.parent), len(arm.frame), q.shape[2]
-    R, o, v = np.zeros((nv + 1, 3, 3, W)), np.zeros((nv + 1, 3, W)), np.empty((nv, 3, W))
-    site, turn, mass = np.empty((P, 3, W)), np.empty((2, W)), np.empty((nv + 1, W))
-    centre, first = np.empty((3, W)), np.empty((nv + 1, 3, W))
+    nv = len(arm.parent)
+    P = len(arm.frame)
+    W = q.shape[2]
+    R = np.zeros((nv + 1, 3, 3, W))
+    o = np.zeros((nv + 1, 3, W))
+    v = np.empty((nv, 3, W))
+    site = np.empty((P, 3, W))
+    turn = np.empty((2, W))
+    mass = np.empty((nv + 1, W))
+    centre = np.empty((3, W))
+    first = np.empty((nv + 1, 3, W))
     for x in range(3):
         R[0, x, x] = 1.0
     for b in range(len(q)):
-        own, z, L, J = b % len(body.mass), at.axis[b], at.length[b], at.jacobian[b]
+        own = b % len(body.mass)
+        z = at.axis[b]
+        L = at.length[b]
+        J = at.jacobian[b]
         for j in range(nv):
             k = arm.parent[j]
             for w in each(turn):
@@ -211,16 +224,22 @@ def pose(arm: Arm, body: Body, q: Array, wrench: Array, at: Pose) -> None:
             for x in range(3):
                 _placed(o[arm.frame[p], x], R[arm.frame[p], x], body.site[own, p], site[p, x])
         L[:] = body.fixed[own]
-        J[:], at.shortest[b] = 0.0, np.inf
+        J[:] = 0.0
+        at.shortest[b] = np.inf
         for s in range(len(arm.ends)):
-            c, u, end = arm.ends[s, 0], at.segment[b, s], site[arm.ends[s, 2]]
+            c = arm.ends[s, 0]
+            u = at.segment[b, s]
+            end = site[arm.ends[s, 2]]
             _straight(site[arm.ends[s, 1]], end, u, L[c], at.shortest[b])
             for t in range(arm.path.shape[1]):
-                j, g = arm.path[s, t], arm.sign[s, t]
+                j = arm.path[s, t]
+                g = arm.sign[s, t]
                 if g != 0.0:
                     _moving(u, v[j], z[j], end, g, at.motion[b, s, t], J[c, j])
 
-        first[:], at.moved[b], mass[:] = 0.0, 0.0, body.mass[own]
+        first[:] = 0.0
+        at.moved[b] = 0.0
+        mass[:] = body.mass[own]
         for j in range(nv, -1, -1):  # from the tips on: mass and first moment of what j moves
             for x in range(3):
                 _placed(o[j, x], R[j, x], body.centre[own, j], centre[x])
@@ -233,7 +252,8 @@ def pose(arm: Arm, body: Body, q: Array, wrench: Array, at: Pose) -> None:
                 for x in range(3):
                     _add(first[j, x], first[arm.parent[j - 1], x])
 
-        tip, JX = at.tip[b], at.tip_jacobian[b]
+        tip = at.tip[b]
+        JX = at.tip_jacobian[b]
         for x in range(3):
             _placed(o[arm.tip, x], R[arm.tip, x], body.tip[own], tip[3, x])
             for y in range(3):
@@ -264,19 +284,29 @@ def stiffness(
     arm without springs, or (B, 1, …) for their sum. ``size`` (B, nv, W) is, then only, the sum of
     the magnitudes of their diagonals.
     """
-    nv, C, W = len(arm.parent), F.shape[1], F.shape[2]
-    apart, sum_of = K.shape[1] // 4, np.empty((nv, W))
-    a, r, pull = np.empty((3, W)), np.empty(W), np.empty((3, W))
+    nv = len(arm.parent)
+    C = F.shape[1]
+    W = F.shape[2]
+    apart = K.shape[1] // 4
+    sum_of = np.empty((nv, W))
+    a = np.empty((3, W))
+    r = np.empty(W)
+    pull = np.empty((3, W))
     c = np.empty((arm.path.shape[1], 3, W))
     for x in range(3):
         pull[x] = arm.gravity[x]
     for b in range(len(F)):
-        K[b], size[b], sum_of[:] = 0.0, 0.0, 0.0
-        z, J = at.axis[b], at.jacobian[b]
+        K[b] = 0.0
+        size[b] = 0.0
+        sum_of[:] = 0.0
+        z = at.axis[b]
+        J = at.jacobian[b]
         for s in range(len(arm.ends)):
-            u, d = at.segment[b, s], at.motion[b, s]
+            u = at.segment[b, s]
+            d = at.motion[b, s]
             for t in range(arm.path.shape[1]):
-                j, g = arm.path[s, t], arm.sign[s, t]
+                j = arm.path[s, t]
+                g = arm.sign[s, t]
                 if g != 0.0:
                     _bent(u, d[t], z[j], F[b, arm.ends[s, 0]], g, c[t])
                     for n in range(t + 1):
@@ -335,9 +365,13 @@ def along(K: Array, size: Array, JX: Array, u: Array, skew: bool, out: Array, pi
     ``pivot`` (B, W), relative to ``size``, is not small. Without ``skew``, K_θ is symmetric, and L
     follows from U. The stiffness is infinite where the tip cannot move.
     """
-    nv, W = K.shape[2], K.shape[4]
-    t, s, r = np.empty((nv, W)), np.empty((nv, W)), np.empty(W)
-    most, reach = np.empty(W), np.empty(W)
+    nv = K.shape[2]
+    W = K.shape[4]
+    t = np.empty((nv, W))
+    s = np.empty((nv, W))
+    r = np.empty(W)
+    most = np.empty(W)
+    reach = np.empty(W)
     for b in range(len(K)):
         A = K[b, 0]
         pivot[b] = np.inf
@@ -354,7 +388,8 @@ def along(K: Array, size: Array, JX: Array, u: Array, skew: bool, out: Array, pi
             for x in range(3):
                 _enlarge(JX[b, 0, j, x], reach)
         for n in range(len(u)):
-            r[:], most[:] = 0.0, 0.0
+            r[:] = 0.0
+            most[:] = 0.0
             for j in range(nv):
                 _turned(JX[b, 0, j], u[n], t[j])
                 _enlarge(t[j], most)
@@ -428,16 +463,26 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
     their lower bound, at the least rise of ‖F‖²; from base to tip, their multipliers y follow. The
     Karush-Kuhn-Tucker conditions then decide: J_Lᵀ F = τ, and F_c ≥ (J_L y)_c for all others.
     """
-    nv, C, W = len(arm.parent), F.shape[1], F.shape[2]
-    y, rest, left = np.empty((nv, W)), np.empty((2, W)), np.empty((C + 1, W))
-    best, both, J2 = np.empty((4, W)), np.empty((2, W)), np.empty((2, 2, W))
-    chosen, size = np.empty((len(arm.pair_ends), W)), np.empty(W)
+    nv = len(arm.parent)
+    C = F.shape[1]
+    W = F.shape[2]
+    y = np.empty((nv, W))
+    rest = np.empty((2, W))
+    left = np.empty((C + 1, W))
+    best = np.empty((4, W))
+    both = np.empty((2, W))
+    J2 = np.empty((2, 2, W))
+    chosen = np.empty((len(arm.pair_ends), W))
+    size = np.empty(W)
     left[C] = 0.0  # the second cable of blocks with one axis
     for b in range(len(F)):
-        J, none = at.jacobian[b], left[C]
-        F[b], good[b] = low[b], True
+        J = at.jacobian[b]
+        none = left[C]
+        F[b] = low[b]
+        good[b] = True
         for n in range(len(arm.pair_ends) - 2, -1, -1):
-            i, j = arm.axes[arm.axis_ends[n]], arm.axes[arm.axis_ends[n + 1] - 1]
+            i = arm.axes[arm.axis_ends[n]]
+            j = arm.axes[arm.axis_ends[n + 1] - 1]
             rest[0], rest[1] = at.torque[b, i], at.torque[b, j]
             if i == j:
                 rest[1] = 0.0
@@ -447,11 +492,13 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
                     _less_product(J[c, j], F[b, c], rest[1])
             best[0], best[1] = np.inf, -1.0
             for m in range(arm.pair_ends[n], arm.pair_ends[n + 1]):
-                p, q = arm.pairs[m, 0], arm.pairs[m, 1]
+                p = arm.pairs[m, 0]
+                q = arm.pairs[m, 1]
                 _paired(J, p, q, i, j, arm.least, J2)
                 _weighed(J2, rest, low[b, p], low[b, q] if i != j else none, m, best)
             for m in range(arm.pair_ends[n], arm.pair_ends[n + 1]):
-                p, q = arm.pairs[m, 0], arm.pairs[m, 1]
+                p = arm.pairs[m, 0]
+                q = arm.pairs[m, 1]
                 _add_chosen(best[1], m, best[2], F[b, p])
                 if i != j:
                     _add_chosen(best[1], m, best[3], F[b, q])
@@ -460,7 +507,8 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
                 good[b, w] &= best[1, w] >= 0.0
 
         for n in range(len(arm.pair_ends) - 1):
-            i, j = arm.axes[arm.axis_ends[n]], arm.axes[arm.axis_ends[n + 1] - 1]
+            i = arm.axes[arm.axis_ends[n]]
+            j = arm.axes[arm.axis_ends[n + 1] - 1]
             own = arm.cables[arm.cable_ends[n] : arm.cable_ends[n + 1]]
             for c in own:
                 left[c] = F[b, c]
@@ -468,7 +516,8 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
                     _less_product(J[c, t], y[t], left[c])
             both[:] = 0.0
             for m in range(arm.pair_ends[n], arm.pair_ends[n + 1]):
-                p, q = arm.pairs[m, 0], arm.pairs[m, 1]
+                p = arm.pairs[m, 0]
+                q = arm.pairs[m, 1]
                 _paired(J, p, q, i, j, arm.least, J2)
                 _multiplied(J2, left[p], left[q] if i != j else none, chosen[n], m, both)
             y[j], y[i] = both[1], both[0]
@@ -479,7 +528,8 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
                 _verified(left[c], F[b, c], high[b, c], good[b])
 
         for i in range(nv):  # rounding, where two cables of a block pull in nearly one direction
-            rest[0], size[:] = at.torque[b, i], 0.0
+            rest[0] = at.torque[b, i]
+            size[:] = 0.0
             for c in range(C):
                 if arm.pulls[c, i]:
                     _less_product(J[c, i], F[b, c], rest[0])

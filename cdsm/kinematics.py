@@ -99,7 +99,8 @@ class KinematicSolution(Result):
     @quantity("1", "limit")
     def at_limit(self) -> tuple[str, ...]:
         """Names of the joints at a limit."""
-        arm, q = self.posture.arm, self.angles
+        arm = self.posture.arm
+        q = self.angles
         room = np.minimum(q - arm.lower, arm.upper - q)
         tight = np.flatnonzero(room <= 2.0 * _TOUCHING * (arm.upper - arm.lower))
         return tuple(arm.joint_names[i] for i in tight)
@@ -144,8 +145,10 @@ def inverse_kinematics(
         problem = f"shape {wanted.shape} given; give a position (3,) or a pose (4, 4) [m]."
         raise InvalidInput("target", problem)
     if wanted.ndim == 2:
-        R, last = wanted[:3, :3], wanted[3].tolist()
-        off, determinant = float(abs(R.T @ R - np.eye(3)).max()), float(np.linalg.det(R))
+        R = wanted[:3, :3]
+        last = wanted[3].tolist()
+        off = float(abs(R.T @ R - np.eye(3)).max())
+        determinant = float(np.linalg.det(R))
         if off > 1e-9 or determinant < 0.0 or last != [0.0, 0.0, 0.0, 1.0]:
             problem = (
                 f"is no rigid transform: RᵀR is off 1 by {off:.2g}, det R = {determinant:.4g}, the "
@@ -188,15 +191,16 @@ def _solve(
 ) -> KinematicSolution:
     near = frozen(np.zeros(instance("arm", arm, Manipulator).nv))
     if guess is not None:
-        near = vector("guess", guess, arm.nv, arm._meaning_of_q)
-        for i in np.flatnonzero(arm._beyond_limits(near)).tolist():
+        near = vector("guess", guess, arm.nv, arm.meaning_of_q)
+        for i in np.flatnonzero(arm.beyond_limits(near)).tolist():
             limits = arm.lower[i], arm.upper[i], arm.joint_units[i]
             problem = beyond(arm.joint_names[i], near[i], *limits)
             raise InvalidInput("guess", f"{problem}; guess angles within the joint limits.")
     if not 0.0 < (tolerance := scalar("tolerance", tolerance)) < 1.0:
         raise InvalidInput("tolerance", f"{tolerance:g} given; a number between 0 and 1 is needed.")
     search = partial(_nearest, partial(_residual, arm, of, target), near, tolerance)
-    lower, upper = arm.lower, np.maximum(arm.upper, arm.lower + 1e-12)  # a joint may be locked
+    lower = arm.lower  # a joint may be locked
+    upper = np.maximum(arm.upper, arm.lower + 1e-12)
     try:
         pose = arm.at(search(lower, upper))
     except InvalidInput as error:
@@ -213,8 +217,9 @@ def _residual(arm: Manipulator, of: _Kind, target: Array, q: Array) -> _Pair:
     if of == "lengths":
         pose = arm.at(q, check_limits=False)
         return (pose.cable_lengths - target) / arm.length, pose.length_jacobian / arm.length
-    tip, jacobian = arm._body.tip(q)
-    linear, wanted = jacobian[:3] / arm.length, target if of == "position" else target[:3, 3]
+    tip, jacobian = arm.body.tip(q)
+    linear = jacobian[:3] / arm.length
+    wanted = target if of == "position" else target[:3, 3]
     offset = (tip[:3, 3] - wanted) / arm.length
     if of == "position":
         return offset, linear
@@ -253,5 +258,6 @@ def _nearest(
         start = best if trial < 2 else random.uniform(lower, upper)
         other, least = fit(start, _WEIGHTS[-1], method="dogbox" if trial else "trf")
         if least < (1.0 - 1e-6) * misfit:  # better by more than rounding
-            best, misfit = other, least
+            best = other
+            misfit = least
     return best

@@ -132,10 +132,10 @@ class Manipulator(Printed):
     lower: Array
     upper: Array
     _geometry: Geometry | None
-    _body: RigidBody
-    _routing: Routing
-    _laws: CableLaws
-    _own_springs: dict[str, tuple[float, float]] | None
+    body: RigidBody
+    routing: Routing
+    laws: CableLaws
+    own_springs: dict[str, tuple[float, float]] | None
     _doubts: tuple[str, ...]
 
     def __init__(
@@ -273,8 +273,8 @@ class Manipulator(Printed):
                 cable coincide at this posture.
         """
         q = self._angles(q, check_limits)
-        routing = self._routing
-        state = self._body.state(q)
+        routing = self.routing
+        state = self.body.state(q)
         site = routing.sites(state.placement)
         spans = routing.spans(state.twist, site)
         self._require_apart(spans.length, q)
@@ -295,8 +295,8 @@ class Manipulator(Printed):
 
     def _angles(self, q: ArrayLike, check_limits: bool) -> Array:
         """Check joint angles (nv,) [rad] and return them read-only."""
-        q = vector("q", q, self.nv, self._meaning_of_q)
-        if flag("check_limits", check_limits) and (out := self._beyond_limits(q)).any():
+        q = vector("q", q, self.nv, self.meaning_of_q)
+        if flag("check_limits", check_limits) and (out := self.beyond_limits(q)).any():
             at = np.flatnonzero(out).tolist()
             names, units = ([of[i] for i in at] for of in (self.joint_names, self.joint_units))
             angles, low, high = (of[at].tolist() for of in (q, self.lower, self.upper))
@@ -306,18 +306,19 @@ class Manipulator(Printed):
         return q
 
     @cached_property
-    def _meaning_of_q(self) -> str:
+    def meaning_of_q(self) -> str:
+        """What an entry of q is, and the names of the joints, for messages."""
         coordinate = "angle [rad] or way [m]" if self.slides.any() else "angle [rad]"
         return f"one {coordinate} per joint, {', '.join(self.joint_names)}"
 
-    def _beyond_limits(self, q: Array) -> NDArray[np.bool_]:
+    def beyond_limits(self, q: Array) -> NDArray[np.bool_]:
         """Return for each joint angle of q (nv,) whether it is beyond its limits (nv,)."""
         return np.asarray((q < self.lower - LIMIT_SLACK) | (q > self.upper + LIMIT_SLACK))
 
     def _require_apart(self, length: Array, q: Array) -> None:
         """Raise InvalidInput if a segment, of the ``length`` (S,) [m], has no direction."""
         if length.min(initial=math.inf) < SHORTEST_SEGMENT:
-            cable = self.cables[int(self._routing.cable[length.argmin()])]
+            cable = self.cables[int(self.routing.cable[length.argmin()])]
             said = f"two neighbouring sites coincide at q = {q.tolist()}, so the cable has no "
             said += "direction there. Move a site, or change the posture."
             raise InvalidInput(f"cable {cable.name!r}", said, Status.COINCIDENT_SITES.name)
@@ -344,8 +345,8 @@ class Manipulator(Printed):
         """
         if self.is_serpentine:
             return self.geometry.length
-        reach = float(np.linalg.norm(self._routing.point, axis=1).max())
-        return max(self._body.length, reach)
+        reach = float(np.linalg.norm(self.routing.point, axis=1).max())
+        return max(self.body.length, reach)
 
     @cached_property
     def has_springs(self) -> bool:
@@ -399,7 +400,7 @@ class Manipulator(Printed):
             joint_names = sequence_of("joint_names", joint_names, str)
         cables = _checked(cables)
         same = like is not None and urdf is like.urdf and np.array_equal(gravity, like.gravity)
-        body = like._body if like and same else RigidBody(urdf, tip_link, gravity, joint_names)
+        body = like.body if like and same else RigidBody(urdf, tip_link, gravity, joint_names)
         usual = geometry.springs if geometry else {}
         own = springs_of(usual if springs is None else springs, body.all_joints, body.coupling)
         # those that change the springs of the geometry, if any do
@@ -407,9 +408,9 @@ class Manipulator(Printed):
         self.__dict__.update({name: getattr(body, name) for name in _OF_BODY})
         self.__dict__.update(urdf=urdf, cables=cables, tip_link=tip_link, gravity=gravity)
         self.__dict__.update(original_length=original_length, tolerances=tolerances, springs=own)
-        self.__dict__.update(_geometry=geometry, _body=body, _own_springs=changed)
-        self.__dict__.update(_routing=Routing.of(body, cables))
-        self.__dict__.update(_laws=CableLaws(cables, original_length), _doubts=_doubts(self))
+        self.__dict__.update(_geometry=geometry, body=body, own_springs=changed)
+        self.__dict__.update(routing=Routing.of(body, cables))
+        self.__dict__.update(laws=CableLaws(cables, original_length), _doubts=_doubts(self))
         for doubt in self._doubts:
             if like is None or doubt not in like._doubts:
                 warn(f"{self.name}: {doubt}")
@@ -419,7 +420,7 @@ class Manipulator(Printed):
         """Return what defines the arm: two arms are equal if these values are equal."""
         names = ("urdf", "cables", "tip_link", "original_length", "joint_names", "tolerances")
         state = {name: getattr(self, name) for name in names}
-        state |= {"geometry": self._geometry, "springs": self._own_springs}
+        state |= {"geometry": self._geometry, "springs": self.own_springs}
         return state | {"gravity": tuple(self.gravity.tolist())}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -431,27 +432,27 @@ class Manipulator(Printed):
     def __hash__(self) -> int:
         return hash(self.urdf)
 
-    def _replace(self, **changes: Any) -> Manipulator:
+    def replace(self, **changes: Any) -> Manipulator:
         """Return an arm of which some of the values in :meth:`__getstate__` are others."""
         state = {**self.__getstate__(), **changes}
         return Manipulator.__new__(Manipulator)._define(**state, like=self)
 
-    def _with_geometry(self, geometry: Geometry, cables: Sequence[Cable]) -> Manipulator:
+    def with_geometry(self, geometry: Geometry, cables: Sequence[Cable]) -> Manipulator:
         """Return the arm of another geometry with these cables, otherwise like this one."""
         urdf = to_urdf(geometry)
-        return self._replace(geometry=geometry, cables=cables, urdf=urdf, joint_names=None)
+        return self.replace(geometry=geometry, cables=cables, urdf=urdf, joint_names=None)
 
     def with_cables(self, cables: CablesOrFile) -> Manipulator:
         """Return an arm with the same robot and other cables, given as for :class:`Manipulator`."""
-        return self._replace(cables=cables)
+        return self.replace(cables=cables)
 
     def with_friction(self, friction: float) -> Manipulator:
         """Return the same arm with one friction coefficient μ [-], from 0 to 2, in all holes."""
-        return self._replace(cables=[cable.with_friction(friction) for cable in self.cables])
+        return self.replace(cables=[cable.with_friction(friction) for cable in self.cables])
 
     def with_tolerances(self, tolerances: Tolerances) -> Manipulator:
         """Return the same arm with other :class:`Tolerances`; InvalidInput for another type."""
-        return self._replace(tolerances=instance("tolerances", tolerances, Tolerances))
+        return self.replace(tolerances=instance("tolerances", tolerances, Tolerances))
 
     def with_springs(self, springs: Mapping[str, Spring]) -> Manipulator:
         """Return the same arm with these springs at its joints, and no others.
@@ -463,16 +464,16 @@ class Manipulator(Printed):
         Raises:
             InvalidInput: A stiffness is negative, or no number. There is no such joint.
         """
-        return self._replace(springs=springs)
+        return self.replace(springs=springs)
 
     def with_gravity(self, gravity: Direction) -> Manipulator:
         """Return the same arm under another gravity: (3,) [m/s²] in base axes, or an axis."""
-        return self._replace(gravity=gravity)
+        return self.replace(gravity=gravity)
 
     @cached_property
-    def _chains(self) -> Chains:
+    def chains(self) -> Chains:
         """All cables of the arm, divided at their holes into segments."""
-        return Chains.of(self.cables, self._body, self.original_length)
+        return Chains.of(self.cables, self.body, self.original_length)
 
 
 def _checked(cables: CablesOrFile) -> Cables:
@@ -493,7 +494,7 @@ def _checked(cables: CablesOrFile) -> Cables:
 
 def _doubts(arm: Manipulator) -> tuple[str, ...]:
     """Return texts of warnings: lengths look as if not in metres, or no joint moves the tip."""
-    length = arm._body.length
+    length = arm.body.length
     # without lengths between the joints, the frame of the robot may be as long as any arm
     most = max(_FARTHEST, 10.0 * length) if length > 0.0 else LONGEST
     sizes = []
@@ -506,7 +507,7 @@ def _doubts(arm: Manipulator) -> tuple[str, ...]:
     largest = max(sizes, key=lambda size: size[1] / size[2])
     # a geometry warns of its own length
     found = doubts_about_units(0.0 if arm.is_serpentine else length, [largest])
-    if not arm._body.tip_joints.size:
+    if not arm.body.tip_joints.size:
         said = f"no joint moves its tip {arm.tip_link}, so its stiffness is infinite"
         found.append(f"{said}; give another link as tip.")
     return tuple(found)

@@ -90,7 +90,7 @@ class ArmParameters:
             if not numbers:
                 lacks = _LACKS.get(kind, "no cable that ends there")
                 raise InvalidInput(name, f"{self.arm.name} has {lacks}.")
-            if kind in _LACKS and self.arm._own_springs is not None:
+            if kind in _LACKS and self.arm.own_springs is not None:
                 said = (
                     "the springs of the arm are not those of its geometry, which alone is varied."
                 )
@@ -122,7 +122,8 @@ class ArmParameters:
         """
         places = {one_of("parameter", name, self.names): self._place(name) for name in values}
         numbers = {name: scalar(name, number) for name, number in values.items()}
-        changes, laws = [dict[str, float]() for _ in self.arm.cables], dict[Any, Elasticity]()
+        changes = [dict[str, float]() for _ in self.arm.cables]
+        laws = dict[Any, Elasticity]()
         for name, (kind, where) in places.items():
             for i in where if PARAMETERS[kind].part == "cables" else ():
                 changes[i][kind] = numbers[name]
@@ -139,7 +140,8 @@ class ArmParameters:
         for name, (kind, where) in places.items():
             value: float | None = numbers[name]
             if name == "hole_radius":
-                common, value = numbers[name], None  # of all joints: they have none of their own
+                common = numbers[name]  # of all joints: they have none of their own
+                value = None
             _, _, part, attribute, _ = PARAMETERS[kind]
             for i in where if part != "cables" else ():
                 if part == "beams":
@@ -162,7 +164,7 @@ class ArmParameters:
             _changed(replace(old, sites=holes_like(new, old), lead=new.lead), own, laws)
             for old, new, own in zip(self.arm.cables, routed, changes, strict=True)
         ]
-        return self.arm._with_geometry(geometry, cables)
+        return self.arm.with_geometry(geometry, cables)
 
     def _place(self, name: str) -> tuple[str, list[int]]:
         """Split a name such as ``hole_radius@2`` into its kind, and the indices in its part."""
@@ -235,7 +237,8 @@ def _changed(cable: Cable, changes: dict[str, float], laws: dict[Any, Elasticity
     names = {name: PARAMETERS[name].attribute for name in ("spring", "slack", "gain")}
     own: dict[str, Any] = {names[key]: x for key, x in changes.items() if key in names}
     if "rigidity" in changes:
-        law, factor = cable.elasticity, changes["rigidity"]
+        law = cable.elasticity
+        factor = changes["rigidity"]
         own["elasticity"] = laws.setdefault((law, factor), law.scaled(factor))
     return replace(cable, **own)
 
@@ -245,7 +248,8 @@ def holes_like(cable: Cable, other: Cable) -> tuple[Site, ...]:
 
     A hole that only ``cable`` passes gets the friction of the nearest hole that ``other`` passes.
     """
-    sites, known = list(cable.sites), other._holes
+    sites = list(cable.sites)
+    known = other._holes
     for i in cable._holes if known else ():
         near = min(max(i, known[0]), known[-1])
         wrap = other.sites[near].wrap if i == near else 0.0

@@ -66,12 +66,12 @@ class Posture(ReadOnlyState):
         return frozen(self.arm.springs.torque(self.q))
 
     @property
-    def _own_torque(self) -> Array:
+    def own_torque(self) -> Array:
         """Derivative of the energy of weight and springs (nv,)."""
         return self.gravity_torque + self.spring_torque
 
     @property
-    def _own_stiffness(self) -> Array:
+    def own_stiffness(self) -> Array:
         """Second derivative of the energy of weight and springs (nv, nv)."""
         return self.gravity_stiffness + self.arm.springs.matrix
 
@@ -103,8 +103,9 @@ class Posture(ReadOnlyState):
     @cached_property
     def length_hessian(self) -> Array:
         """H_L[c, i, j] = ∂²L_c/∂θ_i∂θ_j, (C, nv, nv) [m/rad²], computed on first use."""
-        routing = self.arm._routing
-        one, count = np.ones(routing.cable.size), len(self.cable_lengths)
+        routing = self.arm.routing
+        one = np.ones(routing.cable.size)
+        count = len(self.cable_lengths)
         return frozen(routing.hessians(self._spans, one, routing.cable, count))
 
     @cached_property
@@ -116,7 +117,8 @@ class Posture(ReadOnlyState):
     @property
     def joint_positions(self) -> Array:
         """Positions of the joints (nv, 3) [m]: one point on each joint axis."""
-        coupling, every = self.arm._body.coupling, self._placements[1:, :3, 3]
+        coupling = self.arm.body.coupling
+        every = self._placements[1:, :3, 3]
         return frozen(every[list(coupling.leaders)]) if coupling else every
 
     @property
@@ -132,7 +134,8 @@ class Posture(ReadOnlyState):
     @cached_property
     def _bones(self) -> list[tuple[int, Array]]:
         """The bones, each with the row of the joint that carries its link; row 0 is the base."""
-        origin, body = self._placements[:, :3, 3], self.arm._body
+        origin = self._placements[:, :3, 3]
+        body = self.arm.body
         tip = ([0, *body.tip_joints + 1][-1], self.tip[:3, 3])
         ends = [*zip(body.parent[1:], origin[1:], strict=True), tip]
         bones = [(row, np.array([origin[row], end])) for row, end in ends]
@@ -141,7 +144,7 @@ class Posture(ReadOnlyState):
     def _stick_figure(self, without: Collection[int] = ()) -> tuple[list[Array], list[Array]]:
         """Return :attr:`bones` and :attr:`brackets`, except those of the rows in ``without``."""
         brackets = []
-        for row, site in zip(self.arm._routing.row.tolist(), self._sites.T, strict=True):
+        for row, site in zip(self.arm.routing.row.tolist(), self._sites.T, strict=True):
             if row not in without:
                 feet = [foot(site, bone) for at, bone in self._bones if at == row]
                 ends = feet or [self._placements[row, :3, 3]]
@@ -151,7 +154,7 @@ class Posture(ReadOnlyState):
 
     def link_pose(self, link: str) -> Array:
         """Compute the pose (4, 4) [m] of a link's frame in base axes, or raise InvalidInput."""
-        poses = self.arm._body.link_placements(self.q)
+        poses = self.arm.body.link_placements(self.q)
         return frozen(poses[one_of("link", link, poses)])
 
     @cached_property
@@ -163,7 +166,8 @@ class Posture(ReadOnlyState):
         """
         if not self.arm.is_serpentine:
             return ()
-        disks, poses = self.arm.geometry.disks, self.arm._body.link_placements(self.q)
+        disks = self.arm.geometry.disks
+        poses = self.arm.body.link_placements(self.q)
         return tuple(overlapping(disks, {disk.link: poses[disk.link] for disk in disks}))
 
     @property
@@ -175,22 +179,24 @@ class Posture(ReadOnlyState):
     @cached_property
     def segments(self) -> Segments:
         """Lengths of cable segments between holes, and wrap angles; computed on first use."""
-        return Segments.at(self.arm._chains, self._twist, self._placements)
+        return Segments.at(self.arm.chains, self._twist, self._placements)
 
-    def _equals(self, other: Posture) -> bool:
+    def equals(self, other: Posture) -> bool:
+        """Return whether arm and joint angles are equal."""
         return self is other or (self.arm == other.arm and np.array_equal(self.q, other.q))
 
     def _active(self, tension: Array) -> Array:
         """Compute the active term H_L·F (nv, nv) [N m/rad] of K_θ for tensions F (C,) [N]."""
-        routing = self.arm._routing
+        routing = self.arm.routing
         return np.asarray(routing.hessian(self._spans, tension[routing.cable]))
 
     def _load(self, wrench: Array) -> Array:
         """Compute the load term −∂(J_Xᵀ W)/∂θ (nv, nv) [N m/rad] of K_θ for a wrench W (6,)."""
-        body = self.arm._body
+        body = self.arm.body
         if body.coupling is None:
             return load_stiffness(self.jacobian, wrench, body.tip_joints)
-        v, z = self._twist[:3], self._twist[3:]
+        v = self._twist[:3]
+        z = self._twist[3:]
         every = np.vstack([v + cross(z, self.tip[:3, 3:]), z])
         return body.coupling.square(load_stiffness(every, wrench, body.tip_joints))
 
@@ -231,7 +237,8 @@ class MomentArms(Result):
 
     def __getitem__(self, names: tuple[str, str]) -> float:
         """Return the moment arm of a cable about a joint."""
-        cables, joints = self.posture.arm.cables.names, self.posture.arm.joint_names
+        cables = self.posture.arm.cables.names
+        joints = self.posture.arm.joint_names
         said = f'give a cable and a joint, such as moment_arms["{cables[0]}", "{joints[0]}"].'
         if not isinstance(names, tuple) or len(names) != 2:
             raise InvalidInput("moment_arms", f"{names!r} given; {said}")

@@ -110,7 +110,8 @@ def experimental_prototype_geometry(
     """
     assumed = {"link_length": 0.1, "base_length": 0.05, "disk_offset": 0.02, "hole_radius": 0.03}
     given: dict[str, Any] = assumed | {"lead": 0.3, "joint_limit": np.deg2rad(30.0)} | sizes
-    name, twist = "experimental_prototype", np.deg2rad(30.0)
+    name = "experimental_prototype"
+    twist = np.deg2rad(30.0)
     geometry = Geometry.hinged(name=name, joints=3, twist=twist, link_mass=link_mass, **given)
     if tool_length is None:
         return geometry
@@ -216,7 +217,8 @@ def nitinol_segment(
     with 10 mm, at 171, 168 and 169 mm. Assumed: tendons that do not stretch, hole angles of 90°,
     −30° and 210°, a density of 6450 kg/m³, ν = 0.3, and disks without mass.
     """
-    outer, inner = 1.22e-3, 0.954e-3
+    outer = 1.22e-3
+    inner = 0.954e-3
     section = {"length": 0.25, "disks": 10, "hole_angles": _THREE_HOLES, "hole_radius": 6e-3}
     geometry = Geometry.backbone(
         name="nitinol_segment",

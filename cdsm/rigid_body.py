@@ -76,7 +76,8 @@ class RigidBody:
         except ValueError as error:
             raise GeometryError(f"Pinocchio does not accept the URDF: {error}") from None
         model.gravity.linear = np.array(gravity)
-        names, mimics = tuple(model.names)[1:], mimics_of(robot)
+        names = tuple(model.names)[1:]
+        mimics = mimics_of(robot)
         free = tuple(name for name in names if name not in mimics)
         self.joint_names = free if joint_names is None else _reordered(free, joint_names)
         self.all_joints = names
@@ -104,23 +105,29 @@ class RigidBody:
 
     def state(self, q: Array) -> State:
         """Compute everything at joint angles q (nv,)."""
-        model, data = self._model, self._data()
+        model = self._model
+        data = self._data()
         slope = pin.computeGeneralizedGravityDerivatives(model, data, self._angles(q))
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         # for a model with one joint, Pinocchio returns vectors
         n = len(self.all_joints)
-        J, twist = jacobian.reshape(6, n).copy(), data.J.reshape(6, n).copy()
-        torque, slope = data.g.copy(), slope.reshape(n, n).copy()
+        J = jacobian.reshape(6, n).copy()
+        twist = data.J.reshape(6, n).copy()
+        torque = data.g.copy()
+        slope = slope.reshape(n, n).copy()
         if self.coupling:
             S = self.coupling.matrix
-            J, torque, slope = J @ S, torque @ S, self.coupling.square(slope)
+            J = J @ S
+            torque = torque @ S
+            slope = self.coupling.square(slope)
         tip = pin.updateFramePlacement(model, data, self._tip).homogeneous
         placement = np.array([each.homogeneous for each in data.oMi])
         return State(tip, J, torque, slope, twist, placement)
 
     def tip(self, q: Array) -> tuple[Array, Array]:
         """Compute only the pose (4, 4) of the tip and J_X (6, nv) of :meth:`state`."""
-        model, data = self._model, self._data()
+        model = self._model
+        data = self._data()
         pin.computeJointJacobians(model, data, self._angles(q))
         jacobian = pin.getFrameJacobian(model, data, self._tip, pin.LOCAL_WORLD_ALIGNED)
         pose: Array = pin.updateFramePlacement(model, data, self._tip).homogeneous
@@ -171,8 +178,10 @@ class RigidBody:
 
     def arrays(self) -> TreeArrays:
         """Return the kinematic tree as plain arrays."""
-        model, tip = self._model, self._model.frames[self._tip]
-        places, inertias = list(model.jointPlacements), list(model.inertias)
+        model = self._model
+        tip = self._model.frames[self._tip]
+        places = list(model.jointPlacements)
+        inertias = list(model.inertias)
         return TreeArrays(
             parent=np.array(self.parent, dtype=np.intp),
             rotation=np.array([place.rotation for place in places]),
@@ -212,7 +221,8 @@ class RigidBody:
 
     def _local_twists(self) -> Array:
         """Compute the unit twist of each joint in its own frame (nv+1, 6), linear part first."""
-        model, data = self._model, self._data()
+        model = self._model
+        data = self._data()
         pin.computeJointJacobians(model, data, pin.neutral(model))
         columns = [
             pin.getJointJacobian(model, data, 1 + j, pin.LOCAL).reshape(6, -1)[:, j]

@@ -102,7 +102,8 @@ class Routing:
                     if not every:
                         fixed[c] += length
                         continue
-                to_a, to_b = body.joints_to(row[-2]), body.joints_to(row[-1])
+                to_a = body.joints_to(row[-2])
+                to_b = body.joints_to(row[-1])
                 way = [(joint - 1, -1.0) for joint in reversed(to_a) if joint not in to_b]
                 way += [(joint - 1, 1.0) for joint in to_b if joint not in to_a]
                 segments.append((c, len(row) - 1, way))
@@ -190,7 +191,8 @@ class Routing:
         real = self.sign != 0.0
         p, q = np.triu_indices(m)
         both = real[:, p] & real[:, q]
-        i, j = self.path[:, p][both], self.path[:, q][both]
+        i = self.path[:, p][both]
+        j = self.path[:, q][both]
         segment = np.broadcast_to(np.arange(S)[:, None], both.shape)[both]
         source = (np.arange(S)[:, None] * m * m + p * m + q)[both]
         off = i != j

@@ -60,7 +60,8 @@ class Chains:
     def of(cls, cables: Sequence[Cable], body: RigidBody, original_length: OriginalLength) -> Self:
         """Divide cables at their holes into segments."""
         segments: list[Cable] = []
-        start, holes = [0], []
+        start = [0]
+        holes = []
         for cable in cables:
             sites = list(cable.sites)
             if cable.lead > 0.0:
@@ -126,12 +127,15 @@ class Segments(ReadOnlyState):
         """
         routing = chains.routing
         spans = routing.spans(twist, routing.sites(placement))
-        hole, nv = chains.hole, routing.nv
-        u, v = spans.direction[:, hole], spans.direction[:, hole + 1]
+        hole = chains.hole
+        nv = routing.nv
+        u = spans.direction[:, hole]
+        v = spans.direction[:, hole + 1]
         normal = cross(u, v)
         sine = np.sqrt(dot(normal, normal))
         normal = normal / np.where(sine > STRAIGHT, sine, np.inf)
-        p, q = cross(normal, u) / spans.length[hole], cross(v, normal) / spans.length[hole + 1]
+        p = cross(normal, u) / spans.length[hole]
+        q = cross(v, normal) / spans.length[hole + 1]
         # from the end at the hole to the other one, the first site
         along = (spans.length * spans.direction)[:, :, None]
         back = spans.motion - cross(spans.axis, along)

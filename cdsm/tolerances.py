@@ -46,7 +46,8 @@ class Tolerance:
     of: str = EVERY
 
     def __post_init__(self) -> None:
-        standard, rho = scalar("standard", self.standard), scalar("correlation", self.correlation)
+        standard = scalar("standard", self.standard)
+        rho = scalar("correlation", self.correlation)
         if standard < 0.0:
             raise InvalidInput("standard", f"{standard:g} given; a tolerance is not negative.")
         if not 0.0 <= rho <= 1.0:
@@ -155,7 +156,8 @@ def _checked(source: str, value: Any) -> tuple[Tolerance, ...]:
         given = sequence_of("tolerances", each, Tolerance)
     except InvalidInput as error:
         raise InvalidInput(source, str(error).removeprefix("standard: ")) from None
-    u, largest = max([0.0, *(one.standard for one in given)]), _LARGEST.get(source, math.inf)
+    u = max([0.0, *(one.standard for one in given)])
+    largest = _LARGEST.get(source, math.inf)
     if u > largest:
         said = f"a standard uncertainty of {u:g} given; up to {largest:g} is a tolerance"
         raise InvalidInput(source, f"{said}. EA and springs are relative, angles in rad.")
@@ -188,7 +190,8 @@ def from_table(table: Mapping[str, Any]) -> Tolerances:
     """Build tolerances from a parsed TOML table; raise GeometryError that lists every fault."""
     if not isinstance(table, Mapping):
         raise GeometryError([f"is {table!r}; give a table [tolerances]"])
-    found, faults = {}, []
+    found = {}
+    faults = []
     for name, value in table.items():
         try:
             one_of("source of uncertainty", name, SOURCES)

@@ -62,7 +62,8 @@ def read_urdf(source: str | os.PathLike[str], *, check_inertia: bool = True) -> 
         raise GeometryError(
             f"{name} is a xacro file; run xacro on it first, and give what it prints."
         )
-    links, joints = robot.findall("link"), robot.findall("joint")
+    links = robot.findall("link")
+    joints = robot.findall("joint")
     faults = [] if robot.get("name") else ["<robot> has no name"]
     faults += _text_faults([*links, *joints])
     faults = faults or [*_link_faults(links, check_inertia), *_joint_faults(joints)]
@@ -138,7 +139,9 @@ def _joint_faults(joints: list[etree._Element]) -> Iterator[str]:
     if not 0 < len(moving) <= 2 * MAXIMUM_JOINTS:
         yield f"has {len(moving)} joints that move; 1 to {2 * MAXIMUM_JOINTS} are needed"
     for joint in joints:
-        where, kind, limit = f"joint {joint.get('name')}", joint.get("type"), joint.find("limit")
+        where = f"joint {joint.get('name')}"
+        kind = joint.get("type")
+        limit = joint.find("limit")
         if joint not in moving and kind != "fixed":
             remedy = _INSTEAD.get(
                 str(kind), "one of revolute, continuous, prismatic, fixed is needed"
@@ -167,9 +170,11 @@ def _tree_faults(links: list[str], joints: list[etree._Element]) -> list[str]:
     """Return what is wrong: unknown links, two parents or roots, circles, too many in series."""
     if len(links) > _MOST_LINKS:
         return [f"has {len(links)} links; {_MOST_LINKS} are taken at most"]
-    faults, carriers = [], defaultdict(list)
+    faults = []
+    carriers = defaultdict(list)
     for joint in joints:
-        name, ends = str(joint.get("name")), _ends(joint)
+        name = str(joint.get("name"))
+        ends = _ends(joint)
         faults += [f"joint {name}: there is no link {link}" for link in ends if link not in links]
         faults += [f"joint {name}: joins link {ends[1]} to itself"] * (ends[0] == ends[1])
         carriers[ends[1]].append((name, ends[0]))
@@ -193,7 +198,8 @@ def _tree_faults(links: list[str], joints: list[etree._Element]) -> list[str]:
 
 def _reading_faults(robot: etree._Element) -> Iterator[str]:
     """Yield what Pinocchio refuses or reads otherwise; warn of moving links without mass."""
-    masses, joints = _masses(robot.findall("link")), robot.findall("joint")
+    masses = _masses(robot.findall("link"))
+    joints = robot.findall("joint")
     root = next(link for link in masses if link not in {_ends(joint)[1] for joint in joints})
     try:
         arm = RigidBody(etree.tostring(robot, encoding="unicode"), root, np.zeros(3))

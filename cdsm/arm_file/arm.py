@@ -95,7 +95,7 @@ def _wire_tables(cables: Sequence[Cable]) -> tuple[dict[Elasticity, Any], dict[s
     values: dict[Elasticity, Any] = {}
     tables: dict[str, Any] = {}
     for law in dict.fromkeys(cable.elasticity for cable in cables):
-        values[law] = name_of(law) or law._constant or f"wire{len(tables) + 1}"
+        values[law] = name_of(law) or law.constant_rigidity or f"wire{len(tables) + 1}"
         if values[law] == f"wire{len(tables) + 1}":
             tables[values[law]] = table_of(law)
     return values, tables
@@ -143,13 +143,14 @@ def read_arm(
 
 def arm_text(arm: Manipulator) -> str:
     """Return the text of an ARM.toml; InvalidInput if an elasticity cannot be written."""
-    cables, geometry = arm.cables, arm.geometry if arm.is_serpentine else None
+    cables = arm.cables
+    geometry = arm.geometry if arm.is_serpentine else None
     values, tables = _wire_tables(cables)
     owns = [{"wire": values[each.elasticity]} | _settings(each) for each in cables]
     shared = {key: x for key, x in owns[0].items() if all(own.get(key) == x for own in owns)}
     owns = [{key: x for key, x in own.items() if key not in shared} for own in owns]
     data: dict[str, Any] = {"gravity": arm.gravity.tolist(), "original_length": arm.original_length}
-    data |= {"springs": arm._own_springs}
+    data |= {"springs": arm.own_springs}
     data |= {**shared, "wires": tables, "tolerances": tolerance_table(arm.tolerances)}
     plain: tuple[Cable, ...] = ()
     if geometry is None:

@@ -201,7 +201,8 @@ def _built(given: Any, check: Callable[[Any], Any], info: Info) -> Cables:
     known = info.data
     if known.get("geometry", ...) is None and not isinstance(given, list):
         raise ValueError("give tables [[cables]], one for each cable")
-    tables, faults = check({} if given is None else given), list[str]()
+    tables = check({} if given is None else given)
+    faults = list[str]()
     routes: dict[str, Any]
     if isinstance(tables, tuple):
         routes = {f"[{i}]": each for i, each in enumerate(tables, start=1)}
@@ -219,8 +220,10 @@ def _built(given: Any, check: Callable[[Any], Any], info: Info) -> Cables:
         place = f"{where}.wire"
         try:
             law = known.get("wire") if own.wire is None else _law_of(own.wire, known)
-            place, given = where, shared | _given(vars(own))
-            mu, slack = given.pop("friction", None), given.pop("slack_below", False)
+            place = where
+            given = shared | _given(vars(own))
+            mu = given.pop("friction", None)
+            slack = given.pop("slack_below", False)
             law = law.slack_below() if law and slack else law or _NO_WIRE
             if isinstance(route, _Routed):
                 route = route.built(mu or 0.0)
@@ -270,7 +273,8 @@ def read_model(
 
     Raises FileError, which lists every fault or the cables without a wire.
     """
-    forced, faults = None if wire is None else as_wire(wire), ""
+    forced = None if wire is None else as_wire(wire)
+    faults = ""
     try:
         data = _read_tables(path, changes, robot)
         described, rest = toml.split_geometry(data)

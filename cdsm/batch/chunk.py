@@ -48,31 +48,41 @@ class Chunk:
         status: Codes,
         memory: dict[str, Array],
     ) -> None:
-        self._rows, self._kernels, self._part, self._status = rows, kernels, part, status
+        self._rows = rows
+        self._kernels = kernels
+        self._part = part
+        self._status = status
         self._memory = memory
-        self._table, self._names = rows_of(rows.arm), set(rows.names)
+        self._table = rows_of(rows.arm)
+        self._names = set(rows.names)
         self._q = rows.q[part]
         self._width = width if kernels.COMPILED else len(self._q)
 
     def quantities(self) -> dict[str, Array]:
         """Compute the quantities (n, …); NaN where one does not exist, as the status says."""
-        table, rows, status = self._table, self._rows, self._status
+        table = self._table
+        rows = self._rows
+        status = self._status
         if rows.check_limits:
-            low, high = rows.arm.lower - LIMIT_SLACK, rows.arm.upper + LIMIT_SLACK
+            low = rows.arm.lower - LIMIT_SLACK
+            high = rows.arm.upper + LIMIT_SLACK
             beyond = ((self._q < low) | (self._q > high)).any(axis=1)
             status[beyond] = Status.BEYOND_LIMITS
         every = table.coupling.angles(self._q) if table.coupling else self._q
-        W, q = self._lanes(rows.wrench), side_by_side(every, self._width)
+        W = self._lanes(rows.wrench)
+        q = side_by_side(every, self._width)
         at = Pose(*(self._empty(name, len(q), *shape) for name, shape in table.shapes.items()))
         self._kernels.pose(table.arm, self._body(), q, W, at)
-        full, at = at, self._reduced(at)
+        full = at
+        at = self._reduced(at)
         short = self._alone(at.shortest) < SHORTEST_SEGMENT
         status[short & (status == Status.OK)] = Status.COINCIDENT_SITES
         found = self._of_posture(at)
         if not self._names <= found.keys():
             F = self._tensions(at)
-            L, pull = self._alone(at.length), self._alone(F)
-            laws = rows.arm._laws
+            L = self._alone(at.length)
+            pull = self._alone(F)
+            laws = rows.arm.laws
             if self._names <= {*OF_POSTURE, *OF_TENSION}:
                 k = np.zeros_like(pull)
             elif rows.springs is not None:
@@ -117,13 +127,16 @@ class Chunk:
 
     def _tensions(self, at: Pose) -> Array:
         """Return F (B, C, W): given, distributed, or any number where none exists or is needed."""
-        rows, status, shape = self._rows, self._status, at.length.shape
+        rows = self._rows
+        status = self._status
+        shape = at.length.shape
         if rows.tension is not None:
             return np.nan_to_num(self._lanes(rows.tension))
         if rows.bounds is None:
             return np.zeros(shape)
         low, high = map(self._lanes, rows.bounds)
-        F, good = np.empty(shape), np.zeros((shape[0], shape[2]), dtype=np.bool_)
+        F = np.empty(shape)
+        good = np.zeros((shape[0], shape[2]), dtype=np.bool_)
         if len(self._table.arm.pairs):
             self._kernels.guess(self._table.arm, at, low, high, F, good)
         for n in np.flatnonzero(~self._alone(good) & (status == Status.OK)):
@@ -134,8 +147,11 @@ class Chunk:
 
     def _of_stiffness(self, full: Pose, at: Pose, F: Array, k: Array, W: Array) -> dict[str, Array]:
         """Compute K_θ, its terms if they are needed, and what is read off it."""
-        names, status, u = self._names, self._status, self._rows.directions
-        wanted, rows = names & set(READINGS), np.flatnonzero(status == Status.OK)
+        names = self._names
+        status = self._status
+        u = self._rows.directions
+        wanted = names & set(READINGS)
+        rows = np.flatnonzero(status == Status.OK)
         found: dict[str, Array] = {}
         if (
             self._kernels.COMPILED
@@ -155,7 +171,8 @@ class Chunk:
             found["joint"] = terms.sum(axis=1)
             if not wanted:
                 return found
-            K, terms = found["joint"][rows], terms[rows]
+            K = found["joint"][rows]
+            terms = terms[rows]
         parts = abs(terms).sum(axis=1)
         read_off, status[rows] = read(wanted, K, parts, self._jacobian(at)[rows], u)
         for name, value in read_off.items():
@@ -171,20 +188,27 @@ class Chunk:
         pivot = np.zeros((len(F), self._width))
         if "along" in self._names:
             u = self._rows.directions.copy()  # writable, whatever u is: the kernel compiles once
-            along, moment = np.empty((len(F), len(u), self._width)), bool(W[:, 3:].any())
+            along = np.empty((len(F), len(u), self._width))
+            moment = bool(W[:, 3:].any())
             self._kernels.along(K, size, at.tip_jacobian, u, moment, along, pivot)
             found["along"] = self._alone(along)
         return found, self._alone(pivot)
 
     def _terms(self, at: Pose, F: Array, k: Array, W: Array, rows: Indices | None) -> Array:
         """Return the 4 or 5 terms (n, 5, nv, nv) of K_θ of some rows, or of all."""
-        body, number, coupling = self._body(), len(self._q), self._table.coupling
+        body = self._body()
+        number = len(self._q)
+        coupling = self._table.coupling
 
         def some(x: Array) -> Array:
             return side_by_side(self._alone(x)[rows], self._width)
 
         if rows is not None:
-            at, F, k, W, number = Pose(*map(some, at)), some(F), some(k), some(W), rows.size
+            at = Pose(*map(some, at))
+            F = some(F)
+            k = some(k)
+            W = some(W)
+            number = rows.size
             body = body if self._rows.body is None else Body(*map(some, body))
         count = 5 if self._rows.arm.has_springs or "springs" in self._names else 4
         terms = one_by_one(self._stiffness(at, body, F, k, W, count)[0], number)
@@ -195,7 +219,8 @@ class Chunk:
     ) -> tuple[Array, Array]:
         """Compute the 4 or 5 terms (B, 5, nv, nv, W) of K_θ, or 1: their sum."""
         B, nv, _ = at.gravity.shape
-        K, size = self._empty(f"K{count}", B, count, nv, nv), self._empty("size", B, nv)
+        K = self._empty(f"K{count}", B, count, nv, nv)
+        size = self._empty("size", B, nv)
         self._kernels.stiffness(self._table.arm, body, at, F, k, W, K, size)
         return K, size
 

@@ -83,15 +83,17 @@ class ArmRows:
     """
 
     def __init__(self, arm: Manipulator) -> None:
-        tree, routing = arm._body.arrays(), arm._routing
+        tree = arm.body.arrays()
+        routing = arm.routing
         parent = tree.parent[1:]
         nv = len(parent)
-        self.coupling = arm._body.coupling
+        self.coupling = arm.body.coupling
         moves = np.eye(nv, dtype=np.bool_)
         for j in range(nv):
             if parent[j]:
                 moves[j] |= moves[parent[j] - 1]
-        axis, slide = tree.twist[1:, 3:], tree.twist[1:, :3]
+        axis = tree.twist[1:, 3:]
+        slide = tree.twist[1:, :3]
         about = axis[:, :, None] * axis[:, None, :]
         about[~axis.any(axis=1)] = np.eye(3)  # a joint that slides does not turn
         cross = np.cross(axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
@@ -129,7 +131,8 @@ class ArmRows:
             spring=arm.springs.stiffness,
         )
         self.body = cache(self._body)
-        C, (S, m) = len(arm.cables), path.shape
+        C = len(arm.cables)
+        (S, m) = path.shape
         self.shapes: dict[str, tuple[int, ...]] = {
             "length": (C,),
             "jacobian": (C, nv),

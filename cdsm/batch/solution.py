@@ -30,7 +30,8 @@ Springs = Callable[[Array, Array, slice], Array]
 
 # numbers of the poses of a chunk, compiled and by numpy, where a chunk has one block; 64 postures
 # side by side are fastest, or 32 of long arms
-_CACHE, _WIDE = 2**19, 2**21
+_CACHE = 2**19
+_WIDE = 2**21
 
 PATIENCE = 20.0
 """Seconds that numpy may take for all batches of a process before the kernels are compiled."""
@@ -145,9 +146,12 @@ class Rows:
 
     def solve(self, status: Codes, threads: int = 1) -> dict[str, Array]:
         """Compute the quantities by name (N, …); set the ``status`` (N,) of rows that are OK."""
-        arm, table, count = self.arm, rows_of(self.arm), len(self.q)
+        arm = self.arm
+        table = rows_of(self.arm)
+        count = len(self.q)
         kernels = kernels_for(table, count)
-        width, size = 32 if arm.nv >= 80 else 64, min(max(1, _WIDE // table.size), 2048)
+        width = 32 if arm.nv >= 80 else 64
+        size = min(max(1, _WIDE // table.size), 2048)
         if kernels.COMPILED:
             size = width * max(1, _CACHE // (table.size * width))
         parts = [slice(first, first + size) for first in range(0, count, size)]

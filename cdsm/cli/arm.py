@@ -69,7 +69,8 @@ def new(
         least = max(10.0, float(f"{1.05 * first:.4g}"))
         write_text(arm, template(arm.name, _number(law), least, parts))
     units = options.joint_scales(made)
-    low, high = made.lower / units, made.upper / units
+    low = made.lower / units
+    high = made.upper / units
     bent = min([10.0, *(high[~made.slides] / 2.0).tolist()])
     inside = [bent if a <= bent <= b else (a + b) / 2.0 for a, b in zip(low, high, strict=True)]
     asked = ",".join(f"{each:.3g}" for each in (inside[:1] if {*inside} == {bent} else inside))
@@ -129,7 +130,8 @@ def _serpentine(
     kind: str, counts: list[int], law: cdsm.Elasticity
 ) -> tuple[cdsm.Manipulator, list[tuple[str, dict[str, float]]]]:
     """Build an arm of sections with these numbers of joints; return it with the sizes of each."""
-    hinged, parts = kind == "hinged", []
+    hinged = kind == "hinged"
+    parts = []
     for i, count in enumerate(counts):
         each = 2 if hinged else 3
         sizes = {"joints": count} | ({"twist": math.pi / 2.0} if hinged else {})

@@ -171,7 +171,8 @@ def reproduce(
 
     paper = cdsm.paper
     make_folder(out)
-    results, written = [], []
+    results = []
+    written = []
     for compute in track(paper.FIGURES.values(), "recomputing the paper"):
         result = compute()
         results.append(result)

@@ -130,7 +130,8 @@ def coordinates(text: str | None, arm: cdsm.Manipulator) -> Array:
     """Return the joint coordinates of --angles (nv,) in SI; 0 without this option."""
     from cdsm.support.validation import scalar
 
-    names, form = arm.joint_names, "an angle"
+    names = arm.joint_names
+    form = "an angle"
     if text is not None and "=" in text:
         named = by_joint("--angles", text, arm, "JOINT=DEG,...")
         each = {name: numbers("--angles", value, (1,), form)[0] for name, value in named.items()}

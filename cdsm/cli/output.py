@@ -24,7 +24,9 @@ Json = dict[str, object]
 debug_wanted: ContextVar[bool] = ContextVar("debug_wanted", default=False)
 """Whether the running command shows tracebacks."""
 
-FAILED, UNMET, INTERRUPTED = 1, 3, 130
+FAILED = 1
+UNMET = 3
+INTERRUPTED = 130
 """Exit codes: an error; the arm does not do what was asked; Ctrl-C. A wrong option has 2.
 
 UNMET is the exit code of every answer with a warning, such as that of an unstable arm, and of
@@ -143,7 +145,8 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
         except (cdsm.CdsmError, OSError, MemoryError) as error:  # OSError: of terminal or pipe
             if debug_wanted.get():
                 raise
-            kind, message = type(error).__name__, _OF_PYTHON.sub("", str(error))
+            kind = type(error).__name__
+            message = _OF_PYTHON.sub("", str(error))
             if isinstance(error, MemoryError):
                 message = f"out of memory: compute less at once; a sweep can --store. {error}"
             if given["as_json"]:

@@ -154,7 +154,8 @@ def sweep(
     counts = {word: int((status == value).sum()) for value, word in status_names(dataset).items()}
     listed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     lines = [f"{dataset.attrs['title']}, {dataset.attrs['poses']}: {listed}"]
-    warnings, entries = [], sum(counts.values())
+    warnings = []
+    entries = sum(counts.values())
     if not counts.get("ok"):
         warnings.append(f"no posture could be evaluated: {listed}")
     if figure is not None:
@@ -251,7 +252,8 @@ def design(
         said = f"{number} given, but the front has the designs 0 to {count - 1}. See {front}, and"
         raise misuse("--choose", f"{said} repeat the command with one of them.")
     if refine:
-        found, number = cdsm.refine_design(task, found.design(number)), 0
+        found = cdsm.refine_design(task, found.design(number))
+        number = 0
         front = write_text(front, found.best.to_csv())
     paths = [
         every,

@@ -57,7 +57,8 @@ def stiffness(
     wrench = options.load_at_tip(robot, load, mass)
     K, rest = _balanced(robot, wrench, angles, minimum, maximum, tension, pull)
     head, numbers = header(K.posture, [] if rest else [minimum])
-    axes, lines = {axis: options.direction_of(axis) for axis in ("x", "y", "z")}, list[str]()
+    axes = {axis: options.direction_of(axis) for axis in ("x", "y", "z")}
+    lines = list[str]()
     if direction is not None:
         axes[direction] = u = options.direction_of(direction)
         k = (rest or K).along(u)
@@ -113,7 +114,8 @@ def _sticking(
     tension: cdsm.Tension | None, axes: dict[str, Sequence[float]]
 ) -> tuple[list[str], Json]:
     """Return the stuck stiffness and the load of the first slip, as text and for JSON, if any."""
-    lines, numbers = list[str](), Json()
+    lines = list[str]()
+    numbers = Json()
     if tension is None or not tension.posture.arm.has_friction:
         return [], {}
     for name, u in axes.items():
@@ -193,7 +195,8 @@ def weigh(
     robot = options.read(arm, changes)
     weight = _weight(robot, load, mass)
     K, rest = _balanced(robot, [0.0] * 6, angles, minimum, maximum, tension, pull)
-    pose, start = K.posture, rest or K.tension
+    pose = K.posture
+    start = rest or K.tension
     head, numbers = header(pose, [] if rest else [minimum], "included")
     result: WeightTest | LoadHistory
     if cycles is not None:
@@ -204,7 +207,8 @@ def weigh(
             "--load", "has a moment, but a weight is a force: FX,FY,FZ. --cycles takes moments."
         )
     else:
-        more, result = {}, cdsm.weight_test(pose, start, weight[:3], steps=steps or 5)
+        more = {}
+        result = cdsm.weight_test(pose, start, weight[:3], steps=steps or 5)
         without = " without friction" if pose.arm.has_friction else ""
         note = f"at the full load{without}:\n{result.states[-1]}"
     write_picture(figure, result.plot)

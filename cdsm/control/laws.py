@@ -29,7 +29,8 @@ from cdsm.posture import Posture
 from cdsm.support.validation import vector
 from cdsm.support.values import Array
 
-PROPORTIONAL, INTEGRAL = 0.2, 0.3
+PROPORTIONAL = 0.2
+INTEGRAL = 0.3
 """Gains of the tension control [-]: fractions of the tension error that one step corrects."""
 
 _ROUNDING = 1e-9  # distance of a tension beyond its bound [N] that counts as rounding
@@ -108,7 +109,9 @@ def limited(given: ControlInput, paid_out: Array) -> Command:
     The tensions after the step are predicted as the top of the module says. Raises InvalidInput if
     ``paid_out`` is not one number per cable.
     """
-    now, before, k = given.reference, given.reference_before, given.reference.stiffness
+    now = given.reference
+    before = given.reference_before
+    k = given.reference.stiffness
     length = vector("wire of the law", paid_out, k.size, "one length [m] per cable")
     surplus = (now.paid_out - before.paid_out) - (length - given.measurement.paid_out)
     predicted = given.measurement.tension + (now.tension - before.tension) + k * surplus
@@ -164,7 +167,8 @@ def checked_command(command: object, given: ControlInput, names: Sequence[str]) 
         raise InvalidInput("law", said)
     wire = vector("wire of the law", command.paid_out, len(names), "one length [m] per cable")
     tension = vector("tension of the law", command.tension, len(names), "one [N] per cable")
-    low, high = given.minimum - _ROUNDING, given.maximum + _ROUNDING
+    low = given.minimum - _ROUNDING
+    high = given.maximum + _ROUNDING
     wrong = ~((wire > 0.0) & (low <= tension) & (tension <= high))
     if wrong.any():
         c = int(wrong.argmax())
@@ -179,7 +183,9 @@ def checked_command(command: object, given: ControlInput, names: Sequence[str]) 
 
 def _regulated(given: ControlInput) -> Array:
     """Return l_0 (C,) [m] to pay out if PI control holds the tension of each cable."""
-    now, k, error = given.reference, given.reference.stiffness, given.error
+    now = given.reference
+    k = given.reference.stiffness
+    error = given.error
     correction = PROPORTIONAL * (error - given.error_before) + INTEGRAL * error
     taken_in = np.divide(correction, k, out=np.zeros_like(k), where=k > 0.0)
     planned = now.paid_out - given.reference_before.paid_out
@@ -195,8 +201,10 @@ def _clamped(given: ControlInput, paid_out: Array, predicted: Array) -> Command:
 
 def reference_at(arm: Manipulator, q: Array, tension: Array) -> Reference:
     """Return the reference at angles q (nv,) and tensions F (C,) [N], without friction."""
-    laws, lengths = arm._laws, arm.at(q).cable_lengths
-    wire, k = laws.original_lengths(lengths, tension), laws.stiffness(lengths, tension)
+    laws = arm.laws
+    lengths = arm.at(q).cable_lengths
+    wire = laws.original_lengths(lengths, tension)
+    k = laws.stiffness(lengths, tension)
     return Reference(q, tension, wire, k)
 
 
@@ -209,10 +217,15 @@ class StiffnessLoop:
     """
 
     def __init__(self, plan: PathPlan, low: Array, high: Array, change: Array) -> None:
-        self._plan, self._low, self._high, self._change = plan, low, high, change
-        self._arm, self._softness = plan.arm, 1.0
+        self._plan = plan
+        self._low = low
+        self._high = high
+        self._change = change
+        self._arm = plan.arm
+        self._softness = 1.0
         self._mean = plan.tensions[0]  # mean tensions along each cable, as planned last
-        self._steps, self.failed = 0, dict[int, str]()
+        self._steps = 0
+        self.failed = dict[int, str]()
 
     def next(
         self, wanted: Reference, target: Array, estimate: Estimate, before: Reference
@@ -223,7 +236,10 @@ class StiffnessLoop:
         the reference ``before``. Return the reference, the one before with the wire as calibrated
         now, and the values of ``target_unreachable`` and ``change_limited``.
         """
-        ratio, last, unreachable, limited = estimate.ratio, self._mean, False, False
+        ratio = estimate.ratio
+        last = self._mean
+        unreachable = False
+        limited = False
         try:
             self._calibrate(estimate.softness)
             moved = wanted.angles + (estimate.pose.q - before.angles)
@@ -232,7 +248,8 @@ class StiffnessLoop:
             F, reached = self._least(pose, target, self._low * ratio, self._high * ratio, wrench)
             part = 1.0 / max(float((abs(F - last) / self._change).max()), 1.0)
             self._mean = last + part * (F - last)
-            unreachable, limited = not reached, part < 1.0
+            unreachable = not reached
+            limited = part < 1.0
         except CdsmError as error:
             self.failed[self._steps] = str(error)
         self._steps += 1

@@ -111,7 +111,7 @@ class QuasiStaticPlant:
         """Return the state at rest at angles (nv,), with tensions (C,) [N] and a wrench (6,)."""
         pose = self.arm.at(q)
         loading = QuasiStaticArm(pose, tension)
-        paid_out = self.arm._laws.original_lengths(pose.cable_lengths, tension)
+        paid_out = self.arm.laws.original_lengths(pose.cable_lengths, tension)
         return QuasiStaticState(loading, paid_out, loading.initial(wrench))
 
     def step_to(self, state: QuasiStaticState, command: Command, wrench: Array) -> QuasiStaticState:
@@ -138,7 +138,8 @@ def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
         EquilibriumError: There is no equilibrium: the arm buckles.
         ElasticityRangeError: A tension leaves the domain of its law.
     """
-    pose, true = state.pose, state.true_values
+    pose = state.pose
+    true = state.true_values
     F = true.tension
     if pose.arm.has_friction:
         F = _tensions_of(pose.arm, pose.cable_lengths, true.paid_out, F)
@@ -217,7 +218,7 @@ class MuJoCoPlant:
 
         pose = self.arm.at(q)
         text = to_mjcf(self.arm, pose, tension, damping_ratio=self.damping_ratio)
-        paid_out = self.arm._laws.original_lengths(pose.cable_lengths, tension)
+        paid_out = self.arm.laws.original_lengths(pose.cable_lengths, tension)
         model = mujoco.MjModel.from_xml_string(text)
         joints = frozen(np.array([model.qpos0, 0.0 * model.qpos0]))
         return MuJoCoState(model, pose, Measurement(paid_out, tension), joints)

@@ -195,12 +195,16 @@ class TrackingRun(Result, Plotted):
         return f"<TrackingRun of {self.arm.name}, law {self.law}, {self.outcome}>"
 
     def __str__(self) -> str:
-        tip, off = 1e3 * self.tip_error, 100.0 * abs(self.stiffness_error)
-        known, clamped = off[np.isfinite(off)], np.flatnonzero(self.saturated.any(axis=0))
+        tip = 1e3 * self.tip_error
+        off = 100.0 * abs(self.stiffness_error)
+        known = off[np.isfinite(off)]
+        clamped = np.flatnonzero(self.saturated.any(axis=0))
         motors = listed([self.arm.cables.names[c] for c in clamped]) if clamped.size else "none"
-        low, high = self.tension.min(initial=math.inf), self.tension.max(initial=0.0)
+        low = self.tension.min(initial=math.inf)
+        high = self.tension.max(initial=0.0)
         least = f"{np.nanmin(self.margin, initial=math.inf):.4g} {self.arm.stiffness_unit()}"
-        inside, bands = self.inside, plural(self.inside.size, "step")
+        inside = self.inside
+        bands = plural(self.inside.size, "step")
         rows = [
             ("tip error, mean and largest", f"{_both(tip)} mm"),
             ("frictionless stiffness error, mean and largest", f"{_both(known)} %"),

@@ -34,7 +34,8 @@ _LARGEST_NOISE: Final = 4.0  # standard deviations at which noise is cut off
 _UNSURE: Final = 0.3  # standard deviation of 1/s before the first measurement
 _FINEST: Final = 1e-9  # smallest assumed error of a length [m], also with exact sensors
 _LEAST_SPREAD: Final = 1e-3  # smallest assumed error of a tension [N], also with exact load cells
-_STEPS, _CONVERGED = 8, 1e-8  # most Gauss–Newton steps, and the step [rad] that ends them
+_STEPS = 8  # most Gauss–Newton steps, and the step [rad] that ends them
+_CONVERGED = 1e-8
 
 
 class Measurement(NamedTuple):
@@ -126,16 +127,22 @@ class Observer:
         cable = pose.segments.chains.cable
         T = np.clip(measured.tension, *self._domains)[cable]
         rest_length = self._problem.rest_lengths(pose.segments.lengths, T)
-        one, shares = np.ones(len(self.arm.cables)), np.ones(cable.size)
+        one = np.ones(len(self.arm.cables))
+        shares = np.ones(cable.size)
         force = self._tip_force(pose, T)
         return Estimate(pose, one, force, 1.0, _UNSURE**2, rest_length, shares)
 
     def update(self, before: Estimate, measured: Measurement) -> Estimate:
         """Return the estimate after one more measurement; ``before`` is the previous estimate."""
-        locked, laws = self.arm.cables.position_controlled, self.arm._laws
-        F, wire = np.clip(measured.tension, *self._domains), measured.paid_out
-        pose, q, x = before.pose, before.pose.q, before.softness
-        strain, soft = self._mean_strain(pose, before.shares, F), np.array(laws.series)
+        locked = self.arm.cables.position_controlled
+        laws = self.arm.laws
+        F = np.clip(measured.tension, *self._domains)
+        wire = measured.paid_out
+        pose = before.pose
+        q = before.pose.q
+        x = before.softness
+        strain = self._mean_strain(pose, before.shares, F)
+        soft = np.array(laws.series)
         for law, of in self._problem.laws:
             soft[of] += x * wire[of] / law.rigidity(F[of])
         spring = laws.series * (F - laws.rest)
@@ -151,7 +158,8 @@ class Observer:
             scaled = np.vstack([rows, prior])
             right = np.append(missing, (before.softness - x) / sure)
             step = np.linalg.lstsq(scaled, right, rcond=None)[0]
-            q, x = q + step[:-1], x + float(step[-1])
+            q = q + step[:-1]
+            x = x + float(step[-1])
             if abs(step).max() < _CONVERGED:
                 break
         covariance = np.linalg.pinv(scaled)
@@ -186,7 +194,7 @@ class Observer:
         F = tension[segments.chains.start[:-1]]
         spread = np.hypot(max(self._tension_spread, _LEAST_SPREAD), grip(pose) * F)
         weights = np.linalg.pinv(pose.length_jacobian.T * spread)
-        torque = tension @ segments.length_jacobian + pose._own_torque
+        torque = tension @ segments.length_jacobian + pose.own_torque
         found = np.linalg.lstsq(weights @ pose.jacobian[:3].T, weights @ torque, rcond=None)
         return np.asarray(found[0])
 
@@ -194,7 +202,8 @@ class Observer:
         """Compute the mean strains ε̄ (C,) [-] from F (C,) [N] at the motors and shares ρ (S,)."""
         segments = pose.segments
         chains = segments.chains
-        T, strain = shares * F[chains.cable], np.zeros(segments.lengths.size)
+        T = shares * F[chains.cable]
+        strain = np.zeros(segments.lengths.size)
         for law, of in self._problem.laws:
             mine = np.isin(chains.cable, of)
             strain[mine] = law.strain(np.clip(T[mine], law.low, law.high))

@@ -101,7 +101,8 @@ def track(
     """
     arm = instance("plan", plan, PathPlan).arm
     if not plan.complete:
-        first, lacking = plan.infeasible[0], f"{len(plan.infeasible)} of {len(plan.target)}"
+        first = plan.infeasible[0]
+        lacking = f"{len(plan.infeasible)} of {len(plan.target)}"
         said = f"{lacking} samples are not planned, the first of them sample {first.index}"
         raise InvalidInput("plan", f"{said}: {first.reason}")
     require_unstrained("plan", arm)
@@ -155,18 +156,22 @@ def _follow(
     rows: list[dict[str, Any]],
 ) -> tuple[Outcome, str]:
     """Control step by step, with a row per step added to ``rows``; return how it ends, and why."""
-    last, load = schedule[0].reference, plan.stiffness[0].wrench
+    last = schedule[0].reference
+    load = plan.stiffness[0].wrench
     state = plant.initial(last.angles, last.tension, load)
-    random, true_values = np.random.default_rng(sensors.seed), [state.true_values]
+    random = np.random.default_rng(sensors.seed)
+    true_values = [state.true_values]
     measured = sensors.measure(true_values, random)
     observer = Observer(plan.arm, sensors)
     estimate = observer.initial(last.angles, measured)
-    paid_out, error = measured.paid_out, 0.0 * last.tension
+    paid_out = measured.paid_out
+    error = 0.0 * last.tension
     forced = _tension_controlled(plan.stiffness[0].posture)
     for wanted in progress.track(schedule, "following the path"):
         measured = sensors.measure(true_values, random)
         estimate = observer.update(estimate, measured)
-        reference, before = wanted.reference, last
+        reference = wanted.reference
+        before = last
         flags = {"target_unreachable": False, "change_limited": False}
         if outer is not None:
             reference, before, flags = outer.next(reference, wanted.target, estimate, last)
@@ -177,7 +182,9 @@ def _follow(
         except CdsmError as fault:
             return _OUTCOMES.get(type(fault), "diverged"), str(fault)
         true_values.append(state.true_values)
-        last, paid_out, error = reference, command.paid_out, given.error
+        last = reference
+        paid_out = command.paid_out
+        error = given.error
         tip = state.pose.tip[:3, 3]
         rows.append(
             {
@@ -220,7 +227,8 @@ def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
 
     The weight ``hung`` (3,) [N] acts on the second half.
     """
-    arm, size = plan.arm, len(plan.planned)
+    arm = plan.arm
+    size = len(plan.planned)
     at = np.linspace(0.0, size - 1.0, (size - 1) * steps + 1)
     laws = [cable.elasticity for cable in arm.cables]
     domains = [law.low for law in laws], [law.high for law in laws]
@@ -234,7 +242,7 @@ def _schedule(plan: PathPlan, steps: int, hung: Array) -> list[_Wanted]:
     parts = plan.angles, plan.tensions, plan.target, loads
     for q, F, target, W in zip(*map(along, parts), strict=True):
         pose = arm.at(q)
-        missing = pose.jacobian.T @ W - pose._own_torque - F @ pose.length_jacobian
+        missing = pose.jacobian.T @ W - pose.own_torque - F @ pose.length_jacobian
         F = np.clip(F + np.linalg.lstsq(pose.length_jacobian.T, missing)[0], *domains)
         reference = reference_at(arm, q, F)
         late = 2 * len(wanted) >= len(at) - 1

@@ -108,7 +108,8 @@ class Designs(ReadOnlyState, Named):
 
         The heading has the name, the margin for tolerances if there is one, and the unit.
         """
-        problem, found = self.problem, dict[str, Sequence[Any]]()
+        problem = self.problem
+        found = dict[str, Sequence[Any]]()
         rows = [problem.values(each) for each in self.designs]
         for variable, column in zip(problem.variables, zip(*rows, strict=True), strict=True):
             found[f"{variable.of} [{variable.unit}]" if variable.unit else variable.of] = column
@@ -192,20 +193,24 @@ class InfeasibleDesign(CdsmError):
 
     def __init__(self, message: str, constraints: Sequence[str], design: Sequence[float]) -> None:
         super().__init__(message)
-        self.constraints, self.design = tuple(constraints), tuple(design)
+        self.constraints = tuple(constraints)
+        self.design = tuple(design)
 
 
 def explain(designs: Designs) -> NoReturn:
     """Raise InfeasibleDesign: what the design of the smallest sum of violations misses."""
-    problem, count = designs.problem, plural(len(designs), "design")
+    problem = designs.problem
+    count = plural(len(designs), "design")
     missed = np.nan_to_num(designs.violations, posinf=1e9)
     arms = np.array([not fault for fault in designs.faults])
     if not arms.any():
         raise InfeasibleDesign(f"none of {count} is an arm: {designs.faults[0]}", (), ())
     best = int(np.where(arms, missed.sum(axis=1), np.inf).argmin())
-    row, said = designs.designs[best], dict[str, str]()
+    row = designs.designs[best]
+    said = dict[str, str]()
     if missed[best, 0] > 0.0:
-        share, why = f"{100.0 * missed[best, 0]:.3g} %", _first_reason(problem, row)
+        share = f"{100.0 * missed[best, 0]:.3g} %"
+        why = _first_reason(problem, row)
         said["held"] = f"{share} of its postures and loads are not held: {why}"
     for each, miss in zip(problem.constraints, missed[best, 1:].tolist(), strict=True):
         if miss > 0.0:
@@ -231,7 +236,9 @@ def explain(designs: Designs) -> NoReturn:
 
 def _first_reason(problem: DesignProblem, row: Array) -> str:
     """Return which posture a design does not hold first, and why."""
-    bounds, worst, number = (problem.minimum_of(row), problem.maximum), problem.worst_friction, 0
+    bounds = (problem.minimum_of(row), problem.maximum)
+    worst = problem.worst_friction
+    number = 0
     try:
         arm = quiet_arm(problem, row)
         for number, q in enumerate(problem.postures_of(arm)):

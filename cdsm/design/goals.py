@@ -21,7 +21,10 @@ class Kind(NamedTuple):
     directed: bool = False  # whether it has a direction
 
 
-_ONE, _MM, _STIFF, _N = ("", 1.0), ("mm", 1e-3), ("N/mm", 1e3), ("N", 1.0)
+_ONE = ("", 1.0)
+_MM = ("mm", 1e-3)
+_STIFF = ("N/mm", 1e3)
+_N = ("N", 1.0)
 
 KINDS: Final[dict[str, Kind]] = {
     "stiffness": Kind("least stiffness along", "N/m", _STIFF, "most", directed=True),

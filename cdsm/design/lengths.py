@@ -9,7 +9,8 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.values import Array
 
 _STARTS = 32  # corners, and as many random angles; more find the same in all arms of the tests
-_SWEEPS, _BEST = 20, 4  # after this number of sweeps, only the best of them go on
+_SWEEPS = 20  # after this number of sweeps, only the best of them go on
+_BEST = 4
 _SAME = 1e-9  # change of a length [m] at which a search ends
 
 
@@ -19,7 +20,8 @@ def length_bounds(arm: Manipulator) -> tuple[Array, Array]:
     They are the sums of the extremes of all segments. A posture attains them if no two segments of
     a cable cross the same joint, or a joint and its follower; else they may be too wide.
     """
-    routing, table = arm._routing, rows_of(arm)
+    routing = arm.routing
+    table = rows_of(arm)
     ends = np.array([arm.lower, arm.upper])
     low, high = np.sort(table.coupling.angles(ends) if table.coupling else ends, axis=0)
     paths = dict[tuple[int, ...], list[int]]()
@@ -27,7 +29,8 @@ def length_bounds(arm: Manipulator) -> tuple[Array, Array]:
         paths.setdefault(tuple(path[sign != 0.0].tolist()), []).append(s)
     found = np.tile(routing.fixed, (2, 1))
     for path, segments in paths.items():
-        a, b = routing.point[routing.first[segments]], routing.point[routing.second[segments]]
+        a = routing.point[routing.first[segments]]
+        b = routing.point[routing.second[segments]]
         j = list(path)
         joints = table.arm.turn[j], table.dimensions.shift[j], low[j], high[j]
         for sign, total in zip((-1.0, 1.0), found, strict=True):
@@ -43,29 +46,37 @@ def _longest(
     The square of a distance is a sinusoid of each angle, whose best value is known. So one angle
     after the other is moved there, from corners of the limits and random angles, until it stays.
     """
-    rng, m = np.random.default_rng(0), len(low)
+    rng = np.random.default_rng(0)
+    m = len(low)
     corners = [*np.ndindex(*[2] * m)] if 2**m <= _STARTS else rng.integers(2, size=(_STARTS, m))
     starts = np.vstack([corners, rng.uniform(size=(_STARTS, m))])
     q = np.repeat((low + (high - low) * starts).T[:, None], len(a), axis=1)  # (m, S, N)
     first, last = (np.repeat(each[:, None], q.shape[2], axis=1) for each in (a, b))
-    length, change, sweeps = np.zeros(q.shape[1:]), np.inf, 0
+    length = np.zeros(q.shape[1:])
+    change = np.inf
+    sweeps = 0
     while change > _SAME:
         if (sweeps := sweeps + 1) == _SWEEPS:
             best = np.argsort(-sign * length, axis=1)[:, :_BEST]
-            q, length = np.take_along_axis(q, best[None], 2), np.take_along_axis(length, best, 1)
-            first, last = first[:, :_BEST], last[:, :_BEST]
+            q = np.take_along_axis(q, best[None], 2)
+            length = np.take_along_axis(length, best, 1)
+            first = first[:, :_BEST]
+            last = last[:, :_BEST]
         carried = [last]  # by each joint, from the last one
         for j in range(m - 1, 0, -1):
             carried.append(shift[j] + _turned(turn[j], q[j], carried[-1]))
         seen = first
         for j in range(m):
-            seen, (_, B, C), p = seen - shift[j], turn[j], carried[m - 1 - j]
+            seen = seen - shift[j]
+            (_, B, C) = turn[j]
+            p = carried[m - 1 - j]
             x, y = (-sign * (seen * (p @ each.T)).sum(axis=2) for each in (B, C))
             best = np.arctan2(y, x)
             nearer = np.where(np.cos(best - low[j]) > np.cos(best - high[j]), low[j], high[j])
             q[j] = np.where((low[j] <= best) & (best <= high[j]), best, nearer)
             seen = _turned(turn[j].transpose(0, 2, 1), q[j], seen)
-        before, length = length, np.linalg.norm(last - seen, axis=2)
+        before = length
+        length = np.linalg.norm(last - seen, axis=2)
         change = abs(length - before).max()
     return np.asarray((sign * length).max(axis=1))
 

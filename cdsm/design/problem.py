@@ -188,7 +188,8 @@ class DesignProblem(ReadOnlyState):
             InvalidInput: A number of the design is outside its range.
             GeometryError: No valid arm has these values; the error lists every fault.
         """
-        made, low = self._made(design), self.minimum_of(design)
+        made = self._made(design)
+        low = self.minimum_of(design)
         bounds = [(max(c.minimum, low), min(c.maximum, self.maximum)) for c in made.cables]
         pairs = zip(made.cables, bounds, strict=True)
         return made.with_cables([replace(c, minimum=a, maximum=b) for c, (a, b) in pairs])

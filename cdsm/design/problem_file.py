@@ -109,7 +109,8 @@ def _built(
     kind: type[_Kind], tables: Sequence[dict[str, Any]], name: str, faults: list[str]
 ) -> tuple[_Kind, ...]:
     """Build one ``kind`` from each table; add what is wrong to ``faults``."""
-    made, known = list[_Kind](), [each.name for each in fields(kind)]  # type: ignore[arg-type]
+    made = list[_Kind]()
+    known = [each.name for each in fields(kind)]  # type: ignore[arg-type]
     for i, table in enumerate(tables, start=1):
         where = f"{name}[{i}]"
         try:

@@ -82,7 +82,9 @@ class _Arm:
     """An arm at all pairs of posture and load; it is held at those where it is stable."""
 
     def __init__(self, problem: DesignProblem, arm: Manipulator, minimum: float) -> None:
-        self.problem, self.arm, self.postures = problem, arm, problem.postures_of(arm)
+        self.problem = problem
+        self.arm = arm
+        self.postures = problem.postures_of(arm)
         payloads = [each.direction for each in problem.measures if each.of == "payload"]
         self.ways = [*dict.fromkeys(payloads)]
         names = {_SWEPT.get(each.of, each.of) for each in problem.measures} & {*QUANTITIES}
@@ -107,11 +109,12 @@ class _Arm:
 
     def cases_of(self, each: Measure) -> Array:
         """Return a quantity in SI (n, k): n held cases, or 1 for all; k = 1, or the cables."""
-        held, geometry = self.held, self.arm.geometry
+        held = self.held
+        geometry = self.arm.geometry
         inside = held.reshape(len(self.postures), -1).any(axis=1)
         swept = _SWEPT.get(each.of, each.of)
         if each.of == "mass":
-            return np.array([[sum(body.mass for body in geometry._chain.bodies[1:])]])
+            return np.array([[sum(body.mass for body in geometry.chain.bodies[1:])]])
         if each.of == "length":
             return np.array([[geometry.length]])
         if each.of == "deflection":
@@ -165,11 +168,10 @@ class _Arm:
         that do not change.
         """
         if (each.key, case) not in self.margins:
-            (pose, load), of = self._pair(case), _MEASURANDS[each.of]
-            given, rough = (
-                (float(self.cases.minimum[0]), self.cases.maximum),
-                self.cases.worst_friction,
-            )
+            (pose, load) = self._pair(case)
+            of = _MEASURANDS[each.of]
+            given = (float(self.cases.minimum[0]), self.cases.maximum)
+            rough = self.cases.worst_friction
             pull = distribute_tension(pose, *bounds_at(pose, *given, rough), load)
             u = None if each.direction is None else np.array(each.direction)
             tolerances = self.problem.tolerances

@@ -110,7 +110,8 @@ class DesignSearch(ReadOnlyState, Plotted):
             GeometryError: Two parsers disagree on the URDF.
         """
         row = self.design(number)
-        arm, into = self.problem.arm_of(row), make_folder(folder)
+        arm = self.problem.arm_of(row)
+        into = make_folder(folder)
         return [
             arm.write(into / "arm.toml"),
             write_urdf(arm.geometry, into / "arm.urdf"),
@@ -148,8 +149,10 @@ class DesignSearch(ReadOnlyState, Plotted):
 
     def _text(self, chosen: int) -> str:
         """Return the printed table of the front; it includes design ``chosen``."""
-        problem, feasible = self.problem, int(self.evaluated.feasible.sum())
-        shown, count = self._spread(_PRINTED, chosen), len(self.front)
+        problem = self.problem
+        feasible = int(self.evaluated.feasible.sum())
+        shown = self._spread(_PRINTED, chosen)
+        count = len(self.front)
         more = f", {len(shown)} shown" if len(shown) < count else ""
         head = (
             f"{plural(len(self.evaluated), 'design')}, {feasible} feasible, {count} on the front"
@@ -185,7 +188,8 @@ class DesignSearch(ReadOnlyState, Plotted):
         keys = [problem.with_margin(each, each.key) for each in problem.measures]
         rows = [["design", *(variable.of for variable in problem.variables), *keys]]
         for i in shown:
-            row, values = problem.values(self.design(i)), self.values(i).values()
+            row = problem.values(self.design(i))
+            values = self.values(i).values()
             chosen = (v.shown(x) for v, x in zip(problem.variables, row, strict=True))
             found = (m.shown(x) for m, x in zip(problem.measures, values, strict=True))
             rows.append([f"{i}{'*' if i == self.compromise else ''}", *chosen, *found])

@@ -171,7 +171,8 @@ def refine_design(
         raise InvalidInput("start", "is needed: the given arm is outside the ranges.")
     problem.values(begin)
     low, high = problem.bounds.T
-    objective, limits = problem.objectives[0], problem.constraints
+    objective = problem.objectives[0]
+    limits = problem.constraints
     visited: list[tuple[Array, Found]] = []
     known: dict[bytes, list[Array] | None] = {}
 

@@ -232,7 +232,8 @@ def _parameters(arm: Manipulator, names: tuple[str, ...]) -> ArmParameters:
 @lru_cache(maxsize=16)
 def _rerouted(arm: Manipulator, values: tuple[tuple[Variable, Value], ...]) -> Manipulator:
     """Return the arm with as many cables, their ends and their wire as the values say."""
-    geometry, law = arm.geometry, None
+    geometry = arm.geometry
+    law = None
     routes = [*geometry.cables]
     for variable, value in values:
         match variable.kind:
@@ -260,7 +261,7 @@ def _rerouted(arm: Manipulator, values: tuple[tuple[Variable, Value], ...]) -> M
         )
         for cable, kept in zip(routed, like, strict=True)
     ]
-    return arm._with_geometry(geometry, cables)
+    return arm.with_geometry(geometry, cables)
 
 
 def _even(geometry: Geometry, count: int) -> list[CableRoute]:

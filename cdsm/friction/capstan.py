@@ -59,20 +59,24 @@ class ChainProblem:
     def __init__(
         self, cables: tuple[Cable, ...], start: Indices, tension: Array, unstrained: bool
     ) -> None:
-        self._start, self._cable = start, np.repeat(np.arange(len(cables)), np.diff(start))
-        size, first = self._cable.size, start[:-1]
-        self._spring, self._unloaded = np.zeros(size), np.zeros(size)
+        self._start = start
+        self._cable = np.repeat(np.arange(len(cables)), np.diff(start))
+        size = self._cable.size
+        first = start[:-1]
+        self._spring = np.zeros(size)
+        self._unloaded = np.zeros(size)
         self._spring[first] = [1.0 / cable.series_stiffness for cable in cables]
         self._unloaded[first] = [cable.elasticity.rest for cable in cables]
-        self._base, self._softness = np.ones(size), np.zeros(size)
+        self._base = np.ones(size)
+        self._softness = np.zeros(size)
         self._curved: list[tuple[Elasticity, Indices]] = []
         self.laws = list(group_by_law(enumerate(cables)).items())
         for law, of in self.laws:
             segments = np.flatnonzero(np.isin(self._cable, of))
-            if law._constant is None:
+            if law.constant_rigidity is None:
                 self._curved.append((law, segments))
             else:
-                self._softness[segments] = 1.0 / law._constant
+                self._softness[segments] = 1.0 / law.constant_rigidity
         if not unstrained:
             F = tension[self._cable]
             base, softness = self._strain(F)
@@ -101,7 +105,8 @@ class ChainProblem:
         wire = (length - self._spring * (new - self._unloaded)) / stretch
         after = rest_length - slip
         after[1:] += slip[:-1]
-        first, supplied = self._start[:-1], ~np.isnan(forced)
+        first = self._start[:-1]
+        supplied = ~np.isnan(forced)
         after[first[supplied]] = wire[first[supplied]]
         slack = (new == 0.0) & ~supplied[self._cable]
         if slack.any():  # the wire of a slack cable moves freely: it spreads evenly over segments
@@ -124,7 +129,8 @@ class ChainProblem:
         base, softness = self._strain(tension)
         energy = self._softness * tension**2 / 2.0
         for law, of in self._curved:
-            T, inside = tension[of], np.clip(tension[of], law.low, law.high)
+            T = tension[of]
+            inside = np.clip(tension[of], law.low, law.high)
             energy[of] = law.energy(inside) + softness[of] * (T**2 - inside**2) / 2.0
         return np.asarray(tension * (base + softness * tension) - energy)
 
@@ -132,7 +138,8 @@ class ChainProblem:
         """Return the tensions (S,) between ``T`` and ``new``, by ln T, of the least Σ D_j."""
         T = np.maximum(T, _SLACK)
         step = np.log(np.maximum(new, _SLACK) / T)
-        low, high = 0.0, 1.0
+        low = 0.0
+        high = 1.0
         for _ in range(5):
             middle = (low + high) / 2.0
             there = T * np.exp(middle * step)
@@ -144,10 +151,11 @@ class ChainProblem:
         """Linearise 1 + ε ≈ base + softness · T at ``tension`` (S,): base, softness [1/N]."""
         if not self._curved:
             return self._base, self._softness
-        base, softness = self._base.copy(), self._softness.copy()
+        base = self._base.copy()
+        softness = self._softness.copy()
         for law, of in self._curved:
             inside = np.clip(tension[of], law.low, law.high)
-            strain, rigidity = law._evaluate(inside)
+            strain, rigidity = law.evaluate(inside)
             softness[of] = 1.0 / rigidity
             base[of] += strain - inside / rigidity
         return base, softness
@@ -172,7 +180,8 @@ def chain_tangent(
     T = chain.tension
     begins = np.append(True, ~chain.slides[:-1])
     begins[start[:-1]] = True
-    block, first = np.cumsum(begins) - 1, np.flatnonzero(begins)
+    block = np.cumsum(begins) - 1
+    first = np.flatnonzero(begins)
     up = np.where(begins[1:], 0.0, np.sign(np.diff(T)))
     psi = np.zeros_like(gradient)
     np.cumsum(up[:, None] * turning[:-1], axis=0, out=psi[1:])
@@ -205,8 +214,10 @@ def assemble_segments(
     ``sliding`` (P,) marks the holes in which cables slide. Raises ElasticityRangeError if a tension
     is outside the domain of its law.
     """
-    segments, laws = pose.segments, pose.segments.chains.laws
-    chains, length = segments.chains, segments.lengths
+    segments = pose.segments
+    laws = pose.segments.chains.laws
+    chains = segments.chains
+    length = segments.lengths
     k = laws.stiffness(length, tension)
     # (1 + ε) of the wire: the spring in series is part of the length
     rest_length = laws.original_lengths(length, tension)
@@ -220,11 +231,12 @@ def assemble_segments(
     state = ChainState(T, rest_length, np.zeros_like(T), slides, stretch, compliance)
     forced = k[chains.start[:-1]] == 0.0
     gradient = chain_tangent(chains.start, forced, state, segments.length_jacobian, turning)
-    passive, active = segments.length_jacobian.T @ gradient, segments.active(tension)
+    passive = segments.length_jacobian.T @ gradient
+    active = segments.active(tension)
     if friction == "stuck":
         passive = (passive + passive.T) / 2.0  # symmetric but for rounding
     F = frozen(tension[chains.start[:-1]])
-    k = pose.arm._laws.stiffness(pose.cable_lengths, F)
+    k = pose.arm.laws.stiffness(pose.cable_lengths, F)
     frictionless = assemble(pose, F, wrench, k, distribution)
     return replace(
         frictionless,

@@ -86,7 +86,8 @@ def _slope(
 ) -> tuple[float, float, float]:
     """Compute V_j′ [m], ∂V_j′/∂T [m/N], Σ|l_0| [m] at ``tension``; ``best`` (S,): exp(y*_i) [N]."""
     total, rise = _surplus(wire, j, tension)
-    T, size = tension, abs(wire.rest_length[j])
+    T = tension
+    size = abs(wire.rest_length[j])
     for i in range(j + 1, last + 1):
         T = min(max(best[i], T / wire.ratio[i - 1]), T * wire.ratio[i - 1])
         if best[i] == T > 0.0:  # V_i is flat; at T = 0 this is the limit T → 0
@@ -103,7 +104,9 @@ def _root(wire: Wire, best: Array, j: int, last: int, near: float) -> float:
     """Find exp(y*_j) [N], the tension at which V_j′ is zero, from ``near`` [N]; 0: slack."""
     if _slope(wire, best, j, last, 0.0)[0] >= 0.0:
         return 0.0
-    low, high, T = 0.0, math.inf, near if near > 0.0 else 1.0
+    low = 0.0
+    high = math.inf
+    T = near if near > 0.0 else 1.0
     for _ in range(_STEPS):
         value, rise, size = _slope(wire, best, j, last, T)
         if value < 0.0:
@@ -133,9 +136,13 @@ def solve_chains(
     without friction it always slides.
     """
     size = wire.length.shape[0]
-    best, T, slip, slides = np.empty(size), np.empty(size), np.zeros(size), np.zeros(size, np.bool_)
+    best = np.empty(size)
+    T = np.empty(size)
+    slip = np.zeros(size)
+    slides = np.zeros(size, np.bool_)
     for c in range(start.shape[0] - 1):
-        first, last = start[c], start[c + 1] - 1
+        first = start[c]
+        last = start[c + 1] - 1
         # minimizers from the end to the motor, tensions back to the end, then the slips
         for j in range(last, first, -1):
             best[j] = _root(wire, best, j, last, near[j])

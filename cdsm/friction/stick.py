@@ -109,13 +109,16 @@ def breakaway(
         SingularStiffness: The stuck arm is about to buckle.
     """
     u = unit_direction("direction", direction)
-    K, segments = stuck_stiffness(pose, tension, wrench), pose.segments
-    chains, loads = segments.chains, np.full(segments.wrap.size, math.inf)
+    K = stuck_stiffness(pose, tension, wrench)
+    segments = pose.segments
+    chains = segments.chains
+    loads = np.full(segments.wrap.size, math.inf)
     sticks = can_stick(pose)
     if math.isfinite(K.along(u)):
         assert K.tension_gradient is not None
         motion = np.asarray(np.linalg.solve(K.joint, u @ pose.jacobian[:3]), np.float64)
-        F, slack = K.tension[chains.cable], K.tension[chains.cable] == 0.0
+        F = K.tension[chains.cable]
+        slack = K.tension[chains.cable] == 0.0
         relative = K.tension_gradient @ motion / np.where(slack, 1.0, F)
         change = abs(relative[chains.hole + 1] - relative[chains.hole])
         rate = change - chains.friction * (segments.wrap_jacobian @ motion)
@@ -124,22 +127,30 @@ def breakaway(
         slides = sticks & (rate > _NEVER * change.max(initial=0.0))
         loads[slides] = exponent[slides] / rate[slides]
     load = float(loads.min()) if sticks.any() else 0.0
-    cable, site, link = "", 0, ""
+    cable = ""
+    site = 0
+    link = ""
     if 0.0 < load < math.inf:
         load, hole = _first_slip(K, u, load, motion)
-        first, site = pose.arm.cables[chains.cable[chains.hole[hole]]], int(chains.site[hole]) + 1
-        cable, link = first.name, first.sites[site - 1].link
+        first = pose.arm.cables[chains.cable[chains.hole[hole]]]
+        site = int(chains.site[hole]) + 1
+        cable = first.name
+        link = first.sites[site - 1].link
     where: Any = {"cable": cable, "site": site, "link": link}
     return Breakaway(stiffness=K, direction=u, load=load, hole_loads=frozen(loads), **where)
 
 
 def _first_slip(K: Stiffness, u: Array, load: float, motion: Array) -> tuple[float, int]:
     """Return load [N] and hole of first slip along u; ``load``, ``motion`` [rad/N]: first order."""
-    pose, arm = K.posture, K.posture.arm
-    segments, forced = pose.segments, ~arm.cables.position_controlled
-    chains, T = segments.chains, K.tension[segments.chains.cable]
+    pose = K.posture
+    arm = K.posture.arm
+    segments = pose.segments
+    forced = ~arm.cables.position_controlled
+    chains = segments.chains
+    T = K.tension[segments.chains.cable]
     problem = ChainProblem(arm.cables, chains.start, K.tension, arm.original_length == "unstrained")
-    wire, ratio = problem.rest_lengths(segments.lengths, T), np.ones(T.size)
+    wire = problem.rest_lengths(segments.lengths, T)
+    ratio = np.ones(T.size)
     ratio[chains.hole[can_stick(pose)]] = _STUCK
 
     def at(load: float, motion: Array) -> tuple[Posture, Array]:
@@ -252,7 +263,8 @@ def half_width(K: Stiffness, u: Array) -> float:
     """
     K.along(u)
     segments = K.posture.segments
-    chains, F = segments.chains, K.tension[segments.chains.cable]
+    chains = segments.chains
+    F = K.tension[segments.chains.cable]
     with np.errstate(divide="ignore"):
         soft = 1.0 / segments.chains.laws.stiffness(segments.lengths, F)
     forced = np.isinf(soft)  # the first segment of a force-controlled cable

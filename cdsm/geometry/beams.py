@@ -132,7 +132,9 @@ class Backbone(Beam):
         """Return the fields of the :class:`~cdsm.Geometry` by name."""
         sections = cast("Sequence[Section]", self.sections)  # see _section
         common = sections[0].hole_radius
-        joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
+        joints = list[Joint]()
+        links = list[Link]()
+        cables = list[CableRoute]()
         for section in sections:
             gap = section.length / section.disks
             own = None if section.hole_radius == common else section.hole_radius

@@ -23,7 +23,8 @@ _MOST_AXES = 400  # one behind the other; many more crash the parser of URDFs
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _OF_CROSS = 0.01  # mass of the cross of a beam's joint, taken from its piece
 _POISSON = 0.3
-_LEAST, _NEAR = 1e-6, 1e-9  # two disks that are closer than this [m] are one
+_LEAST = 1e-6  # two disks that are closer than this [m] are one
+_NEAR = 1e-9
 
 
 Sizes = tuple[float, float, float]
@@ -77,7 +78,11 @@ class Chain:
         """End the last body at a joint, and begin the next; ``more`` as the last of an Axis."""
         self.axes.append(Axis(name, self.link, child, self.x, axis, *more))
         self.end()
-        self.link, self.kind, self.x, self.mass, self.behind = child, kind, 0.0, 0.0, self.at
+        self.link = child
+        self.kind = kind
+        self.x = 0.0
+        self.mass = 0.0
+        self.behind = self.at
 
     def disk(self, joint: int, radius: float, outer: float) -> None:
         """Put a disk here, unless there is one."""
@@ -104,11 +109,15 @@ class Chain:
         stops: bool,
     ) -> None:
         """Run along a beam of this length [m]; the body at its end is called ``end``."""
-        EI, GJ, n = of.bending_stiffness, of.torsion_stiffness, of.pieces
+        EI = of.bending_stiffness
+        GJ = of.torsion_stiffness
+        n = of.pieces
         assert EI is not None
         GJ = EI / (1.0 + _POISSON) if GJ is None else GJ
-        piece, each = length / n, mass / n * (1.0 - 2.0 * _OF_CROSS)
-        limit, spring = limit / (2 * n), (2.0 * EI / piece, 0.0)
+        piece = length / n
+        each = mass / n * (1.0 - 2.0 * _OF_CROSS)
+        limit = limit / (2 * n)
+        spring = (2.0 * EI / piece, 0.0)
 
         def go(part: float) -> None:
             self.x += part * piece
@@ -146,7 +155,8 @@ def chain_of(
     ``offsets`` are the distances [m] of each joint from the disk before and the one after it; both
     are ``disk_offset`` if they are not given.
     """
-    chain, rigid = Chain(), (STEEPEST, False)
+    chain = Chain()
+    rigid = (STEEPEST, False)
     offsets = offsets or [[joint.disk_offset] * 2 for joint in joints]
     for k in range(len(joints) + 1):
         after = joints[k] if k < len(joints) else None
@@ -175,7 +185,9 @@ def _start(
     chain: Chain, k: int, joint: Joint, link: Link, sizes: Sizes, offsets: Sequence[float]
 ) -> float:
     """Add joint k with the disk after it; return where x = 0 of its link is behind the joint."""
-    (before, h), (radius, outer, limit), stops = offsets, sizes, joint.limit is None
+    (before, h) = offsets
+    (radius, outer, limit) = sizes
+    stops = joint.limit is None
     chain.at = k
     bends = link.bending_stiffness is not None
     if not joint.axes:
@@ -184,13 +196,15 @@ def _start(
         chain.run(stem, before + h, joint, joint.mass, name, limit, stops)
         chain.disk(k, radius, outer)
         return h - chain.x
-    name, child = f"joint{k}", f"link{k}_start" if bends else f"link{k}"
+    name = f"joint{k}"
+    child = f"link{k}_start" if bends else f"link{k}"
     ends = limit, stops, joint.stiffness, joint.rest_angle
     leader = f"joint{joint.follows}" if joint.follows else ""
     if len(joint.axes) == 2:
         first = f"{leader}_1" if leader else ""
         chain.turn(f"{name}_1", joint.axes[0], f"cross{k}", "cross", *ends, first)
-        name, leader = f"{name}_2", f"{leader}_2" if leader else ""
+        name = f"{name}_2"
+        leader = f"{leader}_2" if leader else ""
     chain.turn(name, joint.axes[-1], child, "beam" if bends else "link", *ends, leader)
     if bends:
         chain.run(f"link{k}a", h, link, link.mass * h / link.length, f"link{k}", STEEPEST, False)

@@ -82,7 +82,7 @@ class Geometry(Printed):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if faults := [*self._faults()] or self._chain.faults():
+        if faults := [*self._faults()] or self.chain.faults():
             raise CrossFaults(faults)
         for doubt in self._doubts():
             warn(f"{self.name}: {doubt}")
@@ -90,7 +90,9 @@ class Geometry(Printed):
 
     def _faults(self) -> Iterator[str]:
         """Yield the faults that concern several parts, such as too short links."""
-        joints, links, n = self.joints, self.links, len(self.joints)
+        joints = self.joints
+        links = self.links
+        n = len(self.joints)
         if len(links) != n:
             yield f"links: {len(links)} given for {n} joints; give one for each"
         offsets = [*(joint.disk_offset for joint in joints), 0.0]
@@ -124,7 +126,8 @@ class Geometry(Printed):
 
     def _doubts(self) -> Iterator[str]:
         """Yield texts of warnings: lengths look like mm, angles like degrees; holes are shared."""
-        cables, names = self.cables, self.cable_names
+        cables = self.cables
+        names = self.cable_names
         offset = max(joint.disk_offset for joint in self.joints)
         sizes = [("hole_radius", max(self.hole_radii), WIDEST), ("disk_offset", offset, WIDEST)]
         yield from doubts_about_units(self.length, sizes)
@@ -141,8 +144,9 @@ class Geometry(Printed):
             yield f"cables share holes: {listed(shared, 4, '; ')}. {remedy}"
 
     def __str__(self) -> str:
-        joints, cables = plural(len(self.joints), "joint"), plural(len(self.cables), "cable")
-        freedom = plural(len(self._chain.axes), "degree")
+        joints = plural(len(self.joints), "joint")
+        cables = plural(len(self.cables), "cable")
+        freedom = plural(len(self.chain.axes), "degree")
         return f"{self.name}: {joints} ({freedom} of freedom), {cables}, {self.length:g} m long"
 
     def __repr__(self) -> str:
@@ -171,7 +175,9 @@ class Geometry(Printed):
         if not parts:
             raise GeometryError(["sections: none given; give one or more"])
         first, *_ = parts
-        joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
+        joints = list[Joint]()
+        links = list[Link]()
+        cables = list[CableRoute]()
         for part in parts:
             begin = len(joints)
             if links:
@@ -215,7 +221,7 @@ class Geometry(Printed):
         return [max([R, *(r for j, r in rings if j > k)]) for k, R in enumerate(self.hole_radii)]
 
     @cached_property
-    def _chain(self) -> Chain:
+    def chain(self) -> Chain:
         """Bodies, joints and disks, base to tip."""
         rows = zip(self.joints, self._farthest_holes, strict=True)
         radii = [joint.disk_radius or 1.1 * farthest for joint, farthest in rows]
@@ -232,7 +238,7 @@ class Geometry(Printed):
     @property
     def disks(self) -> tuple[Disk, ...]:
         """All disks, base to tip: two per joint, before and after it; necks may share one."""
-        return tuple(self._chain.disks)
+        return tuple(self.chain.disks)
 
     def disks_of(self, route: CableRoute) -> tuple[Disk, ...]:
         """Return the disks that a cable passes; it ends on the last one, after its joint."""
@@ -247,7 +253,7 @@ class Geometry(Printed):
     @property
     def springs(self) -> dict[str, tuple[float, float]]:
         """Stiffness [N m/rad] and angle without torque [rad] of each spring, by joint name."""
-        sprung = (axis for axis in self._chain.axes if axis.stiffness)
+        sprung = (axis for axis in self.chain.axes if axis.stiffness)
         return {axis.name: (axis.stiffness, axis.rest_angle) for axis in sprung}
 
     def to_toml(self) -> str:

@@ -148,7 +148,8 @@ def overlapping(disks: Sequence[Disk], poses: dict[str, Array]) -> list[tuple[st
     bodies = []
     for link, pose in poses.items():
         own = [disk for disk in disks if disk.link == link]
-        first, last = own[0].x, own[-1].x
+        first = own[0].x
+        last = own[-1].x
         shape = coal.Cylinder(max(disk.radius for disk in own), last - first)
         centre = pose[:3, 3] + pose[:3, 0] * (first + last) / 2.0
         place = coal.Transform3s(np.roll(pose[:3, :3], -1, axis=1), centre)  # its z is the link's x

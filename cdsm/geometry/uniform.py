@@ -100,7 +100,9 @@ class Universal(Beam):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        n, angles, count = self.joints, self.hole_angles, self.cables_per_joint
+        n = self.joints
+        angles = self.hole_angles
+        count = self.cables_per_joint
         faults = [
             f"{key}: {len(value)} values given for {n} joints; give one, or one for each"
             for key, value in vars(self).items()
@@ -120,13 +122,18 @@ class Universal(Beam):
 
     def parts(self) -> dict[str, Any]:
         """Return the fields of the :class:`~cdsm.Geometry` by name."""
-        n, (axes, usual), own = self.joints, self._axes_and_angles(), self.hole_angles
+        n = self.joints
+        (axes, usual) = self._axes_and_angles()
+        own = self.hole_angles
         given: Sequence[Any] = own or usual
         angles = given if isinstance(given[0], Sequence) else [given] * n
         values = [getattr(self, key) for key in _OF_JOINTS]
         each = [value if isinstance(value, Sequence) else [value] * n for value in values]
-        joints, links, cables = list[Joint](), list[Link](), list[CableRoute]()
-        common, beam = each[1][0], self.stiffness()
+        joints = list[Joint]()
+        links = list[Link]()
+        cables = list[CableRoute]()
+        common = each[1][0]
+        beam = self.stiffness()
         rows = zip(axes, angles, *each, strict=True)
         for axis, phis, h, R, r, top, length, mass, lead, mu, ring, phase, k, rest in rows:
             R = None if common == R else R
@@ -163,7 +170,8 @@ class Hinged(Universal):
 
 def evenly_spaced(joints: int, cables: int) -> list[list[float]]:
     """Return φ = 2π((k−1) + n j)/(n m) [rad] of cables j = 0…m−1 of each of n ``joints`` k."""
-    n, m = joints, cables
+    n = joints
+    m = cables
     return [[2.0 * math.pi * (k + n * j) / (n * m) for j in range(m)] for k in range(n)]
 
 

@@ -44,7 +44,8 @@ class Determination:
     @cached_property
     def covariance(self) -> Array:
         """Covariance (JᵀJ)⁻¹ (P, P); undetermined parameters have infinite variance."""
-        inner, null = self.coordinates, self._null_projector
+        inner = self.coordinates
+        null = self._null_projector
         return frozen(np.where(null != 0.0, np.copysign(np.inf, null), inner @ inner.T))
 
     @cached_property
@@ -74,7 +75,8 @@ class Determination:
         Changing the parameters together by these amounts changes no residual. No amount is above
         1 % of the range of its parameter.
         """
-        null, texts = self._parts[2], []
+        null = self._parts[2]
+        texts = []
         if not len(null):
             return ()
         # easiest to read: one dependent parameter per combination
@@ -117,7 +119,8 @@ def interval(
     there is none before the bound or the end of the model. Raises InvalidInput if the profile falls
     below the supposed optimum.
     """
-    others, least = np.flatnonzero(np.arange(best.size) != i), problem.cost(best)
+    others = np.flatnonzero(np.arange(best.size) != i)
+    least = problem.cost(best)
     beside = jacobian[:, others]
     tangent = np.linalg.lstsq(beside, -jacobian[:, i], rcond=1e-6)[0]
     width = math.sqrt(rise) / float(np.linalg.norm(jacobian[:, i] + beside @ tangent))
@@ -143,13 +146,16 @@ def interval(
         return math.sqrt(max(delta, 0.0)) - math.sqrt(rise)
 
     def limit(side: float) -> float:
-        near, step, end = float(best[i]), width, math.inf
+        near = float(best[i])
+        step = width
+        end = math.inf
         for _ in range(_TRIALS):
             far = min(max(near + side * step, 0.0), 1.0)
             if far == near:
                 return side * math.inf
             if excess(far) == math.inf:
-                end, step = abs(far - near), step / 2.0  # the model ends in between
+                end = abs(far - near)  # the model ends in between
+                step = step / 2.0
                 if end < _EDGE * width:
                     break
             elif excess(far) >= 0.0:
@@ -158,7 +164,8 @@ def interval(
                 return float(problem.values(x)[i])
             else:
                 end -= abs(far - near)
-                near, step = far, min(1.6 * step, end / 2.0)
+                near = far
+                step = min(1.6 * step, end / 2.0)
         return side * math.inf
 
     return limit(-1.0), limit(1.0)

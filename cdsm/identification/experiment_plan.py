@@ -91,7 +91,8 @@ class ExperimentPlan(Result, Plotted):
     def __str__(self) -> str:
         times = ((label, f"{count}×") for label, count in self.repetitions.items())
         rows = aligned([("test", "times"), *times])
-        shares, cells = 196.0 * self.std / abs(self.values), list[tuple[str, ...]]()
+        shares = 196.0 * self.std / abs(self.values)
+        cells = list[tuple[str, ...]]()
         for name, x, share in zip(self.names, self.values, shares, strict=True):
             said = "not determined" if math.isinf(share) else f"± {share:.3g} %"
             cells.append((name, f"{x:.4g}", said))
@@ -146,13 +147,15 @@ def plan_experiment(
         InvalidInput: An argument is invalid, or ``model_of`` fails or does not take a parameter; no
             candidate can be tested, or none determines any parameter.
     """
-    angles, forces = number_array("postures", postures), number_array("weights", weights, "force")
+    angles = number_array("postures", postures)
+    forces = number_array("weights", weights, "force")
     if angles.ndim != 2 or not angles.size:
         said = f"shape {angles.shape} given; (n, nv) joint angles [rad] are needed."
         raise InvalidInput("postures", said)
     if forces.ndim != 1 or not forces.size or forces.min() <= 0.0:
         raise InvalidInput("weights", f"{weights!r} given; positive forces (n,) [N] are needed.")
-    bound, count = number_array("minimum", minimum), whole_number("steps", steps, 1, 100)
+    bound = number_array("minimum", minimum)
+    count = whole_number("steps", steps, 1, 100)
     axes = np.atleast_2d(unit_directions("directions", directions)).tolist()
     names = {axis: name for name, axis in AXES.items()}
     way = (*range(count + 1), *range(count - 1, -1, -1))  # up and down
@@ -189,15 +192,19 @@ def plan_tests(
         said = "give {name: expected value} for at least one."
         raise InvalidInput("parameters", f"{parameters!r} given; {said}")
     values = np.array([scalar(f"parameters[{name!r}]", x) for name, x in parameters.items()])
-    names, most = tuple(parameters), whole_number("tests", tests, 1)
+    names = tuple(parameters)
+    most = whole_number("tests", tests, 1)
     if not values.all():
         said = "0 given; intervals are judged relative to the expected value. Give a small one "
         said += "(commands: in ARM.toml or by --set)."
         raise InvalidInput(f"parameters[{names[int(abs(values).argmin())]!r}]", said)
     bounds = {n: (min(0.0, 2.0 * v), max(0.0, 2.0 * v)) for n, v in zip(names, values, strict=True)}
-    usable, rows, failures = list[WeightLoop](), list[Array](), list[tuple[str, str]]()
+    usable = list[WeightLoop]()
+    rows = list[Array]()
+    failures = list[tuple[str, str]]()
     for loop in track(candidates, "following the candidates", wanted=progress):
-        problem, middle = Problem(model_of, None, [loop], bounds), np.full(len(names), 0.5)
+        problem = Problem(model_of, None, [loop], bounds)
+        middle = np.full(len(names), 0.5)
         if isinstance(reason := problem.predict(middle), str):
             failures.append((loop.label, reason))
             continue

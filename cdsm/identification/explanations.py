@@ -37,7 +37,8 @@ class Explanations(Result):
         unexplained: Residuals of the arm as it is (n,) in standard deviations.
     """
 
-    _headline, _rows = "chi_square", "explanation"
+    _headline = "chi_square"
+    _rows = "explanation"
 
     names: tuple[str, ...] = field(metadata=unit("1", "explanation", name="explanation"))
     alone: tuple[Identification, ...]
@@ -89,7 +90,7 @@ class Explanations(Result):
 
     @property
     def _deviations(self) -> Array:
-        readings = [each._readings for each in self.alone[0].measurements]
+        readings = [each.readings for each in self.alone[0].measurements]
         pairs = zip(self.alone[0].measurements, readings, strict=True)
         sigma = [each._errors(own)[1] for each, own in pairs]
         return np.repeat(sigma, [own.size for own in readings])
@@ -97,7 +98,9 @@ class Explanations(Result):
     @property
     def verdict(self) -> tuple[str, ...]:
         """What the fits say, in sentences."""
-        r, best, yes = self.unexplained, self.best, self.explains
+        r = self.unexplained
+        best = self.best
+        yes = self.explains
         good = [name for name, each in zip(self.names, yes, strict=True) if each]
         bad = [name for name, each in zip(self.names, yes, strict=True) if not each]
         said = list[str]()
@@ -113,7 +116,9 @@ class Explanations(Result):
 
     def _beside(self, name: str) -> tuple[str, str]:
         """Return how a parameter relates to the best one: in a word, and in a sentence."""
-        i, best, both = self.names.index(name), self.best, self.together[name]
+        i = self.names.index(name)
+        best = self.best
+        both = self.together[name]
         fall = max(0.0, self.alone[0].chi_square - both.chi_square)
         values = ", ".join(f"{key} = {x:.4g}" for key, x in both.parameters.items())
         if fall > _NEEDED:
@@ -194,7 +199,8 @@ def _both(
     other: Identification,
 ) -> Identification:
     """Fit two parameters from the middle of the second one, or else from its own fit."""
-    (a,), (b,) = best.names, other.names
+    (a,) = best.names
+    (b,) = other.names
     bounds = {a: free[a], b: free[b]}
     middle = other._problem.values(np.full(1, 0.5))[0]
     fits = list[Identification]()

@@ -58,12 +58,15 @@ def read_loops(
             wrong; the line and the column are named.
         InvalidInput: ``displacement_std`` or ``minimum`` is invalid.
     """
-    joints, cables = instance("arm", arm, Manipulator).joint_names, arm.cables.names
+    joints = instance("arm", arm, Manipulator).joint_names
+    cables = arm.cables.names
     units = {"test": _TEXT, "direction": _TEXT, "force": _FORCE, "minimum": _FORCE}
     units |= dict.fromkeys(("displacement", *"xyz"), _LENGTH) | dict.fromkeys(cables, _FORCE)
     units |= zip(joints, (_LENGTH if each else ANGLE for each in arm.slides), strict=True)
     table = Columns(path, units, "loops")
-    refuse, text, number = table.refuse, table.text, table.number
+    refuse = table.refuse
+    text = table.text
+    number = table.number
 
     def fixed(rows: list[Row], name: str) -> Row:
         """Return the first row of a test, whose cell of a column later rows repeat."""

@@ -81,10 +81,11 @@ def identify(
     first = _start(problem, start)
     with progress_allowed(progress), progress_bar("identifying parameters"):
         best = _optimum(problem, first)
-        found, jacobian = problem.predict(best), problem.jacobian(best, central=True)
+        found = problem.predict(best)
+        jacobian = problem.jacobian(best, central=True)
     assert not isinstance(found, str)
     r = problem.weighed(found.numbers)
-    measured = np.concatenate([each._readings for each in measurements])
+    measured = np.concatenate([each.readings for each in measurements])
     pairs = zip(measurements, found.numbers, strict=True)
     errors = np.concatenate([each._errors(numbers)[0] for each, numbers in pairs])
     return Identification(
@@ -133,7 +134,8 @@ def _checked_bounds(free: object) -> dict[str, tuple[float, float]]:
 
 def _start(problem: Problem, start: Mapping[str, float] | None) -> Array:
     """Return ``start``, or the middle of the bounds, as a point (P,) that has a prediction."""
-    point, name = np.full(len(problem.names), 0.5), "the middle of the bounds"
+    point = np.full(len(problem.names), 0.5)
+    name = "the middle of the bounds"
     if start is not None:
         if not isinstance(start, Mapping) or set(start) != set(problem.names):
             needed = f"one value for each of {', '.join(problem.names)} is needed."
@@ -144,7 +146,8 @@ def _start(problem: Problem, start: Mapping[str, float] | None) -> Array:
             if not low <= value <= high:
                 said = f"{value:g} is outside the bounds {low:g} to {high:g}."
                 raise InvalidInput(f"start[{each!r}]", said)
-        point, name = np.clip(problem.point(values), 0.0, 1.0), "it"
+        point = np.clip(problem.point(values), 0.0, 1.0)
+        name = "it"
     reason = problem.predict(point)
     if isinstance(reason, str):
         said = f"{name} does not give every measurement a stable prediction. At "
@@ -161,7 +164,8 @@ def _optimum(problem: Problem, start: Array) -> Array:
     best = problem.search(start)
     free = np.ones(best.size, dtype=bool)
     for i in np.flatnonzero(np.minimum(best, 1.0 - best) < _NEAR):
-        free[i], trial = False, best.copy()
+        free[i] = False
+        trial = best.copy()
         trial[i] = round(best[i])
         if free.any() and math.isfinite(problem.cost(trial)):
             trial = problem.search(trial, np.flatnonzero(free))

@@ -72,7 +72,8 @@ class Measurement:
     _suffixes = ("",)  # after the label, for the name of each reading
 
     def __post_init__(self) -> None:
-        value, std = positive("value", self.value, "N/m"), positive("std", self.std, "N/m")
+        value = positive("value", self.value, "N/m")
+        std = positive("std", self.std, "N/m")
         force = scalar("force", self.force)
         if force < 0.0:
             remedy = "it must be positive, or 0 for the tangent. Turn the direction round instead."
@@ -80,7 +81,8 @@ class Measurement:
         _keep(self, value=value, std=std, force=force)
 
     @property
-    def _readings(self) -> Array:
+    def readings(self) -> Array:
+        """Measured numbers (n,), in SI."""
         return np.array([self.value])
 
     def _predict(self, pose: Posture, tension: Tension | ArrayLike) -> Array:
@@ -90,7 +92,8 @@ class Measurement:
             unit = pose.arm.stiffness_unit()
             said = f"the arm buckles: the smallest stiffness is {K.margin:.3g} {unit}."
             raise SingularStiffness(said, K.critical_direction)
-        value, u = K.along(self.direction), unit_direction("direction", self.direction)
+        value = K.along(self.direction)
+        u = unit_direction("direction", self.direction)
         if self.force:
             value = weight_test(pose, K.tension, self.force * u, wrench=K.wrench).stiffness
         if not value < 1.0 / SMALLEST:
@@ -146,13 +149,15 @@ class WeightLoop:
     label: str = ""
 
     def __post_init__(self) -> None:
-        forces, read = number_array("forces", self.forces, "force"), None
+        forces = number_array("forces", self.forces, "force")
+        read = None
         if forces.ndim != 1 or forces.size < 2 or np.ptp(forces) == 0.0:
             said = "a loop needs forces of at least two sizes, one after the other, as 0, 2, 4, 2, "
             said += "0 N: only differences of readings are used."
             raise InvalidInput("forces", f"{self.forces!r} given; {said}")
         if self.displacements is not None:
-            array, n = number_array("displacements", self.displacements, "length"), forces.size
+            array = number_array("displacements", self.displacements, "length")
+            n = forces.size
             if array.shape not in ((n,), (n, 3)):
                 said = f"one reading [m] per force is needed, ({n},) along the direction or "
                 said += f"({n}, 3) in base axes."
@@ -181,7 +186,8 @@ class WeightLoop:
         return [f" force {k + 1}" for k in range(len(self.forces)) for _ in self.axes]
 
     @property
-    def _readings(self) -> Array:
+    def readings(self) -> Array:
+        """Displacements (n,) [m] along the direction; zeros of a planned test."""
         if self.displacements is None:
             return np.zeros(len(self.forces))  # of a planned test, any
         return np.array(self.displacements).ravel()
@@ -203,7 +209,8 @@ class WeightLoop:
         instance("arm", arm, Manipulator)
         if not isinstance(random, np.random.Generator | None):
             random = np.random.default_rng(whole_number("random", random, 0))
-        pose, alone = arm.at(self.angles), replace(self, displacements=None)
+        pose = arm.at(self.angles)
+        alone = replace(self, displacements=None)
         read = alone._predict(pose, tension_before(self, pose))
         if random is not None:
             read += self.displacement_std * random.normal(size=read.size)
@@ -222,7 +229,7 @@ class WeightLoop:
 
     def _errors(self, predicted: Array) -> tuple[Array, float]:
         """Return errors less their mean along each axis (the unknown zero of least χ²), and σ."""
-        off = (predicted - self._readings).reshape(len(self.forces), -1)
+        off = (predicted - self.readings).reshape(len(self.forces), -1)
         return (off - off.mean(axis=0)).ravel(), self.displacement_std
 
     def _shown(self, measured: Array, predicted: Array) -> list[str]:
@@ -253,7 +260,8 @@ def positive(name: str, value: object, unit: str) -> float:
 
 def _keep(given: Measurement | WeightLoop, **own: object) -> None:
     """Check label, direction, wrench, angles and tensions; keep them and ``own``, as numbers."""
-    tension, minimum = given.tension, given.minimum
+    tension = given.tension
+    minimum = given.minimum
     if (tension is None) == (minimum is None):
         said = "give one of tension= (measured, of each cable) and minimum= (a bound to distribute"
         which = "neither" if tension is None else "both"

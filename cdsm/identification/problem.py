@@ -49,8 +49,10 @@ class Problem:
         measurements: Sequence[Test],
         bounds: Mapping[str, tuple[float, float]],
     ) -> None:
-        self.model_of, self.tension_of = model_of, tension_of
-        self.measurements, self.names = tuple(measurements), tuple(bounds)
+        self.model_of = model_of
+        self.tension_of = tension_of
+        self.measurements = tuple(measurements)
+        self.names = tuple(bounds)
         self.low, self.high = np.array([*bounds.values()], dtype=np.float64).T
         self._by_log = (self.low > 0.0) & (self.high >= _DECADES * self.low)
         self._ends = self._scaled(self.low), self._scaled(self.high)
@@ -90,7 +92,8 @@ class Problem:
         """
         if self._last[0] != x.tobytes():
             rests = dict[object, Posture]()
-            self._last, self._rests = (x.tobytes(), self._predict(x, rests)), rests
+            self._last = (x.tobytes(), self._predict(x, rests))
+            self._rests = rests
             if isinstance(reason := self._last[1], str):
                 self.edge = f"{self.describe(x)}: {reason}"
         return self._last[1]
@@ -100,7 +103,8 @@ class Problem:
     ) -> Prediction | str:
         """Predict at a point; put in ``rests`` where the arm rests, sought from those ``near``."""
         parameters = dict(zip(self.names, self.values(x).tolist(), strict=True))
-        where, numbers = "model_of: ", list[Array]()
+        where = "model_of: "
+        numbers = list[Array]()
         try:
             with warnings.catch_warnings():  # a trial value may look like one in another unit
                 warnings.simplefilter("ignore", CdsmWarning)
@@ -139,7 +143,7 @@ class Problem:
         """Compute r (n,) at a point, or one ``beside`` the last; inf without a model."""
         found = self._predict(x, {}, self._rests) if beside else self.predict(x)
         if isinstance(found, str):
-            return np.full(sum(each._readings.size for each in self.measurements), np.inf)
+            return np.full(sum(each.readings.size for each in self.measurements), np.inf)
         return self.weighed(found.numbers)
 
     def cost(self, x: Array) -> float:
@@ -152,7 +156,8 @@ class Problem:
 
         A side beyond a bound or without a model is left out. Raises InvalidInput if both are.
         """
-        here, columns = self.residuals(x), []
+        here = self.residuals(x)
+        columns = []
         step = _STEP_OF_RESTS if self.has_rests else _STEP
         for i in range(x.size) if over is None else over:
             sides = list[tuple[float, Array]]()

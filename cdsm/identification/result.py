@@ -26,7 +26,8 @@ from cdsm.support.values import Array, Plotted, frozen
 
 _CORRELATED = 0.95  # a warning names two parameters whose correlation exceeds this value
 _UNLIKELY = 1e-3  # least probability of χ²; below it, the model does not explain the measurements
-_OWN, _MIXED = "own unit", "N/m or m"
+_OWN = "own unit"
+_MIXED = "N/m or m"
 
 
 def likely(chi_square: float, freedom: int) -> bool:
@@ -37,7 +38,7 @@ def likely(chi_square: float, freedom: int) -> bool:
 def independent_readings(measurements: Sequence[Test]) -> int:
     """Return the number of readings, less one for each axis of a loop: its offset is unknown."""
     offsets = sum(len(each.axes) for each in measurements if isinstance(each, WeightLoop))
-    return sum(each._readings.size for each in measurements) - offsets
+    return sum(each.readings.size for each in measurements) - offsets
 
 
 @final
@@ -62,7 +63,8 @@ class Identification(Result, Plotted):
         unfinished: Why the search ended before the optimum; empty if it did not.
     """
 
-    _headline, _rows = "chi_square", "parameter"
+    _headline = "chi_square"
+    _rows = "parameter"
     _figure = "plot_identification"
 
     names: tuple[str, ...] = field(metadata=unit("1", "parameter"))
@@ -84,12 +86,12 @@ class Identification(Result, Plotted):
     @quantity(_MIXED, "reading")
     def measured(self) -> Array:
         """Measured numbers (n,): stiffnesses [N/m], displacements of loops and coordinates [m]."""
-        return frozen(np.concatenate([each._readings for each in self.measurements]))
+        return frozen(np.concatenate([each.readings for each in self.measurements]))
 
     @cached_property
     def measurement_of(self) -> NDArray[np.intp]:
         """Index of the measurement to which each of the n measured numbers belongs (n,)."""
-        sizes = [each._readings.size for each in self.measurements]
+        sizes = [each.readings.size for each in self.measurements]
         return frozen(np.repeat(np.arange(len(sizes)), sizes))
 
     @quantity(_OWN, "parameter")
@@ -134,7 +136,9 @@ class Identification(Result, Plotted):
     @property
     def warnings(self) -> tuple[str, ...]:
         """One sentence for each reason not to trust the result; empty if there is none."""
-        said, r, std = list[str](), self.correlation, self.std
+        said = list[str]()
+        r = self.correlation
+        std = self.std
         for combination in self._determination.open_combinations:
             said.append(
                 f"not identifiable (rank {self.rank} of {len(self.names)}): no prediction changes "
@@ -189,9 +193,11 @@ class Identification(Result, Plotted):
         """
         if not 0.0 < (level := scalar("level", level)) < 1.0:
             raise InvalidInput("level", f"{level:g} given; it must lie between 0 and 1, as 0.95.")
-        problem, rise = self._problem, float(ndtri((1.0 + level) / 2.0) ** 2)
+        problem = self._problem
+        rise = float(ndtri((1.0 + level) / 2.0) ** 2)
         best = problem.point(self.values)
-        jacobian, found = self.jacobian * problem.slope(best), dict[str, tuple[float, float]]()
+        jacobian = self.jacobian * problem.slope(best)
+        found = dict[str, tuple[float, float]]()
         with progress_allowed(progress):
             for i in track(range(best.size), "finding the confidence of the parameters"):
                 known = math.isfinite(self.std[i])

@@ -94,7 +94,8 @@ class TipPosition:
         return [name for name in _MOTORS if getattr(self, name) is not None]
 
     @property
-    def _readings(self) -> Array:
+    def readings(self) -> Array:
+        """Measured numbers (n,), in SI."""
         return np.array([getattr(self, axis) for axis in self.axes], dtype=np.float64)
 
     @property
@@ -116,7 +117,7 @@ class TipPosition:
         return pose.tip[["xyz".index(axis) for axis in self.axes], 3]
 
     def _errors(self, predicted: Array) -> tuple[Array, float]:
-        return predicted - self._readings, self.std
+        return predicted - self.readings, self.std
 
     @property
     def _suffixes(self) -> list[str]:
@@ -128,7 +129,7 @@ class TipPosition:
 
     def _require_near(self, arm: Manipulator, name: str) -> None:
         """Raise InvalidInput if the tip of an arm of this length cannot be there."""
-        far = float(np.linalg.norm(self._readings))
+        far = float(np.linalg.norm(self.readings))
         if far > _FARTHEST * arm.length:
             said = f"{name} has the tip {far:.4g} m from the base, of an arm {arm.length:.4g} m "
             raise InvalidInput("measurements", f"{said}long: mm? Give x, y, z in m.")

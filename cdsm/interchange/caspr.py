@@ -173,11 +173,14 @@ def _body(
         where = f"{name}: <{path.rpartition('/')[2]}>"
         return np.array(numbers(where, element.findtext(path), count))
 
-    body, kind = "physical/inertia", element.find("joint")
+    body = "physical/inertia"
+    kind = element.find("joint")
     if kind is None or kind.get("type") not in _JOINTS:
-        given, known = None if kind is None else kind.get("type"), ", ".join(_JOINTS)
+        given = None if kind is None else kind.get("type")
+        known = ", ".join(_JOINTS)
         raise XmlFault(f"{name}: the joint type {given!r} is not supported; {known} are")
-    mass, centre = float(values("physical/mass", 1)[0]), values("physical/com_location")
+    mass = float(values("physical/mass", 1)[0])
+    centre = values("physical/com_location")
     if mass < 0.0:
         raise XmlFault(f"{name}: <mass> {mass:g} kg given; it cannot be negative")
     keys = [[f"{body}/I{min(a, b)}{max(a, b)}" for b in "xyz"] for a in "xyz"]
@@ -191,13 +194,15 @@ def _body(
     if kind.get("type") == "S_FIXED_XYZ":
         joints.reverse()  # turns about fixed axes X, Y, Z equal turns about moving axes Z, Y, X
     parent = links[_whole(f"{name}: its parent", element.findtext("parent/num"), len(links) - 1)]
-    carrier, place = parent.name, values("parent/location")
+    carrier = parent.name
+    place = values("parent/location")
     for i, (turns, label, *settings) in enumerate(joints, start=1):
         # single joints of one link need massless links between them
         child = name if i == len(joints) else f"{name}_{i}"
         parts += [joint(turns, label, carrier, child, origin(place), *settings)]
         parts += [E.link(name=child)]
-        carrier, place = child, np.zeros(3)
+        carrier = child
+        place = np.zeros(3)
     if mass:
         parts[-1].append(inertial(mass, inertia, origin(centre)))
     return _Link(name, centre, values("physical/end_location"), names)

@@ -170,9 +170,10 @@ def mujoco_model(
     compiler.set("inertiafromgeom", "false")
     # implicit in velocities only: integrators implicit in positions take energy from springs
     option = etree.SubElement(root, "option", gravity=row(arm.gravity), integrator="implicitfast")
-    coupling, q = arm._body.coupling, np.zeros(arm.nv) if pose is None else pose.q
+    coupling = arm.body.coupling
+    q = np.zeros(arm.nv) if pose is None else pose.q
     angles = coupling.angles(q) if coupling else q
-    start = dict(zip(arm._body.all_joints, angles.tolist(), strict=True))
+    start = dict(zip(arm.body.all_joints, angles.tolist(), strict=True))
     add_bodies(root, arm, start)
     of_joints = 0.0 if damping is None else float(damping)
     step, of_cables, said = _motion(arm, K, damping_ratio, damping)
@@ -181,7 +182,7 @@ def mujoco_model(
     for joint in joints:
         joint.set("damping", repr(of_joints))
     if coupling:
-        couple(root, coupling, arm._body.all_joints, step)
+        couple(root, coupling, arm.body.all_joints, step)
     controls = _cables(root, arm, K, actuators, of_cables)
     if K is not None:
         frame = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="pose")
@@ -206,11 +207,13 @@ def _motion(
     arm: Manipulator, K: Stiffness | None, ratio: float | None, damping: float | None
 ) -> tuple[float, Array, list[str]]:
     """Choose time step [s] and cable damping [N s/m]: joint dampers slow long arms down tenfold."""
-    step, of, wires = _STEPS[0], "MuJoCo's own", np.zeros(len(arm.cables))
+    step = _STEPS[0]
+    of = "MuJoCo's own"
+    wires = np.zeros(len(arm.cables))
     unit = JointUnits(arm.slides).joined("N m s/rad", "N s/m")
     damped = f"{damping or 0.0:.4g} {unit} at every joint"
     if K is not None:
-        M = arm._body.mass_matrix(K.posture.q) + LEAST_INERTIA * np.eye(arm.nv)
+        M = arm.body.mass_matrix(K.posture.q) + LEAST_INERTIA * np.eye(arm.nv)
         squares, shapes = vibrations(K, M)
         fastest = math.sqrt(abs(squares).max())
         step = next((each for each in _STEPS if each * fastest <= _PHASE), _STEPS[-1])
@@ -249,16 +252,20 @@ def _cables(
     root: etree._Element, arm: Manipulator, K: Stiffness | None, actuators: str, damping: Array
 ) -> list[float]:
     """Add tendons and actuators of the kind; return ``ctrl`` of each actuator at the posture."""
-    tendon, motors = etree.SubElement(root, "tendon"), etree.SubElement(root, "actuator")
+    tendon = etree.SubElement(root, "tendon")
+    motors = etree.SubElement(root, "actuator")
     at_start = []
     for c, cable in enumerate(arm.cables):
         spatial = etree.SubElement(tendon, "spatial", name=cable.name, width=repr(_CABLE))
         for i in range(1, len(cable.sites) + 1):
             etree.SubElement(spatial, "site", site=f"{cable.name}/{i}")
         spatial.set("damping", repr(float(damping[c])))
-        F, k, length = 0.0, 0.0, 0.0
+        F = 0.0
+        k = 0.0
+        length = 0.0
         if K is not None:
-            F, k = float(K.tension[c]), float(K.cable_stiffness[c])
+            F = float(K.tension[c])
+            k = float(K.cable_stiffness[c])
             length = float(K.posture.cable_lengths[c]) - cable.lead
         rest = length - F / k if k > 0.0 else -1.0
         if actuators == "none" and (K is None or rest >= 0.0):
@@ -266,10 +273,14 @@ def _cables(
             spatial.attrib.update(spring if K is not None else {})
             continue
         # force along the tendon, which pulls where it is negative: gain ctrl + bias
-        gain, bias, control = k, [k * length - F, -k, 0.0], 0.0
+        gain = k
+        bias = [k * length - F, -k, 0.0]
+        control = 0.0
         motor = etree.SubElement(motors, "general", name=cable.name, tendon=cable.name)
         if actuators == "tension":
-            gain, bias, control = -1.0, [0.0, 0.0, 0.0], F
+            gain = -1.0
+            bias = [0.0, 0.0, 0.0]
+            control = F
             motor.set("ctrlrange", f"0 {_MOST!r}")
         elif actuators == "none":
             gain = 0.0

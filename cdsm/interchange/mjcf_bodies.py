@@ -14,7 +14,8 @@ from cdsm.manipulator import Manipulator
 from cdsm.support.files import parse_xml
 from cdsm.support.values import Array
 
-_MASS, LEAST_INERTIA = 1e-6, 1e-9  # of bodies without mass in MuJoCo [kg], [kg m²]
+_MASS = 1e-6  # of bodies without mass in MuJoCo [kg], [kg m²]
+LEAST_INERTIA = 1e-9
 _SMALLEST = 1e-12  # a smaller mass [kg] or moment of inertia [kg m²] of a body counts as zero
 _ROUNDING = 1e-9  # relative; MuJoCo refuses a moment of inertia above the sum of the other two
 _SITE, _STICK = 1e-3, 0.008  # radius [m] of a drawn hole; of a stick over the length of the arm
@@ -30,7 +31,8 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
     """
     robot = parse_xml(arm.urdf, "robot")
     links = {str(link.get("name")): link for link in robot.findall("link")}
-    joints, own = robot.findall("joint"), arm.springs
+    joints = robot.findall("joint")
+    own = arm.springs
     pairs = zip(own.stiffness.tolist(), own.angle.tolist(), strict=True)
     springs = dict(zip(own.joints, pairs, strict=True))
     (base,) = links.keys() - {joint.find("child").get("link") for joint in joints}
@@ -38,7 +40,8 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
     # MuJoCo reserves the name world for its root
     bodies = {base: world if base == "world" else etree.SubElement(world, "body", name=base)}
     for name in (queue := [base]):
-        body, link = bodies[name], links[name]
+        body = bodies[name]
+        link = links[name]
         below = [joint for joint in joints if joint.find("parent").get("link") == name]
         if body is not world:
             _add_inertia(body, link)
@@ -59,12 +62,14 @@ def add_bodies(root: etree._Element, arm: Manipulator, start: Mapping[str, float
         for hole, position in sites:
             etree.SubElement(body, "site", name=hole, pos=row(position), size=repr(_SITE))
         for joint in below:
-            child, turns = joint.find("child").get("link"), joint.get("type") != "prismatic"
+            child = joint.find("child").get("link")
+            turns = joint.get("type") != "prismatic"
             queue.append(child)
             bodies[child] = etree.SubElement(body, "body", name=child)
             place, turn = _place(joint)
             if joint.get("type") != "fixed":
-                axis, limit = _numbers(joint.find("axis"), "xyz", "1 0 0"), joint.find("limit")
+                axis = _numbers(joint.find("axis"), "xyz", "1 0 0")
+                limit = joint.find("limit")
                 q = start.get(joint.get("name"), 0.0)
                 moved = q * axis / np.linalg.norm(axis)
                 place = place if turns else place + turn.apply(moved)
@@ -89,8 +94,10 @@ def _add_inertia(body: etree._Element, link: etree._Element) -> None:
         least = {"mass": repr(_MASS), "diaginertia": row([LEAST_INERTIA] * 3)}
         etree.SubElement(body, "inertial", pos="0 0 0", **least)
         return
-    (place, turn), inertia = _place(inertial), inertial.find("inertia")
-    R, keys = turn.as_matrix(), [[f"i{min(a, b)}{max(a, b)}" for b in "xyz"] for a in "xyz"]
+    (place, turn) = _place(inertial)
+    inertia = inertial.find("inertia")
+    R = turn.as_matrix()
+    keys = [[f"i{min(a, b)}{max(a, b)}" for b in "xyz"] for a in "xyz"]
     tensor = R @ np.array([[float(inertia.get(key)) for key in each] for each in keys]) @ R.T
     moments, axes = np.linalg.eigh(tensor)
     taken = np.maximum(moments, LEAST_INERTIA) if moments[0] < _SMALLEST else moments.copy()

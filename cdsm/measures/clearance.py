@@ -109,7 +109,8 @@ def distances(
     pose: Posture, diameter: float, thickness: float = 0.0, kinds: Collection[str] = KINDS
 ) -> dict[str, Named]:
     """Compute the distances of ``kinds`` out of :data:`KINDS`, with the names of the bodies."""
-    arm, paths = pose.arm, pose.cable_paths
+    arm = pose.arm
+    paths = pose.cable_paths
     cable = np.repeat(np.arange(len(paths)), [len(path) - 1 for path in paths])
     ends = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
     names = [arm.cables[c].name for c in cable.tolist()]
@@ -120,15 +121,15 @@ def distances(
         later = np.triu(np.ones((cable.size, cable.size), dtype=np.bool_))
         found["cable_clearance"] = _nearest(wires, wires, later & (cable[:, None] != cable))
     if "link_clearance" in kinds:
-        radii = {arm._body.locate(d.link)[0]: _BACKBONE * d.hole_radius for d in reversed(disks)}
+        radii = {arm.body.locate(d.link)[0]: _BACKBONE * d.hole_radius for d in reversed(disks)}
         rows = [row for row, _ in pose._bones]
-        links = ["the base", *(f"the link after {name}" for name in arm._body.all_joints)]
+        links = ["the base", *(f"the link after {name}" for name in arm.body.all_joints)]
         radius = np.array([radii.get(row, 0.0) for row in rows])
         lines = np.array(pose.bones).reshape(-1, 2, 3)
         bones = _Bodies.bars([links[row] for row in rows], lines, radius)
         found["link_clearance"] = _nearest(wires, bones, np.ones((cable.size, len(rows)), np.bool_))
     if "disk_clearance" in kinds:
-        poses = arm._body.link_placements(pose.q)
+        poses = arm.body.link_placements(pose.q)
         place = np.array([poses[disk.link] for disk in disks]).reshape(-1, 4, 4)
         x, radius = (np.array([getattr(disk, of) for disk in disks]) for of in ("x", "radius"))
         axis = place[:, :3, 0]
@@ -173,8 +174,11 @@ class _Bodies:
     def __init__(
         self, names: list[str], shapes: list[Any], centre: Array, axis: Array, extent: Array
     ) -> None:
-        self.names, self.centre, self.extent = names, centre, extent
-        self.radius, self._shapes = np.zeros(len(names)), shapes
+        self.names = names
+        self.centre = centre
+        self.extent = extent
+        self.radius = np.zeros(len(names))
+        self._shapes = shapes
         # a reflection that takes z to the axis, up to the sign, and one that turns the hand back
         v = axis + np.where(axis[:, 2:] > 0.0, 1.0, -1.0) * [0.0, 0.0, 1.0]
         mirror = np.eye(3) - 2.0 * v[:, :, None] * v[:, None] / (v**2).sum(axis=1)[:, None, None]
@@ -203,7 +207,8 @@ def _nearest(one: _Bodies, other: _Bodies, pairs: NDArray[np.bool_]) -> Named:
     if not pairs.any():
         return best
     offset = one.centre.mean(axis=0)
-    a, b = one.centre - offset, other.centre - offset
+    a = one.centre - offset
+    b = other.centre - offset
     square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * a @ b.T
     apart = np.sqrt(np.maximum(square, 0.0)) - one.radius[:, None] - other.radius
     reach = [np.linalg.norm(each.extent, axis=1) for each in (one, other)]
@@ -212,8 +217,10 @@ def _nearest(one: _Bodies, other: _Bodies, pairs: NDArray[np.bool_]) -> Named:
     gaps = np.maximum(abs(a[i] - b[j]) - one.extent[i] - other.extent[j], 0.0)
     rounding = one.radius[i] + other.radius[j]
     least = np.linalg.norm(gaps, axis=1) - rounding
-    request, result = coal.DistanceRequest(False), coal.DistanceResult()
-    request.gjk_tolerance, request.enable_signed_distance = _PRECISE, False
+    request = coal.DistanceRequest(False)
+    result = coal.DistanceResult()
+    request.gjk_tolerance = _PRECISE
+    request.enable_signed_distance = False
     for k in np.argsort(least).tolist():
         if least[k] >= best.distance:
             break

@@ -77,7 +77,8 @@ def principal_stiffness(compliance: Array) -> dict[str, Array]:
     """
     values, vectors = np.linalg.eigh((compliance + compliance.swapaxes(-1, -2)) / 2.0)
     most = values[..., 2]
-    softest, stiffest = np.full_like(most, np.inf), np.full_like(most, np.inf)
+    softest = np.full_like(most, np.inf)
+    stiffest = np.full_like(most, np.inf)
     np.divide(1.0, most, out=softest, where=most > 0.0)
     np.divide(1.0, values[..., 0], out=stiffest, where=values[..., 0] > RIGID * most)
     isotropy = np.ones_like(most)  # value for a tip that cannot move at all

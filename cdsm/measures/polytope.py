@@ -144,11 +144,13 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
     """
     axes, size, _ = np.linalg.svd(pose.jacobian[:3])
     k = int((size > _NO_MOTION * pose.arm.length).sum())
-    basis, unbounded = axes[:, :k], axes[:, k:].T
+    basis = axes[:, :k]
+    unbounded = axes[:, k:].T
     farthest = balanced(pose, basis, wrench, low, high)
     if farthest(np.zeros(k)) is None:
         return None
-    points, normals = np.zeros((0, k)), np.vstack([np.eye(k), -np.eye(k)])
+    points = np.zeros((0, k))
+    normals = np.vstack([np.eye(k), -np.eye(k)])
     tried: set[tuple[float, ...]] = set()
     while True:
         reached = (points @ normals.T).max(axis=0, initial=-math.inf)
@@ -167,7 +169,9 @@ def polytope_of(pose: Posture, wrench: Array, low: Array, high: Array) -> ForceP
         points = np.vstack([points, *new])
         corners, faces, normals = _hull(points)
     if k == 0:
-        corners, faces, points = np.zeros(1, np.intp), np.zeros((0, 3), np.intp), np.zeros((1, 0))
+        corners = np.zeros(1, np.intp)
+        faces = np.zeros((0, 3), np.intp)
+        points = np.zeros((1, 0))
     return ForcePolytope(
         posture=pose,
         wrench=wrench,
@@ -191,9 +195,11 @@ def _hull(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     size = max(np.ptp(points, axis=0).max(), _OUTSIDE * abs(points).max()) or 1.0
     scaled = (points - points[0]) / size
     try:
-        hull, flat = ConvexHull(scaled), points.shape[1] < 3
+        hull = ConvexHull(scaled)
+        flat = points.shape[1] < 3
     except QhullError:  # a flat polytope is made a little thick
-        hull, flat = ConvexHull(scaled, qhull_options="QJ"), True
+        hull = ConvexHull(scaled, qhull_options="QJ")
+        flat = True
     normals = np.unique(np.round(hull.equations[:, :-1], 9), axis=0)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     corners = np.sort(hull.vertices).astype(np.intp)
@@ -217,8 +223,9 @@ def balanced(pose: Posture, U: Array, wrench: Array, low: Array, high: Array) ->
     lever = abs(A).max(axis=1)
     lever[lever == 0.0] = 1.0
     A /= lever[:, None]
-    b = (pose.jacobian.T @ wrench - pose._own_torque) / lever
-    count, free = low.size, np.full(U.shape[1], math.inf)
+    b = (pose.jacobian.T @ wrench - pose.own_torque) / lever
+    count = low.size
+    free = np.full(U.shape[1], math.inf)
     # near the straight arm, forces along it are huge: each counts by what it does to the joints
     scale = abs(A[:, count:]).max(axis=0)
     scale[scale == 0.0] = 1.0

@@ -44,11 +44,13 @@ TENSIONS: Final = frozen(np.linspace(3.0, 86.0, 5))
 POSTURE: Final = frozen(np.deg2rad([-12.0, -18.0, -20.0]))
 """Joint angles of Table II (3,) [rad] (Section V-C)."""
 
-DROPS, RISES = (0.17, 0.40), (7.93, 12.25)
+DROPS = (0.17, 0.40)
+RISES = (7.93, 12.25)
 """What stiffness in y falls by with tension (Fig. 12) and rises by with the springs (Fig. 13),
 (last − first)/first, in two configurations."""
 
-CHECK, MEASURED = 139.0, 131.0
+CHECK = 139.0
+MEASURED = 131.0
 """Calculated and measured stiffness in z [N/m] of the accuracy check (Section V-B)."""
 
 HYBRID: Final = 1890.0
@@ -62,7 +64,8 @@ TENSION_OFFSET: Final = 17.3
 SECOND_POSTURE: Final = frozen(np.deg2rad([-30.0, -30.0, 7.28]))
 """Joint angles of the second configuration of Figs. 12 and 13 (3,) [rad]; the first is POSTURE."""
 
-HIGHEST_TENSION, HYBRID_TENSION = 34.4, 3.0
+HIGHEST_TENSION = 34.4
+HYBRID_TENSION = 3.0
 """Highest tension in Fig. 12 [N], and the tension in Fig. 13 and the accuracy check [N]."""
 
 STIFFEST: Final = 8.04 * HYBRID
@@ -115,7 +118,8 @@ def measured(arm: Manipulator, q: ArrayLike, tensions: Sequence[float] | Array) 
     ``tensions`` are N reported tensions of the force-controlled cables [N]; statics give those of
     the others. ``q`` are the joint angles (nv,) [rad].
     """
-    pose, rows = arm.at(q), []
+    pose = arm.at(q)
+    rows = []
     forced = [cable.name for cable in arm.cables if cable.control == "force"]
     for tension in np.asarray(tensions, dtype=np.float64) + TENSION_OFFSET:
         K = stiffness(pose, distribute_tension(pose, fixed=dict.fromkeys(forced, float(tension))))
@@ -136,9 +140,11 @@ def figure_10() -> ExperimentFigure:
     """
     arm = presets.fitted_prototype()
     tensions = frozen(np.linspace(TENSIONS[0], TENSIONS[-1], _POINTS))
-    curves, computed = measured(arm, POSTURE, tensions), measured(arm, POSTURE, TENSIONS)
+    curves = measured(arm, POSTURE, tensions)
+    computed = measured(arm, POSTURE, TENSIONS)
     exchanged = "x and y exchanged in rows 2 to 4 of the table"
-    claims, traces = [], []
+    claims = []
+    traces = []
     for axis, paper, ours, curve in zip(XYZ, TABLE_II_SWAPPED.T, computed.T, curves.T, strict=True):
         said = "Table II", f"stiffness in {axis}", "N/mm", floats(paper / 1e3)
         claims.append(_claim(said, ours / 1e3, f"tensions evenly spaced; {exchanged}"))

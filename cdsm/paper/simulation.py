@@ -43,7 +43,8 @@ FIGURE_8_POSTURES: Final = {
 LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
 """Examined leads [m]. With a lead of 0.33 m or more the arm buckles below 800 N."""
 
-_FROM_FIG_6, _POINTS = "prototype searched for Fig. 6", 25
+_FROM_FIG_6 = "prototype searched for Fig. 6"
+_POINTS = 25
 Part = Literal["active", "passive"]
 _STIFFNESS: Final = unit("N/m", "case", "axis")
 _CHANGE: Final = unit("percent", "lead", "reading", "axis")
@@ -133,7 +134,8 @@ def _curves(
     def curve(length: OriginalLength) -> Curve:
         arm = cache(partial(presets.virtual_prototype, original_length=length, lead=lead))
         cases = [(arm(law).at(q), float(F)) for law, F in product(laws, minima)]
-        found, axes = [stiffness(pose, distribute_tension(pose, F)) for pose, F in cases], np.eye(3)
+        found = [stiffness(pose, distribute_tension(pose, F)) for pose, F in cases]
+        axes = np.eye(3)
         return Curve(
             label=label,
             original_length=length,
@@ -200,7 +202,8 @@ def figure_4() -> StiffnessFigure:
     minima = np.linspace(100.0, 800.0, _POINTS)
     strand = "EA = 48 kN (the strand in its elastic stage)", [presets.ELASTIC_STAGE]
     wire = "EA = 226 kN (solid wire, the stated 200 GPa)", [presets.STEEL_WIRE_200GPA]
-    pairs, claims = [_curves(*case, minima) for case in (strand, wire)], []
+    pairs = [_curves(*case, minima) for case in (strand, wire)]
+    claims = []
     for pair, searched in zip(pairs, ("EA, range of tension", "range of tension"), strict=True):
         assumed = f"{pair[0].label}, lower bound 100 to 800 N"
         what = f"change of stiffness with tension, {pair[0].label.partition(' (')[0]}"
@@ -217,7 +220,8 @@ def figure_lead() -> LeadFigure:
     wires are shorter than the cable: EA/l_0 = (EA + F)/L. Only this depends on the lead. The paper
     takes l_0 = L and leaves it out.
     """
-    law, ends = [presets.ELASTIC_STAGE], [100.0, 800.0]
+    law = [presets.ELASTIC_STAGE]
+    ends = [100.0, 800.0]
     pairs = [_curves("", law, ends, lead=lead) for lead in LEADS.tolist()]
     stretched, original = (
         _rows((_percent(curve.pseudoinverse), _percent(curve.along)) for curve in curves)
@@ -264,9 +268,11 @@ def figure_7() -> StiffnessFigure:
 
 def figure_8() -> StiffnessFigure:
     """Compute stiffness as a function of tension, over its whole range, at three postures."""
-    pairs, claims = [], []
+    pairs = []
+    claims = []
     for label, q in FIGURE_8_POSTURES.items():
-        highest, law = _highest_minimum(q), [presets.STRAND_1X19]
+        highest = _highest_minimum(q)
+        law = [presets.STRAND_1X19]
         # more points at low tension, where the curve is steep
         pairs.append(_curves(label, law, np.geomspace(5.0, highest, 2 * _POINTS), q))
         end = _curves(label, law, [LEVEL[0], highest], q)

@@ -15,7 +15,8 @@ from cdsm.paper.claims import Claim, Figure, floats
 from cdsm.support.result import unit
 from cdsm.support.values import Array, frozen
 
-GAUGE_LENGTH, JOIN = 0.5, 31.0  # [m], [N]
+GAUGE_LENGTH = 0.5  # [m], [N]
+JOIN = 31.0
 
 LEVEL: Final = (400.0, 810.0)
 """Range of tension [N] over which the paper calls the rigidity near-constant (Section IV-C)."""
@@ -69,7 +70,8 @@ def eq19_as_printed(tension: ArrayLike) -> Array:
 
 def left_open(tension: float) -> tuple[float, float]:
     """Return the least and largest EA [N] above 31 N, by coefficients that round to the printed."""
-    middle, half = float(eq19_as_printed(tension)), float(polyval(tension, HALF_UNITS[1]))
+    middle = float(eq19_as_printed(tension))
+    half = float(polyval(tension, HALF_UNITS[1]))
     return middle - half, middle + half
 
 
@@ -83,7 +85,8 @@ def figure_5() -> StrandFigure:
     end = "EA at 810 N, least and largest within the printed digits"
     rise = "rise of EA from least to largest, 400 to 810 N (paper: near-constant)"
     misprint = "misprint: −1e-3 for −1e-4; all other digits as printed"
-    level, steps = "Eq. 19 most level within its digits", eq19_as_printed([JOIN])
+    level = "Eq. 19 most level within its digits"
+    steps = eq19_as_printed([JOIN])
     claims: list[tuple[str, str, tuple[float] | None, Iterable[float], str]] = [
         (first, "N⁻⁵", (-10.0,), [1e4 * law.coefficients[0][-1]], misprint),
         (jump, "-", (1.0,), steps / law.polynomial(JOIN), "none: a misprint"),

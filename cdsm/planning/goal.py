@@ -20,7 +20,8 @@ REACHED: Final = 1e-6
 
 _CORNERS = 12  # number of random directions in which corners are sought
 _ENOUGH = 2  # number of lines beyond the corners that hit the target
-_STARTS, _LEAST = 5, 2  # number of starts on lines, and at the least corners, if the first fails
+_STARTS = 5  # number of starts on lines, and at the least corners, if the first fails
+_LEAST = 2
 _SEARCHES = 3  # largest number of searches from each start
 
 
@@ -61,16 +62,20 @@ class Goal:
             return float(way @ way) / 2.0, way / unit
 
         rule = "ineq" if self.at_least else "eq", self.misses
-        best, known, missed = None, math.inf, math.inf
+        best = None
+        known = math.inf
+        missed = math.inf
         for _ in range(_SEARCHES):
             F = self.space.search(start, effort, rule, bounds=bounds)
             if F is None or (self.met(F) and effort(F)[0] > (1.0 - REACHED) * known):
                 break
             if self.met(F):
-                best, known = F, effort(F)[0]
+                best = F
+                known = effort(F)[0]
             elif self.misfit(F) > missed / 2.0:
                 break
-            start, missed = F, self.misfit(F)
+            start = F
+            missed = self.misfit(F)
         return best
 
     def least(self) -> Array:
@@ -107,7 +112,8 @@ class Goal:
 
     def _beyond(self, corners: list[Array]) -> list[Array]:
         """Return where lines from the anchor to what searches from corners find hit the target."""
-        sign, found = -float(np.sign(self.misses(self.space.anchor)[0][0])), list[Array]()
+        sign = -float(np.sign(self.misses(self.space.anchor)[0][0]))
+        found = list[Array]()
         for F in corners:
             end = farther(self.space, -sign, downhill(self.space, F) if sign < 0.0 else F)
             found += self._crossings(self.space.anchor, [end])
@@ -116,12 +122,15 @@ class Goal:
         return found
 
     def _unreachable(self, low: End, high: End) -> UnreachableStiffness:
-        space, target = self.space, float(self.targets[0])
+        space = self.space
+        target = float(self.targets[0])
         end = low if target < low.value else high
         hint = advice(space.pose.arm, end.F, *space.bounds)
         if space.reserve(end.F) < AT_END:
             hint = "take stiffer cables, since the arm is about to buckle there"
-        first, last, u = low.value, high.value, space.directions[0]
+        first = low.value
+        last = high.value
+        u = space.directions[0]
         nearest = [first, last] if first <= target <= last else [end.value]
         return UnreachableStiffness(u, target, first, last, nearest, hint)
 

@@ -94,7 +94,8 @@ def plan_path(
     limit = checked_change("max_change_per_sample", arm, max_change_per_sample)
     checked_bounds(arm, minimum, maximum)  # check now, not at the first feasible posture
 
-    near, found = guess, dict[int, Stiffness]()
+    near = guess
+    found = dict[int, Stiffness]()
     infeasible: list[InfeasibleSample] = []
     for i in track(range(len(path)), "planning the path"):
         try:
@@ -102,7 +103,8 @@ def plan_path(
             if tips is not None:
                 q = near = _angles(arm, q, near)
             space = TensionSpace(arm.at(q), directions, minimum, maximum, loads[i])
-            goal, last = Goal(space, targets[i].reshape(-1)), max(found, default=i)
+            goal = Goal(space, targets[i].reshape(-1))
+            last = max(found, default=i)
             before = found[last].tension if found else None
             F = _plan(goal, before, (i - last) * limit if found else limit, i - last)
             found[i] = stiffness(space.pose, F, loads[i])

@@ -63,7 +63,8 @@ class PathPlan(Result, Plotted):
         infeasible: The samples that are not planned, each with its reason.
     """
 
-    _headline, _rows = "tensions", "planned"
+    _headline = "tensions"
+    _rows = "planned"
     _figure = "plot_path_plan"
 
     arm: Manipulator

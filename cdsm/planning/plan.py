@@ -49,7 +49,8 @@ class StiffnessPlan(Result):
         at_least: Whether the arm may be stiffer than the target.
     """
 
-    _headline, _rows = "tension", "cable"
+    _headline = "tension"
+    _rows = "cable"
 
     tension: Tension = field(metadata=unit("N", "cable"))
     stiffness: Stiffness

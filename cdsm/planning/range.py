@@ -27,8 +27,10 @@ STARTS: Final = 24
 AT_END: Final = 1e-3
 """Relative distance to the limit of stability, or to a cap, that counts as none."""
 
-_ASCENTS, _DESCENTS = 16, 5  # largest number of searches for each end
-_AGREED, _SAME = 5, 1e-5  # number of ascents whose ends differ by this part at most, and suffice
+_ASCENTS = 16  # largest number of searches for each end
+_DESCENTS = 5
+_AGREED = 5  # number of ascents whose ends differ by this part at most, and suffice
+_SAME = 1e-5
 _STEEP = 10.0  # factor of ln(along/start)
 _TANGENT = 0.1  # along/start below which the logarithm is straight
 _SETTINGS: Any = {"precision": 1e-10, "iterations": 50}
@@ -49,7 +51,8 @@ class StiffnessRange(Result, Plotted):
         floor: Smallest eigenvalue of K_θ at which an arm still counts as stable [N m/rad].
     """
 
-    _headline, _rows = "ends", "cable"
+    _headline = "ends"
+    _rows = "cable"
     _figure = "plot_stiffness_range"
 
     direction: Array = field(metadata=unit("1", "axis"))
@@ -85,10 +88,12 @@ class StiffnessRange(Result, Plotted):
         return self.low <= target <= self.high
 
     def __str__(self) -> str:
-        (low, high), limited = self.ends / 1e3, self.limited_by_stability
+        (low, high) = self.ends / 1e3
+        limited = self.limited_by_stability
         said = f"along {coordinates(self.direction)} the stiffness can be {low:.4g} to {high:.4g}"
         arm = self.posture.arm
-        lines, unit = [f"{said} N/mm ({frictionless_model(arm)})"], arm.stiffness_unit()
+        lines = [f"{said} N/mm ({frictionless_model(arm)})"]
+        unit = arm.stiffness_unit()
         tensions = {"softest": self.low_tension, "stiffest": self.high_tension}
         for (name, F), stops in zip(tensions.items(), limited, strict=True):
             margin = f"smallest joint stiffness {stiffness(self.posture, F).margin:.4g} {unit}"
@@ -133,7 +138,8 @@ def stiffness_range(
         SingularStiffness: The tip cannot move along u, or no admissible tensions make the arm
             stable.
     """
-    u, number = unit_direction("direction", direction), whole_number("starts", starts, 1, 1000)
+    u = unit_direction("direction", direction)
+    number = whole_number("starts", starts, 1, 1000)
     space = TensionSpace(pose, u, minimum, maximum, wrench)
     with progress_bar("searching the ends of the range"):
         found = ends(space, number)
@@ -161,7 +167,8 @@ class End(NamedTuple):
 
 def ends(space: TensionSpace, starts: int = STARTS) -> tuple[End, End]:
     """Find the softest and the stiffest tensions along the only direction of ``space``."""
-    (low, high), anchor = space.capped, space.anchor
+    (low, high) = space.capped
+    anchor = space.anchor
 
     def value(F: Array) -> float:
         return float(_along(space, F)[0])
@@ -187,9 +194,11 @@ def ends(space: TensionSpace, starts: int = STARTS) -> tuple[End, End]:
     inside = [(F + anchor) / 2.0 for F in corners]  # where no constraint stops the first step
     stiffest = best(-1.0, [*corners, *inside], _ASCENTS, _AGREED)
     down = [downhill(space, F) for F in corners]
-    softest, known = best(1.0, [*corners, *down], _DESCENTS), np.inf
+    softest = best(1.0, [*corners, *down], _DESCENTS)
+    known = np.inf
     while value(softest) < (1.0 - _GAIN) * known:
-        known, other = value(softest), np.where(2.0 * softest < low + high, high, low)
+        known = value(softest)
+        other = np.where(2.0 * softest < low + high, high, low)
         beside = np.where(np.eye(len(other)) > 0.0, other, softest)  # one tension far away in each
         found = (space.nearest(F, space.capped) for F in beside)
         points = [space.pulled_back(F, 1e-3) for F in found if F is not None]
@@ -234,7 +243,8 @@ def downhill(space: TensionSpace, F: Array) -> Array:
     value, slope = _along(space, F)
     while (corner := space.corner(-slope)) is not None:
         softer = space.pulled_back(corner, 1e-3)
-        known, (value, slope) = value, _along(space, softer)
+        known = value
+        (value, slope) = _along(space, softer)
         if value > (1.0 - _GAIN) * known:
             break
         F = softer

@@ -41,7 +41,8 @@ class StiffnessGradient(Result):
         cable_stiffness: dk_c/dF_c (C,) [1/m] of each cable; 0 under force control.
     """
 
-    _headline, _rows = "cable_stiffness", "cable"
+    _headline = "cable_stiffness"
+    _rows = "cable"
     _posture_from = "stiffness.posture"
 
     stiffness: Stiffness
@@ -50,7 +51,8 @@ class StiffnessGradient(Result):
     @cached_property
     def joint(self) -> Array:
         """∂K_θ/∂F (C, nv, nv) [m/rad²]: one symmetric matrix per cable."""
-        J, slope = self._posture.length_jacobian, self.cable_stiffness[:, None, None]
+        J = self._posture.length_jacobian
+        slope = self.cable_stiffness[:, None, None]
         return frozen(self._posture.length_hessian + slope * J[:, :, None] * J[:, None])
 
     @cached_property
@@ -80,7 +82,7 @@ class StiffnessGradient(Result):
         SingularStiffness if K_θ is singular or the tip cannot move along u.
         """
         u = unit_direction("direction", direction)
-        self.stiffness._require_mobile(u)
+        self.stiffness.require_mobile(u)
         return frozen(self._through(u[None], np.array([[self.stiffness.along(u)]]))[:, 0, 0])
 
     def _through(self, U: Array, X: Array) -> Array:
@@ -89,8 +91,10 @@ class StiffnessGradient(Result):
         M = K_θ⁻¹ (U J_v)ᵀ X is the joint motion per motion of the tip. The left one is of
         K_θᵀ, which differs if a moment acts on the tip.
         """
-        K, rows = self.stiffness.joint, U @ self._posture.jacobian[:3]
-        left, right = np.linalg.solve(K.T, rows.T) @ X.T, np.linalg.solve(K, rows.T) @ X
+        K = self.stiffness.joint
+        rows = U @ self._posture.jacobian[:3]
+        left = np.linalg.solve(K.T, rows.T) @ X.T
+        right = np.linalg.solve(K, rows.T) @ X
         return form_by_tension(self._posture, self.cable_stiffness, left, right)
 
     def __str__(self) -> str:
@@ -115,7 +119,7 @@ def stiffness_gradient(stiffness: Stiffness) -> StiffnessGradient:
         ElasticityRangeError: A tension is outside the domain of its elasticity.
     """
     K = instance("stiffness", stiffness, Stiffness).require_frictionless()
-    slope = K.posture.arm._laws.stiffness_slope(K.tension, K.cable_stiffness)
+    slope = K.posture.arm.laws.stiffness_slope(K.tension, K.cable_stiffness)
     return StiffnessGradient(stiffness=K, cable_stiffness=slope)
 
 
@@ -141,7 +145,8 @@ class Saturation(Result, Plotted):
         along: Stiffness along u under the least tensions with these bounds (n,) [N/m].
     """
 
-    _headline, _rows = "bound", "minimum"
+    _headline = "bound"
+    _rows = "minimum"
     _figure = "plot_saturation"
 
     direction: Array = field(metadata=unit("1", "axis"))
@@ -160,7 +165,8 @@ class Saturation(Result, Plotted):
         return self.tension.posture
 
     def __str__(self) -> str:
-        end, along = self.minimum[-1], f"the stiffness along {coordinates(self.direction)}"
+        end = self.minimum[-1]
+        along = f"the stiffness along {coordinates(self.direction)}"
         most = f"{along} is at most {self.along.max() / 1e3:.4g} N/mm, at a lower bound of "
         lines = [f"{most}{self.stiffest:.4g} N"]
         if math.isinf(self.bound):
@@ -206,8 +212,10 @@ def saturation(
         ElasticityRangeError: The tensions at the smallest lower bound are outside the elasticities.
         SingularStiffness: The tip cannot move along u, or the arm is stable at no lower bound.
     """
-    arm, u = instance("pose", pose, Posture).arm, unit_direction("direction", direction)
-    part, start = scalar("fraction", fraction), scalar("minimum", minimum)
+    arm = instance("pose", pose, Posture).arm
+    u = unit_direction("direction", direction)
+    part = scalar("fraction", fraction)
+    start = scalar("minimum", minimum)
     if not 0.0 < part <= 1.0:
         raise InvalidInput("fraction", f"{part:g} given; 0 < fraction <= 1 is needed.")
     ceiling = bound("maximum", maximum, len(arm.cables))
@@ -219,10 +227,10 @@ def saturation(
     distribute_tension(pose, start, ceiling, wrench)  # raises if minimum exceeds maximum
     laws = [cable.elasticity for cable in arm.cables if cable.control == "position"]
     low = max([start, *(law.low for law in laws)])
-    at(low)._require_mobile(u)
+    at(low).require_mobile(u)
     highest: list[tuple[float, End]] = [(FAR * max(float(at(low).tension.max()), 1.0), "none")]
     highest += [(law.high, "elasticity") for law in laws]
-    highest += [(float(each), "maximum") for each in arm._laws.narrowed(ceiling, ceiling)[1]]
+    highest += [(float(each), "maximum") for each in arm.laws.narrowed(ceiling, ceiling)[1]]
     high, limit = min(highest, key=lambda each: each[0])
     stable: list[float] = []
     tried = [low, *np.geomspace(max(low, _SMALLEST * high), max(low, high), _SAMPLES)[1:].tolist()]
@@ -242,7 +250,8 @@ def saturation(
         found = [at(b) for b in tried if b < lower] or [at(low)]
         least = f"least tensions with lower bounds from {low:.4g} to {lower:.4g} N"
         raise unstable(max(found, key=lambda K: K.margin), least)
-    bounds, along = np.array(stable), np.array([at(lower).along(u) for lower in stable])
+    bounds = np.array(stable)
+    along = np.array([at(lower).along(u) for lower in stable])
     top = int(along.argmax())
     first = int((along >= part * along[top]).argmax())
     beside = slice(max(first - 1, 0), first + 1)

@@ -74,21 +74,24 @@ class TensionSpace:
         maximum: ArrayLike,
         wrench: ArrayLike,
     ) -> None:
-        self.pose, self.directions = instance("pose", pose, Posture), directions.reshape(-1, 3)
+        self.pose = instance("pose", pose, Posture)
+        self.directions = directions.reshape(-1, 3)
         self.least, (low, high) = _least_tensions(pose, minimum, maximum, wrench)
         self.unit = float(self.least.values.max()) or 1.0
         self.bounds = low, high
         self.capped = low, np.minimum(high, FAR * max(self.unit, float(low.max())))
-        K, J = stiffness(pose, self.least), pose.length_jacobian
+        K = stiffness(pose, self.least)
+        J = pose.length_jacobian
         for u in self.directions:
-            K._require_mobile(u)
+            K.require_mobile(u)
         self._size = max(float(K._magnitudes.diagonal().min()), SMALLEST)
-        self._constant = K.gravity + K.load + K.springs
-        torque = pose.jacobian.T @ self.least.wrench - pose._own_torque
+        self.constant_stiffness = K.gravity + K.load + K.springs
+        torque = pose.jacobian.T @ self.least.wrench - pose.own_torque
         self._balance = nondimensional(J, torque, low, high, pose.arm.length)
         _, sizes, basis = np.linalg.svd(J.T)
         rank = int((sizes > _FLAT * sizes.max(initial=0.0)).sum())
-        self._rows, self._free = basis[:rank], basis[rank:]
+        self._rows = basis[:rank]
+        self._free = basis[rank:]
         self._last: tuple[Array, Point] | None = None
 
     def at(self, F: Array) -> Point:
@@ -96,8 +99,9 @@ class TensionSpace:
         F = np.clip(F, *self.bounds)
         if self._last and np.array_equal(F, self._last[0]):  # SLSQP asks for value, then gradient
             return self._last[1]
-        pose, (K, k) = self.pose, self._joint_stiffness(F)
-        slope = pose.arm._laws.stiffness_slope(F, k)
+        pose = self.pose
+        (K, k) = self._joint_stiffness(F)
+        slope = pose.arm.laws.stiffness_slope(F, k)
         values, vectors = np.linalg.eigh((K + K.T) / 2.0)
         rows = self.directions @ pose.jacobian[:3]
         K = K + 1e-21 * self._size * np.eye(len(K))  # which cannot be singular
@@ -115,9 +119,10 @@ class TensionSpace:
 
     def _joint_stiffness(self, F: Array) -> tuple[Array, Array]:
         """Compute K_θ (nv, nv) and the cable stiffnesses (C,) [N/m] under F (C,) [N]."""
-        pose, J = self.pose, self.pose.length_jacobian
-        k = pose.arm._laws.stiffness(pose.cable_lengths, F)
-        return self._constant + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J, k
+        pose = self.pose
+        J = self.pose.length_jacobian
+        k = pose.arm.laws.stiffness(pose.cable_lengths, F)
+        return self.constant_stiffness + np.tensordot(F, pose.length_hessian, 1) + (J.T * k) @ J, k
 
     def nearest(self, F: Array, bounds: Bounds | None = None) -> Array | None:
         """Return the balanced tensions (C,) [N] nearest to F within the bounds, if any."""
@@ -151,13 +156,17 @@ class TensionSpace:
         tensions (C,) [N] in balance within ``bounds``, or None if there are none. They may miss
         stability and ``rules``.
         """
-        unit, limits = self.unit, bounds or self.bounds
+        unit = self.unit
+        limits = bounds or self.bounds
         if (limits[0] > limits[1]).any():
             return None
 
         def scaled(kind: str, of: Function) -> dict[str, Any]:
-            value, slope = (lambda x: of(unit * x)[0]), (lambda x: unit * of(unit * x)[1])
-            return {"type": kind, "fun": value, "jac": slope}
+            return {
+                "type": kind,
+                "fun": lambda x: of(unit * x)[0],
+                "jac": lambda x: unit * of(unit * x)[1],
+            }
 
         def balance(F: Array) -> tuple[Array, Array]:
             return self._rows @ (F - self.least.values) / unit, self._rows / unit
@@ -255,7 +264,8 @@ def form_by_tension(pose: Posture, slope: Array, left: Array, right: Array) -> A
 
     ``slope`` (C,) [1/m] are the derivatives of the cable stiffnesses with respect to the tensions.
     """
-    H, J = pose.length_hessian, pose.length_jacobian
+    H = pose.length_hessian
+    J = pose.length_jacobian
     pairs = (left[:, None, :, None] * right[:, None]).reshape(H[0].size, -1)
     active = (H.reshape(len(H), -1) @ pairs).reshape(-1, left.shape[1], right.shape[1])
     passive = slope[:, None, None] * (J @ left)[:, :, None] * (J @ right)[:, None]
@@ -279,11 +289,14 @@ def _least_tensions(
     pose: Posture, minimum: ArrayLike, maximum: ArrayLike, wrench: ArrayLike
 ) -> tuple[Tension, Bounds]:
     """Distribute the least tensions within bounds and domains; return these bounds, too."""
-    least, cables = distribute_tension(pose, minimum, maximum, wrench), pose.arm.cables
-    F, held = least.values, cables.position_controlled  # the others do not use their elasticity
+    least = distribute_tension(pose, minimum, maximum, wrench)
+    cables = pose.arm.cables
+    F = least.values  # the others do not use their elasticity
+    held = cables.position_controlled
     first = np.where(held, [cable.elasticity.low for cable in cables], 0.0)
     last = np.where(held, [cable.elasticity.high for cable in cables], np.inf)
-    low, high = np.maximum(least.minimum, first), np.minimum(least.maximum, last)
+    low = np.maximum(least.minimum, first)
+    high = np.minimum(least.maximum, last)
     outside = (low > F) | (high < F)
     if not outside.any():
         return least, (low, high)

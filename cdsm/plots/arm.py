@@ -40,7 +40,8 @@ _PADS: Final = {"x": -3.0, "y": -6.0, "z": -4.0}  # from the numbers of an axis 
 _UNZOOMED = 0.97  # side of the square of 3D axes, over the diagonal of their box at zoom 1
 _ELEVATION, _AZIMUTH = np.deg2rad((24.0, -62.0))  # of the eye
 _GHOSTS = 5  # number of postures that are drawn over each other
-_FRAMES, _RATE = 150, 15  # largest number of frames of an animation, and frames per second
+_FRAMES = 150  # largest number of frames of an animation, and frames per second
+_RATE = 15
 _SHAPES = 3  # number of modes that are drawn
 _DEFLECTED = 0.25  # largest displacement of the tip in the picture of a mode, over the arm's length
 
@@ -53,7 +54,8 @@ class Ellipsoid(NamedTuple):
     longest: float  # largest true displacement per force [m/N]
 
     def __str__(self) -> str:
-        large, small = max(self.scale, 1.0), max(1.0 / self.scale, 1.0)
+        large = max(self.scale, 1.0)
+        small = max(1.0 / self.scale, 1.0)
         return f"where 1 N moves the tip, scale {large:g}:{small:g}"
 
 
@@ -89,7 +91,7 @@ def plot_arm(
     title = pose.arm.name
     if stiffness is not None:
         style.expect("stiffness", stiffness, "Stiffness")
-        if not stiffness.posture._equals(pose):
+        if not stiffness.posture.equals(pose):
             said = "belongs to another posture or arm; compute it for this one."
             raise InvalidInput("stiffness", said)
         if not stiffness.is_stable:
@@ -183,7 +185,8 @@ def ellipsoid(compliance: Array, tip: Array, length: float) -> Ellipsoid | None:
 
 def color_scale(tensions: Array) -> ScalarMappable:
     """Build the colour scale from the smallest to the largest of ``tensions`` [N]."""
-    low, high = tensions.min(), tensions.max()
+    low = tensions.min()
+    high = tensions.max()
     return ScalarMappable(Normalize(low, max(high, low + 1e-9)), style.COLOR_MAP)
 
 

@@ -36,7 +36,8 @@ def plot_weight_test(test: WeightTest) -> Figure:
         left.plot([0.0, linear[i]], [0.0, loads[-1]], "--", color=color, linewidth=0.9)
     left.set(xlabel="displacement of the tip [mm]", ylabel="load [N]")
     left.legend(title="direction; dashed: linear")
-    arm, tensions = test.unloaded.pose.arm, np.vstack([test.unloaded.tension, test.tensions])
+    arm = test.unloaded.pose.arm
+    tensions = np.vstack([test.unloaded.tension, test.tensions])
     style.cable_lines(right, loads, tensions, arm.cables.names)
     right.set(xlabel="load [N]", ylabel="tension at each motor [N]")
     right.set_ylim(bottom=0.0)
@@ -104,7 +105,8 @@ def plot_load_history(history: LoadHistory) -> Figure:
         left.set(xlabel="number of the load", ylabel="displacement of the tip [mm]")
         left.legend()
     cable = int(np.argmax([np.ptp(T, axis=1).max() for T in history.tensions]))
-    tensions, F = history.tensions[cable], history.reference_tension[cable]
+    tensions = history.tensions[cable]
+    F = history.reference_tension[cable]
     values = np.vstack([np.full(tensions.shape[1], F), tensions])
     right.plot(values[:, 0], color=style.BLUE, linewidth=0.9, zorder=3, label="at the motor")
     for line in right.plot(values[:, 1:-1], color="0.6", linewidth=0.9)[:1]:
@@ -127,7 +129,9 @@ def plot_tracking_run(run: TrackingRun) -> Figure:
     """
     figure, axes = style.panels(style.TWO_COLUMNS, 6.4, rows=4, sharex=True)
     error, stiffness, band, tension = axes[:, 0]
-    t, target, found = run.time, N_PER_MM * run.target, N_PER_MM * run.stiffness
+    t = run.time
+    target = N_PER_MM * run.target
+    found = N_PER_MM * run.stiffness
     error.plot(t, MM * run.tip_error)
     error.set(ylabel="tip error [mm]")
     for k, u in enumerate(run.directions):
@@ -164,7 +168,8 @@ def _margins(
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.6)
     axes.plot(x, margins, "o-" if x.size == 1 else "-")
     axes.axhline(0.0, color="0.2", linewidth=0.8)
-    low, high = min(0.0, *margins[seen]), max(0.0, *margins[seen])
+    low = min(0.0, *margins[seen])
+    high = max(0.0, *margins[seen])
     axes.set_ylim(low - 2.0 * _ROOM * (high - low), high + _ROOM * (high - low))
     axes.set_ylabel(f"smallest joint stiffness [{critical.posture.arm.stiffness_unit()}]")
     return figure, axes

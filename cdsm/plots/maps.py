@@ -48,7 +48,8 @@ _TALLEST = 2.3  # largest height of a map [inch]
 _CHARACTERS = 15.0  # of a label in an inch
 _TICK = 0.6  # least space for the label of a tick [inch]
 _LABELS = 0.75  # space for the labels beside and below a map [inch]
-_BAR, _HEADING = 1.0, 0.6  # width of the colour bar with its label, height of the title [inch]
+_BAR = 1.0  # width of the colour bar with its label, height of the title [inch]
+_HEADING = 0.6
 _HUGE = 1e300
 _SLICE = 0.04  # half thickness of the slices of a cloud of tips, divided by its extent
 
@@ -172,9 +173,11 @@ def _panels(shapes: list[float]) -> tuple[Figure, Any, float]:
 
 def _maps(dataset: xarray.Dataset, quantity: str, section: Any) -> Iterator[Map]:
     """Yield a map of each view, for each combination of the coordinates besides those of poses."""
-    value, status = dataset[quantity], dataset["status"]
+    value = dataset[quantity]
+    status = dataset["status"]
     tips = MM * dataset["tip_position"].transpose(..., "axis")
-    poses, dims = [str(dim) for dim in tips.dims[:-1]], [str(dim) for dim in value.dims]
+    poses = [str(dim) for dim in tips.dims[:-1]]
+    dims = [str(dim) for dim in value.dims]
     if quantity == "status" or not {*poses} <= {*dims} <= {*status.dims, "direction"}:
         raise InvalidInput(
             "quantity",
@@ -194,12 +197,10 @@ def _maps(dataset: xarray.Dataset, quantity: str, section: Any) -> Iterator[Map]
     status = status.isel({dim: 0 for dim in status.dims if dim not in dims}, drop=True)
     points = tips.values.reshape(-1, 3)
     known = np.isfinite(points).all(axis=1)
-    points, (x, code) = (
-        points[known],
-        (
-            each.transpose(*cases, *poses).values.reshape(len(names), -1)[:, known]
-            for each in (value, status.broadcast_like(value))
-        ),
+    points = points[known]
+    (x, code) = (
+        each.transpose(*cases, *poses).values.reshape(len(names), -1)[:, known]
+        for each in (value, status.broadcast_like(value))
     )
     (buckled,) = (code for code, word in status_names(dataset).items() if word == "unstable")
     unstable = code == buckled
@@ -217,7 +218,8 @@ def _maps(dataset: xarray.Dataset, quantity: str, section: Any) -> Iterator[Map]
 
 def _name(coordinate: xarray.DataArray) -> str:
     """Write a coordinate of a case: ``minimum 20 N``."""
-    value, unit = coordinate.item(), coordinate.attrs.get("units", "1")
+    value = coordinate.item()
+    unit = coordinate.attrs.get("units", "1")
     said = value if isinstance(value, str) else f"{value:g}"
     return f"{coordinate.name} {said}{'' if unit == '1' else f' {unit}'}"
 
@@ -230,7 +232,8 @@ def _views(points: Array, section: Any, path: bool) -> Iterator[View]:
         inside = abs(points[:, axis] - middle) <= half
         return title.replace(" ", "\xa0"), axis, inside, section is None  # no line break
 
-    every, extent = np.full(len(points), True), np.ptp([*points, np.zeros(3)], axis=0)
+    every = np.full(len(points), True)
+    extent = np.ptp([*points, np.zeros(3)], axis=0)
     flat = np.ptp(points, axis=0) <= _FLAT * extent.max()
     if section is not None:
         if not isinstance(section, (tuple, list)) or len(section) != 3:
@@ -254,21 +257,25 @@ def _colors(values: Array) -> tuple[ScalarMappable, str]:
     """Return a colour scale for ``values`` without outliers, and the ends beyond which they are."""
     finite = values[np.isfinite(values)] if np.isfinite(values).any() else np.array([0.0, 1.0])
     low, high = np.percentile(finite, _ROBUST)
-    scale, name = Normalize, style.COLOR_MAP
+    scale = Normalize
+    name = style.COLOR_MAP
     if finite.min() < 0.0 < finite.max():  # a margin: colours show its sign, zero is in the middle
-        high, name = max(-low, high), "PuOr"
+        high = max(-low, high)
+        name = "PuOr"
         low = -high
     elif low > 0.0 and high > _WIDE * low:
         scale = LogNorm
     if high - low <= _FLAT * abs(high):  # differences are rounding
-        low, high = low - 0.05 * abs(low), high + 0.05 * abs(high)
+        low = low - 0.05 * abs(low)
+        high = high + 0.05 * abs(high)
     beyond = bool((finite < low).any()), bool((values > high).any())
     extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond]
     return ScalarMappable(scale(low, high), colormaps[name]), extend
 
 
 def _draw(axes: Any, shown: Map, colors: ScalarMappable, statistic: Statistic | None) -> None:
-    points, values = shown.points, np.minimum(shown.values, _HUGE)  # inf would not be drawn
+    points = shown.points  # inf would not be drawn
+    values = np.minimum(shown.values, _HUGE)
     known = ~np.isnan(values)
     look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap}
     for chosen, mark in ((~shown.unstable & ~known, _NONE), (shown.unstable & ~known, _UNSTABLE)):

@@ -38,7 +38,9 @@ _ENDLESS = 1000.0  # tension [N] up to which a law without a highest tension is 
 def plot_tensile_fit(fit: TensileFit) -> Figure:
     """Plot force [N] against strain [%] with the fit; EA [kN] with its 95 % band and stages."""
     figure, ((left, right),) = style.panels(style.TWO_COLUMNS, 3.0, 2)
-    tension, band, length = fit.tension, fit.band, fit.test.gauge_length
+    tension = fit.tension
+    band = fit.band
+    length = fit.test.gauge_length
     fitted = 100.0 * (fit.start / length + fit.elasticity.strain(tension))
     left.plot(
         100.0 * fit.test.displacement / length, fit.test.force, ".", color="0.6", label="test"
@@ -86,8 +88,10 @@ def plot_identification(fit: Identification) -> Figure:
     panels = iter(left)
     for own, unit, size in ((stiff, "N/mm", N_PER_MM), (tips, "mm", MM)):
         if own:
-            panel, sigma = next(panels), [size * rows[k].std for k in own]
-            measured, predicted = size * fit.measured[own], size * fit.predicted[own]
+            panel = next(panels)
+            sigma = [size * rows[k].std for k in own]
+            measured = size * fit.measured[own]
+            predicted = size * fit.predicted[own]
             ends = [np.append(measured, predicted).min(), np.append(measured, predicted).max()]
             panel.plot(ends, ends, color="0.6", linewidth=0.9)
             panel.errorbar(measured, predicted, xerr=sigma, fmt="o", color=style.BLUE)
@@ -164,9 +168,11 @@ def plot_uncertainty(budget: Uncertainty) -> Figure:
 @style.styled
 def plot_monte_carlo(run: MonteCarlo) -> Figure:
     """Plot the histogram of the values, and the normal distribution of ``run.budget``."""
-    (unit, size), first = run.budget.measurand.unit, run.budget
+    (unit, size) = run.budget.measurand.unit
+    first = run.budget
     figure, ((axes,),) = style.panels(style.ONE_COLUMN, 2.8)
-    values, u = run.values / size, first.standard_uncertainty / size
+    values = run.values / size
+    u = first.standard_uncertainty / size
     low, high = np.quantile(values, [0.0005, 0.9995])
     shown = values[(values >= low) & (values <= high)]
     axes.hist(shown, 80, density=True, alpha=0.45, label="Monte Carlo")

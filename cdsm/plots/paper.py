@@ -77,7 +77,9 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
     for (name, reading), dash in zip(_READINGS.items(), ("-", "--"), strict=True):
         lines: list[Line] = []
         for curve, look in zip(result.curves, looks, strict=True):
-            x, whole, part = curve.swept / 1e9, getattr(curve, name), getattr(curve, f"{name}_part")
+            x = curve.swept / 1e9
+            whole = getattr(curve, name)
+            part = getattr(curve, f"{name}_part")
             lines.append((x, N_PER_MM * whole, {**look, "label": curve.label}))
             differences.append((x, 100.0 * (part / whole - 1.0), {**look, "ls": dash}))
         dots = {**_DOT, "ms": 2.0, "label": "passive part alone"}
@@ -101,7 +103,9 @@ def _plot_moduli(result: paper.StiffnessFigure) -> Figure:
 
 def _plot_directions(result: paper.StiffnessFigure) -> Figure:
     """Plot Fig. 6: K_R and the stiffness for a hung weight, against tension."""
-    (curve,), (original,), stated = result.curves, result.original, result.claims[0].paper or ()
+    (curve,) = result.curves
+    (original,) = result.original
+    stated = result.claims[0].paper or ()
     looks = {"color": style.BLUE}, {"color": style.VERMILLION, "ls": "--"}
     rows: list[Row] = []
     for name, reading in _READINGS.items():
@@ -125,8 +129,10 @@ def _plot_directions(result: paper.StiffnessFigure) -> Figure:
 
 def _plot_changes(result: paper.StiffnessFigure) -> Figure:
     """Plot Figs. 4 and 7: active part of K_R, and changes [%] of both stiffnesses, over tension."""
-    first, shades = result.curves[0], (style.BLUE, style.ORANGE)
-    x, active = first.tension[:, 1], first.pseudoinverse_part
+    first = result.curves[0]
+    shades = (style.BLUE, style.ORANGE)
+    x = first.tension[:, 1]
+    active = first.pseudoinverse_part
     rows: list[Row] = [("active part of $K_R$ [N/mm]", [(x, N_PER_MM * active, {})])]
     for name, reading in _READINGS.items():
         lines: list[Line] = []
@@ -173,7 +179,8 @@ def _plot_postures(result: paper.StiffnessFigure) -> Figure:
     figure = Figure(figsize=(style.TWO_COLUMNS, 6.4))
     grid = figure.add_gridspec(3, 3, height_ratios=(1.1, 1.0, 1.0))
     for column, pose in enumerate(result.postures):
-        curve, original = result.curves[column], result.original[column]
+        curve = result.curves[column]
+        original = result.original[column]
         picture: Any = figure.add_subplot(grid[0, column], projection="3d")
         draw_arm(picture, pose)
         picture.set_box_aspect(frame_arms(picture), zoom=1.2)
@@ -210,11 +217,13 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
     right.plot(result.tension, KN * result.tangent, label="tangent, repaired")
     right.plot(result.tension, KN * result.secant, "--", color=style.GREEN, label="secant (Eq. 18)")
     lower = result.tension <= result.join  # above, the printed and the repaired law share digits
-    tension, printed = result.tension[lower], KN * result.printed[lower]
+    tension = result.tension[lower]
+    printed = KN * result.printed[lower]
     red: Any = {"color": style.VERMILLION}
     right.plot(tension, printed, ":", label="as printed, misprint", **red)
     arrow = {"arrowstyle": "<-", "linewidth": 0.8, **red}
-    words, end = f"as printed: {printed[-1]:.0f} kN at {result.join:g} N", (60, -3.2)
+    words = f"as printed: {printed[-1]:.0f} kN at {result.join:g} N"
+    end = (60, -3.2)
     at = tension[np.argmax(printed < -4.0)], -4.0
     right.annotate(words, at, xytext=end, fontsize="small", arrowprops=arrow, **red)
     shade_stages(right, _STAGES)
@@ -228,12 +237,18 @@ def _plot_strand(result: paper.StrandFigure) -> Figure:
 def _plot_experiment(result: paper.ExperimentFigure) -> Figure:
     """Plot Fig. 10, 12 or 13, a panel per trace: computed values as a line, the paper's as dots."""
     figure, grid = style.panels(style.TWO_COLUMNS, 2.8, len(result.traces), sharex=True)
-    across, scale, colors = 1.0, N_PER_MM, style.COLORS  # x, y and z, or y alone
-    x, y = "tension as reported [N]", "stiffness [N/mm]"
+    across = 1.0  # x, y and z, or y alone
+    scale = N_PER_MM
+    colors = style.COLORS
+    x = "tension as reported [N]"
+    y = "stiffness [N/mm]"
     if result.swept == "cable_stiffness":
-        across, x = N_PER_MM, "cable stiffness [N/mm]"
+        across = N_PER_MM
+        x = "cable stiffness [N/mm]"
     if result.relative:
-        scale, y, colors = 1.0, "stiffness in y\nover the first [-]", (style.PURPLE,) * 7
+        scale = 1.0
+        y = "stiffness in y\nover the first [-]"
+        colors = (style.PURPLE,) * 7
     for axes, trace, color in zip(grid[0], result.traces, colors, strict=False):
         axes.plot(across * trace.swept, scale * trace.computed, color=color, label="computed")
         axes.plot(across * trace.paper_at, scale * trace.paper, "ko", label="paper")

@@ -61,7 +61,8 @@ def plot_stiffness_ranges(ranges: Mapping[str, Sequence[StiffnessRange]]) -> Fig
     def around(found: Sequence[StiffnessRange], values: Sequence[float]) -> tuple[Array, Array]:
         v = np.array([one.direction for one in found])
         half = np.mod(np.arctan2(v[:, second], v[:, first]), np.pi)
-        turn, radius = np.sort(half), N_PER_MM * np.array(values)[np.argsort(half)]
+        turn = np.sort(half)
+        radius = N_PER_MM * np.array(values)[np.argsort(half)]
         return np.append(turn, [*(turn + np.pi), turn[0]]), np.append(radius, [*radius, radius[0]])
 
     shades = colormaps[style.COLOR_MAP](np.linspace(0.0, 0.85, len(ranges)))
@@ -104,7 +105,8 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     Infeasible samples are shaded. :func:`plot_path` draws the arm on its path, and writes a film.
     """
     figure, ((above,), (below,)) = style.panels(style.TWO_COLUMNS, 4.6, rows=2, sharex=True)
-    x, rows = np.arange(float(len(plan.target))), list(plan.planned)
+    x = np.arange(float(len(plan.target)))
+    rows = list(plan.planned)
     wanted = N_PER_MM * plan.target.reshape(len(x), -1)
     # NaN leaves a gap in the line at samples that are not planned
     achieved = np.full(wanted.shape, np.nan)
@@ -112,7 +114,8 @@ def plot_path_plan(plan: PathPlan) -> Figure:
     achieved[rows] = N_PER_MM * plan.achieved.reshape(len(rows), wanted.shape[1])
     tensions[rows] = plan.tensions
     for k, u in enumerate(plan.direction.reshape(-1, 3)):
-        label, color = f"reached along {style.direction_name(u)}", style.COLORS[k % 7]
+        label = f"reached along {style.direction_name(u)}"
+        color = style.COLORS[k % 7]
         wide = {"color": "0.7", "linewidth": 4.0, "label": None if k else "wanted"}
         above.step(x, wanted[:, k], where="mid", **wide)
         above.plot(x, achieved[:, k], ".-", color=color, linewidth=1.0, label=label)
@@ -133,7 +136,8 @@ def plot_path_plan(plan: PathPlan) -> Figure:
 @style.styled
 def plot_shares(shares: Shares) -> Figure:
     """Plot the contribution [N/mm] of each cable, gravity, load and springs as bars."""
-    arm, rest = shares.stiffness.posture.arm, [*shares.others.values()]
+    arm = shares.stiffness.posture.arm
+    rest = [*shares.others.values()]
     none = np.zeros(len(rest))
     passive, active = (N_PER_MM * np.append(each, none) for each in (shares.passive, shares.active))
     others = N_PER_MM * np.append(0.0 * shares.active, rest)
@@ -154,11 +158,12 @@ def plot_shares(shares: Shares) -> Figure:
 @style.styled
 def plot_stiffness_plan(plan: StiffnessPlan, attainable: StiffnessRange | None = None) -> Figure:
     """Plot the planned tension [N] of each cable, beside those of the softest and stiffest arm."""
-    F, misses = plan.tension, "" if plan.reached else f", missed by {100.0 * plan.misfit:.2g} %"
+    F = plan.tension
+    misses = "" if plan.reached else f", missed by {100.0 * plan.misfit:.2g} %"
     if attainable is None:
         return _plot_tensions([(F, f"planned{misses}", "o")], f"{F.posture.arm.name}: plan")
     style.expect("attainable", attainable, "StiffnessRange")
-    same = F.posture._equals(attainable.posture) and plan.direction.shape == (3,)
+    same = F.posture.equals(attainable.posture) and plan.direction.shape == (3,)
     if not same or abs(plan.direction - attainable.direction).max() > _SAME:
         raise InvalidInput("attainable", "is not of the posture and the direction of the plan.")
     said = f"planned: {N_PER_MM * float(plan.achieved):.4g} N/mm"

@@ -137,7 +137,8 @@ def line_looks(names: Sequence[str]) -> list[dict[str, Any]]:
     """Return colour, style and label of a line for each name; above 24 names, a colour only."""
     if len(names) > _NAMED:
         return [{"color": each} for each in colormaps[COLOR_MAP](np.linspace(0, 1, len(names)))]
-    color, style = COLORS * 4, [each for each in STYLES for _ in COLORS]
+    color = COLORS * 4
+    style = [each for each in STYLES for _ in COLORS]
     return [{"color": color[i], "ls": style[i], "label": name} for i, name in enumerate(names)]
 
 

@@ -121,14 +121,17 @@ def _faults(report: Report) -> Iterator[str]:
         yield " ".join(map(str.strip, K.warnings))
     elif report.condition > 1e12:  # singular but for rounding
         yield f"the arm is about to buckle: K_θ has the condition number {report.condition:.2g}."
-    violation, kkt = report.bound_violation or 0.0, report.kkt_residual or 0.0
+    violation = report.bound_violation or 0.0
+    kkt = report.kkt_residual or 0.0
     if max(violation, kkt) > checks.TOLERANCE:
         yield f"the tensions are not optimal: bounds violated by {violation:.1e}, KKT {kkt:.1e}."
 
 
 def _notes(report: Report) -> Iterator[str]:
     """Yield what a user of the stiffness should know; none of it means that it is wrong."""
-    K, pose, arm = report.stiffness, report.stiffness.posture, report.stiffness.posture.arm
+    K = report.stiffness
+    pose = report.stiffness.posture
+    arm = report.stiffness.posture.arm
     yield from (*pose.remarks, *missing_leads(K))
     if report.bound_violation is None:
         came = "were given" if K.free_length is None else "follow from an equilibrium"
@@ -161,10 +164,14 @@ def _notes(report: Report) -> Iterator[str]:
 
 def _of_limits(K: Stiffness) -> Iterator[str]:
     """Yield which cables are slack, hold a force, or are near an end of their law; joints alike."""
-    arm, q, F = K.posture.arm, K.posture.q, K.tension
+    arm = K.posture.arm
+    q = K.posture.q
+    F = K.tension
     laws = [cable.elasticity for cable in arm.cables]
     low, high = np.array([(law.low, law.high) for law in laws]).T
-    locked, slack, cables = arm.cables.position_controlled, F == 0.0, arm.cables.names
+    locked = arm.cables.position_controlled
+    slack = F == 0.0
+    cables = arm.cables.names
     near = np.minimum(q - arm.lower, arm.upper - q) < 0.01 * (arm.upper - arm.lower)
     for what, names, chosen in (
         ("slack, 0 N; they stiffen one direction, raise minimum", cables, locked & slack),

@@ -50,7 +50,8 @@ class Equilibrium(Result):
         branch: Share of load and pull up to which the arm followed without a jump; 1: all of it.
     """
 
-    _headline, _rows = "moved", "cable"
+    _headline = "moved"
+    _rows = "cable"
     _posture_from = "pose"
 
     reference: Posture
@@ -112,7 +113,8 @@ class Equilibrium(Result):
         values, vectors = self._motions
         if not values.size:
             return False
-        v, of = vectors[:, 0], np.ix_(self._free, self._free)
+        v = vectors[:, 0]
+        of = np.ix_(self._free, self._free)
         return bool(
             values[0] <= _NEUTRAL * sum(abs(v @ each[of] @ v) for each in self.stiffness._terms)
         )
@@ -133,7 +135,8 @@ class Equilibrium(Result):
     @quantity("1")
     def slack(self) -> tuple[str, ...]:
         """Names of the position-controlled cables that are slack."""
-        held, none = self.pose.arm.cables.position_controlled, self.tension == 0.0
+        held = self.pose.arm.cables.position_controlled
+        none = self.tension == 0.0
         slack = held & none & (self.stiffness.cable_stiffness == 0.0)
         return tuple(self.pose.arm.cables.names[c] for c in np.flatnonzero(slack))
 
@@ -146,13 +149,13 @@ class Equilibrium(Result):
         """Return it as its own reference, its motors as they are, if ``pose`` is its own."""
         if wrench is not None:
             raise InvalidInput("wrench", "comes with the Equilibrium; leave it out here.")
-        if not instance("pose", pose, Posture)._equals(self.pose):
+        if not instance("pose", pose, Posture).equals(self.pose):
             raise InvalidInput("tension", "is the Equilibrium of another posture; give its pose.")
         model = self._model.resumed(self.pose, self.tension)
         own: Any = {"reference": self.pose, "reference_tension": self.tension, "branch": 1.0}
         return replace(self, **own, _model=model)
 
-    def _held(self, forced: NDArray[np.bool_]) -> Posture:
+    def held_posture(self, forced: NDArray[np.bool_]) -> Posture:
         """Return the posture, of an arm of which the cables ``forced`` (C,) have no stiffness."""
         if not forced.any():
             return self.pose
@@ -161,7 +164,7 @@ class Equilibrium(Result):
         return self.pose.arm.with_cables(cables).at(self.pose.q, check_limits=False)
 
     @property
-    def _forced(self) -> NDArray[np.bool_]:
+    def force_controlled(self) -> NDArray[np.bool_]:
         """Which cables have a motor that holds the tension (C,)."""
         held: NDArray[np.bool_] = self.pose.arm.cables.position_controlled
         return held & (self.motors == "tension")
@@ -169,10 +172,11 @@ class Equilibrium(Result):
     @property
     def _paid_out(self) -> Array:
         """How much longer than straight the slack wires are (C,) [m], if motors hold lengths."""
-        pose, F = self.pose, self.tension
+        pose = self.pose
+        F = self.tension
         if self.motors == "tension":
             return np.zeros(F.size)
-        more = self.stiffness.free_lengths - pose.arm._laws.original_lengths(pose.cable_lengths, F)
+        more = self.stiffness.free_lengths - pose.arm.laws.original_lengths(pose.cable_lengths, F)
         return np.where(F == 0.0, np.maximum(more, 0.0), 0.0)
 
     @property
@@ -208,7 +212,7 @@ class Equilibrium(Result):
         if self.at_limit:
             said = "does not know of stops, and"
             raise InvalidInput("report", f"{said} {listed(self.at_limit)} rests on its own.")
-        pose = self._held(self.stiffness.cable_stiffness == 0.0)
+        pose = self.held_posture(self.stiffness.cable_stiffness == 0.0)
         return stiffness(pose, self.tension, self.wrench).report()
 
     def along(self, direction: Direction) -> float:
@@ -229,7 +233,8 @@ class Equilibrium(Result):
         return cdsm.plots.plot_path([self.reference, self.pose])
 
     def __str__(self) -> str:
-        arm, rows = self.pose.arm, [("cable", "tension [N]", "reference", "")]
+        arm = self.pose.arm
+        rows = [("cable", "tension [N]", "reference", "")]
         for cable, F, F0 in zip(arm.cables, self.tension, self.reference_tension, strict=True):
             below = cable.control == "position" and cable.elasticity.rest > F
             state = "on the slack branch of its wire" if below else ""

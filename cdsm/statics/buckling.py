@@ -54,7 +54,8 @@ class _Critical(Result, Plotted):
         return self.stiffness.tension
 
     def _softest(self) -> str:
-        order, names = np.argsort(-abs(self.mode)), self.posture.arm.joint_names
+        order = np.argsort(-abs(self.mode))
+        names = self.posture.arm.joint_names
         shares = ", ".join(f"{names[i]} {self.mode[i]:+.2f}" for i in order[:4])
         return f"softest joint motion: {shares}" + ", …" * (self.mode.size > 4)
 
@@ -77,7 +78,8 @@ class CriticalTension(_Critical):
         margins: Smallest eigenvalue of K_θ at each of these bounds (n,) [N m/rad].
     """
 
-    _headline, _rows = "minimum", "bounds"
+    _headline = "minimum"
+    _rows = "bounds"
     _figure = "plot_critical_tension"
 
     minimum: float = field(metadata=unit("N"))
@@ -117,7 +119,8 @@ class CriticalLoad(_Critical):
         margins: Smallest eigenvalue of K_θ at each of these factors (n,) [N m/rad].
     """
 
-    _headline, _rows = "factor", "factors"
+    _headline = "factor"
+    _rows = "factors"
     _figure = "plot_critical_load"
 
     load: Array = field(metadata=unit("N and N m", "component"))
@@ -164,7 +167,8 @@ def critical_tension(
     """
     from scipy.optimize import brentq  # slow to import
 
-    arm, W = instance("pose", pose, Posture).arm, wrench_vector("wrench", wrench)
+    arm = instance("pose", pose, Posture).arm
+    W = wrench_vector("wrench", wrench)
     if arm.is_serpentine and (doubt := buckling_doubt(arm.geometry.joints)):
         warn(doubt)
 
@@ -175,7 +179,8 @@ def critical_tension(
     laws = [each.elasticity for each in arm.cables if each.control == "position"]
     low = max((law.low for law in laws), default=0.0) * _ABOVE
     ends = [*(law.high for law in laws), *(each.maximum for each in arm.cables)]
-    high, first = max(min([*ends, checked("up_to", up_to, "tension")]), low), max(low, _LOWEST)
+    high = max(min([*ends, checked("up_to", up_to, "tension")]), low)
+    first = max(low, _LOWEST)
     at(low)  # raises the reason if no tensions balance the arm
     bounds = np.unique([low, *np.geomspace(first, max(high, first), SAMPLES - 1)])
     margins = _margins(pose, bounds[:, None], math.inf, W)
@@ -183,7 +188,8 @@ def critical_tension(
     if n < bounds.size:
         balances = ("none", "buckling")
         high = _bisect(lambda b: _failure(at, b) in balances, *bounds[n - 1 : n + 1])[0]
-        bounds, margins = np.append(bounds[:n], high), np.append(margins[:n], at(high).margin)
+        bounds = np.append(bounds[:n], high)
+        margins = np.append(margins[:n], at(high).margin)
     changes = np.flatnonzero(np.diff(np.concatenate([[False], margins > 0.0, [False]])))
     edges = [
         brentq(lambda b: at(b).margin, *bounds[i - 1 : i + 1], xtol=1e-300, rtol=_PRECISION)
@@ -229,8 +235,10 @@ def critical_load(
         ElasticityRangeError: A tension without the load is outside the domain of its elasticity.
     """
     count = len(instance("pose", pose, Posture).arm.cables)
-    multiplied, always = wrench_vector("load", load), wrench_vector("wrench", wrench)
-    low, high = bound("minimum", minimum, count), bound("maximum", maximum, count)
+    multiplied = wrench_vector("load", load)
+    always = wrench_vector("wrench", wrench)
+    low = bound("minimum", minimum, count)
+    high = bound("maximum", maximum, count)
     if not multiplied.any():
         raise InvalidInput("load", "is zero, and so is any multiple of it; give a load.")
 
@@ -239,12 +247,16 @@ def critical_load(
         return stiffness(pose, distribute_tension(pose, low, high, always + factor * multiplied))
 
     at(0.0)  # raises the reason if no tensions balance the arm
-    end, factor, limit = 1e-3, 0.0, _failure(at, 0.0)
-    factors, margins = np.zeros(1), np.array([at(0.0).margin])
+    end = 1e-3
+    factor = 0.0
+    limit = _failure(at, 0.0)
+    factors = np.zeros(1)
+    margins = np.array([at(0.0).margin])
     if limit == "none":
         while end < _LARGEST and _failure(at, end) == "none":
             end *= 2.0
-        factor, last = math.inf, end if end < _LARGEST else _SHOWN
+        factor = math.inf
+        last = end if end < _LARGEST else _SHOWN
         factors = np.linspace(0.0, last, SAMPLES)
         margins = _margins(pose, low, high, always + factors[:, None] * multiplied)
     if limit == "none" and end < _LARGEST:  # the doubling may have stepped over the first failure
@@ -252,7 +264,8 @@ def critical_load(
         factor, beyond = _bisect(lambda x: _failure(at, x) == "none", *factors[n - 1 : n + 1])
         factor *= factor > _ROUNDING
         limit = _failure(at, beyond)
-        factors, margins = np.append(factors[:n], factor), np.append(margins[:n], at(factor).margin)
+        factors = np.append(factors[:n], factor)
+        margins = np.append(margins[:n], at(factor).margin)
     return CriticalLoad(
         posture=pose,
         wrench=always,

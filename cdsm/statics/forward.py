@@ -71,15 +71,19 @@ def climb(
     It is at the posture ``before``, where the stops push with ``stop_torque`` (nv,) [N m]. Returns
     the last equilibrium before the arm jumps, None if that is this one; and its share.
     """
-    here, step = None, goal - share
+    here = None
+    step = goal - share
     while share < goal:
         part = min(goal, share + step)
         arm = model(part)
         f = Balance(arm.at, arm.reference, arm.at_pose(before))
         found = continued(f, (before.q / f.unit - stop_torque * f.unit / f.k,), before.q)
         if found is not None and stable_between(arm.at, before.q, found.state.pose.q):
-            here, share, step = found, part, 2.0 * step
-            before, stop_torque = found.state.pose, found.stop_torque
+            here = found
+            share = part
+            step = 2.0 * step
+            before = found.state.pose
+            stop_torque = found.stop_torque
         elif step > _FINEST * max(share, 1e-9):
             step /= 2.0
         else:
@@ -201,7 +205,7 @@ def _model(
         said = "l_0 of this arm changes with the tension; use original_length='unstrained'."
         raise InvalidInput(name, said)
     least = np.array([cable.elasticity.rest for cable in arm.cables])
-    straight = arm._laws.original_lengths(home.cable_lengths, least)
+    straight = arm.laws.original_lengths(home.cable_lengths, least)
     if name == "pull":
         taken = vector("pull", value, count, "the wire taken in [m] per cable", "length")
         slack, gain = np.array([(cable.slack, cable.gain) for cable in arm.cables]).T
@@ -228,7 +232,8 @@ def _require_held(arm: LockedArm, home: Posture) -> None:
         return
     worst = int(abs(vectors[:, 0]).argmax())
     name = home.arm.joint_names[worst]
-    k, unit = home.arm.springs.matrix[worst, worst], home.arm.stiffness_unit(worst)
+    k = home.arm.springs.matrix[worst, worst]
+    unit = home.arm.stiffness_unit(worst)
     weak = f"the spring of {name}, {k:.4g} {unit}, is too weak for its weight"
     said = f"{weak if k else f'nothing holds {name}'} where the cables do not pull"
     remedy = "Give all such joints springs at once, which replace those they have: springs.JOINT = "

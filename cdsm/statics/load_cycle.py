@@ -55,7 +55,8 @@ class LoadHistory(Result, Plotted):
         snaps: Whether the arm snaps through in the step to each load (n,).
     """
 
-    _headline, _rows = "dissipated", "load"
+    _headline = "dissipated"
+    _rows = "load"
     _posture_from = "reference"
     _figure = "plot_load_history"
 
@@ -96,7 +97,8 @@ class LoadHistory(Result, Plotted):
     @property
     def holes(self) -> tuple[str, ...]:
         """Name of each hole (P,): its cable, and the number of the site from the actuator."""
-        chains, names = self.reference.segments.chains, self.reference.arm.cables.names
+        chains = self.reference.segments.chains
+        names = self.reference.arm.cables.names
         pairs = zip(chains.cable[chains.hole], chains.site, strict=True)
         return tuple(f"{names[c]} site {site + 1}" for c, site in pairs)
 
@@ -114,7 +116,8 @@ class LoadHistory(Result, Plotted):
         """
         k = self._index(load)
         sliding = self.sliding[k] != 0
-        T, W = self.segment_tensions[k].copy(), frozen(self.wrenches[k].copy())
+        T = self.segment_tensions[k].copy()
+        W = frozen(self.wrenches[k].copy())
         friction: Friction = "sliding" if sliding.any() else "stuck"
         return assemble_segments(self.pose(k), T, sliding, W, friction)
 
@@ -122,21 +125,24 @@ class LoadHistory(Result, Plotted):
         rows = [
             f"{'load':>5}{'force [N]':>35}{'tip moved by [mm]':>30}{'sliding':>9}{'lost [mJ]':>12}"
         ]
-        count, moves = len(self.load), without_rounding(self.displacement)
+        count = len(self.load)
+        moves = without_rounding(self.displacement)
         for k in range(count):
             if count > _SHOWN and _SHOWN // 2 <= k < count - _SHOWN // 2:
                 rows += [f"{'…':>5}"] * (k == _SHOWN // 2)
                 continue
             force = "".join(f"{f:>11.4g}" for f in self.wrenches[k, :3])
             moved = "".join(f"{1000.0 * x:>z10.4f}" for x in moves[k])
-            slide, lost = np.count_nonzero(self.sliding[k]), 1000.0 * self.dissipated[k]
+            slide = np.count_nonzero(self.sliding[k])
+            lost = 1000.0 * self.dissipated[k]
             rows.append(f"{k + 1:>5}  {force}{moved}{slide:>9}{lost:>12.4g}")
         lost = 1000.0 * self.dissipated.sum()
         rows.append(f"{self.sliding.shape[1]} holes; in all {lost:.4g} mJ lost in the holes")
         return "\n".join(rows)
 
     def _labels(self) -> dict[str, Sequence[object]]:
-        chains, names = self.reference.segments.chains, self.reference.arm.cables.names
+        chains = self.reference.segments.chains
+        names = self.reference.arm.cables.names
         pairs = zip(chains.cable, np.arange(chains.cable.size), strict=True)
         segments = [f"{names[c]} segment {s - chains.start[c] + 1}" for c, s in pairs]
         return {**super()._labels(), "hole": self.holes, "segment": segments}
@@ -195,10 +201,13 @@ def load_cycle(
     slack = np.zeros(len(instance("pose", pose, Posture).arm.cables))
     if isinstance(tension, Equilibrium):
         rest = tension._resumed(pose, None)
-        pose, F, W, slack = rest._held(rest._forced), rest.tension, rest.wrench, rest._paid_out
+        pose = rest.held_posture(rest.force_controlled)
+        F = rest.tension
+        W = rest.wrench
+        slack = rest._paid_out
     else:
         F, W = checked_tension(pose, tension, None)
-    pose.arm._laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
+    pose.arm.laws.stiffness(pose.cable_lengths, F)  # in the domains of the laws
     loads = number_array("wrenches", wrenches, "wrench")
     if loads.ndim != 2 or loads.shape[1] != 6 or not len(loads):
         raise InvalidInput(
@@ -207,18 +216,21 @@ def load_cycle(
         )
     substeps = whole_number("substeps", substeps, 1, 1000)
     arm = QuasiStaticArm(pose, F)
-    state, none = arm.initial(W, slack), np.zeros(pose.q.size)
+    state = arm.initial(W, slack)
+    none = np.zeros(pose.q.size)
     commands = np.tile(state.load.motors, (len(loads), 1))
     if motors is not None:
         wire = np.add.reduceat(state.arm_state.chain.rest_length, arm.start[:-1])
         commands = _commands(motors, pose, commands.shape, wire)
-    states, steps = [], []
+    states = []
+    steps = []
     for k, (wrench, command) in enumerate(track(tuple(zip(loads, commands, strict=True)), "loads")):
         goal = Load(wrench, none, command)
         state, step = arm.step_to(state, goal, substeps, f"the step to load {k + 1}")
         states.append(state)
         steps.append(step)
-    hole, rough = pose.segments.chains.hole, pose.segments.chains.friction > 0.0
+    hole = pose.segments.chains.hole
+    rough = pose.segments.chains.friction > 0.0
     arms = [state.arm_state for state in states]
     last = np.array([each.chain.slip[hole] for each in arms])
     return LoadHistory(
@@ -241,7 +253,8 @@ def load_cycle(
 
 def _commands(motors: ArrayLike, pose: Posture, shape: tuple[int, ...], wire: Array) -> Array:
     """Return ``motors`` checked, as an array (n, C); ``wire`` (C,) [m] are the rest lengths."""
-    commands, cables = number_array("motors", motors), pose.arm.cables
+    commands = number_array("motors", motors)
+    cables = pose.arm.cables
     if commands.shape != shape:
         raise InvalidInput(
             "motors",

@@ -41,14 +41,18 @@ class LockedArm:
         *,
         tension_held: bool = False,
     ) -> None:
-        self.reference, self.tension, self.wrench = reference, tension, wrench
+        self.reference = reference
+        self.tension = tension
+        self.wrench = wrench
         self.tension_held = tension_held
-        laws, L = reference.arm._laws, reference.cable_lengths
+        laws = reference.arm.laws
+        L = reference.cable_lengths
         self.rest_length: Array | None = None  # motors that hold tensions hold no length
         self._laws: list[_LockedLaw] = []
         if tension_held:
             return
-        own, length = laws.original_lengths(L, tension), L
+        own = laws.original_lengths(L, tension)
+        length = L
         if rest_length is not None:  # at ``tension``, wire and spring have their rest lengths
             own = length = np.where(reference.arm.cables.position_controlled, rest_length, L)
         self.rest_length = frozen(own)
@@ -71,7 +75,8 @@ class LockedArm:
     def resumed(self, pose: Posture, tension: Array) -> LockedArm:
         """Return the arm, its motors as they are, with an equilibrium as the new reference."""
         other = copy(self)
-        other.reference, other.tension = pose, tension
+        other.reference = pose
+        other.tension = tension
         return other
 
     def at(self, q: Array) -> ArmState:
@@ -81,8 +86,10 @@ class LockedArm:
     def at_pose(self, pose: Posture) -> ArmState:
         """Compute the state at a posture."""
         F, k = self._tensions(pose)
-        J, W, g = pose.length_jacobian, self.wrench, pose._own_torque
-        K = pose._active(F) + (J.T * k) @ J + pose._own_stiffness + pose._load(W)
+        J = pose.length_jacobian
+        W = self.wrench
+        g = pose.own_torque
+        K = pose._active(F) + (J.T * k) @ J + pose.own_stiffness + pose._load(W)
         scale = F @ abs(J) + abs(g) + abs(W) @ abs(pose.jacobian)
         return ArmState(pose, F, F @ J + g - W @ pose.jacobian, K, scale)
 
@@ -95,7 +102,8 @@ class LockedArm:
         return assemble(pose, frozen(F), self.wrench, frozen(k), free_length=lengths)
 
     def _tensions(self, pose: Posture) -> tuple[Array, Array]:
-        F, k = self.tension.copy(), np.zeros(self.tension.size)
+        F = self.tension.copy()
+        k = np.zeros(self.tension.size)
         for each in self._laws:
             F[each.of], k[each.of] = each.tension(pose.cable_lengths[each.of])
         return F, k
@@ -115,14 +123,15 @@ class _LockedLaw(NamedTuple):
     def elongation(self, F: Array) -> tuple[Array, Array]:
         """Compute the elongation from F_0 to F [m], and its slope [m/N]."""
         inside = np.minimum(np.maximum(F, self.law.low), self.law.high)
-        strain, EA = self.law._evaluate(inside)
+        strain, EA = self.law.evaluate(inside)
         slope = self.rest_length / EA + self.series
         wire = self.rest_length * (strain - self.strain)
         return wire + (inside - self.start) * self.series + (F - inside) * slope, slope
 
     def tension(self, lengths: Array) -> tuple[Array, Array]:
         """Compute F [N] and dF/dL [N/m] at lengths L [m]."""
-        wanted, ends = lengths - self.length, np.full((2, lengths.size), [[-_HUGE], [_HUGE]])
+        wanted = lengths - self.length
+        ends = np.full((2, lengths.size), [[-_HUGE], [_HUGE]])
 
         def error(F: Array) -> tuple[Array, Array]:
             reached, slope = self.elongation(F)
@@ -142,7 +151,7 @@ def require_domain(
     inside = np.clip(tension, law.low, law.high)
     near = abs(tension - inside) <= _ROUNDING * tension
     try:
-        law._inside(np.where(near, inside, tension))
+        law.require_inside(np.where(near, inside, tension))
     except ElasticityRangeError as error:
         said = ElasticityRangeError(f"{where}{error.problem}", error.tension, error.indices)
-        raise arm._laws.naming(said, of) from None
+        raise arm.laws.naming(said, of) from None

@@ -91,9 +91,9 @@ def modes(pose: Posture, stiffness: Stiffness) -> Modes:
             cross of its universal joint.
     """
     arm = instance("pose", pose, Posture).arm
-    if not instance("stiffness", stiffness, Stiffness).posture._equals(pose):
+    if not instance("stiffness", stiffness, Stiffness).posture.equals(pose):
         raise InvalidInput("stiffness", "belongs to another posture or arm; compute it for this.")
-    M = arm._body.mass_matrix(pose.q)
+    M = arm.body.mass_matrix(pose.q)
     if arm.is_serpentine:
         least = int(M.diagonal().argmin())  # crosses and massless links have placeholders
         crossed = any(len(joint.axes) == 2 for joint in arm.geometry.joints)

@@ -71,7 +71,8 @@ class QuasiStaticArm:
         arm = reference.arm
         arm._angles(reference.q, True)  # within the joint limits
         LockedArm(reference, tension, np.zeros(6))  # refuses a spring that leaves no wire
-        self.reference, self._tension = reference, tension
+        self.reference = reference
+        self._tension = tension
         self.start = reference.segments.chains.start
         self.forced = ~arm.cables.position_controlled
         unstrained = arm.original_length == "unstrained"
@@ -82,8 +83,10 @@ class QuasiStaticArm:
 
         ``slack`` (C,) [m] is how much longer than straight the wires are.
         """
-        pose, motors = self.reference, np.where(self.forced, self._tension, 0.0)
-        T, none = self._tension[pose.segments.chains.cable], np.zeros(pose.q.size)
+        pose = self.reference
+        motors = np.where(self.forced, self._tension, 0.0)
+        T = self._tension[pose.segments.chains.cable]
+        none = np.zeros(pose.q.size)
         rest_length = np.array(self._problem.rest_lengths(pose.segments.lengths, T))
         rest_length[self.start[:-1]] += slack
         state = self._state(pose, rest_length, Load(wrench, none, motors), T)
@@ -100,33 +103,46 @@ class QuasiStaticArm:
         none, and ElasticityRangeError if a tension of the new state is outside its law. The error
         texts call the step ``what``.
         """
-        state, motion = before, np.zeros_like(before.x)
-        done, part, dissipated, snapped = 0.0, 1.0 / substeps, 0.0, False
+        state = before
+        motion = np.zeros_like(before.x)
+        done = 0.0
+        part = 1.0 / substeps
+        dissipated = 0.0
+        snapped = False
         slip = last = np.zeros_like(before.arm_state.chain.slip)
         while done < 1.0:
             goal = done + part if done + 1.5 * part < 1.0 else 1.0
-            target, old = before.load.interpolate(load, goal), state.arm_state
+            target = before.load.interpolate(load, goal)
+            old = state.arm_state
             f = self._balance(state, target)
             found: Point | None = continued(f, (state.x + motion, state.x), old.pose.q)
             if found is None and goal - done > _SHORTEST:
-                part, motion = (goal - done) / 2.0, 0.0 * motion
+                part = (goal - done) / 2.0
+                motion = 0.0 * motion
                 continue
             if found is None:
-                found, snapped = settle(f, old.pose.q, done, what), True
+                found = settle(f, old.pose.q, done, what)
+                snapped = True
             new = found.state
             assert isinstance(new, ChainArmState)
-            start, end, now = self._jumps(old), self._jumps(new), new.chain.slip
+            start = self._jumps(old)
+            end = self._jumps(new)
+            now = new.chain.slip
             again = now * last > 0.0  # these holes slid the same way before
             dissipated += float(np.where(again, (start + end) / 2.0, end) @ now)
             motion = found.x - state.x
             state = QuasiStaticState(target, new, found.x, found.stop_torque)
-            slip, last, done, part = slip + now, now, goal, min(2.0 * part, 1.0 / substeps)
+            slip = slip + now
+            last = now
+            done = goal
+            part = min(2.0 * part, 1.0 / substeps)
         self._require_domains(state.arm_state.tension, what)
         return state, Step(slip, dissipated, snapped)
 
     def _balance(self, before: QuasiStaticState, load: Load) -> Balance:
         """Return the normal map of the states that follow ``before`` under a load."""
-        old, rest_length = before.arm_state, before.arm_state.chain.rest_length.copy()
+        old = before.arm_state
+        rest_length = before.arm_state.chain.rest_length.copy()
         rest_length[self.start[:-1]] -= ~self.forced * (load.motors - before.load.motors)
 
         def at(q: Array) -> ChainArmState:
@@ -138,14 +154,18 @@ class QuasiStaticArm:
 
     def _state(self, pose: Posture, rest_length: Array, load: Load, near: Array) -> ChainArmState:
         """Compute the state at a posture; the search for tensions starts at ``near`` (S,) [N]."""
-        segments, W, g = pose.segments, load.wrench, pose._own_torque
-        chains, J = segments.chains, segments.length_jacobian
+        segments = pose.segments
+        W = load.wrench
+        g = pose.own_torque
+        chains = segments.chains
+        J = segments.length_jacobian
         forced = np.where(self.forced, load.motors, np.nan)
         chain = self._problem.settle(segments.lengths, rest_length, segments.ratio, forced, near)
-        turning, T = np.zeros_like(J), chain.tension
+        turning = np.zeros_like(J)
+        T = chain.tension
         turning[chains.hole] = chains.friction[:, None] * segments.wrap_jacobian
         slope = chain_tangent(self.start, self.forced, chain, J, turning)
-        K = segments.active(T) + J.T @ slope + pose._own_stiffness + pose._load(W)
+        K = segments.active(T) + J.T @ slope + pose.own_stiffness + pose._load(W)
         scale = T @ abs(J) + abs(g) + abs(W) @ abs(pose.jacobian)
         return ChainArmState(pose, T, T @ J + g - W @ pose.jacobian, K, scale, chain, slope)
 

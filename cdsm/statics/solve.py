@@ -74,11 +74,13 @@ class Balance:
         holding: Array | float = 0.0,
     ) -> None:
         arm = reference.arm
-        self.reference, self._at, self._holding = reference, at, holding
+        self.reference = reference
+        self._at = at
+        self._holding = holding
         self.unit = np.where(arm.slides, arm.length, 1.0)
         touching = np.zeros(arm.nv, dtype=np.bool_)  # joints that their disks stop
         if arm.is_serpentine:
-            stops = {axis.name: axis.stops for axis in arm.geometry._chain.axes}
+            stops = {axis.name: axis.stops for axis in arm.geometry.chain.axes}
             touching[:] = [stops[name] for name in arm.joint_names]
         apart = np.where(touching, _APART, 0.0)
         # the reference may be nearer to the stop
@@ -89,7 +91,9 @@ class Balance:
     def __call__(self, x: Array) -> Point:
         """Return f, its derivative and the state at x (nv,)."""
         inside = self.inside(x)
-        state, out, beyond = self._at(inside * self.unit), x != inside, self.k * (x - inside)
+        state = self._at(inside * self.unit)
+        out = x != inside
+        beyond = self.k * (x - inside)
         residual = state.residual - self._holding
         value = residual * self.unit + beyond
         slope = np.where(out, 0.0, state.stiffness * self.unit * self.unit[:, None])
@@ -147,7 +151,8 @@ def stable_between(at: Callable[[Array], ArmState], before: Array, after: Array)
 
     If it is not, the arm snaps through, though the search has stepped over the unstable postures.
     """
-    free, length = before != after, float(abs(after - before).max())
+    free = before != after
+    length = float(abs(after - before).max())
     for part in np.arange(_DENSE, length, _DENSE) / max(length, _DENSE):
         K = at(before + part * (after - before)).stiffness[np.ix_(free, free)]
         if np.linalg.eigvalsh(K + K.T)[0] <= 0.0:
@@ -163,7 +168,8 @@ def _descend(
     A step counts if the work ∫f·dx along it is negative. It ends at a stable equilibrium, not at a
     saddle, unless the stops bar both ways down; and if a joint is more than 0.1 rad from ``home``.
     """
-    kicks, identity = 0, np.eye(here.x.size)
+    kicks = 0
+    identity = np.eye(here.x.size)
     for _ in range(_STEPS):
         if home is not None and abs(f.inside(here.x) - home).max() > FAR:
             break
@@ -177,14 +183,17 @@ def _descend(
             mode = np.linalg.eigh(K)[1][:, 0]
             mode *= np.sign(mode[abs(mode).argmax()])
             side = -1.0 if here.value @ mode > _NOISE * f.k else 1.0
-            step, kicks = side * (-1.0) ** kicks * _KICK * mode, kicks + 1
+            step = side * (-1.0) ** kicks * _KICK * mode
+            kicks = kicks + 1
         else:
             shifted = here.slope + max(shift, -1.5 * lowest) * identity
             step = f.limited(here.x, -_solved(shifted, here.value))
             kicks *= bool(abs(step).max() < _KICK)
-        there, gain = f.attempt(here.x + step), float(here.value @ step)
+        there = f.attempt(here.x + step)
+        gain = float(here.value @ step)
         if there and (saddle or 0.0 > 0.5 * gain > (here.value + there.value) @ step):
-            here, shift = there, shift / 4.0
+            here = there
+            shift = shift / 4.0
         else:
             shift = 4.0 * max(shift, -lowest, 1e-4 * f.k)
     return here, False
@@ -218,8 +227,10 @@ def _solved(K: Array, torque: Array) -> Array:
 
 def _not_found(reference: Posture, point: Point, reached: float, load: str) -> EquilibriumError:
     """Return the error of a search that ended at ``point``; say if two sites of a cable meet."""
-    pose, residual = point.state.pose, frozen(np.where(point.out, 0.0, point.state.residual))
-    worst, remedy = int(abs(residual).argmax()), ""
+    pose = point.state.pose
+    residual = frozen(np.where(point.out, 0.0, point.state.residual))
+    worst = int(abs(residual).argmax())
+    remedy = ""
     arm = pose.arm
     problem = (
         f"the arm finds no stable place to rest beyond {100.0 * reached:.3g} % of {load}; at the "

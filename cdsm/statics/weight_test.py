@@ -46,7 +46,8 @@ class WeightTest(Result, Plotted):
         history: States with friction; entry 0 is the arm without the weight. None without friction.
     """
 
-    _headline, _rows = "stiffness", "loads"
+    _headline = "stiffness"
+    _rows = "loads"
     _figure = "plot_weight_test"
 
     force: Array = field(metadata=unit("N", "axis"))
@@ -145,7 +146,8 @@ class WeightTest(Result, Plotted):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences if, without the weight, the arm leaves its reference, or is not stable."""
-        said, history = list[str](), self.history
+        said = list[str]()
+        history = self.history
         if self.left_reference:
             moved = coordinates(1e3 * self.unloaded.displacement)
             without = "without friction " if history else ""
@@ -246,21 +248,26 @@ def weight_test(
     steps = whole_number("steps", steps, 1, 1000)
     if isinstance(tension, Equilibrium):
         unloaded = tension._resumed(pose, wrench)
-        held = unloaded._held(unloaded._forced)
+        held = unloaded.held_posture(unloaded.force_controlled)
     else:
-        unloaded, held = equilibrium(pose, tension, wrench), pose
-    states, added, W = [unloaded], np.append(force, np.zeros(3)), unloaded.wrench
+        unloaded = equilibrium(pose, tension, wrench)
+        held = pose
+    states = [unloaded]
+    added = np.append(force, np.zeros(3))
+    W = unloaded.wrench
 
     def model(share: float) -> LockedArm:
         return unloaded._model.under(frozen(W + share * added))
 
     for i in range(steps):
-        here, goal = states[-1], (i + 1) / steps
+        here = states[-1]
+        goal = (i + 1) / steps
         found, reached = climb(model, here.pose, here.stop_torque, i / steps, goal)
         here = as_equilibrium(model(reached), found) if found else here
         if reached < goal:
             worst = int(abs(here.stiffness.critical_direction).argmax())
-            joint, load = pose.arm.joint_names[worst], reached * np.linalg.norm(force)
+            joint = pose.arm.joint_names[worst]
+            load = reached * np.linalg.norm(force)
             said = f"the arm buckles at {100.0 * reached:.4g} % of the load, under {load:.4g} N"
             raise EquilibriumError(f"{said}: {joint} buckles", here.residual, reached, joint)
         states.append(here)

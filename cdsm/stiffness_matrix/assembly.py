@@ -31,7 +31,7 @@ def stiffness(
         ElasticityRangeError: A tension is outside the domain of its cable's elasticity.
     """
     F, W = checked_tension(pose, tension, wrench)
-    k = pose.arm._laws.stiffness(pose.cable_lengths, F)
+    k = pose.arm.laws.stiffness(pose.cable_lengths, F)
     return assemble(pose, F, W, k, tension if isinstance(tension, Tension) else None)
 
 
@@ -49,7 +49,7 @@ def checked_tension(
         return F, wrench_vector("wrench", NO_WRENCH if wrench is None else wrench)
     if not np.array_equal(tension.posture.q, pose.q):
         raise InvalidInput("tension", "is of another posture; distribute it at this one.")
-    if not tension.posture._equals(pose):
+    if not tension.posture.equals(pose):
         raise InvalidInput("tension", f"was distributed for {ANOTHER_ARM}")
     if wrench is not None:
         raise InvalidInput("wrench", "comes with the Tension; leave it out here.")
@@ -65,8 +65,10 @@ def assemble(
     free_length: Array | None = None,
 ) -> Stiffness:
     """Compute K_θ (Eq. 16) from checked, read-only arrays; :class:`Stiffness` explains them."""
-    J, gravity = pose.length_jacobian, pose.gravity_stiffness
-    active, load = frozen(pose._active(tension)), frozen(pose._load(wrench))
+    J = pose.length_jacobian
+    gravity = pose.gravity_stiffness
+    active = frozen(pose._active(tension))
+    load = frozen(pose._load(wrench))
     passive = frozen((J.T * cable_stiffness) @ J)
     springs = pose.arm.springs.matrix
     return Stiffness(

@@ -54,7 +54,8 @@ def _existing(read: Callable[[], object]) -> object:
 
 def table(K: Stiffness) -> list[str]:
     """Return the lines of the printed table: readings [N/mm] along x, y and z."""
-    axes, parts = np.eye(3), _PARTS if K.posture.arm.has_springs else _PARTS[:-1]
+    axes = np.eye(3)
+    parts = _PARTS if K.posture.arm.has_springs else _PARTS[:-1]
     rows = np.full((3 + len(parts), 3), math.nan)
     for i, u in enumerate(axes):
         with suppress(SingularStiffness):
@@ -83,7 +84,8 @@ def notes(K: Stiffness) -> tuple[str, ...]:
         if _existing(lambda: K.compliance) is not None:
             fixed = f"inf, -: the tip cannot move along {axis_of(error.direction)}"
             missing = [f"{fixed}; cartesian: in the plane of other axes"]
-    state, unit = "stable" if K.is_stable else "UNSTABLE", K.posture.arm.stiffness_unit()
+    state = "stable" if K.is_stable else "UNSTABLE"
+    unit = K.posture.arm.stiffness_unit()
     least = f"{state}, smallest joint stiffness {K.margin:.4g} {unit} ({model_of(K)})"
     return (*missing, *K.posture.remarks, *missing_leads(K), least)
 
@@ -132,7 +134,8 @@ class Remedy:
     factor: float | None
 
     def __str__(self) -> str:
-        what, s = _QUANTITIES[self.change], self.factor
+        what = _QUANTITIES[self.change]
+        s = self.factor
         if s is None:
             return f"no other {what} alone would hold it"
         times = f"{rounded(s, up=s > 1.0)} times as high, or {'more' if s > 1.0 else 'less'}"
@@ -141,7 +144,8 @@ class Remedy:
 
 def verdict(K: Stiffness) -> str:
     """Return a sentence about an unstable arm: which joint buckles most, and the margin."""
-    arm, worst = K.posture.arm, int(abs(K.critical_direction).argmax())
+    arm = K.posture.arm
+    worst = int(abs(K.critical_direction).argmax())
     margin = f"the smallest eigenvalue of K_θ is {K.margin:.4g} {arm.stiffness_unit()}"
     return f"UNSTABLE: the arm buckles, {arm.joint_names[worst]} most; {margin}"
 
@@ -150,7 +154,8 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
     """Yield the remedies of an unstable arm; none if friction or another l_0 makes it unstable."""
     from cdsm.stiffness_matrix.assembly import stiffness  # here, since it needs this module
 
-    pose, given = K.posture, K.distribution
+    pose = K.posture
+    given = K.distribution
     cables = pose.arm.cables
 
     def stiffer(wire: float = 1.0, spring: float = 1.0) -> float:
@@ -162,12 +167,14 @@ def find_remedies(K: Stiffness) -> Iterator[Remedy]:
 
     if stiffness(pose, K.tension, K.wrench).margin > 0.0:
         return
-    if pose.arm._laws.held:
+    if pose.arm.laws.held:
         yield Remedy("wire", _factor(stiffer, _STIFFER))
-    if pose.arm._laws.series[cables.position_controlled].any():
+    if pose.arm.laws.series[cables.position_controlled].any():
         yield Remedy("spring", _factor(lambda s: stiffer(spring=s), _STIFFER))
     if given is not None and given.least and given.minimum.any():
-        low, high, solver = given.minimum, given.maximum, given.solver
+        low = given.minimum
+        high = given.maximum
+        solver = given.solver
 
         def tension(s: float) -> float:
             least = np.where(low < high, s * low, low)

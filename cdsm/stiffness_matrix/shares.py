@@ -32,7 +32,8 @@ class Shares(Result, Named, Plotted):
         springs: Of the joint springs [N/m].
     """
 
-    _headline, _rows = "total", "cable"
+    _headline = "total"
+    _rows = "cable"
     _posture_from = "stiffness.posture"
     _figure = "plot_shares"
 
@@ -48,7 +49,8 @@ class Shares(Result, Named, Plotted):
     def of(cls, K: Stiffness, u: Array) -> Self:
         """Compute the contributions to K.along(u), of a unit vector u (3,)."""
         along, moved = K._along(u)
-        pose, motion = K.posture, moved * along
+        pose = K.posture
+        motion = moved * along
         if K.segment_tension is None or K.tension_gradient is None:
             passive = K.cable_stiffness * (pose.length_jacobian @ motion) ** 2
             active = K.tension * (pose.length_hessian @ motion @ motion)
@@ -100,7 +102,8 @@ class Shares(Result, Named, Plotted):
         return self.stiffness.is_stable
 
     def __str__(self) -> str:
-        K, others = self.stiffness, self.others
+        K = self.stiffness
+        others = self.others
         names = [*self.keys(), *others, "total"]
         whole = without_rounding(np.array([*self.cables, *others.values(), self.total]))
         pairs = zip(names, whole, strict=True)

@@ -73,7 +73,8 @@ class Stiffness(Result):
         tension_gradient: ∂T/∂θ (S, nv) [N/rad] of these segments; None if frictionless.
     """
 
-    _headline, _rows = "margin", "cable"
+    _headline = "margin"
+    _rows = "cable"
 
     posture: Posture
     active: Array = field(metadata=_SQUARE)
@@ -95,17 +96,21 @@ class Stiffness(Result):
     @property
     def free_lengths(self) -> Array:
         """Original lengths l_0 (C,) [m] of the wires, see :class:`Cable`; L if force-controlled."""
-        laws, L = self.posture.arm._laws, self.posture.cable_lengths
+        laws = self.posture.arm.laws
+        L = self.posture.cable_lengths
         l_0 = self.free_length
         return laws.original_lengths(L, self.tension) if l_0 is None else l_0
 
     @quantity("torque", "joint")
     def residual(self) -> Array:
         """J_Lᵀ F − (J_Xᵀ W − g) + k (q − q_0) (nv,) [N m]; zero if the tensions balance the arm."""
-        pose, F, J = self.posture, self.tension, self.posture.length_jacobian
+        pose = self.posture
+        F = self.tension
+        J = self.posture.length_jacobian
         if self.segment_tension is not None:
-            F, J = self.segment_tension, pose.segments.length_jacobian
-        return frozen(F @ J - self.wrench @ pose.jacobian + pose._own_torque)
+            F = self.segment_tension
+            J = pose.segments.length_jacobian
+        return frozen(F @ J - self.wrench @ pose.jacobian + pose.own_torque)
 
     @quantity("joint stiffness")
     def margin(self) -> float:
@@ -198,7 +203,8 @@ class Stiffness(Result):
         D = P.diagonal()
         scale = 1.0 / np.sqrt(np.where(D > 0.0, D, 1.0))
         both = scale * scale[:, None]
-        scaled, least = K * both, REGULAR * float((P * both).max(initial=0.0))
+        scaled = K * both
+        least = REGULAR * float((P * both).max(initial=0.0))
         try:
             inverse = np.linalg.inv(scaled)
         except np.linalg.LinAlgError:
@@ -245,7 +251,7 @@ class Stiffness(Result):
         """Whether a tip force with joint torques J_vᵀ u moves any joint."""
         return bool(abs(torque).max(initial=0.0) > UNMOVED * abs(self.posture.jacobian[:3]).max())
 
-    def _require_mobile(self, u: Array) -> None:
+    def require_mobile(self, u: Array) -> None:
         """Raise SingularStiffness if a tip force along a unit vector u (3,) moves no joint."""
         if not self._moves(u @ self.posture.jacobian[:3]):
             said = f"the tip cannot move along {coordinates(u)}: the stiffness there is infinite "
@@ -259,7 +265,7 @@ class Stiffness(Result):
         is a sum over cables, gravity, load and springs. SingularStiffness also if it is inf.
         """
         u = unit_direction("direction", direction)
-        self._require_mobile(u)
+        self.require_mobile(u)
         return Shares.of(self, u)
 
     @cached_property

@@ -28,13 +28,15 @@ def rounded(value: float, *, up: bool) -> str:
 
 def span(values: Array, form: Callable[[float], str] = "{:.4g}".format) -> str:
     """Return the range of ``values`` as text: ``2 to 5``, or ``2`` if both ends print alike."""
-    low, high = form(float(values.min())), form(float(values.max()))
+    low = form(float(values.min()))
+    high = form(float(values.max()))
     return low if low == high else f"{low} to {high}"
 
 
 def with_uncertainty(value: float, uncertainty: float, size: float) -> str:
     """Return ``value ± uncertainty`` [SI] as text in a unit of this ``size``: two digits of it."""
-    u, places = uncertainty / size, 4
+    u = uncertainty / size
+    places = 4
     if 0.0 < u < math.inf:
         places = min(max(1 - math.floor(math.log10(u)), 0), 12)
     return f"{value / size:.{places}f} ± {u:.{places}f}"

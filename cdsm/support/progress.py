@@ -63,7 +63,8 @@ def _bar(what: str, total: int | None) -> Iterator[Callable[[int], None]]:
     console = Console(stderr=True)
     left = progress.TimeRemainingColumn()
     bar = progress.Progress(*columns, left, console=console, transient=True)
-    task, begun = bar.add_task(what, total=total), monotonic()
+    task = bar.add_task(what, total=total)
+    begun = monotonic()
 
     def advance(count: int) -> None:
         if monotonic() - begun >= DELAY:
@@ -78,14 +79,18 @@ def _bar(what: str, total: int | None) -> Iterator[Callable[[int], None]]:
 
 def _lines(what: str, total: int | None) -> Callable[[int], None]:
     """Return a function that counts items, and prints a line if the last one is long ago."""
-    begun, printed, done = monotonic(), monotonic() - _PAUSE + DELAY, 0
+    begun = monotonic()
+    printed = monotonic() - _PAUSE + DELAY
+    done = 0
 
     def advance(count: int) -> None:
         nonlocal done, printed
-        done, now = done + count, monotonic()
+        done = done + count
+        now = monotonic()
         if now - printed < _PAUSE or done == total:
             return
-        printed, speed = now, done / (now - begun)
+        printed = now
+        speed = done / (now - begun)
         left = f", {(total - done) / speed:.0f} s left" if total and speed else ""
         print(f"{what}: {done}{f' of {total}' if total else ''}{left}", file=sys.stderr, flush=True)
 

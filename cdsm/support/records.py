@@ -91,7 +91,8 @@ Point = Annotated[
 HoleAngles = Annotated[Sequence[Number], BeforeValidator(plain), Field(min_length=1, max_length=64)]
 Name = Annotated[str, AfterValidator(_name)]
 
-ONE, EACH = "(one)", "(each)"
+ONE = "(one)"
+EACH = "(each)"
 """Tags of pydantic: one value for all joints, or one for each joint. Faults do not print tags."""
 
 

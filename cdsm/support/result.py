@@ -98,7 +98,8 @@ class Result(ReadOnlyState):
 
     def to_xarray(self) -> xarray.Dataset:
         """Return all numbers as a labelled Dataset in SI; needs xarray (CdsmError)."""
-        variables, words = {}, {}
+        variables = {}
+        words = {}
         for name, value, of, dims in self._quantities():
             array = _array(value)
             if array.dtype.kind in "USO" or array.ndim != len(dims):
@@ -156,7 +157,8 @@ class Result(ReadOnlyState):
         units = self._units()
         for name, metadata in told.items():
             of = metadata["unit"]
-            value, dims = getattr(self, name), metadata["dims"]
+            value = getattr(self, name)
+            dims = metadata["dims"]
             if "direction" in dims and np.ndim(value) < len(dims):
                 dims = tuple(dim for dim in dims if dim != "direction")
             yield metadata["name"] or name, value, units.get(of, of), dims
@@ -166,14 +168,16 @@ class Result(ReadOnlyState):
         if not self._arm:
             return {}
         joined = JointUnits(self._arm.slides).joined
-        torque, stiffness = joined("N m", "N"), joined("N m/rad", "N/m")
+        torque = joined("N m", "N")
+        stiffness = joined("N m/rad", "N/m")
         return {"joint": joined("rad", "m"), "torque": torque, "joint stiffness": stiffness}
 
     def _labels(self) -> dict[str, Sequence[object]]:
         """Return the names along each dimension that has names."""
         labels: dict[str, Sequence[object]] = {"axis": AXES, "component": COMPONENTS}
         if self._arm:
-            joints, cables = self._arm.joint_names, self._arm.cables
+            joints = self._arm.joint_names
+            cables = self._arm.cables
             labels |= {"joint": joints, "joint_column": joints, "cable": cables.names}
             labels["held_cable"] = [each.name for each in cables if each.control == "position"]
         return labels

@@ -78,7 +78,8 @@ def read_table(
         try:
             rows = [(number, [cell.strip() for cell in next(split)]) for number, _ in kept]
         except (csv.Error, StopIteration) as error:
-            at, why = kept[split.line_num - 1][0], f"{error}" or "a quote is not closed before it"
+            at = kept[split.line_num - 1][0]
+            why = f"{error}" or "a quote is not closed before it"
             raise FileError(path, f"line {at} is no line of a table: {why}.") from None
         tables.append(Table(rows, comments, delimiter))
     return max(tables, key=rank)
@@ -104,9 +105,12 @@ class Columns:
         self, path: str | os.PathLike[str], units: Mapping[str, Mapping[str, float]], holds: str
     ) -> None:
         table = read_table(path, ",;\t", rank=_cells_of_header)
-        self.path, self.units, self._number = path, dict(units), table.number
+        self.path = path
+        self.units = dict(units)
+        self._number = table.number
         self.rows = [row for row in table.rows[1:] if any(row[1])]
-        self._at, self.unit = dict[str, int](), dict[str, str]()  # by name
+        self._at = dict[str, int]()  # by name
+        self.unit = dict[str, str]()
         if not self.rows:
             self.refuse(f"holds no {holds}; a header and a line for each are needed")
         width = max((k for k, cell in enumerate(table.header, 1) if cell), default=0)

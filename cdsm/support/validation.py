@@ -14,7 +14,8 @@ from cdsm.support.values import Array, frozen
 
 _Kind = TypeVar("_Kind")
 
-LARGEST, SMALLEST = 1e15, 1e-12
+LARGEST = 1e15
+SMALLEST = 1e-12
 """Ends of the magnitudes of a number whose quantity is not in :data:`RANGES`."""
 
 
@@ -133,7 +134,8 @@ def bound(name: str, value: ArrayLike, size: int, rows: int | None = None) -> Ar
     ±inf is allowed. If ``rows`` is given, an array (rows, size) is also allowed and keeps its
     shape. Raises InvalidInput.
     """
-    array, (_, least, most) = _native(name, value), RANGES["tension"]
+    array = _native(name, value)
+    (_, least, most) = RANGES["tension"]
     if array.ndim == 0:
         array = array.repeat(size)
     if array.shape not in ((size,), (rows, size)):
@@ -274,7 +276,8 @@ def unit_directions(name: str, value: Direction | Iterable[Direction]) -> Array:
 
 
 # a longer arm, a larger hole radius or disk offset than this [m] was probably given in millimetres
-LONGEST, WIDEST = 30.0, 1.0
+LONGEST = 30.0
+WIDEST = 1.0
 
 
 def doubts_about_units(length: float, sizes: Iterable[tuple[str, float, float]] = ()) -> list[str]:

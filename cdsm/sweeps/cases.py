@@ -132,7 +132,8 @@ class Cases:
     @property
     def sizes(self) -> dict[str, int]:
         """Return the size of each dimension of an output or of the cases."""
-        nv, own = self.arm.nv, {"axis": 3, "axis_column": 3, "cable": len(self.arm.cables)}
+        nv = self.arm.nv
+        own = {"axis": 3, "axis_column": 3, "cable": len(self.arm.cables)}
         own |= {"wrench": len(self.wrench), "minimum": len(self.minimum)}
         return own | {"direction": len(self.direction), "joint": nv, "joint_column": nv}
 
@@ -142,7 +143,8 @@ class Cases:
         Quantities of the posture alone have a row for each posture. NaN stands for what does not
         exist.
         """
-        arm, cases = self.arm, self.count
+        arm = self.arm
+        cases = self.count
         wrench = np.tile(np.repeat(self.wrench, len(self.minimum), axis=0), (len(q), 1))
         low, high, bounded = self._bounds(q)
         kinds = {QUANTITIES[name].needs for name in self.outputs}
@@ -228,7 +230,8 @@ class Cases:
             loss = np.repeat(loss, self.count, axis=0)
             exist = np.asarray((low * loss <= high / loss).all(axis=1))
             loss[~exist] = 1.0
-            low, high = low * loss, high / loss
+            low = low * loss
+            high = high / loss
         return low, high, exist
 
 

@@ -26,7 +26,8 @@ from cdsm.sweeps.cases import CASES, QUANTITIES, Cases
 if TYPE_CHECKING:
     import xarray
 
-_FAST, _SLOW = 2**15, 2**8  # rows that are computed together, also with measures of milliseconds
+_FAST = 2**15  # rows that are computed together, also with measures of milliseconds
+_SLOW = 2**8
 
 
 @final
@@ -79,7 +80,8 @@ class Labelled(Cases):
         self, q: Array, threads: int | None = 1, progress: bool = False
     ) -> tuple[NDArray[Any], ...]:
         """Compute all outputs, then ``status``, at joint angles q (…, nv) [rad]."""
-        flat, found = q.reshape(-1, self.arm.nv), []
+        flat = q.reshape(-1, self.arm.nv)
+        found = []
         with progress_bar("sweep", len(flat), wanted=progress) as advance:
             for part in (flat[i : i + self.together] for i in range(0, len(flat), self.together)):
                 found.append(self.rows(part, threads))
@@ -122,7 +124,8 @@ class Labelled(Cases):
             words = "what became of the entry; NaN stands only where it says so"
             flags = {"flag_meanings": " ".join(kind.name.lower() for kind in Status)}
             return {"long_name": words, "units": "1", **flags, "flag_values": [*map(int, Status)]}
-        units, of_slides = QUANTITIES[name].units, {"N m": "N", "N m rad-1": "N m-1"}
+        units = QUANTITIES[name].units
+        of_slides = {"N m": "N", "N m rad-1": "N m-1"}
         if units in of_slides:
             units = JointUnits(self.arm.slides).joined(units, of_slides[units])
         return {"long_name": QUANTITIES[name].long_name, "units": units}

@@ -89,7 +89,8 @@ class GridPoses(PoseSet):
     def __init__(
         self, angles: Mapping[str, ArrayLike], rest: Mapping[str, float] | None = None
     ) -> None:
-        given, still = angles, {} if rest is None else rest
+        given = angles
+        still = {} if rest is None else rest
         if not (isinstance(given, Mapping) and given and isinstance(still, Mapping)):
             problem = f"{angles!r} and rest {rest!r} given; mappings of joint names are needed."
             raise InvalidInput("angles", problem)
@@ -154,7 +155,8 @@ class PathPoses(ReadOnlyState, PoseSet):
             way = np.linspace(0.0, known[-1], self.count)
             q = np.column_stack([np.interp(way, known, column) for column in q.T])
         told = {"long_name": "way along the path in joint space", "units": _unit(arm)}
-        description, distance = f"path of {len(known)} waypoints", (("pose",), way, told)
+        description = f"path of {len(known)} waypoints"
+        distance = (("pose",), way, told)
         return _Postures({"pose": len(q)}, q.__getitem__, description, {"distance": distance})
 
 
@@ -227,7 +229,8 @@ def angles_of(
             return angles(*(slice(*ends) for ends in block_info[None]["array-location"][:-1]))
 
         lazy: Any = dask.array  # untyped
-        most, shape = 8 * arm.nv * chunk, (*sizes.values(), arm.nv)
+        most = 8 * arm.nv * chunk
+        shape = (*sizes.values(), arm.nv)
         chunks = ("auto",) * len(sizes) + (arm.nv,)
         chunks = lazy.core.normalize_chunks(chunks, shape, limit=most, dtype=np.float64)
         values = lazy.map_blocks(block, chunks=chunks, meta=np.empty(0))

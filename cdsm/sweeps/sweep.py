@@ -223,11 +223,13 @@ def _stored(
             _make(path, cases.dataset(q))
         with only_writer(path):
             kept = read_sweep(path)
-            sizes, dims = kept["status"].encoding["preferred_chunks"], q.dims[:-1]
+            sizes = kept["status"].encoding["preferred_chunks"]
+            dims = q.dims[:-1]
             q = q.chunk({dim: sizes.get(dim, -1) for dim in dims})
             if not is_new:
                 _require_same(path, kept.chunk(sizes), cases.dataset(q))  # chunk by chunk
-            status, names = read_into_memory(kept["status"], path), [*kept.coords]
+            status = read_into_memory(kept["status"], path)
+            names = [*kept.coords]
             slices = lazy.array.core.slices_from_chunks(tuple(q.chunksizes[dim] for dim in dims))
             regions = [dict(zip(dims, part, strict=True)) for part in slices]
             todo = [each for each in regions if (status.isel(each) == Status.PENDING).any()]

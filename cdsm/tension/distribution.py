@@ -51,7 +51,8 @@ class Tension(Result, Named):
             for a stiffness.
     """
 
-    _headline, _rows = "tension", "cable"
+    _headline = "tension"
+    _rows = "cable"
 
     posture: Posture
     values: Array = field(metadata=unit("N", "cable", name="tension"))
@@ -65,7 +66,7 @@ class Tension(Result, Named):
     def residual(self) -> Array:
         """Residual J_Lᵀ F − (J_Xᵀ W − g) of Eq. 13, (nv,) [N m]."""
         at = self.posture
-        torque = at.jacobian.T @ self.wrench - at._own_torque
+        torque = at.jacobian.T @ self.wrench - at.own_torque
         return frozen(self.values @ at.length_jacobian - torque)
 
     def keys(self) -> tuple[str, ...]:
@@ -148,7 +149,7 @@ def distribute_tension(
         held = validation.quantity(f"fixed[{name!r}]", value, "tension", zero=True)
         low, high = (frozen(np.r_[each[:c], held, each[c + 1 :]]) for each in (low, high))
     wrench = wrench_vector("wrench", wrench)
-    torque = pose.jacobian.T @ wrench - pose._own_torque
+    torque = pose.jacobian.T @ wrench - pose.own_torque
     problem = nondimensional(pose.length_jacobian, torque, low, high, pose.arm.length)
     solution = solve(problem, solver)
     if isinstance(solution, str):
@@ -165,9 +166,11 @@ def checked_bounds(
 
     With ``rows``, a bound may also have the shape (rows, C). Invalid bounds raise InvalidInput.
     """
-    count, own = len(arm.cables), "the cable's own "
-    low, high = bound("minimum", minimum, count, rows), bound("maximum", maximum, count, rows)
-    least, most = arm._laws.narrowed(low, high)
+    count = len(arm.cables)
+    own = "the cable's own "
+    low = bound("minimum", minimum, count, rows)
+    high = bound("maximum", maximum, count, rows)
+    least, most = arm.laws.narrowed(low, high)
     allowed = (low >= 0.0) & (low < math.inf) & (least <= most)
     if allowed.all():
         return least, most
@@ -192,7 +195,8 @@ def bounds_at(
     if not flag("worst_friction", worst_friction):
         return low, high
     loss = np.exp(grip(pose))
-    low, high = frozen(low * loss), frozen(high / loss)
+    low = frozen(low * loss)
+    high = frozen(high / loss)
     c = int(np.argmax(low - high))
     if low[c] > high[c]:
         said = f"would need {low[c]:.4g} N or more and {high[c]:.4g} N or less at its motor"
@@ -203,6 +207,7 @@ def bounds_at(
 
 def grip(pose: Posture) -> Array:
     """Compute Σ μ φ (C,) [-] over the holes of each cable, with the friction μ and wrap angle φ."""
-    chains, friction = pose.segments.chains, pose.segments.grip
+    chains = pose.segments.chains
+    friction = pose.segments.grip
     total = np.bincount(chains.cable[chains.hole], friction, len(pose.arm.cables))
     return np.asarray(total, dtype=np.float64)

@@ -35,7 +35,8 @@ def explain(
         raise solver_failed(solver, f"{exists}: {edge}. {HINT}")
     widening = _widening(problem, free)
     blocked = math.isinf(widening) and _widening(problem, np.ones_like(free)) < math.inf
-    names, missing = pose.arm.cables.names, (b - A @ F) * arm * force
+    names = pose.arm.cables.names
+    missing = (b - A @ F) * arm * force
     tight = free & (np.minimum(F - low, high - F) <= OPTIMALITY)
     worst = int(abs(missing).argmax())
     raise InfeasibleTension(
@@ -79,7 +80,8 @@ def advice(
 
 def too_few_cables(arm: Manipulator) -> str:
     """Return a sentence if the cables are too few to hold all joints anywhere, else nothing."""
-    count, joints = len(arm.cables), arm.nv
+    count = len(arm.cables)
+    joints = arm.nv
     if count > joints:
         return ""
     if arm.has_springs:
@@ -106,9 +108,11 @@ def is_proved_infeasible(problem: Problem) -> bool:
     from scipy.optimize import nnls  # slow to import
 
     A, b, low, high, *_ = problem
-    b, upper = b - A @ low, np.flatnonzero(high < np.inf)
+    b = b - A @ low
+    upper = np.flatnonzero(high < np.inf)
     if upper.size:
-        bounded, none = np.eye(low.size)[upper], np.zeros((b.size, upper.size))
+        bounded = np.eye(low.size)[upper]
+        none = np.zeros((b.size, upper.size))
         A = np.block([[A, none], [bounded, np.eye(upper.size)]])
         b = np.concatenate([b, (high - low)[upper]])
     try:
@@ -116,7 +120,8 @@ def is_proved_infeasible(problem: Problem) -> bool:
     except RuntimeError:  # too many iterations
         return False
     r = b - A @ x
-    work, most = r @ b, abs(A).max(axis=0) * abs(r).max()
+    work = r @ b
+    most = abs(A).max(axis=0) * abs(r).max()
     proof = missing > _PROOF and work > _PROOF * (abs(r) @ abs(b))
     return bool(proof and ((r @ A) <= _ROUNDING * most).all())
 
@@ -148,6 +153,7 @@ def _widening(problem: Problem, free: NDArray[np.bool_]) -> float:
     rows = np.column_stack([np.vstack([-np.eye(count), np.eye(count)]), -1.0 * np.tile(free, 2)])
     sides = np.concatenate([-low, high])
     finite = np.isfinite(sides)
-    balance, widest = np.column_stack([A, np.zeros(nv)]), np.append(np.zeros(count), 1.0)
+    balance = np.column_stack([A, np.zeros(nv)])
+    widest = np.append(np.zeros(count), 1.0)
     found = least(widest, A_ub=rows[finite], b_ub=sides[finite], A_eq=balance, b_eq=b)
     return float(found.x[-1]) * force if found.status == OPTIMAL else math.inf

@@ -22,7 +22,9 @@ from cdsm.support.values import Array
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
-OPTIMAL, INFEASIBLE, UNBOUNDED = 0, 2, 3
+OPTIMAL = 0
+INFEASIBLE = 2
+UNBOUNDED = 3
 """Status numbers of scipy that decide a program; all others leave it undecided."""
 
 DEFAULT_SOLVER: Final = "daqp"  # exact, and the fastest in measurements
@@ -58,7 +60,8 @@ class Problem(NamedTuple):
 def nondimensional(J: Array, torque: Array, low: Array, high: Array, length: float) -> Problem:
     """Scale the balance ``J``ᵀ F = ``torque`` of an arm, without rounding; J_L is (C, nv)."""
     arm = 2.0 ** math.frexp(abs(J).max())[1]
-    A, b = J.T / arm, torque / arm
+    A = J.T / arm
+    b = torque / arm
     A[abs(A) < NO_ARM * length / arm] = 0.0
     force = 2.0 ** math.frexp(max(abs(b).max(), low.max()))[1]
     return Problem(A, b / force, low / force, high / force, arm, force)
@@ -92,7 +95,8 @@ def solve(problem: Problem, solver: str) -> Array | str:
         raise solver_failed(solver, f"failed: {error}. {HINT}") from error
     if not found.found or found.x is None or found.y is None:
         return "found no solution with multipliers"
-    x, y = np.asarray(found.x), basis @ found.y
+    x = np.asarray(found.x)
+    y = basis @ found.y
     if not np.isfinite([x.sum(), y.sum()]).all():
         return "calls numbers optimal that are not finite"
     least = -(y @ A)  # the optimum but for the bounds
@@ -149,7 +153,8 @@ def largest(cost: Array, A: Array, b: Array, low: Array, high: Array) -> tuple[f
     """
     import qpsolvers
 
-    lowest, highest = np.maximum(low, -_FARTHEST), np.minimum(high, _FARTHEST)
+    lowest = np.maximum(low, -_FARTHEST)
+    highest = np.minimum(high, _FARTHEST)
     unit = float(abs(cost).max()) or 1.0
     qp = qpsolvers.Problem(
         _CURVATURE * np.eye(cost.size), -cost / unit, A=A, b=b, lb=lowest, ub=highest

@@ -31,7 +31,8 @@ _DRAWN = 100  # random arms that show how far from linear a measurand is
 _STEP = 0.1  # of differences, in standard uncertainties
 _ROWS = 1000  # arms in one batch, which bounds its memory
 _ROUNDING = 1e-9  # a smaller relative uncertainty is rounding
-_DEGREES, _PERCENT = (math.pi / 180.0, " deg"), (1e-2, " %")
+_DEGREES = (math.pi / 180.0, " deg")
+_PERCENT = (1e-2, " %")
 _UNITS = {"joint_angle": _DEGREES, "hole_angle": _DEGREES, "rigidity": _PERCENT, "spring": _PERCENT}
 _UNITS |= {"joint_stiffness": _PERCENT}
 _UNITS |= {"tension": (1.0, " N"), "link_mass": (1e-3, " g"), "friction": (1.0, "")}  # or mm
@@ -53,7 +54,8 @@ class Uncertainty(Result, Plotted):
         failed: Number of these arms for which the measurand does not exist.
     """
 
-    _headline, _rows = "standard_uncertainty", "source"
+    _headline = "standard_uncertainty"
+    _rows = "source"
     _figure = "plot_uncertainty"
 
     measurand: Measurand
@@ -105,7 +107,8 @@ class Uncertainty(Result, Plotted):
         return low, high
 
     def __str__(self) -> str:
-        (unit, size), relative = self.measurand.unit, 100.0 * self.relative
+        (unit, size) = self.measurand.unit
+        relative = 100.0 * self.relative
         low, high = (end / size for end in self.interval())
         own = "its own least tensions" if self.measurand.redistribute else "the tensions given"
         with_them = "" if self.measurand.of == "tip" else f", each with {own}"
@@ -138,7 +141,8 @@ class Uncertainty(Result, Plotted):
 
     @property
     def _unstable(self) -> tuple[str, ...]:
-        K, of = self.measurand.stiffness, self.measurand.of
+        K = self.measurand.stiffness
+        of = self.measurand.of
         return (verdict(K),) if of in ("along", "margin") and not K.is_stable else ()
 
     @property
@@ -214,7 +218,8 @@ def budget_of(measurand: Measurand, tolerances: Tolerances | None) -> Uncertaint
     elif not own.given:
         said = "none given, and the arm has none; give Tolerances(rigidity=0.05, …), or a table "
         raise InvalidInput("tolerances", said + "[tolerances] in its file.")
-    groups, (value,) = measurand.inputs.groups(own), measurand.value().tolist()
+    groups = measurand.inputs.groups(own)
+    (value,) = measurand.value().tolist()
     if measurand.direction is not None and math.isinf(value):
         said = "the tip cannot move in this direction: its stiffness is infinite, and has no "
         said += "uncertainty. Choose another direction, or bend the arm."
@@ -222,7 +227,8 @@ def budget_of(measurand: Measurand, tolerances: Tolerances | None) -> Uncertaint
     drawn = measurand.inputs.draw(groups, np.random.default_rng(0), _DRAWN)
     variances, left, status = propagate(measurand, groups, drawn)
     parts = {source: math.sqrt(variance[0]) for source, variance in variances.items()}
-    u, exist = math.hypot(*parts.values()), status == Status.OK
+    u = math.hypot(*parts.values())
+    exist = status == Status.OK
     scale = max(u, _ROUNDING * abs(value)) or 1.0
     return Uncertainty(
         measurand=measurand,
@@ -245,10 +251,13 @@ def propagate(
     alone = [group.split() for group in groups]
     slopes, values, status = _differences(measurand, list(chain(*alone)), drawn)
     variances: dict[str, Array] = {}
-    left, end = values - measurand.value(), 0
+    left = values - measurand.value()
+    end = 0
     for (source, _, tolerance), own in zip(groups, alone, strict=True):
-        u, rho = tolerance.standard, tolerance.correlation
-        g, end = slopes[end : end + len(own)], end + len(own)
+        u = tolerance.standard
+        rho = tolerance.correlation
+        g = slopes[end : end + len(own)]
+        end = end + len(own)
         variance = u**2 * ((1.0 - rho) * (g**2).sum(axis=0) + rho * g.sum(axis=0) ** 2)
         variances[source] = variances.get(source, 0.0) + variance
         if drawn:
@@ -263,22 +272,27 @@ def _differences(
 
     A difference is one-sided where the measurand exists only for one sign of the error.
     """
-    m, value, labels = len(groups), measurand.value(), measurand.inputs.labels
+    m = len(groups)
+    value = measurand.value()
+    labels = measurand.inputs.labels
     step = _STEP * np.array([group.tolerance.standard for group in groups])
     arms = 2 * m + len(next(iter(drawn.values()), ()))
-    found, status = np.zeros((arms, value.size)), np.zeros(arms, dtype=np.uint8)
+    found = np.zeros((arms, value.size))
+    status = np.zeros(arms, dtype=np.uint8)
     sources = {*drawn, *(group.source for group in groups)}
     for rows in np.split(np.arange(arms), range(_ROWS, arms, _ROWS)) if groups else ():
         errors = {source: np.zeros((rows.size, len(labels[source]))) for source in sources}
         for row, arm in enumerate(rows[rows < 2 * m].tolist()):
-            group, size = groups[arm % m], step[arm % m]
+            group = groups[arm % m]
+            size = step[arm % m]
             errors[group.source][row, group.inputs] = size if arm < m else -size
         for source, each in drawn.items():
             errors[source][rows >= 2 * m] = each[rows[rows >= 2 * m] - 2 * m]
         found[rows], status[rows] = measurand.of_arms(errors)
     exist = (status[: 2 * m] == Status.OK).reshape(2, m, 1)
     for n in np.flatnonzero(~exist.any(axis=0)).tolist():
-        name, state = labels[groups[n].source][groups[n].inputs[0]], Status(status[n]).name
+        name = labels[groups[n].source][groups[n].inputs[0]]
+        state = Status(status[n]).name
         said = f"with a small error of {name} the arm is {state}: there is no budget by it."
         raise InvalidInput(groups[n].source, f"{said} Change the tensions, or leave it out.")
     up, down = np.where(exist, found[: 2 * m].reshape(2, m, value.size), value)

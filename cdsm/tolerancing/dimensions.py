@@ -41,9 +41,13 @@ def changes_of_chain(arm: Manipulator, starts: Mapping[str, int]) -> Iterator[Ch
     The rates are central differences of the chain. It is linear in lengths and masses, except for
     the share of a link's mass that a body has.
     """
-    geometry, chain = arm.geometry, arm.geometry._chain
-    joints, links, disks = geometry.joints, geometry.links, geometry.disks
-    h, number = [joint.disk_offset for joint in joints], {x.name: x.joint for x in chain.bodies}
+    geometry = arm.geometry
+    chain = arm.geometry.chain
+    joints = geometry.joints
+    links = geometry.links
+    disks = geometry.disks
+    h = [joint.disk_offset for joint in joints]
+    number = {x.name: x.joint for x in chain.bodies}
     shared = [
         abs(x.length - a - b) < _NEAR for x, a, b in zip(links, h, [*h[1:], 0.0], strict=True)
     ]
@@ -54,7 +58,8 @@ def changes_of_chain(arm: Manipulator, starts: Mapping[str, int]) -> Iterator[Ch
     def rates(
         moved: Mapping[tuple[int, int], float], longer: int = 0, heavier: int = 0
     ) -> tuple[NDArray[np.intp], Array]:
-        step, found = _STEP * min(h), []
+        step = _STEP * min(h)
+        found = []
         for way in (step, -step):
             offsets = [[x, x] for x in h]
             parts: dict[str, list[Any]] = {"joints": [*joints], "links": [*links]}
@@ -96,7 +101,8 @@ def _numbers(
     arm: Manipulator, starts: Mapping[str, int]
 ) -> tuple[NDArray[np.intp], Callable[[Chain], Array]]:
     """Return which numbers of an arm depend on its chain, and the function that reads them."""
-    chain, places = arm.geometry._chain, dict[str, list[tuple[int, float]]]()
+    chain = arm.geometry.chain
+    places = dict[str, list[tuple[int, float]]]()
     for d, disk in enumerate(chain.disks):
         places.setdefault(disk.link, []).append((d, disk.x))
     own = enumerate(site for cable in arm.cables for site in cable.sites)
@@ -106,7 +112,8 @@ def _numbers(
     )
     pairs = zip(chain.axes, arm.springs.stiffness.tolist(), strict=True)
     springs = [j for j, (axis, k) in enumerate(pairs) if axis.stiffness == k > 0.0]
-    n, bodies = len(chain.axes), np.arange(len(chain.bodies))
+    n = len(chain.axes)
+    bodies = np.arange(len(chain.bodies))
     at = {"shift": 3 * np.arange(n), "site": 3 * sites, "centre": 3 * bodies, "tip": [0]}
     at |= {"mass": bodies, "softness": springs}
 

@@ -60,14 +60,18 @@ class Inputs:
     """
 
     def __init__(self, arm: Manipulator) -> None:
-        cables, table, self._arm = arm.cables, rows_of(arm), (arm.name, _LARGEST * arm.length)
-        self._nominal, self._sprung = table.dimensions, arm.springs.sprung
+        cables = arm.cables
+        table = rows_of(arm)
+        self._arm = (arm.name, _LARGEST * arm.length)
+        self._nominal = table.dimensions
+        self._sprung = arm.springs.sprung
         k = self._nominal.spring
         softness = np.divide(1.0, k, out=np.full(k.shape, np.inf), where=k > 0.0)
         every = *self._nominal[:-1], softness
         self._parts = np.cumsum([x.size for x in every[:-1]])
         self._numbers = np.concatenate([x.ravel() for x in every])
-        of, row = np.repeat(range(len(cables)), [len(c.sites) for c in cables]), arm._routing.row
+        of = np.repeat(range(len(cables)), [len(c.sites) for c in cables])
+        row = arm.routing.row
         self._first = np.flatnonzero((of[1:] == of[:-1]) & (row[1:] == row[:-1]))
         self._of_cable = np.eye(len(cables))[of[self._first]]
         each = [(c.name, i, site) for c in cables for i, site in enumerate(c.sites, 1)]
@@ -104,7 +108,8 @@ class Inputs:
         springs[:, self._sprung] *= 1.0 + errors.get("joint_stiffness", 0.0)
         shapes = zip((*parts, springs), self._nominal, strict=True)
         body = Body(*(part.reshape(count, *x.shape) for part, x in shapes))
-        a, b = self._first, self._first + 1  # within one body
+        a = self._first  # within one body
+        b = self._first + 1
         longer = np.linalg.norm(body.site[:, b] - body.site[:, a], axis=2)
         longer -= np.linalg.norm(self._nominal.site[b] - self._nominal.site[a], axis=1)
         return body._replace(fixed=body.fixed + longer @ self._of_cable)
@@ -115,9 +120,11 @@ class Inputs:
         Raises InvalidInput if the arm has no inputs of a source or none with the name that a
         tolerance gives, if two tolerances belong to one input, or if a length is too uncertain.
         """
-        found, (arm, most) = [], self._arm
+        found = []
+        (arm, most) = self._arm
         for source, given in tolerances.given.items():
-            names, taken = self.labels.get(source, ()), np.zeros(0, dtype=np.intp)
+            names = self.labels.get(source, ())
+            taken = np.zeros(0, dtype=np.intp)
             if not names:
                 raise InvalidInput(source, f"{arm} {_LACKS.get(source, _NO_HOLES)}")
             for each in given:
@@ -147,8 +154,11 @@ class Inputs:
         """
         errors = {g.source: np.zeros((draws, len(self.labels[g.source]))) for g in groups}
         for source, inputs, tolerance in groups:
-            u, rho, size = tolerance.standard, tolerance.correlation, (draws, inputs.size + 1)
-            normal, side = tolerance.distribution == "normal", math.sqrt(3.0)
+            u = tolerance.standard
+            rho = tolerance.correlation
+            size = (draws, inputs.size + 1)
+            normal = tolerance.distribution == "normal"
+            side = math.sqrt(3.0)
             x = rng.standard_normal(size) if normal else rng.uniform(-side, side, size)
             x = math.sqrt(1.0 - rho) * x[:, 1:] + math.sqrt(rho) * x[:, :1]
             square = math.log1p(u**2)  # of the logarithm

@@ -72,7 +72,8 @@ class Measurand(ReadOnlyState):
 
     def value(self) -> Array:
         """Return the value of the arm without errors (1,), or of each cable (C,), in SI."""
-        K, u = self.stiffness, self.direction
+        K = self.stiffness
+        u = self.direction
         if self.of == "tension":
             return K.tension if self.cable is None else K.tension[[self.cable]]
         if u is None:
@@ -81,9 +82,12 @@ class Measurand(ReadOnlyState):
 
     def of_arms(self, errors: Errors, threads: int = 1) -> tuple[Array, Codes]:
         """Compute the values (N, 1 or C) of N arms with ``errors``, and the status (N,) of each."""
-        K, arm = self.stiffness, self.stiffness.posture.arm
-        count, bounds = len(next(iter(errors.values()))), None
-        status, none = np.zeros(count, dtype=np.uint8), np.zeros((count, 1))
+        K = self.stiffness
+        arm = self.stiffness.posture.arm
+        count = len(next(iter(errors.values())))
+        bounds = None
+        status = np.zeros(count, dtype=np.uint8)
+        none = np.zeros((count, 1))
         F = K.tension + errors.get("tension", none)
         if self.redistribute:
             assert K.distribution is not None
@@ -114,9 +118,11 @@ class Measurand(ReadOnlyState):
 
     def _springs(self, errors: Errors, L: Array, F: Array, part: slice) -> Array:
         """Return stiffness with errors of springs and EA; as EA rises, ε falls: EA ε stays."""
-        laws = self.stiffness.posture.arm._laws
+        laws = self.stiffness.posture.arm.laws
         change = errors["rigidity"][part] if "rigidity" in errors else 0.0
-        stretched, EA, series = laws.rigidities(F), np.zeros_like(F), laws.series + 0.0 * F
+        stretched = laws.rigidities(F)
+        EA = np.zeros_like(F)
+        series = laws.series + 0.0 * F
         if "spring" in errors:
             series[:, laws.series > 0.0] /= 1.0 + errors["spring"][part]
         for law, of in laws.held:
@@ -136,7 +142,8 @@ def measurand_of(
 ) -> Measurand:
     """Check the arguments of :func:`~cdsm.uncertainty`; return the measurand they describe."""
     one_of("measurand", of, get_args(MeasurandName))
-    K, names = stiffness(pose, tension, wrench), pose.arm.cables.names
+    K = stiffness(pose, tension, wrench)
+    names = pose.arm.cables.names
     given = {"direction": (direction, of in ("along", "tip")), "cable": (cable, of == "tension")}
     for name, (value, wanted) in given.items():
         if (value is not None) != wanted:

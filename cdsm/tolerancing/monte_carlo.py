@@ -40,7 +40,8 @@ class MonteCarlo(Result, Plotted):
         seed: Seed of the random numbers.
     """
 
-    _headline, _rows = "standard_uncertainty", "draw"
+    _headline = "standard_uncertainty"
+    _rows = "draw"
     _figure = "plot_monte_carlo"
 
     budget: Uncertainty
@@ -154,19 +155,22 @@ def monte_carlo(
             exists for fewer than half of the arms. Other errors as for :func:`~cdsm.uncertainty`.
     """
     count = whole_number("draws", draws, 100, 10**8)
-    start, wanted = whole_number("seed", seed, 0), flag("progress", progress)
+    start = whole_number("seed", seed, 0)
+    wanted = flag("progress", progress)
     asked = measurand_of(pose, tension, direction, of, cable, wrench, redistribute)
     budget = budget_of(asked, tolerances)
     if not budget.tolerances.given:
         raise InvalidInput("tolerances", "are all zero, so all draws are the same; give one.")
-    values, status = [], []
+    values = []
+    status = []
     with progress_bar("Monte Carlo", count, wanted=wanted) as advance:
         for errors in _draws(budget, start, count):
             found, codes = budget.measurand.of_arms(errors, checked_threads(None))
             values.append(found[codes == Status.OK, 0])
             status.append(codes)
             advance(codes.size)
-    exist, codes = np.concatenate(values), np.concatenate(status)
+    exist = np.concatenate(values)
+    codes = np.concatenate(status)
     if exist.size < count / 2:
         worst = Status(int(np.bincount(codes[codes != Status.OK]).argmax())).name
         said = f"the {budget.name} exists for {exist.size} of {count} draws; most others are "

@@ -45,7 +45,8 @@ def guarded_server(port: int, label: str) -> viser.ViserServer:
     except OSError as error:
         said = f"{port} is not available ({error.strerror}); give another port, or 0."
         raise InvalidInput("port", said) from None
-    original, called = websocket_server.serve, threading.Event()
+    original = websocket_server.serve
+    called = threading.Event()
 
     def serve(*args: Any, **options: Any) -> Any:
         called.set()

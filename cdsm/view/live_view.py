@@ -34,7 +34,8 @@ _LOG = logging.getLogger(__name__)
 
 _PANEL = 390  # width of the panel in pixels, so that its longest row fits on one line
 _SIZE = 0.2  # size of the handle at the tip, over the arm's length
-_FASTEST, _SPEED = 30.0, 10.0  # largest speed of a path, and its first speed [samples/s]
+_FASTEST = 30.0  # largest speed of a path, and its first speed [samples/s]
+_SPEED = 10.0
 
 
 def serve(
@@ -114,8 +115,10 @@ class View:
     """Running live view of ``arm``, made by :func:`serve`. Close it, or use it in ``with``."""
 
     def __init__(self, arm: Manipulator, start: Setting, server: viser.ViserServer) -> None:
-        self.arm, self._server = arm, server
-        self._closed, self._lock = threading.Event(), threading.Lock()
+        self.arm = arm
+        self._server = server
+        self._closed = threading.Event()
+        self._lock = threading.Lock()
         self._thread = futures.ThreadPoolExecutor(1, "cdsm view")
         self._last: futures.Future[None] | None = None
         self._player: Player | None = None
@@ -198,7 +201,8 @@ class Player:
     def __init__(
         self, gui: viser.GuiApi, panel: Panel, path: Array, go: Callable[[Array], None]
     ) -> None:
-        self._size, self.paused = float(len(path)), threading.Event()
+        self._size = float(len(path))
+        self.paused = threading.Event()
         self.paused.set()
         with gui.add_folder("Path", order=0.0):
             self.sample = panel.add_slider(f"sample of {len(path)}", 1.0, self._size, 1.0, 1.0)
@@ -229,10 +233,12 @@ class TipHandle:
     def __init__(
         self, scene: viser.SceneApi, arm: Manipulator, changed: Callable[[], None]
     ) -> None:
-        self._arm, self._changed = arm, changed
+        self._arm = arm
+        self._changed = changed
         self._target: Array | None = None
         self._dragged = False
-        self._remark, self._q = "", np.full(arm.nv, np.nan)
+        self._remark = ""
+        self._q = np.full(arm.nv, np.nan)
         self._node = scene.add_transform_controls(
             HANDLE, _SIZE * arm.length, disable_rotations=True, depth_test=False, opacity=0.7
         )
@@ -253,12 +259,14 @@ class TipHandle:
 
     def follow(self, panel: Panel) -> None:
         """Move the joints of ``panel`` so that the tip is at, or nearest to, a new target."""
-        target, self._target = self._target, None
+        target = self._target
+        self._target = None
         if target is None or panel.pulls:
             return
         found = inverse_kinematics(self._arm, target, panel.setting.q)
         panel.move(found.angles)
-        self._q, self._remark = panel.setting.q, ""
+        self._q = panel.setting.q
+        self._remark = ""
         if not found.reachable:
             stops = f" ({', '.join(found.at_limit)} at a limit)" if found.at_limit else ""
             missed = f"{MM * found.position_error:.3g} mm"

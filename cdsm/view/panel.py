@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     import viser
 
 _STEPS = 500  # least number of steps of a slider, which is a few hundred pixels long
-_TENSION, _FORCE = 200.0, 20.0  # ends of sliders [N], unless the start is beyond
+_TENSION = 200.0  # ends of sliders [N], unless the start is beyond
+_FORCE = 20.0
 _PULLED = 0.1  # most wire that a motor takes in or pays out, over the arm's length
 _LENGTHS = 10.0  # largest coordinate of a prismatic joint on its slider, over the arm's length
 _ROUND = 1e-9  # largest difference of an end of a slider from a round number, over a step
@@ -33,7 +34,10 @@ _SAG: Final = (
     "Tension the cables without the force, lock the motors, then apply the force: the arm moves to "
     "its equilibrium. Otherwise the tensions hold the posture under the force."
 )
-_GREEN, _RED, _AMBER, _GREY = "#2f855a", "#c53030", "#b7791f", "#718096"
+_GREEN = "#2f855a"
+_RED = "#c53030"
+_AMBER = "#b7791f"
+_GREY = "#718096"
 _COLORS: Final = {
     Condition.STABLE: _GREEN,
     Condition.UNSTABLE: _RED,
@@ -59,12 +63,16 @@ class Panel:
         start: Setting,
         changed: Callable[[], None],
     ) -> None:
-        self._gui, self._arm, self._start, self._changed = gui, arm, start, changed
+        self._gui = gui
+        self._arm = arm
+        self._start = start
+        self._changed = changed
         friction = "friction in its holes where motors are locked" if arm.has_friction else ""
         basis = f"wire {wires_text(arm.cables)}; gravity {coordinates(arm.gravity)} m/s²"
         gui.add_markdown(escaped(f"{arm}; {basis}; {friction or 'frictionless'}"), order=-2.0)
         self._text = gui.add_markdown("", order=-1.0)  # above the path, which has 0
-        most, push = max(_TENSION, start.minimum), max(_FORCE, float(abs(start.force).max()))
+        most = max(_TENSION, start.minimum)
+        push = max(_FORCE, float(abs(start.force).max()))
         self.largest_force = push
         with gui.add_folder("Load"):
             self._load = [self.add_slider("least tension [N]", 0.0, most, start.minimum)]
@@ -96,7 +104,8 @@ class Panel:
         self, gui: viser.GuiApi, arm: Manipulator, start: Setting, shown: Iterable[tuple[str, Any]]
     ) -> None:
         most = np.where(arm.slides, _LENGTHS * arm.length, 2.0 * math.pi)
-        low, high = np.maximum(arm.lower, -most), np.minimum(arm.upper, most)
+        low = np.maximum(arm.lower, -most)
+        high = np.minimum(arm.upper, most)
         ends = np.transpose([low, high, start.q] / self._unit).tolist()
         with gui.add_folder("Joints"):
             self.joints = [
@@ -113,7 +122,8 @@ class Panel:
             return replace(self._start, pull=pull, force=pushed)
         q = self._unit * [joint.value for joint in self.joints]
         minimum, *force = [slider.value for slider in self._load]
-        F, sag = np.array(force), self._sag.value
+        F = np.array(force)
+        sag = self._sag.value
         return replace(self._start, q=q, minimum=minimum, force=F, sag=sag)
 
     def update(self, shown: Shown, scene: Scene, remark: str) -> None:
@@ -235,7 +245,10 @@ def escaped(text: str) -> str:
 
 def _numbers(shown: Shown) -> Iterator[tuple[str, str, str]]:
     """Yield what each number is, the number, and its unit."""
-    K, source, tensions, pose = shown.stiffness, shown.source, shown.tensions, shown.posture
+    K = shown.stiffness
+    source = shown.source
+    tensions = shown.tensions
+    pose = shown.posture
     if source is not None:
         along = ", ".join(f"{N_PER_MM * source.along(u):.4g}" for u in np.eye(3))
         yield "stiffness along x, y, z", along, "N/mm"

@@ -42,14 +42,16 @@ class Scene:
     """
 
     def __init__(self, server: viser.ViserServer, arm: Manipulator, largest_force: float) -> None:
-        self._arm, self._scene, length = arm, server.scene, arm.length
+        self._arm = arm
+        self._scene = server.scene
+        length = arm.length
         self.cell = 10.0 ** math.floor(math.log10(length / 5.0))  # size of a cell of the grid [m]
         self.force_scale = _ARROW * length / largest_force  # length of the arrow per force [m/N]
         self._draw_surroundings()
         # without a posture, what is below these frames is hidden
         frames = [self._scene.add_frame(name, show_axes=False) for name in ("/arm", "/cables")]
         try:
-            self._shapes = arm._body.visualizer(arm.urdf, server, "/arm")
+            self._shapes = arm.body.visualizer(arm.urdf, server, "/arm")
         except GeometryError as error:
             _LOG.warning("%s Sticks are drawn instead.", error)
             self._shapes = None
@@ -90,17 +92,23 @@ class Scene:
         if len(path) > 1:
             lines = np.stack([path[:-1], path[1:]], axis=1)
             self._thin("/path", points=lines, colors=FORCE, thickness=1.5, visible=True)
-        pose, length = shown.posture, self._arm.length
+        pose = shown.posture
+        length = self._arm.length
         points = np.concatenate([path, *(pose.bones if pose else [np.eye(2, 3)])])
-        low, high = points.min(axis=0), points.max(axis=0)
+        low = points.min(axis=0)
+        high = points.max(axis=0)
         radius = max(float(np.linalg.norm(high - low)), length) / 2.0
         camera.look_at = (low + high) / 2.0
         camera.position = camera.look_at + radius * _SIDE
-        camera.fov, camera.near, camera.far = math.pi / 4.0, radius / 50.0, 200.0 * radius
+        camera.fov = math.pi / 4.0
+        camera.near = radius / 50.0
+        camera.far = 200.0 * radius
 
     def update(self, shown: Shown, names: bool) -> None:
         """Draw the results ``shown``; ``names`` labels all cables."""
-        pose, force, ellipsoid = shown.posture, shown.setting.force, shown.ellipsoid
+        pose = shown.posture
+        force = shown.setting.force
+        ellipsoid = shown.ellipsoid
         for frame in self._frames:
             frame.visible = pose is not None
         self._ellipsoid.visible = ellipsoid is not None
@@ -141,7 +149,8 @@ class Scene:
         self._label.position = tip + 0.1 * self._arm.length * np.eye(3)[2]
 
     def _draw_surroundings(self) -> None:
-        scene, length = self._scene, self._arm.length
+        scene = self._scene
+        length = self._arm.length
         # an environment map and shadows take seconds without a GPU
         scene.configure_environment_map(hdri=None)
         scene.configure_default_lights(cast_shadow=False)
@@ -163,5 +172,8 @@ class Scene:
 def _faces(rows: int, columns: int) -> NDArray[np.uint32]:
     """Return the triangles (n, 3) of a surface through a grid of points, as indices of points."""
     points = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
-    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[:-1, 1:], points[1:, 1:]
+    a = points[:-1, :-1]
+    b = points[1:, :-1]
+    c = points[:-1, 1:]
+    d = points[1:, 1:]
     return np.stack([a, b, c, c, b, d], axis=-1).reshape(-1, 3)

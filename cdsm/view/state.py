@@ -105,7 +105,8 @@ class Shown:
     @cached_property
     def ellipsoid(self) -> Ellipsoid | None:
         """Ellipsoid of displacements, as in :func:`cdsm.plots.plot_arm`; None if not stable."""
-        pose, source = self.posture, self.source
+        pose = self.posture
+        source = self.source
         if pose is None or source is None:
             return None
         return ellipsoid(source.compliance[:3, :3], pose.tip[:3, 3], pose.arm.length)
@@ -124,7 +125,8 @@ class Shown:
         pose = self.posture
         if pose is None or self.tensions is None or not pose.arm.has_friction:
             return np.empty((0, 2, 3)), np.empty((0, 2, 3))
-        chains, sticks = pose.segments.chains, can_stick(pose)
+        chains = pose.segments.chains
+        sticks = can_stick(pose)
         slides = np.zeros_like(sticks) if self.sliding is None else self.sliding
         where = zip(chains.cable[chains.hole], chains.site, strict=True)
         spans = np.array([pose.cable_paths[c][i : i + 2] for c, i in where])

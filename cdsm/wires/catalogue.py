@@ -80,12 +80,12 @@ def write_law(law: Elasticity, path: str | os.PathLike[str]) -> Path:
 
 def table_of(law: Elasticity) -> dict[str, Any]:
     """Return the TOML table of a law; InvalidInput if it was made from a function."""
-    if not law._kind:
+    if not law.kind:
         problem = f"{law!r} was made from a function. Tabulate its strain to save it."
         raise InvalidInput("elasticity", problem)
-    table = {"kind": law._kind, **law._given}
-    if law._constant or law._factor != 1.0:
-        table["rigidity" if law._constant else "factor"] = law._factor
+    table = {"kind": law.kind, **law.arguments}
+    if law.constant_rigidity or law.factor != 1.0:
+        table["rigidity" if law.constant_rigidity else "factor"] = law.factor
     return table | ({"slack_below": True} if law.low < law.rest else {})
 
 
@@ -119,11 +119,11 @@ def name_of(law: Elasticity) -> str | None:
 
 def label(law: Elasticity) -> str:
     """Return a short text for a law: the name of its wire, its EA, or its kind and tensions."""
-    if law._constant or name_of(law):
-        return name_of(law) or f"EA {law._constant:.6g} N"
-    text = f"{law._kind or 'function'}, {law.rest:.4g} to {law.high:.4g} N"
-    text = "1x19-1.2mm" if law._given == STRAND._given else text
-    text += f", EA times {law._factor:.6g}" if law._factor != 1.0 else ""
+    if law.constant_rigidity or name_of(law):
+        return name_of(law) or f"EA {law.constant_rigidity:.6g} N"
+    text = f"{law.kind or 'function'}, {law.rest:.4g} to {law.high:.4g} N"
+    text = "1x19-1.2mm" if law.arguments == STRAND.arguments else text
+    text += f", EA times {law.factor:.6g}" if law.factor != 1.0 else ""
     branch = f", with a slack branch of EA {law.rigidity(law.low):.4g} N below {law.rest:.4g} N"
     return text + branch * (law.low < law.rest)
 

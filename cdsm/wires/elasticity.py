@@ -43,9 +43,9 @@ class Elasticity(Plotted):
     low: float
     high: float
     rest: float
-    _kind: str  # in TOML; empty if the law was made from a function
-    _given: dict[str, Any]  # arguments that the law was made from
-    _factor: float  # EA over that of the polynomials
+    kind: str  # in TOML; empty if the law was made from a function
+    arguments: dict[str, Any]  # arguments that the law was made from
+    factor: float  # EA over that of the polynomials
     _knots: Array  # tensions (n + 1,) [N], from ``rest`` on
     _coefficients: Array  # of ε in F − knot (k, n), lowest power first
     _cells: NDArray[np.intp] | None = None  # piece of each cell, even in (F − rest)^¼
@@ -97,7 +97,7 @@ class Elasticity(Plotted):
         """
         if scalar("factor", factor) <= 0.0:
             raise InvalidInput("factor", f"{factor:g} given; a positive number is needed.")
-        return Elasticity(**vars(self) | {"_factor": self._factor * float(factor)})
+        return Elasticity(**vars(self) | {"factor": self.factor * float(factor)})
 
     def slack_below(self) -> Elasticity:
         """Return the law continued to 0 N with the rigidity of its low end F_0 (an assumption).
@@ -105,7 +105,8 @@ class Elasticity(Plotted):
         The strain stays zero at F_0, so nothing changes above. Below, ε = (F − F_0)/EA is negative.
         Raises InvalidInput if the slack wire would be shorter than half its length.
         """
-        low, EA = self.low, float(self.rigidity(self.low))
+        low = self.low
+        EA = float(self.rigidity(self.low))
         if low > _SHORTEST * EA:
             slack = f"would be slack after shortening by {100.0 * low / EA:.3g} %"
             said = (
@@ -124,28 +125,31 @@ class Elasticity(Plotted):
 
     def strain_and_rigidity(self, tension: ArrayLike) -> tuple[Array, Array]:
         """Compute ε [-] and EA [N] at F [N], any shape; see :meth:`strain`, :meth:`rigidity`."""
-        strain, EA = self._evaluate(self._inside(number_array("tension", tension)))
+        strain, EA = self.evaluate(self.require_inside(number_array("tension", tension)))
         return np.asarray(strain), np.asarray(EA)
 
     def rigidity_slope(self, tension: ArrayLike) -> Array:
         """Compute dEA/dF [-] at F [N], any shape; zero below :attr:`rest`."""
         F = number_array("tension", tension)
-        return self._slope(F, self._evaluate(self._inside(F))[1])
+        return self.slope_at(F, self.evaluate(self.require_inside(F))[1])
 
-    def _slope(self, F: Array, EA: Array) -> Array:
+    def slope_at(self, F: Array, EA: Array) -> Array:
         """Compute dEA/dF [-] at tensions F [N] of the law, with EA [N] there: −EA² ε″."""
         piece, x = self._place(F.clip(self.rest))
-        rows, bend = self._coefficients.take(piece, axis=1), np.zeros_like(x)
+        rows = self._coefficients.take(piece, axis=1)
+        bend = np.zeros_like(x)
         for i in range(len(rows) - 1, 1, -1):
             bend = bend * x + i * (i - 1) * rows[i]
-        return np.where(self.rest > F, 0.0, -bend * EA**2 / self._factor)
+        return np.where(self.rest > F, 0.0, -bend * EA**2 / self.factor)
 
     def energy(self, tension: ArrayLike) -> Array:
         """Compute ∫ F dε [N] = [J/m], from :attr:`rest` to F [N], any shape."""
-        F, moment = self._inside(number_array("tension", tension)), polyint(self._coefficients)
+        F = self.require_inside(number_array("tension", tension))
+        moment = polyint(self._coefficients)
         moment[0, 1:] = np.cumsum(polyval(np.diff(self._knots), moment, tensor=False))[:-1]
-        (strain, EA), below = self._evaluate(F), np.minimum(F - self.rest, 0.0)
-        area = self._polynomial(moment, F) / self._factor + below**2 / (2.0 * EA)
+        (strain, EA) = self.evaluate(F)
+        below = np.minimum(F - self.rest, 0.0)
+        area = self._polynomial(moment, F) / self.factor + below**2 / (2.0 * EA)
         return np.asarray(F * strain - area)  # by parts
 
     def secant_rigidity(self, tension: ArrayLike) -> Array:
@@ -165,30 +169,31 @@ class Elasticity(Plotted):
         return isinstance(other, Elasticity) and repr(self) == repr(other)
 
     def __hash__(self) -> int:
-        return hash((self._kind, self._factor, self.low, self.high))
+        return hash((self.kind, self.factor, self.low, self.high))
 
     def __repr__(self) -> str:
-        given = self._given | ({"rigidity": self._factor} if self._constant else {})
+        given = self.arguments | ({"rigidity": self.factor} if self.constant_rigidity else {})
         text = ", ".join(f"{name}={value!r}" for name, value in given.items())
-        scaled = "" if self._constant or self._factor == 1.0 else f".scaled({self._factor!r})"
+        scaled = "" if self.constant_rigidity or self.factor == 1.0 else f".scaled({self.factor!r})"
         slack = ".slack_below()" * (self.low < self.rest)
-        return f"{self._kind.capitalize()}Elasticity({text}){scaled}{slack}"
+        return f"{self.kind.capitalize()}Elasticity({text}){scaled}{slack}"
 
     @property
-    def _constant(self) -> float | None:
+    def constant_rigidity(self) -> float | None:
         """EA [N] if it is the same at all tensions."""
-        return self._factor if self._kind == "linear" else None
+        return self.factor if self.kind == "linear" else None
 
     @property
     def _span(self) -> str:
         """The tensions of the law, as text."""
         return f"[{self.low:g} N, {self.high:g} N{')' if math.isinf(self.high) else ']'}"
 
-    def _inside(self, F: Array) -> Array:
+    def require_inside(self, F: Array) -> Array:
         """Return the tensions F [N], or raise ElasticityRangeError."""
         if F.size and not (F.min() >= self.low and F.max() <= self.high):
             outside = (self.low > F) | (self.high < F)
-            few, many = bool(F.min() < self.low), bool(F.max() > self.high)
+            few = bool(F.min() < self.low)
+            many = bool(F.max() > self.high)
             bounds = [f"a minimum of {rounded(self.low, up=True)} N or more"] if few else []
             highest = rounded(self.high, up=False)
             bounds += [f"a maximum of {highest} N or less, and a minimum below it"] if many else []
@@ -201,7 +206,7 @@ class Elasticity(Plotted):
             )
         return F
 
-    def _evaluate(self, F: Array) -> tuple[Array, Array]:
+    def evaluate(self, F: Array) -> tuple[Array, Array]:
         """Compute ε [-] and EA [N] at tensions F [N] of the law, any shape."""
         inside = F if self.low == self.rest else np.maximum(F, self.rest)
         piece, x = self._place(inside)
@@ -212,8 +217,8 @@ class Elasticity(Plotted):
             softness += strain
             strain *= x
             strain += row
-        strain /= self._factor
-        EA = self._factor / softness
+        strain /= self.factor
+        EA = self.factor / softness
         return (strain, EA) if inside is F else (strain + (F - inside) / EA, EA)
 
     def _polynomial(self, coefficients: NDArray[Any], F: Array) -> Array:
@@ -233,7 +238,7 @@ class Elasticity(Plotted):
     def _tension_of(self, wanted: Array, name: str, length: float = 1, series: float = 0) -> Array:
         """Return F [N] at which ``length`` · ε + ``series`` · (F − rest) is ``wanted``."""
         knots = np.union1d(self.low, self._knots)
-        reached = length * self._evaluate(knots)[0] + series * (knots - self.rest)
+        reached = length * self.evaluate(knots)[0] + series * (knots - self.rest)
         if (outside := (wanted < reached[0]) | (wanted > reached[-1] * (1.0 + 1e-15))).any():
             given = f"the {name} {wanted[outside][0]:.6g}; it reaches {reached[-1]:.6g}."
             problem = f"no tension of the domain {self._span} gives {given}"
@@ -241,7 +246,7 @@ class Elasticity(Plotted):
         after = np.searchsorted(reached, wanted).clip(1, len(knots) - 1)
 
         def error(F: Array) -> tuple[Array, Array]:
-            strain, EA = self._evaluate(F)
+            strain, EA = self.evaluate(F)
             return length * strain + series * (F - self.rest) - wanted, length / EA + series
 
         start = np.interp(wanted, reached, knots)
@@ -260,7 +265,8 @@ def newton_in_bracket(
         newton = x - value / slope
         if (abs(newton - x) <= 1e-13 * np.maximum(abs(x), 1.0)).all():
             break
-        low, high = np.where(value < 0.0, x, low), np.where(value > 0.0, x, high)
+        low = np.where(value < 0.0, x, low)
+        high = np.where(value > 0.0, x, high)
         x = np.where((low <= newton) & (newton <= high), newton, (low + high) / 2.0)
     return x, slope
 

@@ -28,7 +28,8 @@ _LINE: Final = np.array([0.0, RANGES["tension"].high]), np.array([[0.0], [1.0]])
 _CELLS: Final = 800  # pieces of a function EA(F), to 1e-9 of Eq. 19
 _ACCURACY: Final = 1e-8  # of EA between two knots
 _NEAR: Final = 1.0  # distance [N] from a join within which there is no knot
-_NODES, _WEIGHTS = (leggauss(8)[0] + 1.0) / 2.0, leggauss(8)[1] / 2.0
+_NODES = (leggauss(8)[0] + 1.0) / 2.0
+_WEIGHTS = leggauss(8)[1] / 2.0
 _POWERS: Final = np.arange(3.0, 6.0)
 _QUINTIC = np.linalg.inv([_POWERS**0, _POWERS, _POWERS * (_POWERS - 1.0)])  # by value, slope, bend
 
@@ -71,8 +72,8 @@ class StrandElasticity(Elasticity):
     invalid, 0 <= low < joins < high does not hold, two ranges do not meet, or EA is not positive.
     """
 
-    coefficients = property(lambda law: law._given["coefficients"], doc="As given, in tuples.")
-    joins = property(lambda law: law._given["joins"], doc="As given [N], in a tuple.")
+    coefficients = property(lambda law: law.arguments["coefficients"], doc="As given, in tuples.")
+    joins = property(lambda law: law.arguments["joins"], doc="As given [N], in a tuple.")
 
     def __init__(
         self,
@@ -125,8 +126,8 @@ class TabulatedElasticity(Elasticity):
     or InvalidInput is raised. Only differences of strains matter.
     """
 
-    tensions = property(lambda law: law._given["tensions"], doc="As given [N], in a tuple.")
-    strains = property(lambda law: law._given["strains"], doc="As given [-], in a tuple.")
+    tensions = property(lambda law: law.arguments["tensions"], doc="As given [N], in a tuple.")
+    strains = property(lambda law: law.arguments["strains"], doc="As given [-], in a tuple.")
 
     def __init__(self, tensions: Sequence[float], strains: Sequence[float]) -> None:
         from scipy.interpolate import CubicHermiteSpline, CubicSpline  # import slowly
@@ -142,7 +143,8 @@ class TabulatedElasticity(Elasticity):
             if row[at] - row[at - 1] <= least:
                 rise = f"entry [{at}] is {row[at]:g} after {row[at - 1]:g}; they must rise."
                 raise InvalidInput(name, rise)
-        chords, strain = np.diff(strain) / np.diff(F), strain - strain[0]
+        chords = np.diff(strain) / np.diff(F)
+        strain = strain - strain[0]
         if not 1.0 / LARGEST < chords.min() <= chords.max() < LARGEST:
             raise InvalidInput("strains", "rise so steeply, or so little, that EA is no rigidity.")
         slopes = least = np.minimum(np.append(chords[0], chords), np.append(chords, chords[-1]))
@@ -150,7 +152,9 @@ class TabulatedElasticity(Elasticity):
             middles = (strain[1:] + strain[:-1]) / 2.0
             ln = CubicSpline(middles, np.log(chords), bc_type="natural")(strain)
             slopes = np.exp(np.clip(ln, np.log(least / 2.0), np.log(2.5 * least)))
-        low, high, curve = float(F[0]), float(F[-1]), CubicHermiteSpline(F, strain, slopes)
+        low = float(F[0])
+        high = float(F[-1])
+        curve = CubicHermiteSpline(F, strain, slopes)
         super().__init__(low, high, low, "tabulated", given, 1.0, F, curve.c[::-1])
 
 
@@ -196,15 +200,21 @@ def tabulate(
     width = np.diff(sides)[:, None]
     steps = (width * _WEIGHTS / _checked(rigidity, sides[:-1, None] + width * _NODES)).sum(axis=1)
     rise = np.add.reduceat(steps, np.flatnonzero(np.isin(sides[:-1], F)))
-    before, after = np.maximum(F - 1e-5 * (F + 1.0), low), np.minimum(F + 1e-5 * (F + 1.0), high)
+    before = np.maximum(F - 1e-5 * (F + 1.0), low)
+    after = np.minimum(F + 1e-5 * (F + 1.0), high)
     slope = (_checked(rigidity, after) - _checked(rigidity, before)) / (after - before)
-    EA, h = _checked(rigidity, F), np.diff(F)
+    EA = _checked(rigidity, F)
+    h = np.diff(F)
     slope[-1] += (slope[-1] - slope[-2]) / h[-1] * (high - before[-1]) / 2.0  # one-sided there
-    a, b = 1.0 / EA, -slope / EA**2  # ε′ and ε″
-    start, first, second = np.append(0.0, np.cumsum(rise)[:-1]), a[:-1] * h, b[:-1] * h**2
+    a = 1.0 / EA  # ε′ and ε″
+    b = -slope / EA**2
+    start = np.append(0.0, np.cumsum(rise)[:-1])
+    first = a[:-1] * h
+    second = b[:-1] * h**2
     more = _QUINTIC @ [rise - first - second / 2.0, np.diff(a) * h - second, np.diff(b) * h**2]
     c = np.vstack([start, a[:-1], b[:-1] / 2.0, more / h ** _POWERS[:, None]])
-    test, softness = F[:-1] + 0.3 * h, polyval(0.3 * h, polyder(c), tensor=False)
+    test = F[:-1] + 0.3 * h
+    softness = polyval(0.3 * h, polyder(c), tensor=False)
     wrong = abs(softness * _checked(rigidity, test) - 1.0) > _ACCURACY
     if (wrong & ~near(test, 3.0 * _NEAR)).any():
         raise InvalidInput(

@@ -24,7 +24,9 @@ from cdsm.support.values import Array
 FEWEST: Final = 8  # points of a fit; fewer show no bend
 _FALL = 0.1  # a fall of the force by this share of its range ends a loading branch
 _REACHED = 0.95  # share of the largest force that the fitted branch reaches
-_SPLINES, _GRID, _MOST = 36, 600, 400  # splines, tensions of the grid, points (more are averaged)
+_SPLINES = 36  # splines, tensions of the grid, points (more are averaged)
+_GRID = 600
+_MOST = 400
 _JUMP = 10.0  # EA over the steepest measured chord; beyond it, the curve has overshot a jump
 _ROUGHER = 100.0  # smoothing of the fit over that of the curve for the band
 
@@ -55,7 +57,8 @@ def loading(strain: Array, force: Array, between: tuple[float, float]) -> Loadin
         )
     noise, reach = _noise_and_reach(force)
     lone = _lone(force) | _lone(strain)
-    strain, force = strain[~lone], force[~lone]
+    strain = strain[~lone]
+    force = force[~lone]
     if (lowest := force.min()) < -max(6.0 * noise, 5e-3 * reach):
         refuse(f"{lowest:.4g} N is compression. Tare the load cell, or change the sign.")
     padded = np.pad(force, 1, constant_values=-np.inf)
@@ -63,15 +66,20 @@ def loading(strain: Array, force: Array, between: tuple[float, float]) -> Loadin
     most = float(force.max())
     top = _REACHED * min(most, between[1])
     rise = int(np.flatnonzero(force[peaks] >= top)[-1])
-    first, last, after = 0, peaks[rise] + 1, len(force) - peaks[rise] - 1
+    first = 0
+    last = peaks[rise] + 1
+    after = len(force) - peaks[rise] - 1
     if rise:
         first = peaks[rise - 1] + int(force[peaks[rise - 1] : last].argmin())
-    strain, force = strain[first:last], force[first:last]
+    strain = strain[first:last]
+    force = force[first:last]
     low = force <= force[: max(3, len(force) // 100)].min() + 4.0 * noise
     slack = int(np.flatnonzero(low)[-1]) if force[0] <= 8.0 * noise and low.sum() > 2 else 0
-    strain, force = strain[slack:], force[slack:]
+    strain = strain[slack:]
+    force = force[slack:]
     inside = (force >= between[0]) & (force <= between[1])
-    strain, force = strain[inside], force[inside]
+    strain = strain[inside]
+    force = force[inside]
     in_order = force[np.argsort(strain, kind="stable")]
     rising = isotonic_regression(in_order).x if len(force) else in_order
     if len(force) < FEWEST or not np.std(in_order - rising) < 0.1 * np.ptp(rising):
@@ -125,12 +133,14 @@ class Curve(NamedTuple):
 
 def _grid(force: Array, noise: float) -> tuple[Array, Array]:
     """Return a grid of tensions (g,) [N] from the first load on, and the splines there (g, k)."""
-    low, high = max(float(force.min()) - 3.0 * noise, 0.0), float(force.max())
+    low = max(float(force.min()) - 3.0 * noise, 0.0)
+    high = float(force.max())
     corner = max(low, 8.0 * noise, 5e-3 * high)
     top = np.log1p((high - low) / corner)
     fine = low + corner * np.expm1(np.linspace(0.0, top, 8 * _GRID))
     place = (np.log1p((fine - low) / corner) / top + (fine - low) / (high - low)) / 2.0
-    t, splines = np.linspace(0.0, 1.0, _GRID), min(_SPLINES, 4 + len(force) // 3)
+    t = np.linspace(0.0, 1.0, _GRID)
+    splines = min(_SPLINES, 4 + len(force) // 3)
     knots = np.arange(-3, splines + 1) / (splines - 3)
     rows = BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray()
     return np.interp(t, place, fine), rows
@@ -147,7 +157,9 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
     count = np.array([len(group) for group in groups])
     weight = np.sqrt(count / count.mean())
     tension, splines = _grid(force, noise)
-    (n, k), span, reach = (len(force), splines.shape[1]), np.ptp(strain), np.ptp(force)
+    (n, k) = (len(force), splines.shape[1])
+    span = np.ptp(strain)
+    reach = np.ptp(force)
     bends = np.hstack([np.diff(np.eye(k), 2, axis=0), np.zeros((k - 2, 1))])
     upper = np.argsort(strain)[n // 2 :]
     chord = np.polyfit(strain[upper], force[upper], 1)[0]
@@ -187,7 +199,8 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
             xtol=1e-6,
             ftol=1e-6,
         ).x
-        J, r = slope(x), error(x)
+        J = slope(x)
+        r = error(x)
         normal = J.T @ J + root.T @ root
         scale = np.sqrt(np.diag(normal))  # strain and ln EA are orders apart
         factor = cho_factor(normal / np.outer(scale, scale) + 1e-11 * np.eye(k + 1))
@@ -198,7 +211,8 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
         variance = left / max(n - np.sum((J @ inverse) * J), 1.0)
         return x, float(score), variance * inverse
 
-    x, scores = np.append(np.full(k, start), strain.max() / span), {}
+    x = np.append(np.full(k, start), strain.max() / span)
+    scores = {}
     for power in (6, 4, 2, 0, -2, -4):  # from a straight ln EA on: each start is near
         x, score, _ = solve(power, x)
         scores[score] = power, x
@@ -208,8 +222,10 @@ def fit_curve(strain: Array, force: Array, noise: float) -> Curve:
     x = solve(best, x)[0]
     rough, _, covariance = solve(best - np.log10(_ROUGHER), x)
     variance = np.sum((splines @ covariance[:-1, :-1]) * splines, axis=1)
-    (EA, grid), r = curve(x), error(x)
-    order, step = np.argsort(strain, kind="stable"), max(1, n // 50)
+    (EA, grid) = curve(x)
+    r = error(x)
+    order = np.argsort(strain, kind="stable")
+    step = max(1, n // 50)
     rise, along = (a[order[step:]] - a[order[:-step]] for a in (force, strain))
     if EA.max() > _JUMP * np.max(rise / np.maximum(along, 1e-4 * span)):
         refuse(

@@ -101,8 +101,10 @@ class TensileFit(Result, Plotted):
         return self.band.high
 
     def __str__(self) -> str:
-        F, EA = self.tension[[0, -1]], self.rigidity[[0, -1]]
-        u, length = self.relative_uncertainty(), 1e3 * self.test.gauge_length
+        F = self.tension[[0, -1]]
+        EA = self.rigidity[[0, -1]]
+        u = self.relative_uncertainty()
+        length = 1e3 * self.test.gauge_length
         lines = [
             f"Tensile test of {self.test.force.size} points, gauge length {length:g} mm",
             f"  tension   {F[0]:.4g} N to {F[1]:.4g} N",
@@ -169,7 +171,8 @@ def fit_tensile_test(
             length is not positive, the wire is compressed, the force does not rise or jumps, the
             units are impossible, or fewer than 8 points are left or lie below the yield.
     """
-    u, F = number_array("displacement", displacement), number_array("force", force)
+    u = number_array("displacement", displacement)
+    F = number_array("force", force)
     length = checked("gauge_length", gauge_length, "length")
     if u.ndim != 1 or u.shape != F.shape:
         raise InvalidInput("force", f"shapes {u.shape} and {F.shape} given; a point needs both.")
@@ -177,11 +180,15 @@ def fit_tensile_test(
     if limits.shape != (2,) or limits.dtype.kind not in "iuf" or not limits[0] < limits[1]:
         raise InvalidInput("between", f"{between!r} given; give (low, high) in N, low below high.")
     points = loading(u / length, F, between)
-    strain, pull, notes = points.strain, points.force, points.notes
+    strain = points.strain
+    pull = points.force
+    notes = points.notes
     curve = fit_curve(strain, pull, points.noise)
-    onset, most = _yield_onset(curve), float(pull.max())
+    onset = _yield_onset(curve)
+    most = float(pull.max())
     if onset is not None:  # fit again: the yield would distort the curve below it
-        strain, pull = strain[pull <= onset], pull[pull <= onset]
+        strain = strain[pull <= onset]
+        pull = pull[pull <= onset]
         notes += (
             f"plastic from {onset:.4g} N on: {len(points.force) - len(pull)} points left out",
         )
@@ -201,13 +208,15 @@ def fit_tensile_test(
             "drifts, a grip slips, or EA bends too sharply. The band is too narrow",
         )
     grid, law = _as_law(curve, strain)
-    low, high = float(grid[0]), float(grid[-1])
+    low = float(grid[0])
+    high = float(grid[-1])
     begin = _pretension_end(curve)
     stages = [Stage("elastic", low if begin is None else begin, high)]
     stages[:0] = [] if begin is None else [Stage("pre-tensioning", low, begin)]
     stages += [] if onset is None else [Stage("plastic", high, max(most, high))]
     middle, deviation = (np.interp(grid, curve.tension, a) for a in (curve.rough, curve.deviation))
-    half, level = np.maximum(_NORMAL * deviation, _EXACT), np.log(law.rigidity(grid))
+    half = np.maximum(_NORMAL * deviation, _EXACT)
+    level = np.log(law.rigidity(grid))
     ends = np.minimum(middle - half, level), np.maximum(middle + half, level)
     error = pull - np.interp(strain, curve.strain, curve.tension)
     return TensileFit(
@@ -233,7 +242,8 @@ def _as_law(curve: Curve, strain: Array) -> tuple[Array, TabulatedElasticity]:
 
 def _yield_onset(curve: Curve) -> float | None:
     """Return F [N] from which EA surely stays below 0.8 of its plateau, which no slip raises."""
-    F, level = curve.tension, curve.level
+    F = curve.tension
+    level = curve.level
     even = np.linspace(F[0], F[-1], 200)
     sure = np.interp(even, F, level - _CERTAIN * curve.deviation)
     limit = np.quantile(sure, 0.9) + np.log(_YIELD)
@@ -246,6 +256,7 @@ def _pretension_end(curve: Curve) -> float | None:
     F = curve.tension[(curve.tension > _STEP * curve.tension[0])]
     F = F[curve.tension[-1] > F * _STEP]
     sides = [np.interp(F * s, curve.tension, curve.level) for s in (_STEP, 1.0 / _STEP)]
-    rise, sure = sides[0] - sides[1], np.interp(F, curve.tension, curve.deviation)
+    rise = sides[0] - sides[1]
+    sure = np.interp(F, curve.tension, curve.deviation)
     steep = np.flatnonzero(rise >= np.maximum(np.log(_STEP), _CERTAIN * sure))
     return float(F[steep[-1]]) if len(steep) else None

@@ -118,12 +118,14 @@ def read_tensile_csv(
             f"has no header that names {' and '.join(columns or ('displacement', 'force'))} in "
             f"its first {_HEADERS} lines; there are {', '.join(names) or 'none'}; which columns?"
         )
-    at, chosen = -at, []
+    at = -at
+    chosen = []
     for kind, places, given in zip(_UNITS, fit, units or (None, None), strict=True):
         if len(places) > 1:
             several = " and ".join(names[k] for k in places)
             refuse(f"{several} may both be the {kind}; give one as columns.")
-        known, place = _UNITS[kind], places[0]
+        known = _UNITS[kind]
+        place = places[0]
         written = [_name_and_unit(names[place])[1], *below[place : place + 1]]
         unit = next((each for each in (*written, given) if each in known), None)
         if unit is None or given not in (None, unit):
@@ -177,11 +179,14 @@ def _fitting(row: list[str], columns: Sequence[str] | None) -> tuple[list[int], 
 
 def _name_and_unit(cell: str) -> tuple[str, str]:
     """Split a cell of a header such as ``Load [kN]`` or ``load_kN`` into name and unit, if any."""
-    name, unit = cell, ""
+    name = cell
+    unit = ""
     while brackets := _BRACKETS.search(name):
-        name, unit = name[: brackets.start()], unit or brackets[1].strip()
+        name = name[: brackets.start()]
+        unit = unit or brackets[1].strip()
     if not unit and (last := _LAST_WORD.search(name)) and last[1] in _KNOWN:
-        name, unit = name[: last.start()], last[1]
+        name = name[: last.start()]
+        unit = last[1]
     return name, unit
 
 

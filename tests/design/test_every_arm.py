@@ -90,7 +90,7 @@ def test_every_kind_of_arm_is_searched_and_written(kind: str, tmp_path: Path) ->
     best = found.arm()
     assert cdsm.Manipulator.read(found.write_arm(tmp_path)[0]) == best
     # of what the joints carry; crosses of universal joints are there for simulators only
-    carried = best._body.arrays().mass
+    carried = best.body.arrays().mass
     assert found.values()["mass"] == pytest.approx(carried.sum(), abs=2e-5)
     assert found.values()["mass"] > 0.09
     for row, value in zip(found.evaluated.designs, found.evaluated["margin"], strict=True):

@@ -171,7 +171,7 @@ def test_inertia_about_the_joint_is_moved_to_the_centre(tmp_path: Path) -> None:
     links = link(1, "R_Y", ref="joint", mass=0.05) + link(2, "R_X", mass=0)
     arm = cdsm.read_caspr(folder(tmp_path, links, cable()), elasticity=LAW)
     # of one link about its joint's y axis that is what the file says
-    assert arm._body.mass_matrix(np.zeros(2))[0, 0] == pytest.approx(0.002, rel=1e-12)
+    assert arm.body.mass_matrix(np.zeros(2))[0, 0] == pytest.approx(0.002, rel=1e-12)
 
 
 def test_files_may_be_given_one_by_one(tmp_path: Path) -> None:

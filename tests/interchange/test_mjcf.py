@@ -201,7 +201,7 @@ def test_mass_matrix_is_that_of_mujoco(body: str) -> None:
     stand_ins = model.body_gravcomp > 0.0  # of bodies without mass
     model.body_mass[stand_ins] = model.body_inertia[stand_ins] = 0.0
     mujoco.mj_forward(model, data)
-    place, own = order(model, arm), arm._body.mass_matrix(pose.q)
+    place, own = order(model, arm), arm.body.mass_matrix(pose.q)
     theirs = mass(model, data)[np.ix_(place, place)]
     exact = {"crab": 1e-12, "mixed": 1e-12, "of a plate": 1e-8}
     most = exact | {"of a rod": 1e-5, "of a needle": 1e-5}  # they get a moment of 1e-9 kg m²

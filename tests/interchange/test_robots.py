@@ -121,8 +121,8 @@ def test_mujoco_agrees(name: str) -> None:
     mujoco.mj_resetDataKeyframe(model, state, 0)
     mujoco.mj_forward(model, state)
     theirs = state.qfrc_bias - state.qfrc_passive - state.qfrc_actuator
-    place = [model.joint(joint).dofadr[0] for joint in arm._body.all_joints]
-    theirs, coupling = theirs[place], arm._body.coupling
+    place = [model.joint(joint).dofadr[0] for joint in arm.body.all_joints]
+    theirs, coupling = theirs[place], arm.body.coupling
     assert model.neq == len(place) - arm.nv
     if coupling:  # equations of MuJoCo hold the followers
         assert not state.efc_pos[: state.ne].any()

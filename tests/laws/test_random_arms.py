@@ -113,7 +113,7 @@ def reach(arm: cdsm.Manipulator) -> float:
 
 def weight(arm: cdsm.Manipulator) -> float:
     """Of all links [N]."""
-    return float(arm._body.arrays().mass.sum() * np.linalg.norm(arm.gravity))
+    return float(arm.body.arrays().mass.sum() * np.linalg.norm(arm.gravity))
 
 
 def assert_derivative(

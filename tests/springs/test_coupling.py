@@ -98,8 +98,8 @@ def test_statics_friction_and_modes_couple() -> None:
     pull = cdsm.distribute_tension(rough.at(PHI), 5.0)
     history = cdsm.load_cycle(rough.at(PHI), pull, [[0.0, 0.0, -0.1, 0.0, 0.0, 0.0]])
     assert np.isfinite(history.tip).all()
-    M = ARM._body.mass_matrix(PHI)
-    np.testing.assert_allclose(M, S.T @ FREE._body.mass_matrix(THETA) @ S, atol=1e-12)
+    M = ARM.body.mass_matrix(PHI)
+    np.testing.assert_allclose(M, S.T @ FREE.body.mass_matrix(THETA) @ S, atol=1e-12)
 
 
 def test_sections_turn_alike() -> None:
@@ -160,5 +160,5 @@ def test_followers_do_not_yield_to_the_cables_in_mujoco(follows: dict[str, str])
     state = mujoco.MjData(model)
     for _ in range(200):
         mujoco.mj_step(model, state)
-    found = [state.qpos[model.joint(name).qposadr[0]] for name in arm._body.all_joints]
-    np.testing.assert_allclose(found, arm._body.coupling.angles(pose.q), atol=1e-6)
+    found = [state.qpos[model.joint(name).qposadr[0]] for name in arm.body.all_joints]
+    np.testing.assert_allclose(found, arm.body.coupling.angles(pose.q), atol=1e-6)

@@ -17,7 +17,7 @@ WANTED = 4000.0
 def paid_out(plan: PathPlan) -> Array:
     """Wire that the motors pay out at each sample of a plan (P, C) [m]."""
     pairs = zip(plan.cable_lengths, plan.tensions, strict=True)
-    return np.array([plan.arm._laws.original_lengths(L, F) for L, F in pairs])
+    return np.array([plan.arm.laws.original_lengths(L, F) for L, F in pairs])
 
 
 @cache
