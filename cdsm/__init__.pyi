@@ -67,8 +67,8 @@ from cdsm.planning.sensitivity import stiffness_gradient as stiffness_gradient
 from cdsm.posture import Posture as Posture
 from cdsm.statics.buckling import critical_load as critical_load
 from cdsm.statics.buckling import critical_tension as critical_tension
-from cdsm.statics.forward import equilibrium as equilibrium
-from cdsm.statics.forward import forward_statics as forward_statics
+from cdsm.statics.equilibrium import equilibrium as equilibrium
+from cdsm.statics.forward_statics import forward_statics as forward_statics
 from cdsm.statics.load_cycle import load_cycle as load_cycle
 from cdsm.statics.modes import modes as modes
 from cdsm.statics.weight_test import weight_test as weight_test

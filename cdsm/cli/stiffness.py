@@ -16,8 +16,8 @@ from cdsm.cli.output import Json, answer, header, misuse, write, write_picture
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from cdsm.statics.at_rest import Equilibrium
     from cdsm.statics.buckling import CriticalLoad, CriticalTension
+    from cdsm.statics.equilibrium import Equilibrium
     from cdsm.statics.load_cycle import LoadHistory
     from cdsm.statics.weight_test import WeightTest
     from cdsm.support.values import Array

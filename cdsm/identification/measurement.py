@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.forward import equilibrium
+from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.load_cycle import load_cycle
 from cdsm.statics.weight_test import weight_test
 from cdsm.stiffness_matrix import stiffness

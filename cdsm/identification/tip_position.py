@@ -12,7 +12,7 @@ from cdsm.errors import InvalidInput
 from cdsm.identification.measurement import positive
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.forward import forward_statics
+from cdsm.statics.forward_statics import forward_statics
 from cdsm.support.format import coordinates, without_rounding
 from cdsm.support.validation import NO_WRENCH, number_array, scalar, wrench_vector
 from cdsm.support.values import Array

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from cdsm.errors import InvalidInput
 from cdsm.friction.capstan import assemble_segments
 from cdsm.posture import Posture
-from cdsm.statics.at_rest import Equilibrium
+from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
 from cdsm.support.format import without_rounding

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.friction.stick import Breakaway, breakaway
 from cdsm.posture import Posture
-from cdsm.statics.at_rest import Equilibrium
-from cdsm.statics.forward import as_equilibrium, climb, equilibrium
+from cdsm.statics.continuation import follow
+from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, equilibrium
 from cdsm.statics.load_cycle import LoadHistory, load_cycle
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix.prints import frictionless_model
@@ -262,7 +262,7 @@ def weight_test(
     for i in range(steps):
         here = states[-1]
         goal = (i + 1) / steps
-        found, reached = climb(model, here.pose, here.stop_torque, i / steps, goal)
+        found, reached = follow(model, here.pose, here.stop_torque, i / steps, goal)
         here = as_equilibrium(model(reached), found) if found else here
         if reached < goal:
             worst = int(abs(here.stiffness.critical_direction).argmax())

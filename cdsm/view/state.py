@@ -17,7 +17,7 @@ from cdsm.friction.capstan import can_stick
 from cdsm.manipulator import Manipulator
 from cdsm.plots.arm import Ellipsoid, color_scale, ellipsoid
 from cdsm.posture import Posture
-from cdsm.statics.at_rest import Equilibrium
+from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.locked_arm import LockedArm
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.values import Array, frozen

@@ -1,8 +1,8 @@
-"""Where an arm comes to rest: its motors are locked, hold tensions, or take in wire."""
+"""Where an arm comes to rest, from what its motors do: they hold tensions, or take in wire."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,103 +11,17 @@ from numpy.typing import ArrayLike
 from cdsm.errors import EquilibriumError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.statics.at_rest import Equilibrium
+from cdsm.statics.continuation import Model, follow
+from cdsm.statics.equilibrium import Equilibrium, as_equilibrium, settled
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import Balance, Point, continued, settle, stable_between
-from cdsm.stiffness_matrix import checked_tension, stiffness
+from cdsm.stiffness_matrix import checked_tension
 from cdsm.support.validation import NO_WRENCH, instance, one_of, scalar, vector, wrench_vector
 from cdsm.support.values import Array
-from cdsm.tension import Tension
 
-_FINEST = 2.0**-12  # relative precision of a buckling load; absolute below 1e-9 of the load
 _HELD = 1e-9  # least stiffness of a joint without load, over the largest
-
-Model = Callable[[float], LockedArm]
-"""Arm under a share of the load and of the pull."""
 
 OfCables = ArrayLike | Mapping[str, float]
 """A number for each cable (C,), or numbers by the names of cables; the other cables are loose."""
-
-
-def equilibrium(
-    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
-) -> Equilibrium:
-    """Compute the equilibrium of an arm under a dead wrench, its motors locked at a reference.
-
-    Solve r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13). The elongation of a cable is its elongation at
-    the reference plus its change of length. For a pure force the solution is a minimum of the
-    potential of cables, weight and load: the search leaves saddle points, so an arm that buckles
-    comes to rest away from the posture that became unstable. Joint limits act as stops.
-
-    The whole load acts from the start. If several equilibria exist, slow loading
-    (:func:`~cdsm.weight_test`) may reach another one.
-
-    Args:
-        pose: The reference posture, within the joint limits.
-        tension: F at the reference: the result of :func:`~cdsm.distribute_tension`, or other
-            tensions (C,) [N], which need not balance the arm.
-        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. Default: the wrench
-            of the ``Tension``, or zero.
-
-    Raises:
-        InvalidInput: As for :func:`~cdsm.stiffness`. The posture is beyond a joint limit.
-        ElasticityRangeError: A tension at the reference or at the equilibrium is outside the domain
-            of its law. A law does not say how a cable becomes slack or yields.
-        EquilibriumError: No equilibrium was found. If two sites of a cable meet (disks overlap),
-            the error names this cable.
-    """
-    K = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
-    W = K.wrench if wrench is None else wrench_vector("wrench", wrench)
-    pose.arm._angles(pose.q, True)  # within the joint limits
-    arm = LockedArm(pose, K.tension, W)
-    return as_equilibrium(arm, _settled(arm, pose))
-
-
-def climb(
-    model: Model, before: Posture, stop_torque: Array, share: float, goal: float
-) -> tuple[Point | None, float]:
-    """Follow a stable equilibrium while its ``share`` of load and pull grows to ``goal``.
-
-    It is at the posture ``before``, where the stops push with ``stop_torque`` (nv,) [N m]. Returns
-    the last equilibrium before the arm jumps, None if that is this one; and its share.
-    """
-    here = None
-    step = goal - share
-    while share < goal:
-        part = min(goal, share + step)
-        arm = model(part)
-        f = Balance(arm.at, arm.reference, arm.at_pose(before))
-        found = continued(f, (before.q / f.unit - stop_torque * f.unit / f.k,), before.q)
-        if found is not None and stable_between(arm.at, before.q, found.state.pose.q):
-            here = found
-            share = part
-            step = 2.0 * step
-            before = found.state.pose
-            stop_torque = found.stop_torque
-        elif step > _FINEST * max(share, 1e-9):
-            step /= 2.0
-        else:
-            break
-    return here, share
-
-
-def _settled(arm: LockedArm, start: Posture, reached: float = 0.0) -> Point:
-    """Return the equilibrium to which an arm descends from the posture ``start``."""
-    return settle(Balance(arm.at, arm.reference, arm.at_pose(start)), start.q, reached)
-
-
-def as_equilibrium(arm: LockedArm, found: Point, branch: float = 1.0) -> Equilibrium:
-    """Return a solution as an Equilibrium; ElasticityRangeError if a tension is outside its law."""
-    position = arm.reference.arm.cables.position_controlled
-    return Equilibrium(
-        reference=arm.reference,
-        reference_tension=arm.tension,
-        stiffness=arm.stiffness(found.state.pose),
-        stop_torque=found.stop_torque,
-        _model=arm,
-        motors="tension" if arm.tension_held or not position.any() else "locked",
-        branch=branch,
-    )
 
 
 def forward_statics(
@@ -160,13 +74,13 @@ def forward_statics(
     model = _model(arm, named[0], _of_all(arm, named[0], given[named[0]]), home, begin, W)
     loaded = model(1.0)
     if start is not None:
-        return as_equilibrium(loaded, _settled(loaded, begin))
+        return as_equilibrium(loaded, settled(loaded, begin))
     _require_held(model(0.0), home)
-    here = _settled(model(0.0), home)
-    last, branch = climb(model, here.state.pose, here.stop_torque, 0.0, 1.0)
+    here = settled(model(0.0), home)
+    last, branch = follow(model, here.state.pose, here.stop_torque, 0.0, 1.0)
     here = last or here
     if branch < 1.0:
-        here = _settled(loaded, here.state.pose, branch)
+        here = settled(loaded, here.state.pose, branch)
     return as_equilibrium(loaded, here, branch)
 
 

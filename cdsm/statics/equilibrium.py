@@ -1,4 +1,4 @@
-"""Equilibrium of a loaded arm as a frozen value: where it rests, and what holds it there."""
+"""Equilibrium of a loaded arm with locked motors: where it rests, and what holds it there."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import cdsm
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
-from cdsm.statics.solve import FLAT
+from cdsm.statics.solve import FLAT, Balance, Point, settle
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
-from cdsm.support.validation import Direction, instance, unit_direction
+from cdsm.support.validation import Direction, instance, unit_direction, wrench_vector
 from cdsm.support.values import Array, frozen
+from cdsm.tension import Tension
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -259,3 +260,56 @@ class Equilibrium(Result):
         residual = f"{abs(self.residual).max():.1e} {arm.torque_unit()}"
         state = "; ".join(self.warnings) or "stable"
         return "\n".join([*lines, f"{state}, residual {residual}"])
+
+
+def equilibrium(
+    pose: Posture, tension: Tension | ArrayLike, wrench: ArrayLike | None = None
+) -> Equilibrium:
+    """Compute the equilibrium of an arm under a dead wrench, its motors locked at a reference.
+
+    Solve r(q) = J_Lᵀ F(q) + g − J_Xᵀ W = 0 (Eq. 13). The elongation of a cable is its elongation at
+    the reference plus its change of length. For a pure force the solution is a minimum of the
+    potential of cables, weight and load: the search leaves saddle points, so an arm that buckles
+    comes to rest away from the posture that became unstable. Joint limits act as stops.
+
+    The whole load acts from the start. If several equilibria exist, slow loading
+    (:func:`~cdsm.weight_test`) may reach another one.
+
+    Args:
+        pose: The reference posture, within the joint limits.
+        tension: F at the reference: the result of :func:`~cdsm.distribute_tension`, or other
+            tensions (C,) [N], which need not balance the arm.
+        wrench: W (6,) at ``tool0`` in base axes: force [N], then moment [N m]. Default: the wrench
+            of the ``Tension``, or zero.
+
+    Raises:
+        InvalidInput: As for :func:`~cdsm.stiffness`. The posture is beyond a joint limit.
+        ElasticityRangeError: A tension at the reference or at the equilibrium is outside the domain
+            of its law. A law does not say how a cable becomes slack or yields.
+        EquilibriumError: No equilibrium was found. If two sites of a cable meet (disks overlap),
+            the error names this cable.
+    """
+    K = stiffness(pose, tension, None if isinstance(tension, Tension) else wrench)
+    W = K.wrench if wrench is None else wrench_vector("wrench", wrench)
+    pose.arm._angles(pose.q, True)  # within the joint limits
+    arm = LockedArm(pose, K.tension, W)
+    return as_equilibrium(arm, settled(arm, pose))
+
+
+def settled(arm: LockedArm, start: Posture, reached: float = 0.0) -> Point:
+    """Return the equilibrium to which an arm descends from the posture ``start``."""
+    return settle(Balance(arm.at, arm.reference, arm.at_pose(start)), start.q, reached)
+
+
+def as_equilibrium(arm: LockedArm, found: Point, branch: float = 1.0) -> Equilibrium:
+    """Return a solution as an Equilibrium; ElasticityRangeError if a tension is outside its law."""
+    position = arm.reference.arm.cables.position_controlled
+    return Equilibrium(
+        reference=arm.reference,
+        reference_tension=arm.tension,
+        stiffness=arm.stiffness(found.state.pose),
+        stop_torque=found.stop_torque,
+        _model=arm,
+        motors="tension" if arm.tension_held or not position.any() else "locked",
+        branch=branch,
+    )
