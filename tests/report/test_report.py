@@ -150,8 +150,8 @@ class Own(cdsm.Elasticity):
         super().__init__(0.0, 500.0, 0.0, "", {"off": (rigidity, energy)}, 1.0, *table)
         object.__setattr__(self, "off", (rigidity, energy))
 
-    def _evaluate(self, F: Array) -> tuple[Array, Array]:
-        strain, EA = super()._evaluate(F)
+    def evaluate(self, F: Array) -> tuple[Array, Array]:
+        strain, EA = super().evaluate(F)
         return strain, np.asarray(EA * self.off[0])
 
     def energy(self, tension: ArrayLike) -> Array:
