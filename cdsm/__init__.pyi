@@ -20,7 +20,6 @@ from cdsm.design.evaluation import evaluate_designs as evaluate_designs
 from cdsm.design.goals import Constraint as Constraint
 from cdsm.design.goals import Objective as Objective
 from cdsm.design.problem import DesignProblem as DesignProblem
-from cdsm.design.search import refine_design as refine_design
 from cdsm.design.search import search_designs as search_designs
 from cdsm.design.variables import Variable as Variable
 from cdsm.errors import CdsmError as CdsmError

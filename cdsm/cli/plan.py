@@ -206,7 +206,6 @@ def _grid(text: str, arm: cdsm.Manipulator) -> cdsm.GridPoses:
 
 
 _CHOOSE = "Design of the front to write; default: the compromise, nearest to the best of each goal."
-_REFINE = "Improve the chosen design by SLSQP: one objective, continuous variables."
 
 
 def design(
@@ -219,7 +218,6 @@ def design(
     ],
     out: Annotated[Path, opt("Folder for the results.", "FOLDER")],
     choose: Annotated[int | None, opt(_CHOOSE, "N", min=0)] = None,
-    refine: Annotated[bool, opt(_REFINE, None, "--refine")] = False,
     as_json: AsJson = False,
 ) -> int:
     """Find the best designs of an arm, and write the chosen one.
@@ -229,14 +227,11 @@ def design(
     """
     from cdsm.batch.distribution import checked_threads
     from cdsm.design.problem_file import read_problem
-    from cdsm.design.search import require_smooth
     from cdsm.support.files import make_folder, write_text
 
     task, search = read_problem(problem)
     if (out / "arm.toml").exists() and not (out / "front.csv").exists():
         raise misuse("--out", f"{out} has an arm.toml that no search wrote; give another folder.")
-    if refine:
-        require_smooth(task)
     folder = make_folder(out)
     found = cdsm.search_designs(
         task,
@@ -251,10 +246,6 @@ def design(
     if number >= (count := len(found.front)):
         said = f"{number} given, but the front has the designs 0 to {count - 1}. See {front}, and"
         raise misuse("--choose", f"{said} repeat the command with one of them.")
-    if refine:
-        found = cdsm.refine_design(task, found.design(number))
-        number = 0
-        front = write_text(front, found.best.to_csv())
     paths = [
         every,
         front,

@@ -36,8 +36,7 @@ class Designs(ReadOnlyState, Named):
         problem: The problem.
         designs: The designs (D, n) [m, rad, N, -], a column for each of ``problem.variables``.
         values: Quantities (D, m) in SI: [N/m], [N m/rad], [m], [N], [kg] or [-]; a column for each
-            of ``problem.measures``. A constrained quantity includes its margin for
-            ``problem.tolerances``. NaN if a quantity does not exist.
+            of ``problem.measures``. NaN if a quantity does not exist.
         faults: For each design the reason why no arm can be built from it; empty if one can.
     """
 
@@ -106,7 +105,7 @@ class Designs(ReadOnlyState, Named):
     def columns(self) -> dict[str, Sequence[Any]]:
         """Return a column for each variable and quantity, by its heading.
 
-        The heading has the name, the margin for tolerances if there is one, and the unit.
+        The heading has the name and the unit.
         """
         problem = self.problem
         found = dict[str, Sequence[Any]]()
@@ -114,8 +113,7 @@ class Designs(ReadOnlyState, Named):
         for variable, column in zip(problem.variables, zip(*rows, strict=True), strict=True):
             found[f"{variable.of} [{variable.unit}]" if variable.unit else variable.of] = column
         for each in problem.measures:
-            words = problem.with_margin(each, each.key)
-            found[f"{words} [{KINDS[each.of].unit}]"] = self[each.key].tolist()
+            found[f"{each.key} [{KINDS[each.of].unit}]"] = self[each.key].tolist()
         return found
 
     def __len__(self) -> int:
@@ -217,8 +215,7 @@ def explain(designs: Designs) -> NoReturn:
             value = float(designs[each.key][best])
             now = "does not exist" if np.isnan(value) else each.shown(value)
             far = f", {100.0 * miss:.3g} % off" if miss < 1e9 else ""
-            words = problem.with_margin(each, each.words)
-            said[each.key] = f"{words} {now}, {each.asked} is asked{far}"
+            said[each.key] = f"{each.words} {now}, {each.asked} is asked{far}"
     for objective in problem.objectives:
         value = float(designs[objective.key][best])
         if not np.isfinite(value):

@@ -19,18 +19,14 @@ from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.parameters import PARAMETERS, ArmParameters
 from cdsm.support.format import plural
-from cdsm.support.validation import NO_WRENCH, instance, number_array, scalar, sequence_of
+from cdsm.support.validation import NO_WRENCH, instance, number_array, sequence_of
 from cdsm.support.values import Array, Given, ReadOnlyState, frozen
 from cdsm.sweeps.cases import require
 from cdsm.sweeps.poses import PoseSet, joint_angles
 from cdsm.tension import checked_bounds
-from cdsm.tolerances import Tolerances
 
 MISSED = "held"
 """Key of the fraction of postures and loads that are held; it is computed for every problem."""
-
-SURE = {"stiffness": -1.0, "margin": -1.0, "motor_force": 1.0}
-"""Quantities that hold with a margin for tolerances, and its sign."""
 
 
 @final
@@ -57,10 +53,6 @@ class DesignProblem(ReadOnlyState):
             came before; see :func:`~cdsm.distribute_tension`. ``motor_force`` then belongs to the
             largest tension that friction can cause along each cable.
         diameter: Diameter of the cables [m], for clearances.
-        tolerances: Tolerances of every design; constraints on ``stiffness``, ``margin`` and
-            ``motor_force`` must then be met with a margin of ``coverage`` standard uncertainties
-            u. The value of such a quantity includes the margin, e.g. stiffness − coverage · u.
-        coverage: Coverage factor: number of standard uncertainties in this margin [-], 0 or more.
 
     Raises:
         InvalidInput: An argument is invalid; two variables change the same thing; the arm was made
@@ -78,8 +70,6 @@ class DesignProblem(ReadOnlyState):
     maximum: float = math.inf
     worst_friction: bool = False
     diameter: float = 0.0
-    tolerances: Tolerances | None = None
-    coverage: float = 2.0
 
     def __post_init__(self) -> None:
         geometry = instance("arm", self.arm, Manipulator).geometry  # raises without one
@@ -104,10 +94,6 @@ class DesignProblem(ReadOnlyState):
         require(asked, self.arm, self.maximum, self.worst_friction, self.diameter)
         if "deflection" in asked and not loads[:, :3].any(axis=1).all():
             raise InvalidInput("loads", "deflection needs a force in every load.")
-        if self.tolerances is not None:
-            instance("tolerances", self.tolerances, Tolerances)
-        if scalar("coverage", self.coverage) < 0.0:
-            raise InvalidInput("coverage", f"{self.coverage:g} given; give 0 or more.")
         self.__dict__.update(
             variables=variables,
             objectives=objectives,
@@ -124,9 +110,9 @@ class DesignProblem(ReadOnlyState):
         ``random`` (a number, and ``seed``), ``grid`` (angles [rad] by joint) or ``angles`` (a list
         of postures). ``loads`` is a list of wrenches (6 numbers) or forces (3). The keys of
         ``[[variables]]``, ``[[objectives]]`` and ``[[constraints]]`` are the attributes of
-        :class:`Variable`, :class:`Objective` and :class:`Constraint`. ``tolerances`` is the path of
-        a file of :class:`Tolerances`. All other keys are attributes of this class. The command
-        ``cdsm design`` reads ``[search]`` too. ``examples/design.toml`` has comments.
+        :class:`Variable`, :class:`Objective` and :class:`Constraint`. All other keys are attributes
+        of this class. The command ``cdsm design`` reads ``[search]`` too. ``examples/design.toml``
+        has comments.
 
         Raises:
             FileError: The file, or one that it names, cannot be read, or does not describe a design
@@ -215,17 +201,6 @@ class DesignProblem(ReadOnlyState):
         found = [each.present(self.arm, self.minimum) for each in self.variables]
         known = [each for each in found if each is not None]
         return frozen(np.array(known)) if len(known) == len(found) else None
-
-    def has_margin(self, each: Measure) -> bool:
-        """Whether a quantity includes a margin for tolerances: it is constrained, and may vary."""
-        bounded = any(constraint.key == each.key for constraint in self.constraints)
-        return bounded and self.tolerances is not None and each.of in SURE
-
-    def with_margin(self, each: Measure, words: str) -> str:
-        """Return ``words`` with the margin of the quantity if it has one: ``stiffness - 2 u``."""
-        if not self.has_margin(each):
-            return words
-        return f"{words} {'+' if SURE[each.of] > 0.0 else '-'} {self.coverage:g} u"
 
     def __repr__(self) -> str:
         return f"<DesignProblem {str(self).splitlines()[0]}>"

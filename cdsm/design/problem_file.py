@@ -19,13 +19,19 @@ from cdsm.errors import LINES, CdsmError, FileError, GeometryError, InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.support.files import read_text
 from cdsm.support.format import plural
-from cdsm.support.records import Integer, Number, faults_at, parse, read_toml, record
+from cdsm.support.records import Integer, Number, faults_at, gone, parse, read_toml, record
 from cdsm.support.validation import one_of
 from cdsm.sweeps.poses import GridPoses, PoseSet, RandomPoses
-from cdsm.tolerances import Tolerances
 
 _Kind = TypeVar("_Kind")
 _Tables = Annotated[tuple[dict[str, Any], ...], Field(strict=False)]
+_Margin = Annotated[
+    None,
+    gone(
+        "designs have no margin for tolerances. Tighten the limits of [[constraints]], and compute "
+        "the uncertainty of the chosen arm (cdsm.uncertainty, or [tolerances] in its ARM.toml)"
+    ),
+]
 
 
 @record
@@ -57,8 +63,8 @@ class _File:
     maximum: Number | None = None
     worst_friction: bool = False
     diameter: Number = 0.0
-    tolerances: str | None = None
-    coverage: Number = 2.0
+    tolerances: _Margin = None
+    coverage: _Margin = None
     search: Search = Field(default_factory=Search)
 
 
@@ -100,8 +106,6 @@ def _problem(file: _File, folder: Path) -> DesignProblem:
         maximum=math.inf if file.maximum is None else file.maximum,
         worst_friction=file.worst_friction,
         diameter=file.diameter,
-        tolerances=None if file.tolerances is None else Tolerances.read(folder / file.tolerances),
-        coverage=file.coverage,
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -12,23 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdsm.design.goals import KINDS, Measure
-from cdsm.design.problem import SURE, DesignProblem
+from cdsm.design.problem import DesignProblem
 from cdsm.errors import CdsmError, CdsmWarning, GeometryError
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
-from cdsm.stiffness_matrix import stiffness
 from cdsm.support.status import Status
 from cdsm.support.values import Array
 from cdsm.sweeps.cases import QUANTITIES, Cases
-from cdsm.tension import bounds_at, distribute_tension, grip
-from cdsm.tolerancing.budget import propagate
-from cdsm.tolerancing.measurand import Measurand, MeasurandName
+from cdsm.tension import grip
 
-_MEASURANDS: Final[dict[str, MeasurandName]] = {
-    "stiffness": "along",
-    "margin": "margin",
-    "motor_force": "tension",
-}
 _SWEPT: Final = {
     "stiffness": "translational_compliance",
     "motor_force": "tension",
@@ -50,25 +41,14 @@ class Found(NamedTuple):
 
 def measure(problem: DesignProblem, row: Array) -> Found:
     """Compute the quantities of one design ``row`` (n,), in the order of ``problem.measures``."""
-    return measure_cases(problem, row, ())[0]
-
-
-def measure_cases(
-    problem: DesignProblem, row: Array, goals: Sequence[Measure]
-) -> tuple[Found, list[Array] | None]:
-    """Compute the quantities of a design, and each of ``goals`` at all postures and loads.
-
-    A goal that has a margin for tolerances has it everywhere. The list is None if no arm can be
-    built from the design, or if one posture is not held.
-    """
     try:
         arm = quiet_arm(problem, row)
     except CdsmError as error:
         fault = "; ".join(error.faults) if isinstance(error, GeometryError) else str(error)
-        return Found(np.full(len(problem.measures), math.nan), fault), None
+        return Found(np.full(len(problem.measures), math.nan), fault)
     found = _Arm(problem, arm, problem.minimum_of(row))
     values = np.array([found.value(each) for each in problem.measures])
-    return Found(values), [found.sure(each) for each in goals] if found.held.all() else None
+    return Found(values)
 
 
 def quiet_arm(problem: DesignProblem, design: Array) -> Manipulator:
@@ -100,7 +80,6 @@ class _Arm:
         )
         self.rows = self.cases.rows(self.postures)
         self.held = _held(self.rows)
-        self.margins: dict[tuple[str, int], Array] = {}
 
     def _pair(self, case: int) -> tuple[Posture, Array]:
         """Return the posture and the load of one of the held pairs."""
@@ -139,13 +118,6 @@ class _Arm:
                 found = 1.0 / np.maximum(np.einsum("i,nij,j->n", u, found, u), 0.0)
         return found[:, None]
 
-    def sure(self, each: Measure) -> Array:
-        """Return :meth:`cases_of` with the margin of each case, if the quantity has one."""
-        found = self.cases_of(each)
-        if self.problem.has_margin(each):
-            found = found + [self._margin(each, case) for case in range(len(found))]
-        return found
-
     def value(self, each: Measure) -> float:
         """Return the worst case of a quantity; NaN if no posture is held."""
         if each.of == "held":
@@ -158,30 +130,7 @@ class _Arm:
         found = self.cases_of(each)
         worst = found.argmax() if KINDS[each.of].best == "least" else found.argmin()
         case, cable = divmod(int(worst), found.shape[1])
-        extra = self._margin(each, case)[cable] if self.problem.has_margin(each) else 0.0
-        return float(found[case, cable] + extra)
-
-    def _margin(self, each: Measure, case: int) -> Array:
-        """Compute the margin ± coverage · u (k,) of a quantity in one case, with the worse sign.
-
-        The arm is not built yet: its tensions are the least ones of its dimensions, within bounds
-        that do not change.
-        """
-        if (each.key, case) not in self.margins:
-            (pose, load) = self._pair(case)
-            of = _MEASURANDS[each.of]
-            given = (float(self.cases.minimum[0]), self.cases.maximum)
-            rough = self.cases.worst_friction
-            pull = distribute_tension(pose, *bounds_at(pose, *given, rough), load)
-            u = None if each.direction is None else np.array(each.direction)
-            tolerances = self.problem.tolerances
-            assert tolerances is not None
-            measurand = Measurand(of, stiffness(pose, pull), u, redistribute=True)
-            variances, *_ = propagate(measurand, measurand.inputs.groups(tolerances), {})
-            found = np.sqrt(sum(variances.values(), 0.0 * measurand.value()))
-            loss = np.exp(grip(pose)) if rough and of == "tension" else 1.0
-            self.margins[each.key, case] = SURE[each.of] * self.problem.coverage * loss * found
-        return self.margins[each.key, case]
+        return float(found[case, cable])
 
 
 def _held(rows: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:

@@ -40,7 +40,7 @@ _PRINTED = 20  # number of designs, evenly spread over a front, that a printed t
 @final
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class DesignSearch(ReadOnlyState, Plotted):
-    """Best designs of a problem; made by :func:`search_designs` and :func:`refine_design`.
+    """Best designs of a problem; made by :func:`search_designs`.
 
     Attributes:
         problem: The problem.
@@ -158,15 +158,10 @@ class DesignSearch(ReadOnlyState, Plotted):
             f"{plural(len(self.evaluated), 'design')}, {feasible} feasible, {count} on the front"
             f"{more}; * is the compromise"
         )
-        asked = [
-            f"asked: {problem.with_margin(each, each.words)} {each.asked}"
-            for each in problem.constraints
-        ]
+        asked = [f"asked: {each.words} {each.asked}" for each in problem.constraints]
         notes = []
         if "deflection" in {each.of for each in problem.measures}:
             notes = [_DEFLECTION]
-        if problem.tolerances is not None and problem.constraints:
-            notes.append("u: standard uncertainty by the tolerances")
         return "\n".join([head, *aligned(self._table(shown)), *asked, *notes])
 
     def _spread(self, most: int, *also: int) -> list[int]:
@@ -178,14 +173,13 @@ class DesignSearch(ReadOnlyState, Plotted):
     @property
     def _labels(self) -> list[str]:
         """Name and unit of each objective, for the axes of a figure."""
-        problem = self.problem
-        words = [(problem.with_margin(x, x.words), x.unit[0]) for x in problem.objectives]
-        return [f"{name} [{unit}]" if unit else name for name, unit in words]
+        labels = [(objective.words, objective.unit[0]) for objective in self.problem.objectives]
+        return [f"{name} [{unit}]" if unit else name for name, unit in labels]
 
     def _table(self, shown: Sequence[int]) -> list[list[str]]:
         """Return header and rows for the designs ``shown`` of the front, in units for the user."""
         problem = self.problem
-        keys = [problem.with_margin(each, each.key) for each in problem.measures]
+        keys = [measure.key for measure in problem.measures]
         rows = [["design", *(variable.of for variable in problem.variables), *keys]]
         for i in shown:
             row = problem.values(self.design(i))

@@ -64,6 +64,15 @@ def _in_range(kind: str, zero: bool = False, inf: bool = False) -> AfterValidato
     return AfterValidator(check)
 
 
+def gone(remedy: str) -> BeforeValidator:
+    """Refuse any value of a key that files of an older cdsm have, and say what to do instead."""
+
+    def refuse(_: object) -> None:
+        raise ValueError(f"is gone: {remedy}")
+
+    return BeforeValidator(refuse)
+
+
 Integer = Annotated[int, BeforeValidator(plain)]
 Number = Annotated[float, BeforeValidator(plain), Field(ge=-LARGEST, le=LARGEST)]
 Length = Annotated[Number, _in_range("length")]

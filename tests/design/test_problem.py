@@ -1,4 +1,4 @@
-"""Problems, their evaluation, searches and refinements."""
+"""Problems, their evaluation and searches."""
 
 import itertools
 from dataclasses import replace
@@ -16,6 +16,7 @@ from tests.support.arms import readme_geometry
 
 pytest.importorskip("pymoo")
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 LAW = cdsm.LinearElasticity(48e3)
 BENT = np.random.default_rng(2).uniform(-0.25, 0.25, (4, 6))
 
@@ -178,21 +179,6 @@ def test_a_posture_that_the_worst_friction_takes_is_not_held() -> None:
     assert np.mean(held) < cdsm.evaluate_designs(free, row)["held"][0]
 
 
-def test_tolerances_take_a_margin() -> None:
-    tolerances, row = cdsm.Tolerances(rigidity=0.05), [[0.025, 2.0, 1.0]]
-    bound = cdsm.Constraint("stiffness", "z", at_least=1.0)
-    plain, sure = (
-        cdsm.evaluate_designs(problem(constraints=(bound,), tolerances=each), row)
-        for each in (cdsm.Tolerances(), tolerances)
-    )
-    poses = [sure.problem.arm_of(row[0]).at(q) for q in BENT]
-    pulls = [cdsm.distribute_tension(p, 20.0, 400.0, sure.problem.loads[0]) for p in poses]
-    softest = min(pulls, key=lambda F: cdsm.stiffness(F.posture, F).along("z"))
-    asked: Any = {"direction": "z", "redistribute": True}
-    u = cdsm.uncertainty(softest.posture, softest, tolerances, **asked).standard_uncertainty
-    assert sure[bound.key][0] == pytest.approx(plain[bound.key][0] - 2.0 * u, rel=1e-9)
-
-
 # --- searches --------------------------------------------------------------------------------
 
 
@@ -230,29 +216,6 @@ def test_an_infeasible_problem_is_named() -> None:
     assert f"{100.0 * (1.0 - values[key][0] / 1e7):.3g} % off" in str(caught.value)
     with pytest.raises(InfeasibleDesign, match=r"not held: posture \d: no tension within"):
         cdsm.search_designs(problem(maximum=21.0), generations=1, population=4)
-    with pytest.raises(cdsm.InvalidInput, match="end@cable2_1 is not continuous"):
-        cdsm.refine_design(problem())
-
-
-# --- refinement --------------------------------------------------------------------------
-
-
-def test_refinement_finds_what_a_fine_search_finds() -> None:
-    task = problem(
-        variables=(cdsm.Variable("hole_radius", 0.015, 0.03), cdsm.Variable("minimum", 5.0, 50.0)),
-        objectives=(cdsm.Objective("motor_force"),),
-        constraints=(cdsm.Constraint("stiffness", "z", at_least=START),),
-    )
-    refined = cdsm.refine_design(task, [0.02, 20.0])
-    best = refined.values(0)["motor_force"]
-    radius, low = np.meshgrid(np.linspace(0.015, 0.03, 31), np.linspace(5.0, 50.0, 10))
-    grid = cdsm.evaluate_designs(task, np.column_stack([radius.ravel(), low.ravel()]))
-    goals = np.where(grid.feasible == 1.0, grid["motor_force"], np.inf)
-    assert best <= goals.min() * (1.0 + 1e-9)
-    assert best > 0.8 * goals.min()
-
-
-START = 1.5e4
 
 
 # --- bad problems ----------------------------------------------------------------------------
@@ -292,7 +255,17 @@ def test_bad_problems_name_what_is_wrong(make: Any, said: str) -> None:
         make() if callable(make) else problem(**make)
 
 
-# --- bad problems ----------------------------------------------------------------------------
+@pytest.mark.parametrize("key", ["tolerances = 'tolerances.toml'", "coverage = 2.0"])
+def test_margins_of_an_older_problem_are_refused_with_what_to_do(key: str, tmp_path: Path) -> None:
+    text = (EXAMPLES / "design.toml").read_text(encoding="utf-8")
+    file = tmp_path / "design.toml"
+    file.write_text(f"{key}\n{text}", encoding="utf-8")
+    name = key.split(" ")[0]
+    with pytest.raises(cdsm.FileError, match=f"{name}: is gone.*Tighten the limits"):
+        cdsm.DesignProblem.read(file)
+
+
+# --- files for the workshop ---------------------------------------------------------------
 
 
 def test_files_for_the_workshop(tmp_path: Path) -> None:
