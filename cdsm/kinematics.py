@@ -5,26 +5,25 @@ With a dimensionless residual r(q), lengths over the arm's length and rotations 
     min ½‖q − guess‖²   subject to   r(q) = 0   and   lower ≤ q ≤ upper,
 
 or min ½‖r‖² if r = 0 is out of reach. Both are the limit ε → 0 of min ½‖r‖² + ½ε‖q − guess‖², a
-least-squares problem of full rank, which scipy solves for decreasing ε.
+least-squares problem of full rank (:mod:`cdsm.support.nearest`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
 from cdsm.errors import InvalidInput
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.rigid_body import rotation_vector
 from cdsm.support.format import aligned, beyond, place
+from cdsm.support.nearest import at_limits, nearest, range_of
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.status import Status
 from cdsm.support.validation import instance, number_array, scalar, vector
@@ -33,8 +32,6 @@ from cdsm.support.values import Array, frozen
 _Kind = Literal["position", "pose", "lengths"]
 _Pair = tuple[Array, Array]
 
-_WEIGHTS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-14)  # decreasing ε
-_STARTS = 12  # random postures to start from, if the search from the guess misses the target
 _TOUCHING = 5e-6  # part of a joint's range that is left out at both limits if disks touch there
 
 
@@ -101,9 +98,8 @@ class KinematicSolution(Result):
         """Names of the joints at a limit."""
         arm = self.posture.arm
         q = self.angles
-        room = np.minimum(q - arm.lower, arm.upper - q)
-        tight = np.flatnonzero(room <= 2.0 * _TOUCHING * (arm.upper - arm.lower))
-        return tuple(arm.joint_names[i] for i in tight)
+        at_lower, at_upper = at_limits(q, arm.lower, arm.upper, 2.0 * _TOUCHING)
+        return tuple(arm.joint_names[i] for i in np.flatnonzero(at_lower | at_upper))
 
     def __str__(self) -> str:
         arm = self.posture.arm
@@ -198,7 +194,7 @@ def _solve(
             raise InvalidInput("guess", f"{problem}; guess angles within the joint limits.")
     if not 0.0 < (tolerance := scalar("tolerance", tolerance)) < 1.0:
         raise InvalidInput("tolerance", f"{tolerance:g} given; a number between 0 and 1 is needed.")
-    search = partial(_nearest, partial(_residual, arm, of, target), near, tolerance)
+    search = partial(nearest, partial(_residual, arm, of, target), near, tolerance)
     lower = arm.lower  # a joint may be locked
     upper = np.maximum(arm.upper, arm.lower + 1e-12)
     try:
@@ -207,7 +203,7 @@ def _solve(
         if error.status != Status.COINCIDENT_SITES.name:
             raise
         # disks touch at a limit, so a cable has no direction there
-        margin = _TOUCHING * (upper - lower)
+        margin = _TOUCHING * range_of(lower, upper)
         pose = arm.at(search(lower + margin, upper - margin))
     return KinematicSolution(posture=pose, of=of, target=target, guess=near, tolerance=tolerance)
 
@@ -225,39 +221,3 @@ def _residual(arm: Manipulator, of: _Kind, target: Array, q: Array) -> _Pair:
         return offset, linear
     turn, slope = rotation_vector(tip[:3, :3] @ target[:3, :3].T)
     return np.append(offset, turn), np.vstack([linear, slope @ jacobian[3:]])
-
-
-def _nearest(
-    residual: Callable[[Array], _Pair], guess: Array, tolerance: float, lower: Array, upper: Array
-) -> Array:
-    """Find the angles (nv,) nearest to ``guess`` with r = 0, or else with the least ‖r‖."""
-
-    def fit(q: Array, *weights: float, method: str = "dogbox") -> tuple[Array, float]:
-        for weight in weights:
-            stop = 1e-4 if weight > weights[-1] else 1e-12
-            pull = math.sqrt(weight) * np.eye(q.size)
-            q = least_squares(
-                lambda q, pull=pull: np.append(residual(q)[0], pull @ (q - guess)),
-                np.clip(q, lower, upper),
-                lambda q, pull=pull: np.vstack([residual(q)[1], pull]),
-                bounds=(lower, upper),
-                method=method,
-                ftol=stop,
-                xtol=1e-15,
-                gtol=1e-15,
-                max_nfev=200,
-            ).x
-        return q, float(np.linalg.norm(residual(q)[0]))
-
-    best, misfit = fit(guess, *_WEIGHTS)
-    random = np.random.default_rng(0)
-    for trial in range(_STARTS + 2):
-        if misfit <= tolerance:
-            break
-        # where dogbox creeps along a limit, trf, which keeps off limits, may go on
-        start = best if trial < 2 else random.uniform(lower, upper)
-        other, least = fit(start, _WEIGHTS[-1], method="dogbox" if trial else "trf")
-        if least < (1.0 - 1e-6) * misfit:  # better by more than rounding
-            best = other
-            misfit = least
-    return best

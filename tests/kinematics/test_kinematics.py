@@ -1,6 +1,7 @@
 """Inverse kinematics: solved targets, nearest angles, limits, targets out of reach, bad input."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from tests.support import foreign
 from tests.support.arms import STEEL, random_arm, readme_geometry
 from tests.support.locked import hinge
 
+DATA = Path(__file__).parents[1] / "data"
 KINDS = ("universal", "hinged", "tree")
 TOUCHING = 1e-5  # part of a limit at which disks touch that solutions keep off it
 
@@ -169,6 +171,55 @@ def test_a_joint_at_its_limit_is_found_there_and_a_locked_joint_stays() -> None:
     found = cdsm.inverse_kinematics(tree, tree.at(goal).tip[:3, 3], goal * [1, 2, 1, 1, 1, 1])
     assert found.reachable
     assert found.at_limit == ("a",)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("joints", [4, 5, 7])
+def test_angles_satisfy_the_optimality_conditions(kind: str, joints: int) -> None:
+    """q − guess is normal to the angles with the same tip, within the limits: 45 targets."""
+    for seed in range(5):
+        arm = some_arm(kind, seed, joints)
+        tip = arm.at(inside(arm, seed, 0.8)).tip
+        target = tip[:3, 3] if seed % 2 else tip
+        found = cdsm.inverse_kinematics(arm, target, inside(arm, seed + 100, 0.5))
+        assert found.reachable
+        assert not found.at_limit
+        J = _residual(arm, found.of, found.target, found.angles)[1]
+        away = found.angles - found.guess
+        multipliers = np.linalg.lstsq(J.T, away, rcond=1e-10)[0]
+        assert abs(away - J.T @ multipliers).max() < 1e-9
+
+
+def continuous_finger() -> cdsm.Manipulator:
+    """A finger of which the first joint has no limits, and the third follows the second."""
+    cables = []
+    for side in (1.0, -1.0):
+        sites = (cdsm.Site("palm", (0.0, 0.0, 0.01 * side)), cdsm.Site("p3", (0.01, 0.0, 0.0)))
+        cables.append(cdsm.Cable(f"cable{side:+g}", sites, STEEL))
+    urdf = (DATA / "continuous_finger.urdf").read_text()
+    return cdsm.Manipulator.from_urdf(urdf, cables, tip="nail")
+
+
+@pytest.mark.parametrize("turn", [0.5, 5.0])
+def test_a_joint_without_limits_is_never_at_one(turn: float) -> None:
+    arm = continuous_finger()
+    q = np.array([turn, 0.4])
+    found = cdsm.inverse_kinematics(arm, arm.at(q).tip[:3, 3], q - 0.1)
+    assert found.reachable
+    assert found.at_limit == ()
+    np.testing.assert_allclose(found.angles, q, rtol=0.0, atol=1e-9)
+    found = cdsm.inverse_kinematics(arm, arm.at([turn, 1.0]).tip[:3, 3], [turn, 0.9])
+    assert found.at_limit == ("b2",)
+
+
+def test_a_finger_without_limits_stretches_towards_a_far_target() -> None:
+    arm = continuous_finger()
+    length = 0.05 + 0.03 + 0.02  # from the joint at x = 20 mm to the tip
+    towards = np.array([-0.6, 0.0, 0.8])
+    found = cdsm.inverse_kinematics(arm, [0.02, 0.0, 0.0] + 0.9 * towards)
+    assert not found.reachable
+    assert found.at_limit == ()
+    assert found.position_error == pytest.approx(0.9 - length, rel=1e-9)
 
 
 # --- targets out of reach ------------------------------------------------------------------------
