@@ -96,7 +96,8 @@ def _optimality(
     at_lower, at_upper = at_limits(q, lower, upper)
     free = ~(at_lower | at_upper)
     for _ in range(q.size):  # release what is pulled away from its limit
-        multipliers = np.linalg.lstsq(J[:, free].T, (guess - q)[free], rcond=_SINGULAR)[0]
+        away = (guess - q)[free]
+        multipliers: Array = np.asarray(np.linalg.lstsq(J[:, free].T, away, rcond=_SINGULAR)[0])
         gradient = q - guess + J.T @ multipliers
         inward = ~free & np.where(at_lower, gradient < 0.0, gradient > 0.0) & (lower < upper)
         if not inward.any():
