@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +11,6 @@ from cdsm.cable import Cable
 from cdsm.errors import ElasticityRangeError
 from cdsm.support.values import Array, frozen
 from cdsm.wires.elasticity import Elasticity
-
-OriginalLength = Literal["unstrained", "stretched"]
 
 
 def group_by_law(cables: Iterable[tuple[int, Cable]]) -> dict[Elasticity, list[int]]:
@@ -33,8 +30,6 @@ class CableLaws:
 
     Args:
         cables: Cables of the arm.
-        original_length: l_0 of a wire of length ℓ. ``"unstrained"``: ℓ/(1 + ε); ``"stretched"``: ℓ,
-            as in the paper; then 1 is in the place of 1 + ε everywhere.
 
     Attributes:
         held: Each distinct law of the position-controlled cables, with the indices of its cables.
@@ -42,12 +37,11 @@ class CableLaws:
         series: 1/k_series of all cables (C,) [m/N].
         rest: Tension (C,) [N] at which wire strain and spring elongation are zero.
         constant: EA (C,) [N] of position-controlled cables with a linear law; 0 for all others.
-        linear: Factor b (C,) [-] in EA (1 + ε) = EA + b F of these cables; 0 for all others.
+        linear: Whether a cable is one of these (C,), as 1 or 0: EA (1 + ε) is then EA + F.
     """
 
-    def __init__(self, cables: tuple[Cable, ...], original_length: OriginalLength) -> None:
+    def __init__(self, cables: tuple[Cable, ...]) -> None:
         self._cables = cables
-        self._unstrained = original_length == "unstrained"
         locked = [(c, each) for c, each in enumerate(cables) if each.control == "position"]
         # usually all cables have one law, and a slice is faster than indices
         self.held = [
@@ -64,7 +58,7 @@ class CableLaws:
         for law, of in self.held:
             if law.constant_rigidity is not None:
                 constant[of] = law.constant_rigidity
-                linear[of] = float(self._unstrained)
+                linear[of] = 1.0
         self.constant = frozen(constant)
         self.linear = frozen(linear)
 
@@ -126,7 +120,7 @@ class CableLaws:
         for law, of in self.held:
             stretch, EA = self._evaluate(law, of, tension[of])
             share = stiffness[of] * self.series[of]
-            rise = law.slope_at(tension[of], EA) * stretch + float(self._unstrained)
+            rise = law.slope_at(tension[of], EA) * stretch + 1.0
             slope[of] = stiffness[of] * (share + (1.0 - share) * rise) / (EA * stretch)
         return frozen(slope)
 
@@ -138,7 +132,7 @@ class CableLaws:
             strain, EA = law.evaluate(law.require_inside(tension))
         except ElasticityRangeError as error:
             raise self.naming(error, of) from None
-        return 1.0 + strain * self._unstrained, EA
+        return 1.0 + strain, EA
 
     def naming(
         self, error: ElasticityRangeError, of: slice | NDArray[np.intp]

@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, final, get_args
+from typing import TYPE_CHECKING, Any, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cdsm.cable import Cable, Cables, serpentine_cables
-from cdsm.cable_laws import CableLaws, OriginalLength
+from cdsm.cable_laws import CableLaws
 from cdsm.errors import InvalidInput, listed, warn
 from cdsm.geometry import Geometry
 from cdsm.joints import Spring, Springs, springs_of
@@ -37,7 +37,6 @@ from cdsm.support.validation import (
     flag,
     gravity_vector,
     instance,
-    one_of,
     sequence_of,
     vector,
 )
@@ -90,10 +89,6 @@ class Manipulator(Printed):
             is not given. Their sites may be on any links of :attr:`urdf`.
         gravity: Gravity in base axes (3,) [m/s²], or an axis such as ``"-y"`` for 9.81 m/s² along
             it; (0, 0, 0) for none.
-        original_length: Which length is l_0 in the stiffness EA/l_0 of a wire of length ℓ under
-            tension F. ``"unstrained"``: ℓ/(1 + ε(F)), constant if the motor is locked.
-            ``"stretched"``: ℓ, as in the paper's figures; K is then too low by the strain, 3–5 %
-            for Eq. 19.
 
     Attributes:
         name: Name of the robot.
@@ -101,7 +96,6 @@ class Manipulator(Printed):
         cables: Cables, in the order of every (C,) array; ``cables["cable1_1"]`` is one.
         tip_link: Name of the link whose frame is the tip.
         gravity: Gravity in base axes (3,) [m/s²].
-        original_length: Length of a wire that is l_0 in EA/l_0, as given.
         tolerances: Uncertainties of dimensions and measured values; zero if none were given.
         springs: Springs at the joints: ``springs.stiffness`` k (nv,) [N m/rad] and
             ``springs.angle`` q_0 (nv,) [rad], at which they have no torque.
@@ -114,7 +108,6 @@ class Manipulator(Printed):
     Raises:
         InvalidInput: ``elasticity`` and ``cables`` are both given or both missing, or gravity is
             not three numbers. Two cables have the same name, or a cable is on an unknown link.
-            ``original_length`` is unknown.
         FileError: The file of the cables cannot be read.
     """
 
@@ -123,7 +116,6 @@ class Manipulator(Printed):
     cables: Cables
     tip_link: str
     gravity: Array
-    original_length: OriginalLength
     tolerances: Tolerances
     springs: Springs
     nv: int
@@ -145,7 +137,6 @@ class Manipulator(Printed):
         *,
         cables: CablesOrFile | None = None,
         gravity: Direction = GRAVITY,
-        original_length: OriginalLength = "unstrained",
     ) -> None:
         if isinstance(geometry, str | os.PathLike):
             said = f"{str(geometry)!r} given; a Geometry is needed. "
@@ -159,7 +150,7 @@ class Manipulator(Printed):
         if elasticity is not None:
             cables = serpentine_cables(described, elasticity)
         assert cables is not None
-        self._define(to_urdf(described), cables, TIP, gravity, original_length, None, described)
+        self._define(to_urdf(described), cables, TIP, gravity, None, described)
 
     @classmethod
     def from_urdf(
@@ -171,7 +162,6 @@ class Manipulator(Printed):
         joint_names: Sequence[str] | None = None,
         gravity: Direction = GRAVITY,
         check_inertia: bool = True,
-        original_length: OriginalLength = "unstrained",
         springs: Mapping[str, Spring] | None = None,
     ) -> Manipulator:
         """Build an arm from a URDF and cables: a tree of revolute, prismatic and fixed joints.
@@ -190,7 +180,6 @@ class Manipulator(Printed):
             gravity: As for :class:`Manipulator`.
             check_inertia: Refuse moments of inertia that no rigid body can have. Stiffness does not
                 depend on them, but :func:`~cdsm.modes` do.
-            original_length: As for :class:`Manipulator`.
             springs: As for :meth:`with_springs`; a URDF has no element for them.
 
         Raises:
@@ -201,7 +190,7 @@ class Manipulator(Printed):
         """
         text = read_urdf(urdf, check_inertia=check_inertia)
         more: Any = {"joint_names": joint_names, "springs": springs}
-        return cls.__new__(cls)._define(text, cables, tip, gravity, original_length, **more)
+        return cls.__new__(cls)._define(text, cables, tip, gravity, **more)
 
     @classmethod
     def read(
@@ -386,7 +375,6 @@ class Manipulator(Printed):
         cables: CablesOrFile,
         tip_link: str,
         gravity: Direction,
-        original_length: OriginalLength,
         joint_names: Sequence[str] | None = None,
         geometry: Geometry | None = None,
         tolerances: Tolerances = Tolerances(),  # noqa: B008  # frozen
@@ -394,7 +382,6 @@ class Manipulator(Printed):
         like: Manipulator | None = None,
     ) -> Self:
         """Set all attributes; ``urdf`` is checked, the user has seen the doubts about ``like``."""
-        one_of("original_length", original_length, get_args(OriginalLength))
         gravity = gravity_vector("gravity", gravity)
         if joint_names is not None:
             joint_names = sequence_of("joint_names", joint_names, str)
@@ -407,10 +394,10 @@ class Manipulator(Printed):
         changed = None if own.given == usual else dict.fromkeys(usual, (0.0, 0.0)) | own.given
         self.__dict__.update({name: getattr(body, name) for name in _OF_BODY})
         self.__dict__.update(urdf=urdf, cables=cables, tip_link=tip_link, gravity=gravity)
-        self.__dict__.update(original_length=original_length, tolerances=tolerances, springs=own)
+        self.__dict__.update(tolerances=tolerances, springs=own)
         self.__dict__.update(_geometry=geometry, body=body, own_springs=changed)
         self.__dict__.update(routing=Routing.of(body, cables))
-        self.__dict__.update(laws=CableLaws(cables, original_length), _doubts=_doubts(self))
+        self.__dict__.update(laws=CableLaws(cables), _doubts=_doubts(self))
         for doubt in self._doubts:
             if like is None or doubt not in like._doubts:
                 warn(f"{self.name}: {doubt}")
@@ -418,7 +405,7 @@ class Manipulator(Printed):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what defines the arm: two arms are equal if these values are equal."""
-        names = ("urdf", "cables", "tip_link", "original_length", "joint_names", "tolerances")
+        names = ("urdf", "cables", "tip_link", "joint_names", "tolerances")
         state = {name: getattr(self, name) for name in names}
         state |= {"geometry": self._geometry, "springs": self.own_springs}
         return state | {"gravity": tuple(self.gravity.tolist())}
@@ -473,7 +460,7 @@ class Manipulator(Printed):
     @cached_property
     def chains(self) -> Chains:
         """All cables of the arm, divided at their holes into segments."""
-        return Chains.of(self.cables, self.body, self.original_length)
+        return Chains.of(self.cables, self.body)
 
 
 def _checked(cables: CablesOrFile) -> Cables:

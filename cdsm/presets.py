@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdsm.cable import serpentine_cables
-from cdsm.cable_laws import OriginalLength
 from cdsm.geometry import Geometry, Link
 from cdsm.manipulator import Manipulator
 from cdsm.wires.catalogue import SOLID, STRAND
@@ -77,7 +76,6 @@ def virtual_prototype(
     elasticity: Elasticity = STRAND_1X19,
     *,
     gravity: ArrayLike = (0.0, -9.81, 0.0),
-    original_length: OriginalLength = "unstrained",
     **dimensions: float,
 ) -> Manipulator:
     """Build the paper's virtual prototype (Section IV).
@@ -86,11 +84,10 @@ def virtual_prototype(
         elasticity: Elasticity of all cables. Default: Eq. 19 with the missing digits filled in, see
             :meth:`StrandElasticity.eq19_repaired <cdsm.StrandElasticity.eq19_repaired>`.
         gravity: Gravity in base axes (3,) [m/s²]; the direction −y is assumed.
-        original_length: As for :class:`~cdsm.Manipulator`; the paper uses ``"stretched"``.
         dimensions: Keywords of :func:`virtual_prototype_geometry`.
     """
     geometry = virtual_prototype_geometry(**dimensions)
-    return Manipulator(geometry, elasticity, gravity=gravity, original_length=original_length)
+    return Manipulator(geometry, elasticity, gravity=gravity)
 
 
 def experimental_prototype_geometry(

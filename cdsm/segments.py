@@ -17,7 +17,7 @@ from typing import Self, final
 import numpy as np
 
 from cdsm.cable import Cable
-from cdsm.cable_laws import CableLaws, OriginalLength
+from cdsm.cable_laws import CableLaws
 from cdsm.rigid_body import RigidBody
 from cdsm.routing import Indices, Routing, Spans, cross, dot
 from cdsm.support.values import Array, ReadOnlyState, frozen
@@ -57,7 +57,7 @@ class Chains:
     laws: CableLaws
 
     @classmethod
-    def of(cls, cables: Sequence[Cable], body: RigidBody, original_length: OriginalLength) -> Self:
+    def of(cls, cables: Sequence[Cable], body: RigidBody) -> Self:
         """Divide cables at their holes into segments."""
         segments: list[Cable] = []
         start = [0]
@@ -87,7 +87,7 @@ class Chains:
             friction=frozen(friction.copy()),
             wrap=frozen(wrap.copy()),
             routing=Routing.of(body, segments, every=True),
-            laws=CableLaws(tuple(segments), original_length),
+            laws=CableLaws(tuple(segments)),
         )
 
 

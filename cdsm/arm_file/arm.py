@@ -128,7 +128,7 @@ def read_arm(
 ) -> dict[str, Any]:
     """Read what defines an arm. Arguments and errors are those of :meth:`cdsm.Manipulator.read`."""
     file, cables = read_model(path, wire, changes, robot=True)
-    keys = ("gravity", "original_length", "tolerances", "geometry", "springs")
+    keys = ("gravity", "tolerances", "geometry", "springs")
     arm = {"cables": cables} | {key: getattr(file, key) for key in keys}
     if (robot := file.urdf) is None:
         return {**arm, "urdf": to_urdf(file.geometry), "tip_link": TIP}
@@ -149,7 +149,7 @@ def arm_text(arm: Manipulator) -> str:
     owns = [{"wire": values[each.elasticity]} | _settings(each) for each in cables]
     shared = {key: x for key, x in owns[0].items() if all(own.get(key) == x for own in owns)}
     owns = [{key: x for key, x in own.items() if key not in shared} for own in owns]
-    data: dict[str, Any] = {"gravity": arm.gravity.tolist(), "original_length": arm.original_length}
+    data: dict[str, Any] = {"gravity": arm.gravity.tolist()}
     data |= {"springs": arm.own_springs}
     data |= {**shared, "wires": tables, "tolerances": tolerance_table(arm.tolerances)}
     plain: tuple[Cable, ...] = ()

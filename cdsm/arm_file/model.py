@@ -16,8 +16,7 @@ from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, 
 from pydantic import ValidationInfo as Info
 
 from cdsm.cable import Cable, Cables, Control, Site, serpentine_cables
-from cdsm.cable_laws import OriginalLength
-from cdsm.errors import LINES, FileError, GeometryError, listed
+from cdsm.errors import LINES, FileError, GeometryError, listed, warn
 from cdsm.geometry import Geometry, toml
 from cdsm.manipulator import GRAVITY
 from cdsm.support import records
@@ -108,6 +107,17 @@ def _described(tables: dict[str, Any]) -> Geometry:
         raise CrossFaults(
             known.sub(r"\1; it belongs at the top of the file", fault) for fault in error.faults
         ) from None
+
+
+def _unstrained(length: object) -> object:
+    """Accept the only value that is left of a key of older files."""
+    if length != "unstrained":
+        raise ValueError(
+            f"{length!r} given; leave the key out: a locked motor holds the original length of its "
+            "wire. The paper's reading is a law in Python: cdsm.paper.law_of_stretched_length()"
+        )
+    warn('original_length = "unstrained" holds for every arm; the line may be left out.')
+    return length
 
 
 def _name_of_one(cable: str, info: Info) -> str:
@@ -254,7 +264,7 @@ class ArmFile(_Settings, _Wires):
 
     wire: Annotated[Any, AfterValidator(lambda wire, info: _law_of(wire, info.data))] = None
     gravity: _Gravity = GRAVITY
-    original_length: OriginalLength = "unstrained"
+    original_length: Annotated[Any, AfterValidator(_unstrained)] = None
     tolerances: Annotated[Tolerances, PlainValidator(read_tolerances)] = Tolerances()
     springs: dict[str, records.PerJoint[records.Number]] | None = None
     geometry: Annotated[Any, PlainValidator(_described), Field(alias=_ROBOT)] = None

@@ -87,7 +87,6 @@ def header(
     x, y, z = arm.gravity.tolist()
     words = [f"wire {wires_text(arm.cables)}", f"gravity {x:g}, {y:g}, {z:g} m/s²"]
     words += [f"least tension {shown} N"] if minimum else []
-    words += [] if arm.original_length == "unstrained" else ["stretched lengths"]
     lines = [f"with {'; '.join(words)}; friction {rough}", str(arm)]
     if isinstance(of, cdsm.Posture):
         joints = ", ".join(map(place, without_rounding(of.q).tolist(), arm.joint_units))
@@ -95,7 +94,6 @@ def header(
     told = {"wire": wires_text(arm.cables), "gravity_m_per_s2": arm.gravity}
     told |= {
         "least_tension_N": [low for low, _ in least],
-        "original_length": arm.original_length,
         "friction": rough,
     }
     return "\n".join(lines), {"computed_with": told}

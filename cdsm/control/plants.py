@@ -96,15 +96,14 @@ class QuasiStaticPlant:
         substeps: Number of equal sub-steps of a step, as in :func:`~cdsm.load_cycle`.
 
     Raises:
-        InvalidInput: ``original_length`` of the arm is not ``"unstrained"``, or ``substeps`` is not
-            a positive whole number.
+        InvalidInput: ``substeps`` is not a positive whole number.
     """
 
     arm: Manipulator
     substeps: int = 1
 
     def __post_init__(self) -> None:
-        require_unstrained("arm", self.arm)
+        instance("arm", self.arm, Manipulator)
         whole_number("substeps", self.substeps, 1)
 
     def initial(self, q: Array, tension: Array, wrench: Array) -> QuasiStaticState:
@@ -160,14 +159,6 @@ def _tensions_of(arm: Manipulator, lengths: Array, paid_out: Array, tension: Arr
     return F
 
 
-def require_unstrained(name: str, arm: Manipulator) -> None:
-    """Raise InvalidInput unless ``arm``, called ``name``, has "unstrained" original lengths."""
-    if instance(name, arm, Manipulator).original_length != "unstrained":
-        raise InvalidInput(
-            name, 'has original_length = "stretched"; motors pay out unstrained lengths.'
-        )
-
-
 class MuJoCoState(NamedTuple):
     """State of a :class:`MuJoCoPlant` after a step of control."""
 
@@ -191,8 +182,7 @@ class MuJoCoPlant:
 
     Raises:
         CdsmError: mujoco is not installed.
-        InvalidInput: The arm has friction, ``original_length`` is not ``"unstrained"``, or a number
-            is not positive.
+        InvalidInput: The arm has friction, or a number is not positive.
     """
 
     arm: Manipulator
@@ -201,7 +191,7 @@ class MuJoCoPlant:
 
     def __post_init__(self) -> None:
         need("mujoco", "mujoco")
-        require_unstrained("arm", self.arm)
+        instance("arm", self.arm, Manipulator)
         quantity("period", self.period, "time")
         if scalar("damping_ratio", self.damping_ratio) < 0.0:
             raise InvalidInput("damping_ratio", f"{self.damping_ratio:g} given; 0 or more needed.")

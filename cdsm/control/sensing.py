@@ -214,8 +214,7 @@ class Observer:
     def _problem(self) -> ChainProblem:
         arm = self.arm
         chains = arm.at(np.clip(0.0, arm.lower, arm.upper)).segments.chains
-        even = np.zeros(len(arm.cables))
-        return ChainProblem(arm.cables, chains.start, even, unstrained=True)
+        return ChainProblem(arm.cables, chains.start)
 
     @cached_property
     def _domains(self) -> Array:

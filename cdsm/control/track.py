@@ -25,7 +25,6 @@ from cdsm.control.plants import (
     PlantState,
     QuasiStaticPlant,
     frictionless_stiffness,
-    require_unstrained,
 )
 from cdsm.control.run import Outcome, TrackingRun
 from cdsm.control.sensing import Observer, Sensors
@@ -105,7 +104,6 @@ def track(
         lacking = f"{len(plan.infeasible)} of {len(plan.target)}"
         said = f"{lacking} samples are not planned, the first of them sample {first.index}"
         raise InvalidInput("plan", f"{said}: {first.reason}")
-    require_unstrained("plan", arm)
     low, high = checked_bounds(arm, minimum, maximum)
     name = law if isinstance(law, str) else getattr(law, "__name__", "custom")
     command_of = law if callable(law) else LAWS[one_of("law", law, LAWS)]

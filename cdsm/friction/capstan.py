@@ -48,17 +48,12 @@ class ChainProblem:
     Args:
         cables: Cables of the arm.
         start: First segment of each cable; the last entry is the number of segments (C+1,).
-        tension: F (C,) [N]; needed only if ``unstrained`` is False.
-        unstrained: Whether ε is the strain of the law. If not, ε is this strain minus the strain at
-            ``tension``. A rest length is the length at ε = 0.
 
     Attributes:
         laws: Each law with the indices of its cables.
     """
 
-    def __init__(
-        self, cables: tuple[Cable, ...], start: Indices, tension: Array, unstrained: bool
-    ) -> None:
+    def __init__(self, cables: tuple[Cable, ...], start: Indices) -> None:
         self._start = start
         self._cable = np.repeat(np.arange(len(cables)), np.diff(start))
         size = self._cable.size
@@ -77,10 +72,6 @@ class ChainProblem:
                 self._curved.append((law, segments))
             else:
                 self._softness[segments] = 1.0 / law.constant_rigidity
-        if not unstrained:
-            F = tension[self._cable]
-            base, softness = self._strain(F)
-            self._base = self._base - (base + softness * F - 1.0)
 
     def settle(
         self, length: Array, rest_length: Array, ratio: Array, forced: Array, near: Array

@@ -148,7 +148,7 @@ def _first_slip(K: Stiffness, u: Array, load: float, motion: Array) -> tuple[flo
     forced = ~arm.cables.position_controlled
     chains = segments.chains
     T = K.tension[segments.chains.cable]
-    problem = ChainProblem(arm.cables, chains.start, K.tension, arm.original_length == "unstrained")
+    problem = ChainProblem(arm.cables, chains.start)
     wire = problem.rest_lengths(segments.lengths, T)
     ratio = np.ones(T.size)
     ratio[chains.hole[can_stick(pose)]] = _STUCK

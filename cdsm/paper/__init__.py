@@ -16,7 +16,7 @@ from cdsm.paper.simulation import (
     figure_8,
     figure_lead,
 )
-from cdsm.paper.strand import StrandFigure, figure_5
+from cdsm.paper.strand import StrandFigure, figure_5, law_of_stretched_length
 
 # fmt: off
 FIGURES: Final[dict[str, Callable[[], Figure]]] = {
@@ -27,6 +27,7 @@ FIGURES: Final[dict[str, Callable[[], Figure]]] = {
 
 __all__ = [
     "FIGURES", "HEADER", "Claim", "Curve", "ExperimentFigure", "Figure", "LeadFigure",
-    "StiffnessFigure", "StrandFigure", "Trace", "to_dict", "to_markdown", "to_rows",
+    "StiffnessFigure", "StrandFigure", "Trace", "law_of_stretched_length", "to_dict", "to_markdown",
+    "to_rows",
 ]
 # fmt: on

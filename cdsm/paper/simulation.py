@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cache, partial
 from itertools import product
 from typing import Any, Final, Literal, final
 
@@ -18,9 +17,8 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from cdsm import presets
-from cdsm.cable_laws import OriginalLength
 from cdsm.paper.claims import Claim, Figure, Said, floats
-from cdsm.paper.strand import LEVEL
+from cdsm.paper.strand import LEVEL, law_of_stretched_length
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import stiffness
 from cdsm.support.result import Result, unit
@@ -46,6 +44,7 @@ LEADS: Final = frozen(np.concatenate([[0.0], np.geomspace(0.003, 0.3, 30)]))
 _FROM_FIG_6 = "prototype searched for Fig. 6"
 _POINTS = 25
 Part = Literal["active", "passive"]
+OriginalLength = Literal["stretched", "unstrained"]
 _STIFFNESS: Final = unit("N/m", "case", "axis")
 _CHANGE: Final = unit("percent", "lead", "reading", "axis")
 
@@ -132,8 +131,9 @@ def _curves(
     """Compute a curve over laws and lower bounds of tension, by EA/L and by EA/l_0."""
 
     def curve(length: OriginalLength) -> Curve:
-        arm = cache(partial(presets.virtual_prototype, original_length=length, lead=lead))
-        cases = [(arm(law).at(q), float(F)) for law, F in product(laws, minima)]
+        wires = map(law_of_stretched_length, laws) if length == "stretched" else laws
+        arms = [presets.virtual_prototype(wire, lead=lead) for wire in wires]
+        cases = [(arm.at(q), float(F)) for arm, F in product(arms, minima)]
         found = [stiffness(pose, distribute_tension(pose, F)) for pose, F in cases]
         axes = np.eye(3)
         return Curve(

@@ -14,9 +14,11 @@ from cdsm import presets
 from cdsm.paper.claims import Claim, Figure, floats
 from cdsm.support.result import unit
 from cdsm.support.values import Array, frozen
+from cdsm.wires.elasticity import Elasticity
 
 GAUGE_LENGTH = 0.5  # [m], [N]
 JOIN = 31.0
+_STRONGEST: Final = 1e4  # tension [N] above those of the paper
 
 LEVEL: Final = (400.0, 810.0)
 """Range of tension [N] over which the paper calls the rigidity near-constant (Section IV-C)."""
@@ -73,6 +75,24 @@ def left_open(tension: float) -> tuple[float, float]:
     middle = float(eq19_as_printed(tension))
     half = float(polyval(tension, HALF_UNITS[1]))
     return middle - half, middle + half
+
+
+def law_of_stretched_length(law: Elasticity) -> Elasticity:
+    """Return the law with which EA/l_0 is EA/L of ``law``: the stiffness of a wire in the paper.
+
+    The paper takes the stretched length L of a wire for its original length l_0. With the strain
+    ε = ∫ dF/EA of ``law`` this is exactly a wire of another law, EA′ = EA exp(−ε): its strain is
+    ε′ = exp(ε) − 1, so that EA′/l_0 = EA′ (1 + ε′)/L = EA/L. It ends where ``law``
+    does, at 10 kN at most.
+    """
+    joins = law.arguments.get("joins", ())
+    high = min(law.high, _STRONGEST)
+
+    def rigidity(F: Array) -> Array:
+        strain, EA = law.strain_and_rigidity(F)
+        return EA * np.exp(-strain)
+
+    return Elasticity.from_rigidity(rigidity, law.low, high, joins)
 
 
 def figure_5() -> StrandFigure:

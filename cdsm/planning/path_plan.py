@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 
-from cdsm.cable_laws import CableLaws
 from cdsm.errors import CdsmError, listed
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix import Stiffness
@@ -99,9 +98,9 @@ class PathPlan(Result, Plotted):
     def rest_lengths(self) -> Array:
         """Lengths without strain l_0 (P, H) [m] of the H position-controlled cables: paid-out wire.
 
-        l_0 + Δl(F, l_0) = L, with :meth:`~cdsm.Cable.elongation` Δl, whatever ``original_length``.
+        l_0 + Δl(F, l_0) = L, with :meth:`~cdsm.Cable.elongation` Δl.
         """
-        motors = CableLaws(self.arm.cables, "unstrained")
+        motors = self.arm.laws
         pairs = zip(self.cable_lengths, self.tensions, strict=True)
         rows = np.array([motors.original_lengths(L, F) for L, F in pairs])
         return frozen(rows.reshape(self.tensions.shape)[:, self.arm.cables.position_controlled])

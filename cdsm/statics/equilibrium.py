@@ -42,8 +42,8 @@ class Equilibrium(Result):
         reference_tension: F (C,) [N] at the reference.
         stiffness: K_θ at the equilibrium, with the rest lengths of the *reference*: the derivative
             by q of the torque J_Lᵀ F + g − J_Xᵀ W, without the stops. For a pure force it is the
-            exact Hessian of the potential. If no cable is slack and ``original_length`` of the arm
-            is "unstrained", it equals :func:`~cdsm.stiffness` of this posture and tension.
+            exact Hessian of the potential. If no cable is slack, it equals
+            :func:`~cdsm.stiffness` of this posture and tension.
         stop_torque: Torque of the stops on the joints (nv,) [N m]: positive at a lower limit,
             negative at an upper limit, zero elsewhere.
         motors: ``"locked"``: they hold the lengths, so the elasticity of the cables counts in K_θ;

@@ -57,8 +57,7 @@ def forward_statics(
 
     Raises:
         InvalidInput: Not exactly one of the three is given, an argument has the wrong shape, or a
-            cable does not exist; or motors hold lengths, but a cable has the control ``"force"``,
-            or ``original_length`` of the arm is ``"stretched"``.
+            cable does not exist; or motors hold lengths, but a cable has the control ``"force"``.
         ElasticityRangeError: Motors hold lengths, and a tension is outside the domain of its law.
         EquilibriumError: No stable equilibrium was found, or nothing holds a joint.
     """
@@ -115,9 +114,6 @@ def _model(
         if cable.control == "force":
             said = f"{cable.name} has control='force': its motor holds a tension, no length. "
             raise InvalidInput(name, f"{said}Give tension, or this cable control='position'.")
-    if arm.original_length != "unstrained":
-        said = "l_0 of this arm changes with the tension; use original_length='unstrained'."
-        raise InvalidInput(name, said)
     least = np.array([cable.elasticity.rest for cable in arm.cables])
     straight = arm.laws.original_lengths(home.cable_lengths, least)
     if name == "pull":

@@ -25,8 +25,8 @@ Indices = slice | NDArray[np.intp]
 class LockedArm:
     """Arm under a wrench W (6,), its motors locked where the cables have the tensions F (C,) [N].
 
-    They are locked at ``reference``, or hold the wires of ``rest_length`` (C,) [m], of an arm with
-    ``original_length="unstrained"``, or hold the tensions (``tension_held``). Tensions may leave
+    They are locked at ``reference``, or hold the wires of ``rest_length`` (C,) [m], or
+    hold the tensions (``tension_held``). Tensions may leave
     the domains of their laws: outside, a cable has the stiffness of the nearest end of the domain,
     or is slack. :func:`require_domain` refuses a result outside. Raises ElasticityRangeError if a
     law gives no strain at F, or if a series spring is longer than its whole cable.

@@ -75,8 +75,7 @@ class QuasiStaticArm:
         self._tension = tension
         self.start = reference.segments.chains.start
         self.forced = ~arm.cables.position_controlled
-        unstrained = arm.original_length == "unstrained"
-        self._problem = ChainProblem(arm.cables, self.start, tension, unstrained)
+        self._problem = ChainProblem(arm.cables, self.start)
 
     def initial(self, wrench: Array, slack: Array | float = 0.0) -> QuasiStaticState:
         """Return the state at the reference under ``wrench`` (6,), with even tensions.

@@ -31,9 +31,6 @@ def test_move_is_a_load_and_a_command_of_load_cycle(friction: float) -> None:
 
 def test_arms_that_a_plant_does_not_simulate_are_refused() -> None:
     arm = small_path().arm
-    stretched = cdsm.Manipulator(arm.geometry, cables=arm.cables, original_length="stretched")
-    with pytest.raises(cdsm.InvalidInput, match="stretched"):
-        cdsm.QuasiStaticPlant(stretched)
     with pytest.raises(cdsm.InvalidInput, match="friction"):
         cdsm.MuJoCoPlant(small_path(0.1).arm)
     for ratio in (np.nan, -0.1, "0.5"):

@@ -9,6 +9,7 @@ from scipy.optimize import brentq, root
 
 import cdsm
 from cdsm import presets
+from cdsm.paper import law_of_stretched_length
 from cdsm.support.values import Array
 from tests.friction.test_band import EA, LAW, prototype
 from tests.support import arms
@@ -82,7 +83,7 @@ def test_simulated_arms_begin_to_slide_at_the_load(law: cdsm.Elasticity) -> None
 def test_planar_arm_of_two_joints() -> None:
     """0.226, 0.453 and 0.905 N to first order by an independent program, for μ = 0.05, 0.1, 0.2."""
     sizes = {"link_length": 0.06, "disk_offset": 0.012, "hole_radius": 0.025, "lead": 0.3}
-    plain = hinge(joints=2, law=LAW, original_length="stretched", **sizes)
+    plain = hinge(joints=2, law=law_of_stretched_length(LAW), **sizes)
     for mu, expected in ((0.05, 0.226), (0.1, 0.453), (0.2, 0.905)):
         pose = rough(plain, mu).at(np.deg2rad([15.0, 15.0]))
         assert np.rad2deg(pose.segments.wrap[-3:]) == pytest.approx(7.5)
@@ -140,8 +141,9 @@ def test_load_comes_on_top_of_the_wrench() -> None:
 @pytest.mark.parametrize(("bound", "expected"), [(15.0, 0.27), (50.0, 0.71), (120.0, 1.61)])
 def test_numbers_of_the_virtual_prototype(bound: float, expected: float) -> None:
     """First slip in z of an independent program at μ = 0.1, with and without lead: two digits."""
+    law = law_of_stretched_length(presets.STRAND_1X19)
     for lead in (0.0, 0.3):
-        arm = presets.virtual_prototype(lead=lead, friction=0.1, original_length="stretched")
+        arm = presets.virtual_prototype(law, lead=lead, friction=0.1)
         pose = arm.at(np.full(10, presets.TEN_DEGREES))
         found = cdsm.breakaway(pose, cdsm.distribute_tension(pose, bound), "z")
         assert found.load == pytest.approx(expected, abs=0.007)

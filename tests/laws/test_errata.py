@@ -9,6 +9,7 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import linprog
 
 import cdsm
+from cdsm.paper import law_of_stretched_length
 from cdsm.paper.experiments import CHECK, MEASURED, TABLE_II, TABLE_II_SWAPPED
 from cdsm.paper.strand import EQ19_PRINTED, HALF_UNITS, JOIN, LEVEL, eq19_as_printed, left_open
 from cdsm.support.values import Array
@@ -236,7 +237,7 @@ def test_table2_increment_is_last_minus_first_over_first(table: Array) -> None:
 
 def test_fig6_increase_by_4_24_times_is_a_ratio_of_5_24() -> None:
     """Recomputed on the virtual prototype, from a lower bound of 15 N to one of 120 N."""
-    arm = cdsm.presets.virtual_prototype(original_length="stretched")
+    arm = cdsm.presets.virtual_prototype(law_of_stretched_length(cdsm.presets.STRAND_1X19))
     pose = arm.at(np.full(10, cdsm.presets.TEN_DEGREES))
     first, last = (
         cdsm.stiffness(pose, cdsm.distribute_tension(pose, minimum=bound)).pseudoinverse()[0, 0]

@@ -83,6 +83,15 @@ def test_original_length_stiffens_by_the_strain_and_changes_nothing_else(results
     assert (stiffer < 1.05 * strain[:, 2:]).all()
 
 
+@pytest.mark.parametrize("law", [presets.ELASTIC_STAGE, presets.STRAND_1X19])
+def test_law_of_stretched_length_gives_a_wire_the_stiffness_ea_over_l(law: cdsm.Elasticity) -> None:
+    paper_law = paper.law_of_stretched_length(law)
+    F = np.linspace(3.0, 800.0, 5000)
+    strain, EA = paper_law.strain_and_rigidity(F)
+    np.testing.assert_allclose(EA * (1.0 + strain), law.rigidity(F), rtol=1e-6)
+    np.testing.assert_allclose(strain, np.expm1(law.strain(F)), rtol=1e-6)
+
+
 def test_virtual_prototype_is_that_of_section_iv() -> None:
     arm = presets.virtual_prototype()
     assert (arm.nv, len(arm.cables), arm.geometry.hole_radius) == (10, 15, 0.03)

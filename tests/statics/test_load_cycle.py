@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import cdsm
+from cdsm.paper import law_of_stretched_length
 from cdsm.statics.load_cycle import LoadHistory
 from cdsm.support.values import Array
 from tests.support import arms
@@ -16,10 +17,12 @@ from tests.support.locked import hinge
 WIRE = cdsm.LinearElasticity(48e3)
 
 
-def planar(mu: float, joints: int = 2, **options: Any) -> tuple[cdsm.Posture, cdsm.Tension]:
+def planar(
+    mu: float, joints: int = 2, law: cdsm.Elasticity = WIRE
+) -> tuple[cdsm.Posture, cdsm.Tension]:
     """Hinges about y at 15°: R 25, h 12, links 60 mm, lead 0.3 m, 50 N."""
     sizes = {"link_length": 0.06, "disk_offset": 0.012, "hole_radius": 0.025, "lead": 0.3}
-    arm = hinge(joints=joints, law=WIRE, friction=mu, **sizes, **options)
+    arm = hinge(joints=joints, law=law, friction=mu, **sizes)
     pose = arm.at(np.full(joints, np.deg2rad(15.0)))
     return pose, cdsm.distribute_tension(pose, 50.0)
 
@@ -40,12 +43,12 @@ def along_z(*forces: float) -> Array:
 def slender(law: cdsm.Elasticity = WIRE, **cables: Any) -> cdsm.Posture:
     sizes = {"link_length": 0.05, "base_length": 0.02, "disk_offset": 0.01, "hole_radius": 0.03}
     geometry = arms.readme_geometry(joints=2, link_mass=0.2, lead=0.2, **sizes)
-    own, forced = cables.pop("original_length", "unstrained"), cables.pop("forced", ())
+    forced = cables.pop("forced", ())
     routed = [
         replace(cable, control="force") if c in forced else cable
         for c, cable in enumerate(cdsm.serpentine_cables(geometry, law, **cables))
     ]
-    arm = cdsm.Manipulator(geometry, cables=routed, original_length=own)
+    arm = cdsm.Manipulator(geometry, cables=routed)
     return arm.at(np.deg2rad([5.0, -8.0, 6.0, 4.0]))
 
 
@@ -54,12 +57,11 @@ def slender(law: cdsm.Elasticity = WIRE, **cables: Any) -> cdsm.Posture:
     [
         (slender(), 60.0, 8.0),
         (slender(cdsm.StrandElasticity.eq19_repaired(), series_stiffness=5e4), 60.0, 8.0),
-        (slender(original_length="stretched"), 60.0, 8.0),
         (slender(forced=(0, 4)), 60.0, 8.0),
         (slender(), 12.0, 60.0),  # cables go slack
         (slender(series_stiffness=1e3), 12.0, 40.0),  # joints reach their stops
     ],
-    ids=["linear", "strand behind springs", "stretched", "force", "slack", "stops"],
+    ids=["linear", "strand behind springs", "force", "slack", "stops"],
 )
 def test_without_friction_every_load_gives_the_equilibrium(
     pose: cdsm.Posture, tension: float, load: float
@@ -159,7 +161,7 @@ PLANAR = {  # μ: secant to −6 N [N/mm], left over at 0 N [mm], loss per cycle
 @pytest.mark.parametrize("mu", PLANAR)
 def test_numbers_of_an_independent_program_on_a_planar_arm(mu: float) -> None:
     secant, left, lost = PLANAR[mu]
-    pose, pull = planar(mu, original_length="stretched")
+    pose, pull = planar(mu, law=law_of_stretched_length(WIRE))
     history = cdsm.load_cycle(pose, pull, along_z(-6.0, 0.0, 6.0, -6.0, 6.0, -6.0))
     z = 1000.0 * history.displacement[:, 2]
     assert -6.0 / z[0] == pytest.approx(secant, rel=3e-3)

@@ -141,13 +141,12 @@ def hinge(
     limit: float | None = None,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     law: cdsm.Elasticity | None = None,
-    original_length: cdsm.manipulator.OriginalLength = "unstrained",
     **sizes: Any,
 ) -> cdsm.Manipulator:
     """Hinges about y, of one joint unless ``sizes`` of the geometry say otherwise."""
     geometry = cdsm.Geometry.hinged(**{**SIZES, "joint_limit": limit, **sizes})
     law = law or cdsm.LinearElasticity(EA)
-    return cdsm.Manipulator(geometry, law, gravity=gravity, original_length=original_length)
+    return cdsm.Manipulator(geometry, law, gravity=gravity)
 
 
 def half(side: float, angle: float) -> tuple[float, float]:
