@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from cdsm.support.values import Array
+    import numpy as np
+    from numpy.typing import NDArray
 
     Texts = Sequence[str]
     Numbers = Sequence[float]
@@ -143,7 +144,7 @@ class InfeasibleTension(CdsmError):
 
     def __init__(
         self,
-        missing: Array,
+        missing: NDArray[np.float64],
         joint: str,
         relaxation: float,
         binding: Texts,
@@ -182,7 +183,7 @@ class SingularStiffness(CdsmError, ArithmeticError):
 
     status = "SINGULAR"
 
-    def __init__(self, problem: str, direction: Array) -> None:
+    def __init__(self, problem: str, direction: NDArray[np.float64]) -> None:
         super().__init__(problem)
         self.direction = direction
 
@@ -196,7 +197,12 @@ class EquilibriumError(CdsmError, ArithmeticError):
     """
 
     def __init__(
-        self, problem: str, residual: Array, load_factor: float, joint: str, remedy: str = ""
+        self,
+        problem: str,
+        residual: NDArray[np.float64],
+        load_factor: float,
+        joint: str,
+        remedy: str = "",
     ) -> None:
         usual = "Reduce the load, raise the tensions, or take stiffer cables or springs."
         super().__init__(f"{problem}. {remedy or usual}")
@@ -215,7 +221,7 @@ class UnreachableStiffness(CdsmError):
 
     def __init__(
         self,
-        direction: Array,
+        direction: NDArray[np.float64],
         target: float,
         low: float,
         high: float,

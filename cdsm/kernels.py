@@ -9,7 +9,7 @@ Joints come after their parents, which only here is a matter of order: :mod:`cds
 sorts them. Frame 0 is the base, frame j + 1 that of joint j. A joint has the twist (v, z) about the
 origin of the base: it moves the point x by v + z × x, whether it turns or slides.
 
-``python -m cdsm.kernels`` compiles them ahead, in less than half a minute.
+``python -m cdsm.batch`` compiles them ahead, in less than half a minute.
 """
 
 from __future__ import annotations
@@ -537,9 +537,3 @@ def guess(arm: Arm, at: Pose, low: Array, high: Array, F: Array, good: NDArray[n
                         size[w] += np.abs(J[c, i, w] * F[b, c, w])
             for w in each(size):
                 good[b, w] &= np.abs(rest[0, w]) <= 1e-11 * size[w]
-
-
-if __name__ == "__main__":
-    from cdsm.batch.solution import compile_ahead  # this module under its own name
-
-    compile_ahead()

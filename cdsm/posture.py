@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import NDArray
 
-import cdsm
 from cdsm.errors import InvalidInput, listed
 from cdsm.geometry.parts import overlapping
 from cdsm.routing import Spans, cross
@@ -18,14 +17,12 @@ from cdsm.segments import Segments
 from cdsm.support.format import JointUnits, aligned, coordinates, plain
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import one_of
-from cdsm.support.values import Array, ReadOnlyState, frozen
+from cdsm.support.values import Array, ReadOnlyState, draw, frozen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdsm.manipulator import Manipulator
-    from cdsm.stiffness_matrix import Stiffness
-    from cdsm.tension import Tension
 
 
 @final
@@ -78,9 +75,13 @@ class Posture(ReadOnlyState):
     def __repr__(self) -> str:
         return f"<Posture of {self.arm.name}, tip at {coordinates(1e3 * self.tip[:3, 3])} mm>"
 
-    def plot(self, tension: Tension | None = None, stiffness: Stiffness | None = None) -> Figure:
-        """Plot the arm in mm; ``tension`` colours its cables, ``stiffness`` adds tip compliance."""
-        return cdsm.plots.plot_arm(self, tension, stiffness)
+    def plot(self, tension: Result | None = None, stiffness: Result | None = None) -> Figure:
+        """Plot the arm in mm.
+
+        A :class:`~cdsm.Tension` colours its cables. A :class:`~cdsm.Stiffness` adds the compliance
+        of the tip.
+        """
+        return draw("plot_arm", self, tension, stiffness)
 
     def to_dict(self) -> dict[str, object]:
         """Return angles, tip, cable lengths and moment arms for JSON; keys name the SI units."""

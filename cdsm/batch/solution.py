@@ -55,10 +55,10 @@ def kernels_for(arm: ArmRows, count: int) -> ModuleType:
 
 def compile_ahead() -> None:
     """Compile all kernels, unless numba has kept them on disk."""
-    import cdsm
     from cdsm import kernels
+    from cdsm.presets import virtual_prototype
 
-    arm = cdsm.presets.virtual_prototype()
+    arm = virtual_prototype()
     F = np.full((1, len(arm.cables)), 50.0)
     rows = Rows(
         arm=arm,

@@ -13,13 +13,13 @@ from typing import Any, Final, NamedTuple, Protocol, TypeVar, final
 
 import numpy as np
 
-import cdsm
 from cdsm.control.laws import Command
 from cdsm.control.sensing import Measurement
 from cdsm.errors import ElasticityRangeError, InvalidInput, need, solver_failed
 from cdsm.manipulator import Manipulator
 from cdsm.posture import Posture
 from cdsm.statics import quasi_static
+from cdsm.statics.equilibrium import equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
 from cdsm.stiffness_matrix import Stiffness
 from cdsm.support.validation import instance, quantity, scalar, whole_number
@@ -142,7 +142,7 @@ def frictionless_stiffness(state: PlantState, wrench: Array) -> Stiffness:
     F = true.tension
     if pose.arm.has_friction:
         F = _tensions_of(pose.arm, pose.cable_lengths, true.paid_out, F)
-    return cdsm.equilibrium(pose, F, wrench).stiffness
+    return equilibrium(pose, F, wrench).stiffness
 
 
 def _tensions_of(arm: Manipulator, lengths: Array, paid_out: Array, tension: Array) -> Array:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cdsm
 from cdsm.errors import InvalidInput
 from cdsm.planning.goal import REACHED, Goal
 from cdsm.planning.tension_space import TensionSpace
@@ -26,7 +25,7 @@ from cdsm.support.validation import (
     number_array,
     unit_directions,
 )
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, draw, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
@@ -91,7 +90,7 @@ class StiffnessPlan(Result):
         If ``attainable`` is given, the tensions of the softest and of the stiffest arm are plotted
         too. Raises InvalidInput if ``attainable`` is the range of another posture or direction.
         """
-        return cdsm.plots.plot_stiffness_plan(self, attainable)
+        return draw("plot_stiffness_plan", self, attainable)
 
     def __str__(self) -> str:
         pairs = np.reshape([self.achieved, self.target], (2, -1)).T / 1e3

@@ -136,7 +136,7 @@ def plot_path_plan(plan: PathPlan) -> Figure:
 @style.styled
 def plot_shares(shares: Shares) -> Figure:
     """Plot the contribution [N/mm] of each cable, gravity, load and springs as bars."""
-    arm = shares.stiffness.posture.arm
+    arm = shares.posture.arm
     rest = [*shares.others.values()]
     none = np.zeros(len(rest))
     passive, active = (N_PER_MM * np.append(each, none) for each in (shares.passive, shares.active))
@@ -150,7 +150,7 @@ def plot_shares(shares: Shares) -> Figure:
     axes.bar(x, others, color=style.GREEN, label=", ".join(shares.others))
     axes.axhline(0.0, color="0.2", linewidth=0.8)
     total = f"{N_PER_MM * shares.total:.4g} N/mm along {style.direction_name(shares.direction)}"
-    unstable = "" if shares.stiffness.is_stable else "UNSTABLE: "
+    unstable = "" if shares.is_stable else "UNSTABLE: "
     axes.legend()
     return style.titled(figure, f"{unstable}{arm.name}: contributions to {total}")
 

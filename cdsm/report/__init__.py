@@ -1,5 +1,3 @@
 """Check a stiffness matrix: is it right, is the arm balanced and stable, and how to read it."""
 
-from cdsm.report.report import Report, report_on
-
-__all__ = ["Report", "report_on"]
+from cdsm.report.report import report_on as report_on

@@ -7,8 +7,7 @@ at the tip has no potential; its work by a small rotation takes its place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, final
+from dataclasses import replace
 
 import numpy as np
 from scipy.differentiate import jacobian
@@ -16,14 +15,11 @@ from scipy.linalg import null_space
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
-import cdsm
+from cdsm.batch.evaluation import evaluate
 from cdsm.errors import CdsmError, listed
+from cdsm.stiffness_matrix import Stiffness
+from cdsm.stiffness_matrix.report import Comparison, Verdict
 from cdsm.support.values import Array
-
-if TYPE_CHECKING:
-    from cdsm.stiffness_matrix import Stiffness
-
-Verdict = Literal["agrees", "DIFFERS", "not possible"]
 
 TERMS = ("active", "passive", "gravity", "load", "springs", "joint")
 TORQUES = ("cable torque", "gravity torque", "load torque")
@@ -38,31 +34,6 @@ _STEP = 1e-3  # largest step [rad], or in arm lengths
 _CHANGE = 4e-3  # largest change of a tension in a step, as a fraction of the tension
 
 
-@final
-@dataclass(frozen=True)
-class Comparison:
-    """A term of K_θ or a torque against finite differences, or all terms against the batch.
-
-    Attributes:
-        name: Name of the term or torque, or ``"batch"``; ``"joint"`` is K_θ.
-        unit: ``"N m/rad"`` or, for a torque, ``"N m"``; prismatic joints count with the arm's
-            length as lever.
-        largest: Largest magnitude of an entry.
-        off: Largest magnitude of the difference.
-        error: Error estimate of the finite differences; 0 for the batch.
-        verdict: ``"not possible"`` if the differences decide nothing.
-        reason: Why the check is not possible; else empty.
-    """
-
-    name: str
-    unit: str
-    largest: float
-    off: float
-    error: float
-    verdict: Verdict
-    reason: str
-
-
 def balance_error(K: Stiffness) -> tuple[float, str, float]:
     """Return the largest residual of Eq. 13 [N m], its joint, and the residual per torque [-]."""
     left = abs(K.residual * joint_unit(K))
@@ -72,7 +43,7 @@ def balance_error(K: Stiffness) -> tuple[float, str, float]:
 
 
 def optimality(K: Stiffness) -> tuple[float | None, float | None]:
-    """Return ``bound_violation`` and ``kkt_residual`` of :class:`Report`."""
+    """Return ``bound_violation`` and ``kkt_residual`` of :class:`~cdsm.stiffness_matrix.Report`."""
     F = K.tension
     tension = K.distribution
     if tension is None:
@@ -176,7 +147,7 @@ def _batch(K: Stiffness) -> Array:
         pairs = zip(arm.cables, slack, strict=True)
         arm = arm.with_cables([replace(b, control="force") if free else b for b, free in pairs])
     q = K.posture.q[None]
-    batch = cdsm.evaluate(arm, q, K.tension, K.wrench, TERMS, check_limits=False)
+    batch = evaluate(arm, q, K.tension, K.wrench, TERMS, check_limits=False)
     return np.array([batch[name][0] for name in TERMS])
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import cdsm
 from cdsm.errors import InvalidInput, SingularStiffness, listed
 from cdsm.posture import Posture
 from cdsm.statics.locked_arm import LockedArm
@@ -19,13 +18,13 @@ from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import Direction, instance, unit_direction, wrench_vector
-from cdsm.support.values import Array, frozen
+from cdsm.support.values import Array, draw, frozen
 from cdsm.tension import Tension
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cdsm.report import Report
+    from cdsm.stiffness_matrix import Report
 
 _NEUTRAL = 1e-2  # smallest eigenvalue over the magnitudes of its terms: they cancel, to 1 %
 
@@ -231,7 +230,7 @@ class Equilibrium(Result):
 
     def plot(self) -> Figure:
         """Plot the arm in mm at the reference (grey) and at the equilibrium."""
-        return cdsm.plots.plot_path([self.reference, self.pose])
+        return draw("plot_path", [self.reference, self.pose])
 
     def __str__(self) -> str:
         arm = self.pose.arm

@@ -8,6 +8,8 @@ from cdsm.stiffness_matrix.assembly import assemble as assemble
 from cdsm.stiffness_matrix.assembly import checked_tension as checked_tension
 from cdsm.stiffness_matrix.assembly import stiffness as stiffness
 from cdsm.stiffness_matrix.prints import Remedy as Remedy
+from cdsm.stiffness_matrix.report import Comparison as Comparison
+from cdsm.stiffness_matrix.report import Report as Report
 from cdsm.stiffness_matrix.shares import Shares as Shares
 from cdsm.stiffness_matrix.value import Friction as Friction
 from cdsm.stiffness_matrix.value import Stiffness as Stiffness

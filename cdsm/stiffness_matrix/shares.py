@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Self, final
+from typing import final
 
 import numpy as np
 
-from cdsm.stiffness_matrix.prints import model_of, verdict
+from cdsm.posture import Posture
 from cdsm.support.format import aligned, coordinates, without_rounding
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import one_of
 from cdsm.support.values import Array, Named, Plotted, frozen
-
-if TYPE_CHECKING:
-    from cdsm.stiffness_matrix import Stiffness
 
 
 @final
@@ -23,54 +20,30 @@ class Shares(Result, Named, Plotted):
     """Contributions to the stiffness in one direction; they add up to :attr:`total`.
 
     Attributes:
-        stiffness: The stiffness to which they contribute.
+        posture: The posture.
         direction: Unit direction (3,), base axes.
         passive: Of each cable's elasticity, (C,) [N/m].
         active: Of each cable's tension, (C,) [N/m]; usually negative.
         gravity: Of the weight of the links [N/m].
         load: Of the wrench at the tip [N/m].
         springs: Of the joint springs [N/m].
+        model: Assumptions of the stiffness in words, such as locked motors.
+        warnings: Of an unstable arm, the sentence that says so: its contributions mean nothing.
     """
 
     _headline = "total"
     _rows = "cable"
-    _posture_from = "stiffness.posture"
     _figure = "plot_shares"
 
-    stiffness: Stiffness
+    posture: Posture
     direction: Array = field(metadata=unit("1", "axis"))
     passive: Array = field(metadata=unit("N/m", "cable"))
     active: Array = field(metadata=unit("N/m", "cable"))
     gravity: float = field(metadata=unit("N/m"))
     load: float = field(metadata=unit("N/m"))
     springs: float = field(metadata=unit("N/m"))
-
-    @classmethod
-    def of(cls, K: Stiffness, u: Array) -> Self:
-        """Compute the contributions to K.along(u), of a unit vector u (3,)."""
-        along, moved = K._along(u)
-        pose = K.posture
-        motion = moved * along
-        if K.segment_tension is None or K.tension_gradient is None:
-            passive = K.cable_stiffness * (pose.length_jacobian @ motion) ** 2
-            active = K.tension * (pose.length_hessian @ motion @ motion)
-        else:
-            at = pose.segments
-            each = (at.length_jacobian @ motion) * (K.tension_gradient @ motion)
-            passive = np.bincount(at.chains.cable, each).astype(np.float64)
-            active = at.tension_stiffness(K.segment_tension) @ motion @ motion
-        weight, load, springs = (
-            float(motion @ term @ motion) for term in (K.gravity, K.load, K.springs)
-        )
-        return cls(
-            stiffness=K,
-            direction=u,
-            passive=frozen(passive),
-            active=frozen(active),
-            gravity=weight,
-            load=load,
-            springs=springs,
-        )
+    model: str
+    warnings: tuple[str, ...] = ()
 
     def __getitem__(self, cable: str) -> float:
         """Return passive + active contribution of a cable [N/m], or raise InvalidInput."""
@@ -78,7 +51,7 @@ class Shares(Result, Named, Plotted):
 
     def keys(self) -> tuple[str, ...]:
         """Return the names of the cables."""
-        return self.stiffness.posture.arm.cables.names
+        return self.posture.arm.cables.names
 
     @property
     def cables(self) -> Array:
@@ -89,7 +62,7 @@ class Shares(Result, Named, Plotted):
     def others(self) -> dict[str, float]:
         """Contributions of gravity, of the load and, if there are any, of the springs [N/m]."""
         found = {"gravity": self.gravity, "load": self.load}
-        return found | {"springs": self.springs} if self._posture.arm.has_springs else found
+        return found | {"springs": self.springs} if self.posture.arm.has_springs else found
 
     @quantity("N/m")
     def total(self) -> float:
@@ -99,10 +72,9 @@ class Shares(Result, Named, Plotted):
     @quantity("1")
     def is_stable(self) -> bool:
         """Whether the arm is stable; if not, the contributions mean nothing."""
-        return self.stiffness.is_stable
+        return not self.warnings
 
     def __str__(self) -> str:
-        K = self.stiffness
         others = self.others
         names = [*self.keys(), *others, "total"]
         whole = without_rounding(np.array([*self.cables, *others.values(), self.total]))
@@ -111,6 +83,6 @@ class Shares(Result, Named, Plotted):
         for row, passive, active in zip(rows, self.passive, self.active, strict=False):
             row[1:3] = f"{passive / 1e3:z.4g}", f"{active / 1e3:z.4g}"
         rows = [["cable", "passive", "active", "sum [N/mm]", "share"], *rows]
-        first = [] if K.is_stable else [f"{verdict(K)}; its shares mean nothing"]
+        warnings = [f"{warning}; its shares mean nothing" for warning in self.warnings]
         along = f"stiffness along {coordinates(self.direction)}"
-        return "\n".join([*first, along, *aligned(rows), f"({model_of(K)})"])
+        return "\n".join([*warnings, along, *aligned(rows), f"({self.model})"])

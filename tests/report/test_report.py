@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 import cdsm
-from cdsm.report import Report
 from cdsm.report.checks import TERMS, TORQUES
+from cdsm.stiffness_matrix import Report
 from cdsm.support.values import Array, frozen
 from tests.support import arms, foreign, locked
 

@@ -1,0 +1,159 @@
+"""The report on a stiffness as a frozen value; :mod:`cdsm.report` computes it.
+
+It is printed as text and as HTML, both by rich.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from io import StringIO
+from typing import TYPE_CHECKING, Literal, final
+
+from cdsm.support.format import plain
+from cdsm.support.result import Result, unit
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from cdsm.stiffness_matrix.value import Stiffness
+
+Verdict = Literal["agrees", "DIFFERS", "not possible"]
+
+
+@final
+@dataclass(frozen=True)
+class Comparison:
+    """A term of K_θ or a torque against finite differences, or all terms against the batch.
+
+    Attributes:
+        name: Name of the term or torque, or ``"batch"``; ``"joint"`` is K_θ.
+        unit: ``"N m/rad"`` or, for a torque, ``"N m"``; prismatic joints count with the arm's
+            length as lever.
+        largest: Largest magnitude of an entry.
+        off: Largest magnitude of the difference.
+        error: Error estimate of the finite differences; 0 for the batch.
+        verdict: ``"not possible"`` if the differences decide nothing.
+        reason: Why the check is not possible; else empty.
+    """
+
+    name: str
+    unit: str
+    largest: float
+    off: float
+    error: float
+    verdict: Verdict
+    reason: str
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Report(Result):
+    """Whether a stiffness is right, balanced and stable; made by :meth:`Stiffness.report`.
+
+    Attributes:
+        stiffness: The stiffness that was checked.
+        comparisons: Terms of K_θ and torques against finite differences and the batch.
+        residual: Largest residual |J_Lᵀ F + g − J_Xᵀ W| of Eq. 13 [N m]; the force at a prismatic
+            joint is multiplied by the arm's length.
+        residual_joint: Name of the joint with the largest residual.
+        imbalance: ``residual`` per torque of cables, weight and load [-].
+        bound_violation: Violation of the bounds of distributed tensions per largest tension [-];
+            None for tensions that were given.
+        kkt_residual: min ‖F + J_L λ − μ + ν‖/‖F‖ [-] of Eq. 17 over the multipliers λ of the
+            balance, μ ≥ 0 and ν ≥ 0 of the bounds; None if the tensions need not be the least.
+        condition: Condition number of K_θ [-], made dimensionless with the arm's length.
+        faults: Reasons not to use the stiffness, one text each; empty if there are none.
+        notes: Notes on how to read the stiffness, one text each, e.g. that a cable is slack.
+    """
+
+    _posture_from = "stiffness.posture"
+
+    stiffness: Stiffness
+    comparisons: tuple[Comparison, ...]
+    residual: float = field(metadata=unit("N m"))
+    residual_joint: str = field(metadata=unit("1"))
+    imbalance: float = field(metadata=unit("1"))
+    bound_violation: float | None = field(metadata=unit("1"))
+    kkt_residual: float | None = field(metadata=unit("1"))
+    condition: float = field(metadata=unit("1"))
+    faults: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether there are no faults: all comparisons agree, the arm is in balance and stable."""
+        return not self.faults
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the report and :meth:`Stiffness.to_dict` in SI for JSON, units in the keys."""
+        said = {"passed": self.passed, "faults": self.faults, "notes": self.notes}
+        checked = {"comparisons": [asdict(each) for each in self.comparisons]}
+        return self.stiffness.to_dict() | plain(said | checked) | super().to_dict()
+
+    def to_html(self, about: str = "") -> str:
+        """Return the report as a self-contained HTML page; ``about`` is text below the title."""
+        return _printed(self, about).export_html()
+
+    def __repr__(self) -> str:
+        name = self._posture.arm.name
+        return f"<Report on the stiffness of {name}: {'PASS' if self.passed else 'FAIL'}>"
+
+    def __str__(self) -> str:
+        return "\n".join(map(str.rstrip, _printed(self).export_text().splitlines()))
+
+
+def _printed(report: Report, about: str = "") -> Console:
+    """Return a console that has recorded the report; ``about`` is text below the title."""
+    from rich.console import Console  # slow to import
+    from rich.table import Table
+
+    console = Console(
+        record=True, file=StringIO(), width=100, markup=False, emoji=False, highlight=False
+    )
+    console.print(f"Stiffness check: {report._posture.arm.name}", style="bold")
+    if about:
+        console.print(about)
+    good = "PASS: agrees with finite differences, tensions balance the arm, arm is stable."
+    bad = "FAIL: do not use this stiffness as it is."
+    console.print(good if report.passed else bad, style="bold")
+    for fault in report.faults:
+        console.print(f"! {fault}", style="red")
+    for note in report.notes:
+        console.print(f"- {note}")
+    console.print(f"\n{report.stiffness}\n")
+    for head, *rows in _tables(report):
+        table = Table(box=None, header_style="bold", pad_edge=False)
+        for i, title in enumerate(head):
+            table.add_column(title, justify="right" if i else "left", no_wrap=True)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+        console.print()
+    said = "K_θ = ∂(J_Lᵀ F + g − J_Xᵀ W)/∂θ: rows torque, columns angle. F is tension, the cables' "
+    console.print(f"{said}torque −J_Lᵀ F, the wrench W a dead load; readings are in base axes.")
+    if (arm := report._posture.arm).slides.any():
+        console.print(f"Sliding joints count with the arm's length, {arm.length:.4g} m, as lever.")
+    return console
+
+
+def _tables(report: Report) -> Iterator[tuple[tuple[str, ...], ...]]:
+    """Yield the rows of each table; the first has the titles of its columns."""
+    rows = []
+    for each in report.comparisons:
+        size = each.largest or 1.0
+        off = ("-", "-") if each.reason else (f"{each.off / size:.0e}", f"{each.error / size:.0e}")
+        name = "cdsm.evaluate, all terms" if each.name == "batch" else each.name
+        rows.append((name, f"{each.largest:.4g} {each.unit}", *off, each.verdict))
+    yield ("against finite differences", "largest entry", "off by", "error bound", "verdict"), *rows
+    violation, kkt = (
+        "-" if x is None else f"{x:.1e}" for x in (report.bound_violation, report.kkt_residual)
+    )
+    yield (
+        ("balance, optimality, stability", ""),
+        ("residual of Eq. 13", f"{report.residual:.1e} N m at {report.residual_joint}"),
+        ("residual per torque", f"{report.imbalance:.1e}"),
+        ("violation of bounds", violation),
+        ("KKT residual (recomputed multipliers)", kkt),
+        ("condition of K_θ", f"{report.condition:.3g}"),
+    )
