@@ -1,7 +1,4 @@
-"""Quantities of a batch: dimensions, units, what each one needs, and readings of many K_θ by numpy.
-
-Formulas and thresholds of the readings are those of :mod:`cdsm.stiffness_matrix.value`.
-"""
+"""Quantities of a batch: dimensions, units, what each one needs, and what is read off many K_θ."""
 
 from __future__ import annotations
 
@@ -12,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm import readings
 from cdsm.manipulator import Manipulator
-from cdsm.stiffness_matrix.value import FLAT, REGULAR, UNMOVED
 from cdsm.support.format import JointUnits
 from cdsm.support.result import Result
 from cdsm.support.status import Status, summary
@@ -144,82 +141,37 @@ class OfPostures(Result):
 
 
 def read(
-    names: Collection[str], K: Array, parts: Array, jacobian: Array, directions: Array
+    names: Collection[str], K: Array, magnitudes: Array, jacobian: Array, directions: Array
 ) -> tuple[dict[str, Array], NDArray[np.uint8]]:
     """Compute readings of N postures, and their status; NaN where a reading does not exist.
 
     Args:
         names: Any of ``margin``, ``along``, ``compliance``, ``cartesian``, ``pseudoinverse``.
         K: K_θ (N, nv, nv).
-        parts: Sum of the magnitudes of its terms (N, nv, nv).
+        magnitudes: Sum of the magnitudes of its terms (N, nv, nv).
         jacobian: J_X (N, 6, nv).
         directions: Unit vectors u (D, 3) of ``along``.
     """
-    Jv = jacobian[:, :3]
+    J_v = jacobian[:, :3]
     status = np.zeros(len(K), dtype=np.uint8)
-    found: dict[str, Array] = {}
+    values: dict[str, Array] = {}
     if "margin" in names:
-        found["margin"] = np.asarray(np.linalg.eigvalsh((K + _transposed(K)) / 2.0)[:, 0])
+        values["margin"] = readings.margin(K)
     if not {"cartesian", "pseudoinverse"}.isdisjoint(names):
-        B, S, V = np.linalg.svd(Jv, full_matrices=False)
-        still = S[:, -1] <= FLAT * S[:, 0] if S.shape[1] == 3 else np.ones(len(K), np.bool_)
-        status[still] = Status.IMMOBILE
-        with np.errstate(all="ignore"):
-            A = B / S[:, None]
+        motions = readings.tip_motions(J_v)
+        status[motions.immobile] = Status.IMMOBILE
     if "pseudoinverse" in names:
-        found["pseudoinverse"] = _between(A, V @ K @ _transposed(V), still)
+        values["pseudoinverse"] = readings.pseudoinverse(K, motions)
     if not {"along", "compliance", "cartesian"}.isdisjoint(names):
-        inverse, singular = _inverse(K, parts)
+        inverse, singular = readings.invert(K, magnitudes)
         status[singular] = Status.SINGULAR
         if "along" in names:
-            torque = directions @ Jv  # (N, D, nv)
-            compliance = (torque @ inverse * torque).sum(axis=2)
-            moves = abs(torque).max(axis=2) > UNMOVED * abs(Jv).max(axis=(1, 2))[:, None]
-            with np.errstate(divide="ignore"):
-                found["along"] = np.where(moves, 1.0 / compliance, np.inf)
-            found["along"][singular] = np.nan
+            torque = directions @ J_v  # (N, D, n)
+            moves = readings.moves_tip(torque, J_v)
+            values["along"], _ = readings.along(inverse, torque, moves)
+            values["along"][singular] = np.nan
         if "compliance" in names:
-            found["compliance"] = jacobian @ inverse @ _transposed(jacobian)
+            values["compliance"] = readings.compliance(inverse, jacobian)
         if "cartesian" in names:
-            held = ~(still | singular)
-            inner = np.full((len(K), V.shape[1], V.shape[1]), np.nan)
-            inner[held] = np.linalg.inv((V @ inverse @ _transposed(V))[held])
-            found["cartesian"] = _between(A, inner, ~held)
-    return found, status
-
-
-def _inverse(K: Array, parts: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return K_θ⁻¹ and where it does not exist; there it is NaN."""
-    D = np.diagonal(parts, axis1=1, axis2=2)
-    with np.errstate(all="ignore"):
-        scale = 1.0 / np.sqrt(D)
-        both = scale[:, :, None] * scale[:, None]
-        A = K * both
-        least = REGULAR * (parts * both).max(axis=(1, 2))
-        try:
-            inverse = np.linalg.inv(A)
-        except np.linalg.LinAlgError:  # at least one of them is singular to the last bit
-            least_values = np.array([np.linalg.svd(each, compute_uv=False)[-1] for each in A])
-            inverse = np.full_like(A, np.nan)
-            inverse[least_values > least] = np.linalg.inv(A[least_values > least])
-        # 1/|A⁻¹| is a lower bound of the smallest singular value of A
-        singular = ~(least * np.sqrt((inverse**2).sum(axis=(1, 2))) < 1.0)
-    regular = np.flatnonzero(singular & (D.min(axis=1) > 0.0))
-    if regular.size:
-        values = np.linalg.svd(A[regular], compute_uv=False)[:, -1]
-        singular[regular] = ~(values > least[regular])
-    inverse[singular] = np.nan
-    return inverse * both, singular
-
-
-def _between(A: Array, inner: Array, missing: NDArray[np.bool_]) -> Array:
-    """Compute A K Aᵀ (N, 3, 3), NaN where it is missing or the tip has fewer than three joints."""
-    if A.shape[2] < 3:
-        return np.full((len(A), 3, 3), np.nan)
-    found = A @ inner @ _transposed(A)
-    found[missing] = np.nan
-    return np.asarray(found)
-
-
-def _transposed(a: Array) -> Array:
-    return a.swapaxes(-1, -2)
+            values["cartesian"] = readings.cartesian(inverse, motions)
+    return values, status

@@ -202,7 +202,7 @@ class Equilibrium(Result):
             SingularStiffness: K_θ of these joints is singular.
         """
         J = self.pose.jacobian[:, self._free]
-        return frozen(J @ self.stiffness._inverse_of(self._free) @ J.T)
+        return frozen(J @ self.stiffness.joint_compliance(self._free) @ J.T)
 
     def report(self) -> Report:
         """Check the stiffness here, as :meth:`Stiffness.report` does.
@@ -226,7 +226,7 @@ class Equilibrium(Result):
             InvalidInput: ``direction`` is neither an axis nor three finite numbers, or is zero.
             SingularStiffness: K_θ of the joints that are not at stops is singular.
         """
-        return self.stiffness._along(unit_direction("direction", direction), self._free)[0]
+        return self.stiffness.tip_response(unit_direction("direction", direction), self._free)[0]
 
     def plot(self) -> Figure:
         """Plot the arm in mm at the reference (grey) and at the equilibrium."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal, final, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from cdsm import readings
 from cdsm.errors import InvalidInput, SingularStiffness
 from cdsm.posture import Posture
 from cdsm.stiffness_matrix import prints
@@ -35,9 +36,6 @@ Friction = Literal["frictionless", "stuck", "sliding"]
 Term = Literal["active", "passive", "gravity", "load", "springs", "joint"]
 Joints = slice | NDArray[np.intp]
 
-REGULAR = 1e-8  # least relative singular value of K_θ; its inverse has 6 correct digits there
-FLAT = 1e-6  # least relative singular value of J_v; a 3×3 stiffness has 4 correct digits there
-UNMOVED = 1e-10  # the tip cannot move along u if all entries of J_vᵀ u are below this part of J_v's
 _ORTHOGONAL = 1e-9  # largest product of two unit directions that are orthogonal
 
 _SQUARE = unit("joint stiffness", "joint", "joint_column")
@@ -118,7 +116,7 @@ class Stiffness(Result):
 
         With prismatic and revolute joints, the value depends on the unit of length, not its sign.
         """
-        return float(np.linalg.eigvalsh((self.joint + self.joint.T) / 2.0)[0])
+        return float(readings.margin(self.joint))
 
     @cached_property
     def critical_direction(self) -> Array:
@@ -136,8 +134,7 @@ class Stiffness(Result):
 
         Linear rows first: C_vv [m/N], C_vω [m/(N m)] = [rad/N], C_ωω [rad/(N m)].
         """
-        J = self.posture.jacobian
-        return frozen(J @ self._inverse @ J.T)
+        return frozen(readings.compliance(self._inverse, self.posture.jacobian))
 
     @cached_property
     def cartesian(self) -> Array:
@@ -147,7 +144,7 @@ class Stiffness(Result):
         arm it is never less than :meth:`along` that axis, and often several times larger.
         SingularStiffness also if the tip hardly moves in some direction.
         """
-        return self.cartesian_in(np.eye(3))
+        return self._cartesian_in(None)
 
     def cartesian_in(self, directions: Iterable[Direction]) -> Array:
         """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m]: force per tip displacement in some directions only.
@@ -159,8 +156,7 @@ class Stiffness(Result):
         U = unit_directions("directions", directions).reshape(-1, 3)
         if abs(U @ U.T - np.eye(len(U))).max() > _ORTHOGONAL:
             raise InvalidInput("directions", "are not orthogonal; give axes of a plane.")
-        A, V = self._decompose(U)
-        return frozen(A @ np.linalg.inv(V @ self._inverse @ V.T) @ A.T)
+        return self._cartesian_in(U)
 
     def along(self, direction: Direction) -> float:
         """Compute 1/(uᵀ C_vv u) [N/m], the tangent stiffness that a tip weight measures (Eq. 20).
@@ -170,7 +166,7 @@ class Stiffness(Result):
         :func:`~cdsm.weight_test`. The stiffness is inf if the tip cannot move along u, and may be
         negative if the arm is unstable.
         """
-        return self._along(unit_direction("direction", direction))[0]
+        return self.tip_response(unit_direction("direction", direction))[0]
 
     def pseudoinverse(self, term: Term = "joint") -> Array:
         """Compute J⁺ᵀ K J⁺ (3, 3) [N/m], J the linear rows of J_X: the paper's K_R, read literally.
@@ -180,8 +176,7 @@ class Stiffness(Result):
         InvalidInput if it is neither, SingularStiffness if the tip hardly moves in some direction.
         """
         matrix: Array = getattr(self, one_of("stiffness term", term, get_args(Term)))
-        A, V = self._decompose(np.eye(3))
-        return frozen(A @ (V @ matrix @ V.T) @ A.T)
+        return frozen(readings.pseudoinverse(matrix, self._tip_motions(None)))
 
     @property
     def _terms(self) -> tuple[Array, ...]:
@@ -195,68 +190,76 @@ class Stiffness(Result):
 
     @cached_property
     def _inverse(self) -> Array:
-        return self._inverse_of(slice(None))
+        return self.joint_compliance()
 
-    def _inverse_of(self, joints: Joints) -> Array:
-        """K_θ⁻¹ (n, n) of n joints, all others held; or SingularStiffness with the motion."""
-        K, P = (matrix[joints][:, joints] for matrix in (self.joint, self._magnitudes))
-        D = P.diagonal()
-        scale = 1.0 / np.sqrt(np.where(D > 0.0, D, 1.0))
-        both = scale * scale[:, None]
-        scaled = K * both
-        least = REGULAR * float((P * both).max(initial=0.0))
-        try:
-            inverse = np.linalg.inv(scaled)
-        except np.linalg.LinAlgError:
-            inverse = np.full_like(scaled, math.inf)
-        # 1/|A⁻¹| is a lower bound of the smallest singular value of A
-        if not least * math.sqrt(np.vdot(inverse, inverse)) < 1.0:
-            _, values, rows = np.linalg.svd(scaled)
-            if not values[-1] > least:
-                motion = np.zeros(len(self.joint))
-                motion[joints] = rows[-1] * scale
-                motion = frozen(motion / np.linalg.norm(motion))
-                why = "the arm is just about to buckle"
-                why = why if D.all() else "next to nothing holds the arm"
-                said = f"K_θ is singular: {why} in the joint motion {coordinates(motion)}. "
-                raise SingularStiffness(said + "Change the tensions or the posture.", motion)
-        return inverse * both
+    def joint_compliance(self, joints: Joints = slice(None)) -> Array:
+        """Compute K_θ⁻¹ (n, n) [rad/(N m)] of n joints by their numbers, all others held.
 
-    def _decompose(self, U: Array) -> tuple[Array, Array]:
-        """Decompose U J_v = B S V; return A = B S⁻¹ (n, n) and V (n, nv).
-
-        Then (U C_vv Uᵀ)⁻¹ = A (V K_θ⁻¹ Vᵀ)⁻¹ Aᵀ, in which a stiff direction costs no digits.
+        Raises:
+            SingularStiffness: K_θ of these joints is singular; the error has their motion.
         """
-        rows = self.posture.jacobian[:3]
-        B, S, V = np.linalg.svd(U @ rows)
-        # two joints cannot move the tip in three directions
-        if len(S) < len(U) or not S[-1] > FLAT * np.linalg.norm(rows, 2):
-            u = frozen(B[:, -1] @ U)
-            said = f"the tip cannot move along {prints.axis_of(u)}, where the stiffness is infinite"
-            said += " or nearly so. Use along(direction), other directions, or bend the arm."
-            raise SingularStiffness(said, u)
-        return B / S, V[: len(U)]
+        K = self.joint[joints][:, joints]
+        magnitudes = self._magnitudes[joints][:, joints]
+        inverse, singular = readings.invert(K, magnitudes)
+        if singular:
+            motion = np.zeros(len(self.joint))
+            motion[joints] = readings.singular_motion(K, magnitudes)
+            motion = frozen(motion)
+            held = magnitudes.diagonal().all()
+            why = "the arm is just about to buckle" if held else "next to nothing holds the arm"
+            raise SingularStiffness(
+                f"K_θ is singular: {why} in the joint motion {coordinates(motion)}. "
+                "Change the tensions or the posture.",
+                motion,
+            )
+        return inverse
 
-    def _along(self, u: Array, joints: Joints = slice(None)) -> tuple[float, Array]:
-        """Return stiffness along a unit vector u [N/m] and motion of the joints per force (n,)."""
-        torque = (u @ self.posture.jacobian[:3])[joints]
-        if not self._moves(torque):
+    def tip_response(self, u: Array, joints: Joints = slice(None)) -> tuple[float, Array]:
+        """Compute the response to a tip force along a unit vector u (3,), other joints held.
+
+        Returns:
+            The stiffness along u [N/m], inf if the tip cannot move there, and the motion of the
+            joints per force (n,) [rad/N].
+
+        Raises:
+            SingularStiffness: As :meth:`joint_compliance`.
+        """
+        J_v = self.posture.jacobian[:3]
+        torque = (u @ J_v)[joints]
+        moves = readings.moves_tip(torque, J_v)
+        if not moves:
             return math.inf, np.zeros_like(torque)
-        inverse = self._inverse if isinstance(joints, slice) else self._inverse_of(joints)
-        motion = inverse @ torque
-        compliance = float(torque @ motion)
-        return 1.0 / compliance if compliance else math.inf, motion
+        inverse = self._inverse if isinstance(joints, slice) else self.joint_compliance(joints)
+        stiffness, motion = readings.along(inverse, torque[None], moves)
+        return float(stiffness[0]), motion[0]
 
-    def _moves(self, torque: Array) -> bool:
-        """Whether a tip force with joint torques J_vᵀ u moves any joint."""
-        return bool(abs(torque).max(initial=0.0) > UNMOVED * abs(self.posture.jacobian[:3]).max())
+    def _cartesian_in(self, U: Array | None) -> Array:
+        """Compute (U C_vv Uᵀ)⁻¹ (n, n) [N/m] of orthonormal directions U (n, 3), or of all."""
+        motions = self._tip_motions(U)
+        return frozen(readings.cartesian(self._inverse, motions))
+
+    def _tip_motions(self, U: Array | None) -> readings.TipMotions:
+        """Decompose the motion of the tip; SingularStiffness if it hardly moves in a direction."""
+        J_v = self.posture.jacobian[:3]
+        motions = readings.tip_motions(J_v, U)
+        if motions.immobile:
+            u = frozen(readings.immobile_direction(J_v, np.eye(3) if U is None else U))
+            raise SingularStiffness(
+                f"the tip cannot move along {prints.axis_of(u)}, where the stiffness is infinite "
+                "or nearly so. Use along(direction), other directions, or bend the arm.",
+                u,
+            )
+        return motions
 
     def require_mobile(self, u: Array) -> None:
         """Raise SingularStiffness if a tip force along a unit vector u (3,) moves no joint."""
-        if not self._moves(u @ self.posture.jacobian[:3]):
-            said = f"the tip cannot move along {coordinates(u)}: the stiffness there is infinite "
-            said += "under any tension. Choose another direction, or bend the arm."
-            raise SingularStiffness(said, u)
+        J_v = self.posture.jacobian[:3]
+        if not readings.moves_tip(u @ J_v, J_v):
+            raise SingularStiffness(
+                f"the tip cannot move along {coordinates(u)}: the stiffness there is infinite "
+                "under any tension. Choose another direction, or bend the arm.",
+                u,
+            )
 
     def shares(self, direction: Direction) -> Shares:
         """Compute the contribution of each cable's elasticity and tension to :meth:`along`.
@@ -266,7 +269,7 @@ class Stiffness(Result):
         """
         u = unit_direction("direction", direction)
         self.require_mobile(u)
-        along, moved = self._along(u)
+        along, moved = self.tip_response(u)
         motion = moved * along
         if self.segment_tension is None or self.tension_gradient is None:
             passive = self.cable_stiffness * (self.posture.length_jacobian @ motion) ** 2
