@@ -167,13 +167,13 @@ def reproduce(
     """
     from cdsm.support.files import make_folder, write_text
     from cdsm.support.format import aligned
-    from cdsm.support.progress import track
+    from cdsm.support.progress import show_progress
 
     paper = cdsm.paper
     make_folder(out)
     results = []
     written = []
-    for compute in track(paper.FIGURES.values(), "recomputing the paper"):
+    for compute in show_progress(paper.FIGURES.values(), "recomputing the paper"):
         result = compute()
         results.append(result)
         written.append(cdsm.plots.save_figure(result.plot(), out / f"{result.name}.{kind}"))

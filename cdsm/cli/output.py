@@ -123,10 +123,8 @@ def reported(function: Callable[..., int]) -> Callable[..., None]:
 
     @wraps(function)
     def command(**given: Any) -> None:
-        from cdsm.support.progress import lines_allowed
-
         try:
-            with warnings.catch_warnings(), lines_allowed():
+            with warnings.catch_warnings():
                 warnings.showwarning = _show
                 code = function(**given)
         except (KeyboardInterrupt, SystemError) as error:

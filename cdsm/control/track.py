@@ -34,7 +34,7 @@ from cdsm.manipulator import Manipulator
 from cdsm.planning.path import checked_change
 from cdsm.planning.path_plan import PathPlan
 from cdsm.posture import Posture
-from cdsm.support import progress
+from cdsm.support.progress import show_progress
 from cdsm.support.validation import instance, one_of, quantity, whole_number
 from cdsm.support.values import Array, frozen
 from cdsm.tension import checked_bounds
@@ -165,7 +165,7 @@ def _follow(
     paid_out = measured.paid_out
     error = 0.0 * last.tension
     forced = _tension_controlled(plan.stiffness[0].posture)
-    for wanted in progress.track(schedule, "following the path"):
+    for wanted in show_progress(schedule, "following the path"):
         measured = sensors.measure(true_values, random)
         estimate = observer.update(estimate, measured)
         reference = wanted.reference

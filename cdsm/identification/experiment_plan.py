@@ -16,7 +16,7 @@ from cdsm.identification.measurement import WeightLoop
 from cdsm.identification.problem import Problem
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import aligned, coordinates
-from cdsm.support.progress import track
+from cdsm.support.progress import show_progress
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import (
     AXES,
@@ -202,7 +202,7 @@ def plan_tests(
     usable = list[WeightLoop]()
     rows = list[Array]()
     failures = list[tuple[str, str]]()
-    for loop in track(candidates, "following the candidates", wanted=progress):
+    for loop in show_progress(candidates, "following the candidates", wanted=progress):
         problem = Problem(model_of, None, [loop], bounds)
         middle = np.full(len(names), 0.5)
         if isinstance(reason := problem.predict(middle), str):

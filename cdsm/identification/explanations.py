@@ -15,7 +15,7 @@ from cdsm.identification.problem import Problem, Test
 from cdsm.identification.result import Identification, independent_readings, likely
 from cdsm.manipulator import Manipulator
 from cdsm.support.format import aligned, plural
-from cdsm.support.progress import progress_allowed, track
+from cdsm.support.progress import progress_allowed, show_progress
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.values import Array, frozen
 
@@ -175,13 +175,13 @@ def compare_explanations(
         raise InvalidInput("measurements", said)
     as_it_is = _as_it_is(model_of, measurements)
     with progress_allowed(progress):
-        each = track(free, "fitting each parameter")
+        each = show_progress(free, "fitting each parameter")
         fits = {name: identify(model_of, measurements, {name: free[name]}) for name in each}
         names = sorted(free, key=lambda name: fits[name].chi_square)
         best = fits[names[0]]
         together = {
             name: _both(model_of, measurements, free, best, fits[name])
-            for name in track(names[1:], f"fitting others beside {names[0]}")
+            for name in show_progress(names[1:], f"fitting others beside {names[0]}")
         }
     return Explanations(
         names=tuple(names),

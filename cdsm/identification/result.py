@@ -19,7 +19,7 @@ from cdsm.identification.problem import Problem, Test
 from cdsm.manipulator import Manipulator
 from cdsm.stiffness_matrix.prints import frictionless_model
 from cdsm.support.format import aligned
-from cdsm.support.progress import progress_allowed, track
+from cdsm.support.progress import progress_allowed, show_progress
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import scalar
 from cdsm.support.values import Array, Plotted, frozen
@@ -199,7 +199,7 @@ class Identification(Result, Plotted):
         jacobian = self.jacobian * problem.slope(best)
         found = dict[str, tuple[float, float]]()
         with progress_allowed(progress):
-            for i in track(range(best.size), "finding the confidence of the parameters"):
+            for i in show_progress(range(best.size), "finding the confidence of the parameters"):
                 known = math.isfinite(self.std[i])
                 limits = interval(problem, best, jacobian, i, rise) if known else None
                 found[self.names[i]] = limits or (-math.inf, math.inf)

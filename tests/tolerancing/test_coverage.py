@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binom
 
 import cdsm
-from cdsm.support.progress import track
+from cdsm.support.progress import show_progress
 from cdsm.support.values import Array
 from tests.support.arms import README_SIZES, readme_geometry
 
@@ -42,7 +42,7 @@ def covered(count: int, seed: int, axis: str) -> int:
 
     truth = cdsm.stiffness(pose({}, 48e3, q), F).along(axis)
     held = 0
-    for _ in track(range(count), "arms"):
+    for _ in show_progress(range(count), "arms"):
         sizes = {name: README_SIZES[name] + rng.normal(0.0, u) for name, u in COMMON.items()}
         rigidity, angles = 48e3 * (1.0 + rng.normal(0.0, 0.05)), rng.normal(0.0, ANGLE, 8)
         described, tension = pose(sizes, rigidity, q + angles), F + rng.normal(0.0, 2.0, 12)
