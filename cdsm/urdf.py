@@ -122,10 +122,16 @@ def _write_and_read_back(path: Path, text: str, length: float) -> None:
             raise GeometryError(f"{doubt} at q = {q.tolist()}; the URDF is not written.")
 
 
+def backbone_radius(geometry: Geometry, body: Body) -> float:
+    """Return the radius [m] with which a body is drawn: a fifth of its joint's hole radius."""
+    return 0.2 * geometry.hole_radii[max(body.joint - 1, 0)]
+
+
 def _body(geometry: Geometry, body: Body) -> etree._Element:
     """Build the link element of a body: its inertia, backbone and disks."""
     index = max(body.joint - 1, 0)
     radius = geometry.hole_radii[index]
+    slim = backbone_radius(geometry, body)
     length = body.length
     mass = body.mass
     if body.kind == "cross":
@@ -135,11 +141,11 @@ def _body(geometry: Geometry, body: Body) -> etree._Element:
     disks = [disk for disk in geometry.disks if disk.link == body.name]
     parts = [_cylinder("disk", disk.x, disk.radius, thickness) for disk in disks]
     if length > 0.0:
-        parts.insert(0, _cylinder("backbone", length / 2, 0.2 * radius, length))
+        parts.insert(0, _cylinder("backbone", length / 2, slim, length))
     if body.name == "base_disk":
         return E.link(*parts, name=body.name)
     beam = body.kind == "beam"
-    round_radius = 0.2 * radius if beam else radius
+    round_radius = slim if beam else radius
     lateral = mass * (3.0 * round_radius**2 + length**2) / 12.0
     least = (BEAM_MASS, BEAM_INERTIA) if beam else (CROSS_MASS, CROSS_INERTIA)
     moments = [mass * round_radius**2 / 2.0, lateral, lateral] if mass else [least[1]] * 3

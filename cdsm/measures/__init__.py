@@ -1,4 +1,4 @@
-"""Measures of a posture: loads an arm can carry, cable clearance, wrench closure, wire life."""
+"""Measures of a posture: loads that an arm can carry, cable clearance, wrench closure."""
 
 from cdsm.measures.clearance import Clearance as Clearance
 from cdsm.measures.payload import Payload as Payload

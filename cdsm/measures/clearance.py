@@ -15,12 +15,10 @@ from cdsm.posture import Posture
 from cdsm.support.result import Result, unit
 from cdsm.support.validation import instance, quantity
 from cdsm.support.values import Array
+from cdsm.urdf import backbone_radius
 
 KINDS: Final = ("cable_clearance", "link_clearance", "disk_clearance")
 """Names of the clearances in sweeps and designs."""
-
-_BACKBONE = 0.2
-"""Radius of a link's backbone, divided by the hole radius of its first disk, as in the URDF."""
 
 _ON = 1e-9  # a site this near to a disk [m] is on the disk
 
@@ -121,7 +119,10 @@ def distances(
         later = np.triu(np.ones((cable.size, cable.size), dtype=np.bool_))
         found["cable_clearance"] = _nearest(wires, wires, later & (cable[:, None] != cable))
     if "link_clearance" in kinds:
-        radii = {arm.body.locate(d.link)[0]: _BACKBONE * d.hole_radius for d in reversed(disks)}
+        bodies = arm.geometry.chain.bodies if arm.is_serpentine else ()
+        radii = {
+            arm.body.locate(body.name)[0]: backbone_radius(arm.geometry, body) for body in bodies
+        }
         rows = [row for row, _ in pose._bones]
         links = ["the base", *(f"the link after {name}" for name in arm.body.all_joints)]
         radius = np.array([radii.get(row, 0.0) for row in rows])

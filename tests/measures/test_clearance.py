@@ -4,6 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from lxml import etree
 from scipy.optimize import minimize
 
 import cdsm
@@ -89,6 +90,25 @@ def test_clearances_equal_a_direct_computation(arm: cdsm.Manipulator, reach: flo
     expected = (*direct_cables_and_links(pose), direct_disks(pose))
     # the search of two places stops at 1e-7 m
     assert (found.cables, found.links, found.disks) == pytest.approx(expected, abs=2e-7)
+
+
+@pytest.mark.parametrize("pieces", [1, 4])
+def test_bodies_of_a_beam_without_a_disk_are_as_thick_as_in_the_urdf(pieces: int) -> None:
+    """Each is a cylinder; the URDF says where it is and how thick."""
+    section = {"length": 0.2, "disks": 4, "hole_angles": [0.0, 2.0, 4.0], "hole_radius": 0.01}
+    geometry = cdsm.Geometry.backbone(sections=[section], bending_stiffness=0.02, pieces=pieces)
+    pose = random_posture(cdsm.Manipulator(geometry, cdsm.presets.ELASTIC_STAGE), 2, 0.4)
+    links = np.inf
+    for link in etree.fromstring(pose.arm.urdf.encode()).iter("link"):
+        for cylinder in link.xpath("visual[material/@name='backbone']/geometry/cylinder"):
+            placement = pose.link_pose(link.get("name"))
+            length = float(cylinder.get("length"))
+            bone = placement[:3, 3] + np.array([[0.0], [length]]) * placement[:3, 0]
+            radius = float(cylinder.get("radius"))
+            assert radius == 0.2 * 0.01
+            distances = [between(path, bone) for _, path, _ in segments_of(pose)]
+            links = min(links, min(distances) - radius)
+    assert cdsm.clearance(pose).links == pytest.approx(links, abs=2e-7)
 
 
 def test_batch_is_the_single_posture_and_diameters_count() -> None:
