@@ -171,14 +171,12 @@ def evaluate(
         arm=arm,
         q=angles,
         wrench=np.atleast_2d(loads),
-        names=[name for name in names if given is None or name != "tension"],
+        names=names,
         tension=None if given is None else np.atleast_2d(given),
         bounds=(np.atleast_2d(bounds[0]), np.atleast_2d(bounds[1])) if bounds and needy else None,
         directions=np.zeros((0, 3)) if u is None else u.reshape(-1, 3),
         check_limits=flag("check_limits", check_limits),
     ).solve(status, checked_threads(threads))
-    if given is not None:
-        solved["tension"] = np.broadcast_to(given, (rows, len(arm.cables)))
     if u is not None and u.ndim == 1:
         solved["along"] = solved["along"][:, 0]
     return Batch(

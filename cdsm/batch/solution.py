@@ -6,15 +6,19 @@ computes is the source of the kernels, loaded without the compiler.
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import logging
 import os
+import platform
 import sys
 import threading
 from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, partial
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
@@ -70,6 +74,7 @@ def compile_ahead() -> None:
     )
     with np.errstate(all="ignore"):
         Chunk(rows, kernels, slice(1), 1, np.zeros(1, np.uint8), {}).quantities()
+    _keep_record()
 
 
 @cache
@@ -99,14 +104,45 @@ def plain() -> ModuleType:
 
 @cache
 def _is_kept() -> bool:
-    """Whether numba has kept the kernel that is compiled last, since the source was changed."""
+    """Whether numba has kept all kernels on disk, for this source, version and machine."""
+    record = _record()
+    try:
+        return record is not None and record.read_text(encoding="utf-8") == _stamp()
+    except OSError:
+        return False
+
+
+def _keep_record() -> None:
+    """Write down that all kernels are compiled and kept."""
+    record = _record()
+    if record is not None:
+        with suppress(OSError):  # then another process asks numba again
+            record.parent.mkdir(parents=True, exist_ok=True)
+            record.write_text(_stamp(), encoding="utf-8")
+
+
+def _record() -> Path | None:
+    """Return the file that says what is kept; None if numba keeps nothing.
+
+    The file is ours, in the folder that numba uses: what numba itself writes there has private
+    names, and may be of another clone, interpreter or machine.
+    """
     folder = Path(os.environ.get("NUMBA_CACHE_DIR") or _source().parent / "__pycache__")
     if not folder.is_dir() and not os.access(folder.parent, os.W_OK):  # numba keeps it elsewhere
         from cdsm import kernels
 
-        folder = Path(kernels.along.stats.cache_path)  # type: ignore[attr-defined]
-    changed = _source().stat().st_mtime
-    return any(file.stat().st_mtime > changed for file in folder.rglob("kernels.along-*.nbi"))
+        path: str | None = kernels.along.stats.cache_path  # type: ignore[attr-defined]
+        if path is None:
+            return None
+        folder = Path(path)
+    owner = f"{_source()} {sys.implementation.cache_tag} {platform.node()}"
+    return folder / f"cdsm-kernels-{hashlib.sha256(owner.encode()).hexdigest()[:16]}.txt"
+
+
+def _stamp() -> str:
+    """Return what numba asks of kernels that it has kept: the same source and version."""
+    source = _source().stat()
+    return f"{source.st_mtime_ns} {source.st_size} numba {version('numba')}"
 
 
 def _source() -> Path:
